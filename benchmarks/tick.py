@@ -1,0 +1,260 @@
+"""Cost of a whole tick beside a bare PyBullet tick, and the highest rate held.
+
+    python -m benchmarks.tick
+
+A bare tick sets four motors, steps the engine and reads four joints, with the engine settings that
+the crane needs. A whole tick reads axes, applies the scheme, moves the crane, judges the aiming
+task, writes the frame through to the journal, and with LSL sends it to three outlets that a process
+of their own listens to. Rounds alternate, so that a wandering machine moves all figures together.
+"""
+
+import gc
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from labcrane import Frame, InputDevice, Signal, Tick, loop, rig
+from labcrane.clock import Clock, ManualClock, SystemClock, ticks
+from labcrane.console import Command, Order
+from labcrane.course import Course
+from labcrane.frame_log import FrameLog, columns
+from labcrane.plan import plan_session
+from labcrane.recording.journal import SessionJournal
+from labcrane.registry import discover
+from labcrane.streams.network import use_loopback
+from labcrane.study import Study, load
+
+ROUNDS = 7
+TICKS = 2400
+WARM_UP = 200
+RATES_HZ = (240, 500, 1000, 2000)
+PACED_S = 4.0
+
+STUDY = """\
+labcrane: 1
+study: tick
+title: A trial that does not end
+rate_hz: {rate}
+machine: ch8
+input: {{use: dual_joystick}}
+scheme:
+  use: joint_velocity
+  map: {{slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}}
+dynamics: {{use: bullet_crane}}
+tasks:
+  aiming: {{use: aiming, end: trigger, limit_s: 1.0e+6}}
+sessions:
+  - name: only
+    steps:
+      - block: {{task: aiming}}
+"""
+
+
+class Waves(InputDevice):
+    """Sticks that are always on the move."""
+
+    signals = (Signal("left", "1", ("x", "y")), Signal("right", "1", ("x", "y", "trigger")))
+
+    def __init__(self, rate_hz: float) -> None:
+        phase = np.arange(int(rate_hz) * 4)[:, None] / rate_hz
+        self._axes = 0.5 * np.sin(2 * np.pi * phase * np.array([0.25, 0.5, 0.75, 1.0, 0.0]))
+
+    def read(self, tick: Tick, seen: Frame) -> np.ndarray:
+        del seen
+        return self._axes[tick.number % len(self._axes)]
+
+
+class UntilTick:
+    """Ends the session after so many ticks."""
+
+    def __init__(self, count: int) -> None:
+        self._left = count
+
+    def commands(self) -> list[Command]:
+        self._left -= 1
+        return [Command(Order.END)] if self._left == 0 else []
+
+    def report(self, event: object) -> None:
+        """Nobody looks on."""
+
+
+def study_at(rate_hz: float, folder: Path) -> Study:
+    """Return a study whose first trial outlasts every measurement."""
+    path = folder / "study.yaml"
+    path.write_text(STUDY.format(rate=rate_hz))
+    return load(path, discover())
+
+
+def whole(study: Study, folder: Path, clock: Clock, count: int, *, lsl: bool) -> list[Frame]:
+    """Run ``count`` whole ticks; return their frames, and the end of each in ``frame.elapsed``."""
+    plan = plan_session(study, "P001", 1)
+    the_rig = rig.build(study, simulated=True)
+    the_rig = replace(the_rig, input=Waves(study.protocol.rate_hz))
+    seen: list[Frame] = []
+
+    def end_of_tick(frame: Frame) -> None:
+        frame.elapsed = time.perf_counter()
+        seen.append(frame)
+
+    with rig.opened(the_rig, study, plan.seed) as run:
+        course = Course(study, plan, the_rig, waits=False)
+        path = folder / f"{time.perf_counter_ns()}.xdf"
+        with SessionJournal(path, columns(run), run.rate_hz) as journal, outlets(run, lsl) as push:
+            sinks = (FrameLog(journal, run).write, *push, end_of_tick)
+            loop.run(the_rig, run, course, clock, UntilTick(count), sinks)
+        path.unlink()
+    return seen
+
+
+@contextmanager
+def outlets(run: object, lsl: bool) -> Iterator[Sequence[Callable[[Frame], None]]]:  # noqa: FBT001
+    """Open the session's outlets, with a process that listens to all of them."""
+    if not lsl:
+        yield ()
+        return
+    from labcrane.streams.outlets import Outlets  # noqa: PLC0415
+
+    source = f"tick/{time.perf_counter_ns()}"
+    sending = Outlets(run, source)
+    listener = subprocess.Popen(
+        [sys.executable, "-c", LISTENER, source], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert listener.stdout is not None
+        assert listener.stdout.readline() == "ready\n"
+        yield (sending.push,)
+    finally:
+        listener.kill()
+        listener.communicate()
+        sending.close()
+
+
+LISTENER = """
+import sys, pylsl
+names = ("state", "input", "markers")
+found = [pylsl.resolve_byprop("source_id", f"labcrane/{sys.argv[1]}/labcrane.{n}", 1, 20.0)[0]
+         for n in names]
+inlets = [pylsl.StreamInlet(info) for info in found]
+for inlet in inlets:
+    inlet.open_stream(10.0)
+print("ready", flush=True)
+while True:
+    for inlet in inlets:
+        inlet.pull_chunk(0.02)
+"""
+
+
+class Bare:
+    """The engine alone, with the crane's own settings."""
+
+    def __init__(self, study: Study, folder: Path) -> None:
+        from labcrane_bullet import bullet_crane as crane  # noqa: PLC0415
+        from labcrane_bullet.engine import pybullet  # noqa: PLC0415
+        from labcrane_bullet.urdf import urdf  # noqa: PLC0415
+
+        self._engine = pybullet
+        self._client = client = pybullet.connect(pybullet.DIRECT)
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=1.0 / study.protocol.rate_hz,
+            numSolverIterations=crane.ITERATIONS,
+            solverResidualThreshold=crane.RESIDUAL,
+            physicsClientId=client,
+        )
+        pybullet.setGravity(0, 0, -crane.GRAVITY, physicsClientId=client)
+        path = folder / "crane.urdf"
+        path.write_text(urdf(study.machine))
+        self._body = pybullet.loadURDF(
+            str(path),
+            useFixedBase=True,
+            flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
+            physicsClientId=client,
+        )
+        self._efforts = [joint.effort for joint in study.machine.joints]
+        for joint, angle in enumerate(study.machine.rest):
+            pybullet.changeDynamics(
+                self._body, joint, linearDamping=0, angularDamping=0, jointDamping=0,
+                physicsClientId=client,
+            )  # fmt: skip
+            pybullet.resetJointState(self._body, joint, angle, 0.0, physicsClientId=client)
+
+    def times(self, count: int) -> np.ndarray:
+        """Return the seconds that each of ``count`` ticks took."""
+        engine, client, joints = self._engine, self._client, [0, 1, 2, 3]
+        ends = []
+        for number in range(count):
+            speeds = [0.1 if number // 480 % 2 else -0.1] * 4
+            engine.setJointMotorControlArray(
+                self._body, joints, engine.VELOCITY_CONTROL, targetVelocities=speeds,
+                forces=self._efforts, physicsClientId=client,
+            )  # fmt: skip
+            engine.stepSimulation(physicsClientId=client)
+            engine.getJointStates(self._body, joints, physicsClientId=client)
+            ends.append(time.perf_counter())
+        return np.diff(ends)
+
+
+def cost(folder: Path) -> None:
+    """Print the cost of a tick, bare and whole."""
+    study = study_at(240.0, folder)
+    bare = Bare(study, folder)
+    found: dict[str, list[np.ndarray]] = {"bare": [], "whole": [], "whole, LSL": []}
+    for _ in range(ROUNDS):
+        gc.collect()
+        found["bare"].append(bare.times(TICKS)[WARM_UP:])
+        for name, lsl in (("whole", False), ("whole, LSL", True)):
+            clock = ManualClock(time.perf_counter())  # LSL takes only times of the computer
+            ends = [frame.elapsed for frame in whole(study, folder, clock, TICKS, lsl=lsl)]
+            found[name].append(np.diff(ends)[WARM_UP:])
+    print(f"cost of a tick, {ROUNDS} rounds of {TICKS} ticks, unpaced")
+    print(f"{'':12} {'p50 us':>8} {'p99 us':>8} {'ratio p50':>18} {'ratio p99':>18}")
+    bare_p50, bare_p99 = (np.array([np.quantile(r, q) for r in found["bare"]]) for q in (0.5, 0.99))
+    for name, rounds in found.items():
+        p50, p99 = (np.array([np.quantile(r, q) for r in rounds]) for q in (0.5, 0.99))
+        print(
+            f"{name:12} {np.median(p50) * 1e6:8.1f} {np.median(p99) * 1e6:8.1f} "
+            f"{spread(p50 / bare_p50):>18} {spread(p99 / bare_p99):>18}"
+        )
+
+
+def spread(ratios: np.ndarray) -> str:
+    """Return median and range."""
+    return f"{np.median(ratios):.2f} [{ratios.min():.2f}..{ratios.max():.2f}]"
+
+
+def late(dues: Sequence[float], wakes: Sequence[float], rate_hz: float) -> float:
+    """Return the fraction of ticks that woke over one period after they were due."""
+    return float(np.mean(np.subtract(wakes, dues) > 1.0 / rate_hz))
+
+
+def rates(folder: Path) -> None:
+    """Print late ticks at rising rates, for the empty loop and the whole one."""
+    print(f"\nlate ticks over {PACED_S:g} s (woke over one period after due), LSL with a consumer")
+    print(f"{'rate Hz':>8} {'empty loop':>12} {'whole loop':>12}")
+    held = {"empty": 0, "whole": 0}
+    for rate in RATES_HZ:
+        count = round(PACED_S * rate)
+        empty = [tick for tick, _ in zip(ticks(SystemClock(), rate), range(count), strict=False)]
+        frames = whole(study_at(rate, folder), folder, SystemClock(), count, lsl=True)
+        shares = {
+            "empty": late([t.due for t in empty], [t.woke for t in empty], rate),
+            "whole": late([f.tick.due for f in frames], [f.tick.woke for f in frames], rate),
+        }
+        print(f"{rate:8} {shares['empty']:12.2%} {shares['whole']:12.2%}")
+        for name, share in shares.items():
+            if share < 0.01:
+                held[name] = max(held[name], rate)
+    print(f"held with under 1 % late: empty loop {held['empty']} Hz, whole {held['whole']} Hz")
+
+
+if __name__ == "__main__":
+    use_loopback()
+    with tempfile.TemporaryDirectory() as name:
+        cost(Path(name))
+        rates(Path(name))

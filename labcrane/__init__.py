@@ -1,0 +1,59 @@
+"""labcrane: studies of people operating cranes and manipulators.
+
+Everything a plugin needs is importable from here, and nothing else is public, except the contract
+tests in ``labcrane.testing``.
+"""
+
+from labcrane.actuator import PRESETS, Actuator, ActuatorSettings
+from labcrane.clock import Tick
+from labcrane.errors import DeviceError, LabcraneError, PluginError, ProtocolError, RecordingError
+from labcrane.hookspecs import hookimpl
+from labcrane.kinematics import Arm, frames, jacobian
+from labcrane.machine import Body, Joint, Machine
+from labcrane.offers import Offer, Settings, offer
+from labcrane.reach import reach
+from labcrane.recording.recording import open_recording
+from labcrane.records import Event, Frame, Judgement, Phase, Planned, Run, Trial, Value
+from labcrane.roles import Controller, Dynamics, InputDevice, Task
+from labcrane.signals import FloatArray, Layout, Signal
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "PRESETS",
+    "Actuator",
+    "ActuatorSettings",
+    "Arm",
+    "Body",
+    "Controller",
+    "DeviceError",
+    "Dynamics",
+    "Event",
+    "FloatArray",
+    "Frame",
+    "InputDevice",
+    "Joint",
+    "Judgement",
+    "LabcraneError",
+    "Layout",
+    "Machine",
+    "Offer",
+    "Phase",
+    "Planned",
+    "PluginError",
+    "ProtocolError",
+    "RecordingError",
+    "Run",
+    "Settings",
+    "Signal",
+    "Task",
+    "Tick",
+    "Trial",
+    "Value",
+    "frames",
+    "hookimpl",
+    "jacobian",
+    "offer",
+    "open_recording",
+    "reach",
+]

@@ -1,0 +1,1 @@
+"""The ``labcrane`` command: the only part that prints."""

@@ -1,0 +1,36 @@
+"""All commands, and how an error reaches the user.
+
+Importing this must stay instant: a command imports what it needs when it runs.
+"""
+
+from collections.abc import Sequence
+
+import typer
+from rich.console import Console
+
+from labcrane.cli import inspect, running
+from labcrane.errors import LabcraneError, ProtocolError
+
+app = typer.Typer(
+    help="Studies of people operating cranes and manipulators.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+)
+app.command("demo")(running.demo)
+app.command("run")(running.run)
+app.command("check")(inspect.check)
+app.command("plan")(inspect.plan)
+app.command("plugins")(inspect.plugins)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; return its exit status: 2 for what cannot be run as written."""
+    try:
+        app(args=None if arguments is None else list(arguments))
+    except SystemExit as leaving:
+        return leaving.code if isinstance(leaving.code, int) else 0
+    except LabcraneError as error:
+        complaint = Console(stderr=True, soft_wrap=True)
+        complaint.print(f"labcrane: {error}", markup=False, highlight=False)
+        return 2 if isinstance(error, ProtocolError) else 1
+    return 0

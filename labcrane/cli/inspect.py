@@ -1,0 +1,79 @@
+"""Commands that look and run nothing: check, plan, plugins."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+ProtocolPath = Annotated[Path, typer.Argument(metavar="PROTOCOL", help="the study's YAML file")]
+
+out = Console(soft_wrap=True, highlight=False)
+
+
+def check(protocol: ProtocolPath) -> None:
+    """Check a protocol and everything it refers to, without running it."""
+    from labcrane.registry import discover
+    from labcrane.study import load
+
+    study = load(protocol, discover())
+    sessions = len(study.protocol.sessions)
+    out.print(
+        f"{protocol}: study {study.protocol.study!r} is fine: {sessions} "
+        f"session{'s' if sessions > 1 else ''} on the {study.machine.title}",
+        markup=False,
+    )
+
+
+def plan(
+    protocol: ProtocolPath,
+    participants: Annotated[
+        int | None, typer.Option(help="how many to list; as many as are planned by default", min=1)
+    ] = None,
+    participant: Annotated[
+        str | None, typer.Option(help="one participant only, by pseudonym")
+    ] = None,
+) -> None:
+    """Show blocks, each participant's order, and how long a session is likely to take."""
+    from labcrane.plan import plan_session
+    from labcrane.pseudonyms import pseudonyms
+    from labcrane.registry import discover
+    from labcrane.study import load
+
+    study = load(protocol, discover())
+    count = participants or study.protocol.participants.planned
+    names = [participant] if participant else pseudonyms(study.protocol.participants.pattern, count)
+    for number, session in enumerate(study.protocol.sessions, start=1):
+        table = Table("participant", "block", "trials", "order", "minutes")
+        for name in names:
+            session_plan = plan_session(study, name, number)
+            for block in session_plan.blocks:
+                counted = sum(trial.planned.counted for trial in block.trials)
+                table.add_row(
+                    name,
+                    f"{block.number} {block.name}{' (practice)' if block.practice else ''}",
+                    str(counted),
+                    "; ".join(
+                        f"{factor}: {', '.join(levels)}" for factor, levels in block.levels.items()
+                    ),
+                    f"{block.expected_s / 60:.1f}",
+                )
+        whole = plan_session(study, names[0], number).expected_s / 60
+        out.print(f"session {number} {session.name!r}: about {whole:.0f} minutes")
+        out.print(table)
+
+
+def plugins() -> None:
+    """List what installed plugins offer."""
+    from labcrane.registry import ROLES, discover
+
+    registry = discover()
+    table = Table("role", "name", "plugin", "settings")
+    for role, entry in ROLES.items():
+        for name, offer in sorted(registry.offers[role].items()):
+            settings = ", ".join(offer.settings.model_fields)
+            table.add_row(entry.word, name, registry.plugins[role][name], settings)
+    out.print(table)
+    for plugin, why in registry.broken.items():
+        out.print(f"plugin {plugin!r} is broken: {why}", markup=False, style="red")

@@ -1,0 +1,181 @@
+"""A session in the terminal: what happens is printed, and keys give orders.
+
+Both run in threads of their own, so that a slow terminal never makes the loop wait.
+"""
+
+import select
+import sys
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from labcrane.console import Command, Order, QueueConsole
+from labcrane.records import Event
+
+KEYS: Mapping[str, Order] = {
+    " ": Order.START,
+    "p": Order.PAUSE,
+    "r": Order.REPEAT,
+    "s": Order.SKIP,
+    "e": Order.END,
+    "n": Order.NOTE,
+    "o": Order.OVERRIDE,
+    "c": Order.COMPLETION,
+}
+HELP = (
+    "space start/go on · p pause · r repeat · s skip · e end · n note · o override · c completion"
+)
+POLL_S = 0.1
+
+
+class Terminal:
+    """Prints a session's events and turns keys, or lines of a pipe, into orders.
+
+    With a terminal, single keys; otherwise each line of the standard input is an order and its
+    words: ``note participant coughs``.
+
+    Parameters
+    ----------
+    total
+        How many counted trials the session has, for the progress bar.
+    keys
+        Whether to listen at all; a simulated session needs nobody.
+    """
+
+    def __init__(self, console: QueueConsole, out: Console, total: int, *, keys: bool) -> None:
+        self._console = console
+        self._out = out
+        self._keys = keys
+        self._over = threading.Event()
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            console=out,
+        )
+        self._bar = self._progress.add_task("trials", total=total)
+        self._printer = threading.Thread(target=self._print, name="terminal-out")
+        self._listener = threading.Thread(target=self._listen, name="terminal-in", daemon=True)
+
+    def __enter__(self) -> "Terminal":
+        self._progress.start()
+        self._printer.start()
+        if self._keys:
+            self._out.print(HELP, style="dim")
+            self._listener.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._over.set()
+        self._console.events.put(None)
+        self._printer.join()
+        if self._keys:
+            self._listener.join()
+        self._progress.stop()
+
+    def _print(self) -> None:
+        while (event := self._console.events.get()) is not None:
+            if event.name == "trial.end" and event.data["counted"]:
+                if not event.data["practice"] and event.data["outcome"] != "repeated":
+                    self._progress.advance(self._bar)
+                self._progress.print(_trial_line(event.data), markup=False, highlight=False)
+            elif line := _line(event):
+                self._progress.print(line, markup=False, highlight=False)
+
+    def _listen(self) -> None:
+        if not sys.stdin.isatty():
+            self._listen_to_lines()
+            return
+        with _single_keys():
+            while not self._over.is_set():
+                if select.select([sys.stdin], [], [], POLL_S)[0]:
+                    self._key(sys.stdin.read(1).lower())
+
+    def _listen_to_lines(self) -> None:
+        while not self._over.is_set():
+            if not select.select([sys.stdin], [], [], POLL_S)[0]:
+                continue
+            if not (line := sys.stdin.readline()):
+                return
+            word, _, text = line.strip().partition(" ")
+            if word in {order.value for order in Order}:
+                self._console.give(Command(Order(word), text.strip()))
+            elif word:
+                known = ", ".join(order.value for order in Order)
+                self._progress.print(f"{word!r} is not an order; there is {known}", markup=False)
+
+    def _key(self, key: str) -> None:
+        order = KEYS.get(key)
+        if order is None:
+            self._progress.print(HELP, style="dim")
+        elif order in {Order.NOTE, Order.COMPLETION}:
+            prompt = "note: " if order is Order.NOTE else "completed? 1 or 0: "
+            self._console.give(Command(order, self._ask(prompt)))
+        else:
+            self._console.give(Command(order))
+
+    def _ask(self, prompt: str) -> str:
+        """Read a line key by key, as the terminal gives single keys now."""
+        self._progress.print(prompt, end="")
+        text = ""
+        while (key := sys.stdin.read(1)) not in {"\n", "\r", ""}:
+            text = text[:-1] if key in {"\x7f", "\b"} else text + key
+        self._progress.print(text, markup=False)
+        return text.strip()
+
+
+def _trial_line(data: Mapping[str, object]) -> str:
+    measures = [
+        f"{name.replace('_', ' ')} {value:.3g}"
+        for name in ("movement_time", "error")
+        if isinstance(value := data.get(name), float)
+    ]
+    return f"trial {data['trial']}: {', '.join([str(data['outcome']), *measures])}"
+
+
+def _line(event: Event) -> str | None:
+    data = event.data
+    match event.name:
+        case "instructions.shown":
+            return str(data["text"])
+        case "waiting":
+            return f"{data['what']}: space to start"
+        case "break.start":
+            return f"break of {data['seconds']:g} s"
+        case "block.start":
+            return f"block {data['block']}: {data['block_name']}"
+        case "input.lost":
+            return f"INPUT LOST: {data['why']}"
+        case "input.back":
+            return "input is back"
+        case "pause.start" | "pause.end":
+            return f"{event.name.replace('.', ' ')} ({data['by']})"
+        case name if name.startswith("order.") and data["refused"]:
+            return f"{name.removeprefix('command.')}: {data['refused']}"
+        case _:
+            return None
+
+
+@contextmanager
+def _single_keys() -> Iterator[None]:
+    """Let the terminal give every key at once, and put it back afterwards."""
+    import termios
+    import tty
+
+    before = termios.tcgetattr(sys.stdin)
+    try:
+        tty.setcbreak(sys.stdin)
+        yield
+    finally:
+        with suppress(termios.error):
+            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)

@@ -1,0 +1,64 @@
+"""What the people in the room say to a session, and what it tells them."""
+
+import queue
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+from labcrane.records import Event
+
+
+class Order(StrEnum):
+    """Everything that can be asked of a running session."""
+
+    START = "start"  # begin the step that waits, or go on after a pause
+    PAUSE = "pause"
+    REPEAT = "repeat"  # end the running trial and run it again as a new attempt
+    SKIP = "skip"  # end the running trial, or the break, and go on
+    END = "end"  # end the session
+    NOTE = "note"  # put words into the record
+    OVERRIDE = "override"  # let the running trial go on past its automatic ends
+    COMPLETION = "completion"  # set the completion flag of the running trial: 1 or 0
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One order, with its words if it has any."""
+
+    order: Order
+    text: str = ""
+
+
+class Console(Protocol):
+    """Whoever gives orders and looks on: a terminal now, a page as well later."""
+
+    def commands(self) -> list[Command]:
+        """Return the orders given since the last call, without waiting."""
+        ...
+
+    def report(self, event: Event) -> None:
+        """Be told of an event, without making the session wait."""
+        ...
+
+
+class QueueConsole:
+    """Carries orders and events between threads."""
+
+    def __init__(self) -> None:
+        self._orders: queue.SimpleQueue[Command] = queue.SimpleQueue()
+        self.events: queue.SimpleQueue[Event | None] = queue.SimpleQueue()
+
+    def give(self, command: Command) -> None:
+        """Give an order; the session takes it up at its next tick."""
+        self._orders.put(command)
+
+    def commands(self) -> list[Command]:
+        if self._orders.empty():  # the usual tick
+            return []
+        given = []
+        while not self._orders.empty():
+            given.append(self._orders.get_nowait())
+        return given
+
+    def report(self, event: Event) -> None:
+        self.events.put(event)

@@ -1,0 +1,219 @@
+"""The course of a session: which step, which trial, paused or not, tick by tick.
+
+The steps are read like a script: every ``yield`` in a generator below is one tick, and gives back
+the frame that came of it.
+"""
+
+from collections.abc import Generator, Sequence
+
+from labcrane.attempt import Attempt
+from labcrane.console import Command, Order
+from labcrane.plan import PlannedBlock, PlannedStep, SessionPlan, next_attempt
+from labcrane.records import Event, Frame, Phase, Trial, Value
+from labcrane.rig import Rig
+from labcrane.study import Study
+
+Ticks = Generator[None, Frame, None]
+
+EXAMINER, INPUT = "examiner", "input"
+"""Who can hold a session: it goes on when nobody does."""
+
+
+class Course:
+    """Leads a session through its plan.
+
+    The loop calls :meth:`heed` before the machine moves and :meth:`judge` after.
+
+    Parameters
+    ----------
+    waits
+        Whether instructions and blocks wait for the order to start. A simulated operator needs
+        no telling.
+
+    Attributes
+    ----------
+    over
+        Whether the session has ended.
+    """
+
+    def __init__(self, study: Study, plan: SessionPlan, rig: Rig, *, waits: bool) -> None:
+        self._study = study
+        self._plan = plan
+        self._rig = rig
+        self._waits = waits
+        self._rate_hz = study.protocol.rate_hz
+        self._held_by: set[str] = set()
+        self._notes: list[tuple[str, dict[str, Value]]] = []  # stamped with the tick they fall in
+        self._attempt: Attempt | None = None
+        self._stage = ""
+        self._wishes: set[Order] = set()  # to start, skip or repeat what runs now
+        self._reasons_to_end: list[str] = []
+        self.over = False
+        self._script = self._session()
+        next(self._script)
+
+    @property
+    def moving(self) -> bool:
+        """Whether the operator's command reaches the machine in this tick."""
+        return self._attempt is not None and not self._held_by
+
+    def heed(self, commands: Sequence[Command], fault: str | None) -> None:
+        """Take up orders, and what has become of the operator's controls."""
+        for command in commands:
+            self._obey(command)
+        if fault is not None and INPUT not in self._held_by:
+            self._note("input.lost", why=fault)
+            self._hold(INPUT)
+            if self._study.protocol.on_fault.input_lost == "end":
+                self._reasons_to_end.append("input lost")
+        elif fault is None and INPUT in self._held_by:
+            self._note("input.back")
+            self._release(INPUT)
+
+    def judge(self, frame: Frame) -> None:
+        """Complete ``frame``: trial, phase, the task's values, and everything that happened."""
+        frame.paused = bool(self._held_by)
+        frame.events = self._stamped(frame)
+        try:
+            self._script.send(frame)
+        except StopIteration:
+            self.over = True
+            frame.events += self._stamped(frame)
+
+    # The script
+
+    def _session(self) -> Ticks:
+        for number, step in enumerate(self._plan.steps, start=1):
+            self._note("step.start", step=number, kind=step.kind)
+            if step.block:
+                yield from self._block(step.block)
+            elif step.kind == "break":
+                yield from self._break(step)
+            else:
+                self._note("instructions.shown", text=step.text)
+                yield from self._gate("instructions")
+            self._note("step.end", step=number, kind=step.kind)
+            if self._reasons_to_end:
+                break
+        self._note("session.end", reason=", ".join(self._reasons_to_end) or "complete")
+
+    def _gate(self, what: str) -> Ticks:
+        if not self._waits:
+            return
+        self._enter("waiting")
+        self._note("waiting", what=what)
+        while Order.START not in self._wishes and not self._reasons_to_end:
+            yield
+        self._enter("")
+
+    def _break(self, step: PlannedStep) -> Ticks:
+        left = round(step.seconds * self._rate_hz)
+        self._enter("break")
+        self._note("break.start", seconds=step.seconds)
+        while left > 0 and Order.SKIP not in self._wishes and not self._reasons_to_end:
+            yield
+            left -= 1
+        self._note("break.end", left=left / self._rate_hz)
+        self._enter("")
+
+    def _block(self, block: PlannedBlock) -> Ticks:
+        yield from self._gate(block.name)
+        if self._reasons_to_end:
+            return
+        about: dict[str, Value] = {"block": block.number, "block_name": block.name}
+        self._note("block.start", **about, task=block.task, practice=block.practice)
+        for trial in block.trials:
+            yield from self._trial(block, trial)
+            if self._reasons_to_end:
+                break
+        self._note("block.end", **about)
+
+    def _trial(self, block: PlannedBlock, trial: Trial) -> Ticks:
+        task = self._study.tasks[block.task]
+        attempt = Attempt(task, block, trial, self._rate_hz)
+        for component in (*self._rig.components, task):
+            component.begin_trial(trial)
+        if trial.planned.start_pose is not None:
+            self._rig.dynamics.reset(trial.planned.start_pose)
+        self._note("trial.start", **attempt.about)
+        self._enter("trial", attempt)
+        while not attempt.phase.over:
+            frame = yield
+            attempt.judge(frame, self._wished_end())
+        self._enter("")
+        if attempt.phase is Phase.REPEATED:
+            yield from self._trial(block, next_attempt(self._study, self._plan, trial))
+
+    def _wished_end(self) -> Phase | None:
+        if self._reasons_to_end:
+            return Phase.ENDED
+        if Order.SKIP in self._wishes:
+            return Phase.SKIPPED
+        return Phase.REPEATED if Order.REPEAT in self._wishes else None
+
+    def _enter(self, stage: str, attempt: Attempt | None = None) -> None:
+        self._stage, self._attempt = stage, attempt
+        self._wishes.clear()
+
+    # Orders
+
+    def _obey(self, command: Command) -> None:
+        refused = self._refusal(command)
+        self._note(f"order.{command.order}", text=command.text, refused=refused)
+        if refused is not None:
+            return
+        match command.order:
+            case Order.PAUSE:
+                self._hold(EXAMINER)
+            case Order.START if EXAMINER in self._held_by:
+                self._release(EXAMINER)
+            case Order.START | Order.SKIP | Order.REPEAT:
+                self._wishes.add(command.order)
+            case Order.END:
+                self._reasons_to_end.append("by order")
+            case Order.OVERRIDE:
+                self._running().overrule()
+            case Order.COMPLETION:
+                self._running().completion = command.text == "1"
+            case Order.NOTE:
+                pass  # the event is all there is to it
+
+    def _refusal(self, command: Command) -> str | None:
+        """Return why an order makes no sense now, or None when it does."""
+        match command.order:
+            case Order.REPEAT | Order.OVERRIDE | Order.COMPLETION if self._stage != "trial":
+                return "no trial is running"
+            case Order.SKIP if self._stage not in {"trial", "break"}:
+                return "neither a trial nor a break is running"
+            case Order.START if self._stage != "waiting" and EXAMINER not in self._held_by:
+                return "nothing waits to start"
+            case Order.PAUSE if EXAMINER in self._held_by:
+                return "the session is paused already"
+            case Order.COMPLETION if command.text not in {"0", "1"}:
+                return f"completion is 1 or 0, not {command.text!r}"
+            case Order.NOTE if not command.text:
+                return "a note needs words"
+        return None
+
+    def _running(self) -> Attempt:
+        if self._attempt is None:
+            raise AssertionError("orders that need a trial are refused without one")
+        return self._attempt
+
+    # What is written down
+
+    def _hold(self, who: str) -> None:
+        self._held_by.add(who)
+        self._note("pause.start", by=who)
+
+    def _release(self, who: str) -> None:
+        self._held_by.discard(who)
+        self._note("pause.end", by=who)
+
+    def _note(self, name: str, **data: Value) -> None:
+        self._notes.append((name, data))
+
+    def _stamped(self, frame: Frame) -> tuple[Event, ...]:
+        events = tuple(Event(name, frame.tick.due, data) for name, data in self._notes)
+        self._notes.clear()
+        return events

@@ -1,0 +1,1 @@
+"""What is varied, and in which order each participant meets it."""

@@ -1,0 +1,35 @@
+"""Every error labcrane raises on purpose.
+
+LabcraneError
+├── ProtocolError    the YAML asks for something impossible; nothing has run
+├── PluginError      a plugin is missing, broken, or broke its contract
+├── DeviceError      hardware is absent or stopped answering
+├── StreamError      LSL is set up wrongly, or a stream is missing or broken
+└── RecordingError   a file cannot be written, or is not what it should be
+
+A late tick is not an error: it is data, and is recorded with the frame.
+"""
+
+
+class LabcraneError(Exception):
+    """Base of every deliberate labcrane error; the CLI prints it without a traceback."""
+
+
+class ProtocolError(LabcraneError):
+    """The study protocol, or what was asked of it, cannot be run as written."""
+
+
+class PluginError(LabcraneError):
+    """A plugin is missing, failed to import, or broke its contract."""
+
+
+class DeviceError(LabcraneError):
+    """A device is absent or stopped answering."""
+
+
+class StreamError(LabcraneError):
+    """LSL is not set up as asked, or a stream is missing or broken."""
+
+
+class RecordingError(LabcraneError):
+    """A recording cannot be written, found or read."""

@@ -1,0 +1,42 @@
+"""Every point at which a plugin can extend labcrane.
+
+Hooks are called once, while a rig is being built, and return offers. Nothing here runs during a
+tick. To implement one, decorate a function of the same name with ``labcrane.hookimpl`` in the
+module your entry point names.
+"""
+
+from collections.abc import Sequence
+
+import pluggy
+
+from labcrane.offers import Offer
+from labcrane.roles import Controller, Dynamics, InputDevice, Task
+
+PROJECT = "labcrane"
+
+hookspec = pluggy.HookspecMarker(PROJECT)
+hookimpl = pluggy.HookimplMarker(PROJECT)
+
+
+@hookspec
+def labcrane_inputs() -> Sequence[Offer[InputDevice]]:
+    """Offer devices the operator moves."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_controllers() -> Sequence[Offer[Controller]]:
+    """Offer mappings from the operator's axes to machine commands."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_dynamics() -> Sequence[Offer[Dynamics]]:
+    """Offer machines to operate."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_tasks() -> Sequence[Offer[Task]]:
+    """Offer things for the operator to do."""
+    raise NotImplementedError

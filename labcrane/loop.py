@@ -1,0 +1,54 @@
+"""The real-time loop: the whole data flow, in the order it happens."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from labcrane.clock import Clock, Tick, ticks
+from labcrane.console import Console
+from labcrane.course import Course
+from labcrane.records import Frame, Run
+from labcrane.rig import Rig
+
+
+def run(
+    rig: Rig,
+    this_run: Run,
+    course: Course,
+    clock: Clock,
+    console: Console,
+    sinks: Sequence[Callable[[Frame], None]],
+) -> None:
+    """Tick until the course is over.
+
+    Every frame goes to the ``sinks`` in their order: the journal first, then whoever looks on.
+    """
+    dt = 1.0 / this_run.rate_hz
+    read, control, rest = rig.input.read, rig.controller.command, rig.controller.rest
+    state, step = rig.dynamics.state, rig.dynamics.step
+    heed, judge = course.heed, course.judge
+    no_task = np.full(this_run.task.size, np.nan)
+
+    frame = _before(rig, this_run)
+    for tick in ticks(clock, this_run.rate_hz):
+        axes = read(tick, frame)
+        heed(console.commands(), rig.input.fault)
+        command = control(axes, state()) if course.moving else rest()
+        frame = Frame(tick, 0.0, axes, command, step(command, dt), no_task)
+        judge(frame)
+        for sink in sinks:
+            sink(frame)
+        if course.over:
+            return
+
+
+def _before(rig: Rig, this_run: Run) -> Frame:
+    """Return what a person sees before anything has happened."""
+    return Frame(
+        tick=Tick(-1, 0.0, 0.0),
+        elapsed=0.0,
+        axes=np.zeros(this_run.axes.size),
+        command=rig.controller.rest(),
+        state=rig.dynamics.state(),
+        task=np.full(this_run.task.size, np.nan),
+    )

@@ -1,0 +1,250 @@
+"""The study protocol: what its YAML may say."""
+
+import re
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+    field_validator,
+)
+
+from labcrane.design.order import RULES
+from labcrane.yaml_file import Place, YamlFile
+
+
+class Section(BaseModel):
+    """A part of a protocol: unknown keys are errors, values never change."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False
+    )
+
+
+class Use(Section):
+    """A component to use; the keys beside ``use`` are its settings."""
+
+    model_config = ConfigDict(extra="allow")
+
+    use: str
+    """Name of what a plugin offers; ``labcrane plugins`` lists all."""
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The settings as written, not yet checked against the component."""
+        return dict(self.model_extra or {})
+
+
+DEFAULT_OPERATOR = Use(use="simulated_operator")
+
+
+class Participants(Section):
+    """Who takes part."""
+
+    pattern: str = r"P\d{3,4}"
+    """Regular expression that a participant's pseudonym matches as a whole."""
+
+    planned: PositiveInt = 1
+    """How many participants are planned."""
+
+    @field_validator("pattern")
+    @classmethod
+    def _compiles(cls, pattern: str) -> str:
+        try:
+            re.compile(pattern)
+        except re.error as error:
+            raise ValueError(f"{pattern!r} is no regular expression: {error}") from None
+        return pattern
+
+
+class Design(Section):
+    """What is varied, and how."""
+
+    order: dict[str, str] = Field(default_factory=dict)
+    """For each factor of the tasks, in which order its levels come: ``{pairs: shuffled}``.
+    Factors that are not named come as written."""
+
+    @field_validator("order")
+    @classmethod
+    def _rules_exist(cls, order: dict[str, str]) -> dict[str, str]:
+        for factor, rule in order.items():
+            if rule not in RULES:
+                raise ValueError(f"{factor} is {rule!r}; it can be {', '.join(sorted(RULES))}")
+        return order
+
+
+class OnFault(Section):
+    """What happens when something fails during a session."""
+
+    input_lost: Literal["pause", "end"] = "pause"
+    """The operator's controls are unplugged or fall silent: pause until they are back, or end the
+    session. The machine is held at rest either way."""
+
+
+class Block(Section):
+    """A run of trials of one task.
+
+    Keys beside these limit how many levels of a factor are used: ``pairs: 2``.
+    """
+
+    model_config = ConfigDict(extra="allow")
+
+    task: str
+    """Which of the protocol's tasks."""
+
+    name: str | None = None
+    """Name of the block in the record; the task's by default."""
+
+    repeat: PositiveInt = 1
+    """How many times the block is run, each time in a new order."""
+
+    @property
+    def limits(self) -> dict[str, Any]:
+        """How many levels of which factor, as written."""
+        return dict(self.model_extra or {})
+
+
+class Break(Section):
+    """A pause in which the machine rests."""
+
+    seconds: NonNegativeFloat
+    """How long it lasts, in seconds; the examiner can end it earlier, which is recorded."""
+
+
+class Step(Section):
+    """One step of a session, with what kind it is and what it needs."""
+
+    kind: Literal["instructions", "practice", "block", "break"]
+    text: str = ""
+    file: str = ""
+    block: Block | None = None
+    seconds: float = 0.0
+
+
+class Session(Section):
+    """One visit of a participant."""
+
+    name: str
+    """Name of the session in the record."""
+
+    steps: tuple[Step, ...] = Field(min_length=1)
+    """What happens, in order."""
+
+
+class Protocol(Section):
+    """One study."""
+
+    labcrane: Literal[1]
+    """Version of the protocol format."""
+
+    study: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
+    """Short name of the study, in lower case; part of every seed."""
+
+    title: str
+    """What the study is called."""
+
+    participants: Participants = Participants()
+
+    rate_hz: PositiveFloat = Field(default=240.0, le=2000.0)
+    """Ticks of the loop per second."""
+
+    machine: str
+    """Name of a machine that comes with labcrane, or of a file beside the protocol."""
+
+    input: Use
+    """What the operator moves."""
+
+    operator: Use = DEFAULT_OPERATOR
+    """Who moves it when the study is simulated."""
+
+    scheme: Use
+    """How the operator's axes become commands."""
+
+    dynamics: Use
+    """What moves."""
+
+    tasks: dict[str, Use] = Field(min_length=1)
+    """What the operator is asked to do, by name."""
+
+    design: Design = Design()
+
+    sessions: tuple[Session, ...] = Field(min_length=1)
+    """The visits, in order."""
+
+    on_fault: OnFault = OnFault()
+
+
+def read(path: Path) -> tuple[Protocol | None, YamlFile]:
+    """Read a protocol file; mistakes are noted in the file that is returned.
+
+    Raises
+    ------
+    ProtocolError
+        The file does not exist or is no YAML.
+    """
+    source = YamlFile.read(path)
+    if not isinstance(source.data, dict):
+        source.problem((), "a protocol is a mapping of keys, beginning with 'labcrane: 1'")
+        return None, source
+    plain = {**source.data, "sessions": _sessions(source)}
+    return source.check(Protocol, value=plain), source
+
+
+def _sessions(source: YamlFile) -> Any:
+    """Return the sessions with every step in its long form, noting steps that make no sense."""
+    sessions = source.data.get("sessions")
+    if not isinstance(sessions, list):
+        return sessions
+    found = []
+    for number, session in enumerate(sessions):
+        place: Place = ("sessions", number)
+        steps = session.get("steps") if isinstance(session, dict) else None
+        if not isinstance(steps, list):
+            found.append(session)
+            continue
+        parsed = [_step(source, (*place, "steps", at), step) for at, step in enumerate(steps)]
+        whole = [step for step in parsed if step is not None]
+        # What is wrong with a step has been noted; the model need not complain about none.
+        stand_in = [] if whole else [{"kind": "break"}]
+        found.append({**session, "steps": whole or stand_in})
+    return found
+
+
+STEPS = ("instructions", "practice", "block", "break")
+
+
+def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
+    if not (isinstance(step, dict) and len(step) == 1):
+        source.problem(place, f"a step is one of {', '.join(STEPS)} with a value, not {step!r}")
+        return None
+    (kind, value), *_ = step.items()
+    if kind not in STEPS:
+        close = get_close_matches(kind, STEPS, n=1)
+        hint = f"did you mean {close[0]!r}?" if close else f"possible: {', '.join(STEPS)}"
+        source.problem(place, f"{kind!r} is not a step; {hint}")
+        return None
+    if kind == "instructions":
+        return _instructions(source, place, value)
+    if kind == "break":
+        pause = source.check(Break, (*place, kind))
+        return {"kind": kind, "seconds": pause.seconds} if pause else None
+    block = source.check(Block, (*place, kind))
+    return {"kind": kind, "block": block} if block else None
+
+
+def _instructions(source: YamlFile, place: Place, value: Any) -> dict[str, Any] | None:
+    if not isinstance(value, str):
+        source.problem(place, f"instructions name a text file, not {value!r}")
+        return None
+    path = source.path.parent / value
+    try:
+        return {"kind": "instructions", "file": value, "text": path.read_text(encoding="utf-8")}
+    except OSError:
+        source.problem(place, f"instructions file {str(path)!r} does not exist or cannot be read")
+        return None

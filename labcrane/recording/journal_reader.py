@@ -1,0 +1,178 @@
+"""Reads back what a session's journals hold."""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from labcrane.recording.journal import EVENTS, FRAMES, GROUPS, START, Column
+from labcrane.recording.xdf_reader import XdfFile, XdfStream, read_xdf
+from labcrane.signals import FloatArray
+
+UNREADABLE = "journal.unreadable"
+"""Name of an event whose text is no JSON: damaged in a part of the file that has no checks."""
+
+
+@dataclass(frozen=True, slots=True)
+class LoggedEvent:
+    """One event as the journal has it.
+
+    Attributes
+    ----------
+    name, time, tick
+        As they were written; ``tick`` is NaN when unreadable.
+    part
+        Which part of the journal it is in, counted from 1.
+    data
+        What else it says.
+    """
+
+    name: str
+    time: float
+    tick: float
+    part: int
+    data: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class JournalState:
+    """How a journal was found.
+
+    Attributes
+    ----------
+    size
+        Bytes.
+    samples
+        Samples of all streams.
+    torn, damaged, unchecked
+        Bytes of an incomplete last chunk, bytes left out, and bytes read without a check.
+    """
+
+    name: str
+    size: int
+    samples: int
+    torn: int
+    damaged: int
+    unchecked: int
+
+    @property
+    def notes(self) -> list[str]:
+        """What was not as it should be, for people."""
+        notes = []
+        if self.damaged:
+            notes.append(f"{self.name}: {self.damaged} bytes are damaged and were left out")
+        if self.unchecked:
+            notes.append(
+                f"{self.name}: {self.unchecked} bytes were read, but have lost their checks"
+            )
+        return notes
+
+
+@dataclass
+class SessionLog:
+    """Frames and events of a session, all parts in order.
+
+    Attributes
+    ----------
+    columns
+        What a row holds; the union over the parts.
+    time, part
+        Per frame, in seconds, and which part it is in; shape ``(n_frames,)``.
+    rows
+        Shape ``(n_frames, n_columns)``; NaN where a part has no such column.
+    """
+
+    columns: list[Column] = field(default_factory=list)
+    time: FloatArray = field(default_factory=lambda: np.empty(0))
+    part: FloatArray = field(default_factory=lambda: np.empty(0))
+    rows: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    events: list[LoggedEvent] = field(default_factory=list)
+
+    @property
+    def context(self) -> Mapping[str, Any]:
+        """What the first part says of the session; empty when it was killed before it did."""
+        return next((event.data for event in self.events if event.name == START), {})
+
+    def column(self, group: str, label: str) -> FloatArray | None:
+        """Return one column of all frames; None if there is none."""
+        for number, column in enumerate(self.columns):
+            if (column.group, column.label) == (group, label):
+                return self.rows[:, number]
+        return None
+
+
+def state(file: XdfFile) -> JournalState:
+    """Return how a journal was found."""
+    return JournalState(
+        name=file.path.name,
+        size=file.path.stat().st_size,
+        samples=sum(len(stream.stamps) for stream in file.streams),
+        torn=file.torn,
+        damaged=sum(span.stop - span.start for span in file.damaged),
+        unchecked=sum(span.stop - span.start for span in file.unchecked),
+    )
+
+
+def read_journal(paths: Sequence[Path]) -> tuple[SessionLog, list[JournalState]]:
+    """Read the parts of a session's journal, in order."""
+    files = [read_xdf(path) for path in paths]
+    return merge(files), [state(file) for file in files]
+
+
+def merge(files: Iterable[XdfFile]) -> SessionLog:
+    """Put the parts of a session's journal together."""
+    log = SessionLog()
+    frames: list[tuple[int, XdfStream, list[Column]]] = []
+    for part, file in enumerate(files, start=1):
+        for stream in file.streams:
+            if stream.header.name == EVENTS:
+                log.events += _events(stream, part)
+            elif stream.header.name == FRAMES:
+                frames.append((part, stream, _columns(stream)))
+    if not frames:
+        return log
+    for _, _, columns in frames:
+        log.columns += [column for column in columns if column not in log.columns]
+    log.time = np.concatenate([stream.stamps for _, stream, _ in frames])
+    log.part = np.concatenate(
+        [np.full(len(stream.stamps), float(part)) for part, stream, _ in frames]
+    )
+    log.rows = np.concatenate(
+        [_widened(stream, columns, log.columns) for _, stream, columns in frames]
+    )
+    return log
+
+
+def _columns(stream: XdfStream) -> list[Column]:
+    return [
+        Column(channel.extra.get("group", GROUPS[0]), channel.label, channel.unit)
+        for channel in stream.header.channels
+    ]
+
+
+def _widened(stream: XdfStream, columns: list[Column], union: list[Column]) -> FloatArray:
+    data = np.asarray(stream.data, np.float64)
+    if columns == union:
+        return data
+    rows = np.full((len(data), len(union)), np.nan)
+    rows[:, [union.index(column) for column in columns]] = data
+    return rows
+
+
+def _events(stream: XdfStream, part: int) -> list[LoggedEvent]:
+    return [
+        _event(text, float(time), part)
+        for (text,), time in zip(stream.texts, stream.stamps, strict=True)
+    ]
+
+
+def _event(text: str, time: float, part: int) -> LoggedEvent:
+    try:
+        content = json.loads(text)
+        name, tick = str(content.pop("event")), float(content.pop("tick"))
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return LoggedEvent(UNREADABLE, time, np.nan, part, {"text": text})
+    return LoggedEvent(name, time, tick, part, content)

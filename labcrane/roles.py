@@ -1,0 +1,126 @@
+"""The roles a plugin can fill, in the order data flows through them.
+
+    InputDevice -> Controller -> Dynamics -> Task
+
+Each role has exactly one method that runs every tick. The loop calls it directly, never through
+pluggy, so it must return soon and must not block. ``labcrane.testing`` has a contract test for
+every role; a plugin's tests subclass it.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from labcrane.clock import Tick
+from labcrane.machine import Body
+from labcrane.records import Frame, Judgement, Planned, Run, Trial, Value
+from labcrane.signals import FloatArray, Signal
+
+
+class Component(ABC):
+    """Anything a protocol can ``use``. Opened once per run, closed exactly once."""
+
+    signals: tuple[Signal, ...] = ()
+    """What this component's tick method returns, in order; known before ``open``."""
+
+    def open(self, run: Run) -> None:
+        """Acquire hardware and look up signals. Runs before the first tick."""
+
+    def begin_trial(self, trial: Trial) -> None:
+        """Forget the last trial. Runs before the trial's first tick."""
+
+    def close(self) -> None:
+        """Release what ``open`` acquired. Runs even when ``open`` failed."""
+
+    def facts(self) -> Mapping[str, Value]:
+        """Return what the record should know of the open component: calibration, versions."""
+        return {}
+
+
+class InputDevice(Component):
+    """What the operator moves. Its signals are axes, buttons and whether it is connected."""
+
+    fault: str | None = None
+    """Why the device cannot be trusted now, in words; None while all is well.
+
+    Looked at after every ``read``. While it is set the machine is held at rest and the trial is
+    paused; both go on by themselves when it is None again.
+    """
+
+    @abstractmethod
+    def read(self, tick: Tick, seen: Frame) -> FloatArray:
+        """Return the newest axes, shape ``(n_axes,)``, each in [-1, 1].
+
+        ``seen`` is the frame before: what a person would have seen.
+        """
+
+
+class Controller(Component):
+    """What turns the operator's axes into commands for the machine."""
+
+    @abstractmethod
+    def command(self, axes: FloatArray, state: FloatArray) -> FloatArray:
+        """Return the command, shape ``(n_command,)``: actuators first, then what else to log."""
+
+    def rest(self) -> FloatArray:
+        """Return the command that holds the machine still, shape ``(n_command,)``."""
+        return np.zeros(sum(len(signal.columns) for signal in self.signals))
+
+    @abstractmethod
+    def steer(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
+        """Return the axes, shape ``(n_axes,)``, that ask for a tip velocity.
+
+        What a practised hand does; simulated operators use it. ``velocity`` is in m/s, shape
+        ``(3,)``, in the machine's base frame. Nothing beyond [-1, 1] is returned: a hand that
+        would need more pushes as far as it goes, in the same direction.
+        """
+
+
+class Dynamics(Component):
+    """The machine being operated."""
+
+    @abstractmethod
+    def state(self) -> FloatArray:
+        """Return the state as it stands, shape ``(n_state,)``."""
+
+    @abstractmethod
+    def step(self, command: FloatArray, dt: float) -> FloatArray:
+        """Advance ``dt`` seconds; return the new state, shape ``(n_state,)``."""
+
+    @abstractmethod
+    def reset(self, pose: Sequence[float]) -> None:
+        """Set the joints to ``pose`` in rad, at rest, as if nothing had happened before."""
+
+    @abstractmethod
+    def bodies(self) -> Sequence[Body]:
+        """Return what the machine looks like, for whoever draws it."""
+
+
+class Task(Component):
+    """What the operator is asked to do, and when a trial ends."""
+
+    results: tuple[Signal, ...] = ()
+    """What a finished trial is measured by, with units; columns of the trial table."""
+
+    condition_units: Mapping[str, str] = {}
+    """Units of the numbers in its trials' conditions; ``"1"`` for counts and ratios."""
+
+    @abstractmethod
+    def factors(self) -> Mapping[str, Sequence[str]]:
+        """Return what the design may order: the levels of each factor, as written."""
+
+    @abstractmethod
+    def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[Planned]:
+        """Return a block's trials, for the levels of each factor in the order given."""
+
+    @abstractmethod
+    def judge(self, frame: Frame) -> Judgement:
+        """Say where the trial stands after this tick. Not called between trials or in a pause."""
+
+    @abstractmethod
+    def overrule(self) -> None:
+        """Let the running trial go on past its automatic ends: a time-out, too many mistakes.
+
+        The supervisor's decision. It holds for this trial only.
+        """

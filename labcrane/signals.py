@@ -1,0 +1,98 @@
+"""Named quantities, and where they sit in an array."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from labcrane.errors import ProtocolError
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """A named quantity with one sample per tick.
+
+    Attributes
+    ----------
+    name
+        Dotted path, and its path in a recording: ``"joint.angle"``.
+    unit
+        SI symbol; ``"1"`` when dimensionless.
+    components
+        Names of the parts of a vector, ``("slew", "shoulder")``; empty for a scalar.
+    """
+
+    name: str
+    unit: str
+    components: tuple[str, ...] = ()
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of one sample; ``()`` is a scalar."""
+        return (len(self.components),) if self.components else ()
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """One dotted name per number: ``"joint.angle.slew"``."""
+        if not self.components:
+            return (self.name,)
+        return tuple(f"{self.name}.{part}" for part in self.components)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The signals of one array of a frame, in order.
+
+    Attributes
+    ----------
+    owner
+        Whose signals these are, in words, for error messages: ``"the machine"``.
+    signals
+        In the order in which the array holds them.
+    """
+
+    owner: str
+    signals: tuple[Signal, ...] = ()
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """One dotted name per number of the array."""
+        return tuple(column for signal in self.signals for column in signal.columns)
+
+    @cached_property
+    def units(self) -> tuple[str, ...]:
+        """One unit per number of the array."""
+        return tuple(signal.unit for signal in self.signals for _ in signal.columns)
+
+    @property
+    def size(self) -> int:
+        """How many numbers the array holds."""
+        return len(self.columns)
+
+    def find(self, name: str) -> slice:
+        """Return where the signal called ``name`` sits.
+
+        Components name the quantities they need, and look them up once, in ``open``; a rig
+        that lacks one is refused before the first tick.
+        """
+        start = 0
+        for signal in self.signals:
+            stop = start + len(signal.columns)
+            if signal.name == name:
+                return slice(start, stop)
+            start = stop
+        raise ProtocolError(f"{self.owner} has no {name!r}; it has {self._known()}")
+
+    def index(self, column: str) -> int:
+        """Return where the number called ``column`` sits: ``"joint.angle.slew"``, ``"left.x"``."""
+        if column in self.columns:
+            return self.columns.index(column)
+        raise ProtocolError(
+            f"{self.owner} has no {column!r}; it has {', '.join(self.columns) or 'nothing'}"
+        )
+
+    def _known(self) -> str:
+        return ", ".join(signal.name for signal in self.signals) or "nothing"

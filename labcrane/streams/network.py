@@ -1,0 +1,126 @@
+"""Where LSL streams travel: this computer only, or the lab's network.
+
+liblsl reads the file named by ``LSLAPICFG`` once, when it is loaded. So the choice is made before
+anything imports pylsl, and child processes inherit it with the environment.
+"""
+
+import atexit
+import configparser
+import os
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from labcrane.errors import StreamError
+
+VARIABLE = "LSLAPICFG"
+
+# KnownPeers makes streams of other processes visible to liblsl before 1.18, which sees only one of
+# them by multicast on loopback. PortRange 32, the default, hides outlets beyond the 32nd. Clock
+# probes each second, not each two, halve the time a step of a clock goes unseen.
+LOOPBACK = """\
+; LSL on this computer only: no multicast, no broadcast, nothing beyond loopback.
+[ports]
+IPv6 = disable
+PortRange = 128
+[multicast]
+ResolveScope = machine
+MachineAddresses = {127.0.0.1}
+AddressesOverride = {127.0.0.1}
+Interfaces = {127.0.0.1}
+ListenAddress = 127.0.0.1
+TTLOverride = 0
+[lab]
+KnownPeers = {127.0.0.1}
+[tuning]
+MulticastMinRTT = 0.05
+UnicastMinRTT = 0.1
+ContinuousResolveInterval = 0.25
+TimeUpdateInterval = 1
+[log]
+level = -3
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """What liblsl was, or will be, told.
+
+    Attributes
+    ----------
+    config
+        The file in ``LSLAPICFG``; None when liblsl looks for its own.
+    loopback
+        Whether streams stay on this computer.
+    """
+
+    config: Path | None
+    loopback: bool
+
+    def __str__(self) -> str:
+        reach = "this computer only" if self.loopback else "the network"
+        return f"LSL reaches {reach}, as {self.config or 'liblsl finds its configuration'} says"
+
+
+def use_loopback() -> Network:
+    """Keep LSL on this computer, here and in child processes; call it before pylsl is imported.
+
+    A configuration that the user has set in ``LSLAPICFG`` holds, whatever it says: look at the
+    answer.
+
+    Raises
+    ------
+    StreamError
+        When pylsl has been imported without a configuration, or the one set cannot be read.
+    """
+    if os.environ.get(VARIABLE):
+        return describe()
+    if "pylsl" in sys.modules:
+        raise StreamError(
+            f"LSL cannot be kept on this computer any more: pylsl was imported before {VARIABLE} "
+            "was set; call use_loopback() first"
+        )
+    handle, name = tempfile.mkstemp(prefix="labcrane-lsl-", suffix=".cfg")
+    with os.fdopen(handle, "w") as file:
+        file.write(LOOPBACK)
+    atexit.register(_remove, name, os.getpid())
+    os.environ[VARIABLE] = name
+    return Network(Path(name), loopback=True)
+
+
+def describe() -> Network:
+    """Say which configuration holds, and whether it keeps streams on this computer."""
+    if not (name := os.environ.get(VARIABLE)):
+        return Network(None, loopback=False)
+    parser = configparser.ConfigParser(strict=False, interpolation=None)
+    try:
+        parser.read_string(Path(name).read_text())
+    except (OSError, UnicodeDecodeError, configparser.Error) as error:
+        raise StreamError(
+            f"{VARIABLE} names {name}, which cannot be read ({error}); correct it or unset it"
+        ) from error
+    return Network(Path(name), loopback=_stays_here(parser))
+
+
+def _stays_here(parser: configparser.ConfigParser) -> bool:
+    """Whether every address that liblsl may send to is on this computer."""
+    if parser.get("multicast", "ResolveScope", fallback="site").strip() != "machine":
+        return False
+    if parser.get("ports", "IPv6", fallback="allow").strip() not in ("disable", "disabled"):
+        return False
+    lists = [
+        parser.get("multicast", "AddressesOverride", fallback=""),
+        parser.get("multicast", "MachineAddresses", fallback=""),
+        parser.get("lab", "KnownPeers", fallback="{}"),
+    ]
+    first, second, peers = (
+        [part.strip() for part in text.strip(" {}").split(",")] for text in lists
+    )
+    return all(address.startswith("127.") for address in [*first, *second, *filter(None, peers)])
+
+
+def _remove(name: str, owner: int) -> None:
+    """Remove the file at exit, but not at the exit of a forked child."""
+    if os.getpid() == owner:
+        Path(name).unlink(missing_ok=True)

@@ -1,0 +1,204 @@
+"""The session as LSL streams, for views, recorders and anyone else.
+
+| stream            | type     | format   | a sample                                       |
+|-------------------|----------|----------|------------------------------------------------|
+| labcrane.state    | MoCap    | double64 | the machine's state, each tick                 |
+| labcrane.input    | Joystick | double64 | axes and buttons, each tick                    |
+| labcrane.markers  | Markers  | string   | an event as JSON (docs/markers.md)             |
+| labcrane.codes    | Markers  | int32    | the event's code; the table is in the header   |
+
+Every sample carries the time at which it holds on the session's clock, which is liblsl's clock: a
+frame the time its tick was due, an event the time it happened.
+"""
+
+import ctypes
+import time
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from labcrane.errors import StreamError
+from labcrane.records import Frame, Run
+from labcrane.signals import FloatArray, Layout
+from labcrane.streams.markers import CODES, OTHER, payload
+
+if TYPE_CHECKING:
+    import pylsl
+
+STATE, INPUT = "labcrane.state", "labcrane.input"
+MARKERS, CODE_STREAM = "labcrane.markers", "labcrane.codes"
+
+CLOCK_TOLERANCE_S = 0.0001
+
+# Types of the XDF MoCap conventions; what they do not know is named after the signal.
+MOCAP = {"position": "Position", "orientation": "Orientation"}
+BUTTONS = ("button", "trigger", "hat", "connected")
+
+
+class Outlets:
+    """The session's outlets. Open while the session runs.
+
+    Parameters
+    ----------
+    run
+        Its layouts become the streams' channels.
+    source
+        Which session this is, the same whenever it is resumed: ``"aiming/P001/ses-01"``. The
+        streams' source ids are made of it, so that a recorder finds a restarted session again.
+    codes
+        Codes for event names beside ``CODES``, for the numeric marker stream.
+    """
+
+    def __init__(self, run: Run, source: str, codes: Mapping[str, int] | None = None) -> None:
+        check_clock()
+        self._codes = dict(CODES) | dict(codes or {})
+        state = _info(
+            STATE, "MoCap", run.state.size, "double64", rate_hz=run.rate_hz, source=source
+        )
+        _describe_state(state, run.state)
+        axes = _info(
+            INPUT, "Joystick", run.axes.size, "double64", rate_hz=run.rate_hz, source=source
+        )
+        _describe_input(axes, run.axes)
+        markers = _info(MARKERS, "Markers", 1, "string", rate_hz=0.0, source=source)
+        _channel(markers, label="event", unit="none", type="JSON")
+        numbers = _info(CODE_STREAM, "Markers", 1, "int32", rate_hz=0.0, source=source)
+        _channel(numbers, label="code", unit="none", type="Code")
+        _describe_codes(numbers, self._codes)
+        import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
+
+        self._state = _Samples(state, run.state.size)
+        self._input = _Samples(axes, run.axes.size)
+        self._markers: pylsl.StreamOutlet | None = pylsl.StreamOutlet(markers)
+        self._numbers: pylsl.StreamOutlet | None = pylsl.StreamOutlet(numbers)
+
+    def push(self, frame: Frame) -> None:
+        """Send a frame and its events. Does not wait for any receiver."""
+        due = frame.tick.due
+        self._state.push(frame.state, due)
+        self._input.push(frame.axes, due)
+        if not frame.events or self._markers is None or self._numbers is None:
+            return
+        for event in frame.events:
+            _check_stamp(event.time)
+            self._markers.push_sample([payload(event, frame.tick.number)], event.time)
+            self._numbers.push_sample([self._codes.get(event.name, OTHER)], event.time)
+
+    def close(self) -> None:
+        """End the streams: receivers see them disappear."""
+        self._state.close()
+        self._input.close()
+        self._markers = self._numbers = None
+
+
+class _Samples:
+    """An outlet of float64 samples.
+
+    liblsl is handed a buffer of our own: half the time of ``push_sample`` with a list, and a third
+    of ``push_chunk`` with an array.
+    """
+
+    def __init__(self, info: "pylsl.StreamInfo", size: int) -> None:
+        import pylsl  # noqa: PLC0415
+        from pylsl.lib import lib  # noqa: PLC0415
+
+        self._buffer = np.zeros(size)
+        self._pointer = ctypes.c_void_p(self._buffer.ctypes.data)
+        self._outlet: pylsl.StreamOutlet | None = pylsl.StreamOutlet(info)
+        self._send = lib.lsl_push_sample_dtp
+
+    def push(self, values: FloatArray, stamp: float) -> None:
+        _check_stamp(stamp)
+        if self._outlet is None:
+            raise StreamError("a frame cannot be sent after the outlets were closed")
+        self._buffer[:] = values
+        if status := self._send(self._outlet.obj, self._pointer, ctypes.c_double(stamp), 1):
+            raise StreamError(f"liblsl refused a sample with error {status}")
+
+    def close(self) -> None:
+        self._outlet = None
+
+
+def check_clock() -> None:
+    """Make sure that liblsl's clock is the one the session runs on.
+
+    Raises
+    ------
+    StreamError
+        When ``pylsl.local_clock`` and ``time.perf_counter`` differ by more than 0.1 ms.
+    """
+    import pylsl  # noqa: PLC0415
+
+    before = time.perf_counter()
+    theirs = pylsl.local_clock()
+    after = time.perf_counter()
+    if not before - CLOCK_TOLERANCE_S <= theirs <= after + CLOCK_TOLERANCE_S:
+        raise StreamError(
+            f"liblsl's clock is {theirs - before:.6f} s from time.perf_counter, so samples cannot "
+            "be stamped with the session's time; run on Linux with CPython's monotonic clock"
+        )
+
+
+def _check_stamp(stamp: float) -> None:
+    """Refuse what liblsl would replace by the time of the push: 0 means now, -1 means deduce."""
+    if not stamp > 0.0:
+        raise StreamError(
+            f"a sample cannot be stamped {stamp} s; LSL needs the computer's own time, above 0"
+        )
+
+
+def _info(
+    name: str, kind: str, channels: int, form: str, *, rate_hz: float, source: str
+) -> "pylsl.StreamInfo":
+    import pylsl  # noqa: PLC0415
+
+    info = pylsl.StreamInfo(name, kind, channels, rate_hz, form, f"labcrane/{source}/{name}")
+    description = info.desc()
+    acquisition = description.append_child("acquisition")
+    acquisition.append_child_value("manufacturer", "labcrane")
+    acquisition.append_child_value("model", name)
+    acquisition.append_child_value("serial_number", source)
+    timing = description.append_child("synchronization")
+    for field in ("offset_mean", "offset_rms", "offset_median"):
+        timing.append_child_value(field, "0")
+    timing.append_child_value("can_drop_samples", "false")
+    description.append_child("channels")
+    return info
+
+
+def _channel(info: "pylsl.StreamInfo", **fields: str) -> None:
+    channel = info.desc().child("channels").append_child("channel")
+    for key, value in fields.items():
+        channel.append_child_value(key, value)
+
+
+def _describe_state(info: "pylsl.StreamInfo", layout: Layout) -> None:
+    for signal in layout.signals:
+        owner, _, quantity = signal.name.rpartition(".")
+        for column in signal.columns:
+            fields = {"label": column, "unit": signal.unit, "object": owner or signal.name}
+            if quantity in MOCAP and signal.components:
+                part = column.rpartition(".")[2].upper()
+                fields |= {"type": MOCAP[quantity] + part}
+                if signal.unit == "m":
+                    fields["unit"] = "meters"
+            else:
+                fields["type"] = "".join(word.title() for word in signal.name.split("."))
+            _channel(info, **fields)
+
+
+def _describe_input(info: "pylsl.StreamInfo", layout: Layout) -> None:
+    for column in layout.columns:
+        words = column.replace(".", "_").lower().split("_")
+        button = any(word.startswith(BUTTONS) for word in words)
+        _channel(info, label=column, unit="normalized", type="Button" if button else "Axis")
+
+
+def _describe_codes(info: "pylsl.StreamInfo", codes: Mapping[str, int]) -> None:
+    table = info.desc().append_child("codes")
+    entries: list[tuple[str, Any]] = [("any other event", OTHER), *codes.items()]
+    for name, number in entries:
+        entry = table.append_child("code")
+        entry.append_child_value("event", name)
+        entry.append_child_value("value", str(number))

@@ -1,0 +1,183 @@
+"""The aiming task."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from labcrane import (
+    Event,
+    FloatArray,
+    Frame,
+    Judgement,
+    Machine,
+    Phase,
+    Planned,
+    ProtocolError,
+    Run,
+    Signal,
+    Task,
+    Trial,
+    reach,
+)
+from labcrane_aiming.movement import Movement
+from labcrane_aiming.pairs import Pair, Point, index_of_difficulty, pairs
+from labcrane_aiming.settings import AimingSettings
+
+# Seconds per movement in a plan: an intercept and seconds per bit, seen with simulated operators.
+PLAN_INTERCEPT_S = 1.0
+PLAN_SLOPE_S = 3.2
+
+PRESSED = 0.5  # a button is 0 or 1
+
+
+class Aiming(Task):
+    """Two circles at a time; each movement goes from one to the other and is one trial.
+
+    A pair of circles begins with an approach to its near circle, which is recorded and not
+    counted. The machine goes on from where it stands.
+    """
+
+    signals = (
+        Signal("target.position", "m", ("x", "y", "z")),
+        Signal("target.radius", "m"),
+        Signal("other.position", "m", ("x", "y", "z")),
+    )
+
+    results = (
+        Signal("reaction_time", "s"),  # from the trial's start to the movement's onset
+        Signal("command_onset", "s"),  # from the trial's start to the first command
+        Signal("movement_time", "s"),  # from onset to offset
+        Signal("first_entry", "s"),  # from the trial's start to the first time inside
+        Signal("entries", "1"),  # times the tip came into the circle
+        Signal("error", "m"),  # distance of tip and circle's centre at the offset
+        Signal("error_along", "m"),  # the same along the task axis, positive for too far
+        Signal("error_across", "m"),  # the same across the task axis
+        Signal("error_bound", "m"),  # largest error the end rule allows; NaN where it allows any
+        Signal("path_length", "m"),  # from onset to offset
+        Signal("peak_speed", "m/s"),
+    )
+
+    condition_units = {  # noqa: RUF012 - a constant of the class, as its signals are
+        **dict.fromkeys(("distance", "width", "start_x", "start_y", "start_z"), "m"),
+        **dict.fromkeys(("target_x", "target_y", "target_z"), "m"),
+        "difficulty": "bit",
+        "movement": "1",
+    }
+
+    def __init__(self, settings: AimingSettings, machine: Machine) -> None:
+        self._settings = settings
+        self._pairs = {pair.name: pair for pair in pairs(settings)}
+        for pair in self._pairs.values():
+            for which, point in (("near", pair.near), ("far", pair.far)):
+                if reach(machine, point) is None:
+                    raise ProtocolError(
+                        f"the {which} circle of pair {pair.name!r} at "
+                        f"({', '.join(f'{value:.2f}' for value in point)}) m is out of reach of "
+                        f"the {machine.title}; move the centre or shorten the distance"
+                    )
+        self._values: FloatArray = np.zeros(7)
+
+    def factors(self) -> Mapping[str, Sequence[str]]:
+        return {"pairs": tuple(self._pairs)}
+
+    def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[Planned]:
+        return [
+            self._planned(self._pairs[name], number)
+            for name in levels["pairs"]
+            for number in range(self._settings.movements + 1)
+        ]
+
+    def _planned(self, pair: Pair, number: int) -> Planned:
+        outward = number % 2 == 1  # the approach, number 0, ends at the near circle
+        start, target = (pair.near, pair.far) if outward else (pair.far, pair.near)
+        difficulty = index_of_difficulty(pair.distance, self._settings.width)
+        condition = {
+            "pair": pair.name,
+            "distance": pair.distance,
+            "width": self._settings.width,
+            "difficulty": difficulty,
+            "far_side": pair.side,
+            "movement": number,
+            "direction": "outward" if outward else "inward",
+            **dict(zip(("start_x", "start_y", "start_z"), start, strict=True)),
+            **dict(zip(("target_x", "target_y", "target_z"), target, strict=True)),
+        }
+        expected = PLAN_INTERCEPT_S + PLAN_SLOPE_S * difficulty
+        return Planned(condition, expected_s=expected, counted=number > 0)
+
+    def open(self, run: Run) -> None:
+        self._tip = run.state.find("tip.position")
+        self._velocity = run.state.find("tip.velocity")
+        self._command = run.command.find("command")
+        self._trigger = (
+            run.axes.index(self._settings.trigger) if self._settings.end == "trigger" else None
+        )
+
+    def begin_trial(self, trial: Trial) -> None:
+        condition = trial.planned.condition
+        start, target = _point(condition, "start"), _point(condition, "target")
+        self._movement = Movement(self._settings, start, target)
+        self._values = np.array([*target, self._settings.width / 2, *start])
+        self._limit = self._settings.limit_s
+        self._pressed = True  # a trigger still held from the last movement ends nothing
+
+    def overrule(self) -> None:
+        self._limit = math.inf
+
+    def judge(self, frame: Frame) -> Judgement:
+        movement = self._movement
+        movement.see(
+            frame.elapsed,
+            frame.tick.due,
+            frame.state[self._tip].tolist(),
+            frame.state[self._velocity].tolist(),
+        )
+        events = self._moments(frame)
+        phase, end = self._phase(frame)
+        if not phase.over:
+            return Judgement(phase, self._values, tuple(events))
+        onset = movement.onset()
+        if onset is not None:
+            # Known only now, because it depends on the peak; stamped when it happened.
+            events.append(Event("movement.onset", movement.due[onset]))
+        if end is not None:
+            events.append(Event("movement.offset", movement.due[end]))
+        return Judgement(phase, self._values, tuple(events), movement.measures(end))
+
+    def _moments(self, frame: Frame) -> list[Event]:
+        movement, due = self._movement, frame.tick.due
+        events = []
+        if len(movement.elapsed) == 1:
+            events.append(Event("targets.shown", due))
+        if math.isnan(movement.command_onset) and frame.command[self._command].any():
+            movement.command_onset = frame.elapsed
+            events.append(Event("command.onset", due))
+        if movement.entered:
+            movement.entries += 1
+            if movement.entries == 1:
+                movement.first_entry = frame.elapsed
+                events.append(Event("target.entered", due))
+        return events
+
+    def _phase(self, frame: Frame) -> tuple[Phase, int | None]:
+        movement = self._movement
+        if self._trigger is not None:
+            pressed = bool(frame.axes[self._trigger] > PRESSED)
+            edge, self._pressed = pressed and not self._pressed, pressed
+            if edge:
+                return Phase.SUCCESS, len(movement.elapsed) - 1
+        elif movement.rested and self._arrived():
+            return Phase.SUCCESS, movement.tick_at(movement.rest_since)
+        if frame.elapsed >= self._limit:
+            return Phase.TIMEOUT, None
+        return Phase.RUNNING, None
+
+    def _arrived(self) -> bool:
+        anywhere = self._settings.end == "rest_anywhere"
+        return not anywhere or self._movement.done >= self._settings.rest_after
+
+
+def _point(condition: Mapping[str, object], name: str) -> Point:
+    x, y, z = (float(str(condition[f"{name}_{axis}"])) for axis in "xyz")
+    return x, y, z

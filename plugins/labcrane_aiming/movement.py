@@ -1,0 +1,138 @@
+"""One movement of the tip: what was seen of it so far, and its measures when it is over."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from labcrane import FloatArray, Value
+from labcrane_aiming.settings import AimingSettings
+
+Point = tuple[float, float, float]
+
+
+@dataclass
+class Movement:
+    """The path of the tip, tick by tick.
+
+    Attributes
+    ----------
+    start, target
+        Centres of the circle the movement comes from and of the one it goes to, in metres.
+    elapsed, due
+        Trial time and time on the run's clock of every tick, in seconds.
+    speed, position, distance
+        Tip speed in m/s, position in m, and distance to the target's centre in m.
+    """
+
+    settings: AimingSettings
+    start: Point
+    target: Point
+    elapsed: list[float] = field(default_factory=list)
+    due: list[float] = field(default_factory=list)
+    speed: list[float] = field(default_factory=list)
+    position: list[Point] = field(default_factory=list)
+    distance: list[float] = field(default_factory=list)
+    entries: int = 0
+    first_entry: float = math.nan
+    command_onset: float = math.nan
+    rest_since: float = math.nan
+
+    def see(
+        self, elapsed: float, due: float, tip: Sequence[float], velocity: Sequence[float]
+    ) -> None:
+        """Take one tick."""
+        x, y, z = tip
+        speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
+        distance = math.dist((x, y, z), self.target)
+        somewhere = self.settings.end != "rest_inside"
+        resting = speed < self.settings.rest_speed
+        if not (resting and (somewhere or distance <= self.settings.width / 2)):
+            self.rest_since = math.nan
+        elif math.isnan(self.rest_since):
+            self.rest_since = elapsed
+        self.elapsed.append(elapsed)
+        self.due.append(due)
+        self.speed.append(speed)
+        self.position.append((x, y, z))
+        self.distance.append(distance)
+
+    @property
+    def inside(self) -> bool:
+        """Whether the tip is in the target now."""
+        return self.distance[-1] <= self.settings.width / 2
+
+    @property
+    def entered(self) -> bool:
+        """Whether the tip came into the target in this very tick."""
+        before = len(self.distance) > 1 and self.distance[-2] <= self.settings.width / 2
+        return self.inside and not before
+
+    @property
+    def rested(self) -> bool:
+        """Whether the tip has been at rest, where it must be, for long enough."""
+        # Half a tick of slack: elapsed times are sums of whole ticks.
+        return self.elapsed[-1] - self.rest_since >= self.settings.rest_s - 1e-9
+
+    @property
+    def done(self) -> float:
+        """Fraction of the way from circle to circle that the tip has made along the task axis."""
+        axis = np.subtract(self.target, self.start)
+        way = np.subtract(self.position[-1], self.start)
+        return float(way @ axis / (axis @ axis))
+
+    def onset(self) -> int | None:
+        """Return the tick at which the movement began, or None when it never did.
+
+        Searched back from the peak: the first tick of the stretch around the peak in which the
+        tip is faster than the onset speed, if that stretch is long enough.
+        """
+        speed = np.array(self.speed)
+        peak = int(speed.argmax())
+        threshold = max(self.settings.onset_speed, self.settings.onset_share * speed[peak])
+        slow = np.flatnonzero(speed <= threshold)
+        before, after = slow[slow < peak], slow[slow > peak]
+        first = int(before[-1]) + 1 if before.size else 0
+        last = int(after[0]) - 1 if after.size else len(speed) - 1
+        if speed[peak] <= threshold:
+            return None
+        held = self.elapsed[last] - self.elapsed[first]
+        return first if held >= self.settings.onset_hold_s - 1e-9 else None
+
+    def tick_at(self, elapsed: float) -> int:
+        """Return the tick at a trial time."""
+        return int(np.searchsorted(self.elapsed, elapsed - 1e-9))
+
+    def measures(self, end: int | None) -> dict[str, Value]:
+        """Return the results, ``end`` being the tick of the movement's offset.
+
+        Without an offset (a time-out) the errors are those of the last tick, and the movement
+        time is NaN.
+        """
+        onset = self.onset()
+        last = len(self.elapsed) - 1 if end is None else end
+        began = self.elapsed[onset] if onset is not None else math.nan
+        path = np.array(self.position[onset or 0 : last + 1])
+        along, across = self._error(self.position[last])
+        bounded = self.settings.end == "rest_inside" and end is not None
+        return {
+            "reaction_time": began,
+            "command_onset": self.command_onset,
+            "movement_time": math.nan if end is None else self.elapsed[end] - began,
+            "first_entry": self.first_entry,
+            "entries": self.entries,
+            "error": self.distance[last],
+            "error_along": along,
+            "error_across": across,
+            "error_bound": self.settings.width / 2 if bounded else math.nan,
+            "path_length": float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()),
+            "peak_speed": max(self.speed),
+        }
+
+    def _error(self, tip: Point) -> tuple[float, float]:
+        axis: FloatArray = np.subtract(self.target, self.start)
+        axis = axis / np.linalg.norm(axis)
+        miss = np.subtract(tip, self.target)
+        along = float(miss @ axis)
+        return along, float(np.linalg.norm(miss - along * axis))

@@ -1,0 +1,58 @@
+"""What a protocol may say about the aiming task."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+
+from labcrane import Settings
+
+
+class AimingSettings(Settings):
+    """Settings of :class:`~labcrane_aiming.aiming.Aiming`.
+
+    The published study gives neither the geometry nor the rules; the defaults are a proposal that
+    both bundled machines can reach (``docs/decisions/0004-aiming-geometry.md``).
+    """
+
+    distances: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (2.0, 3.0, 4.0, 6.0)
+    """Distances between the two circles' centres, in metres. Each is used in both mirror images."""
+
+    width: PositiveFloat = 0.5
+    """Diameter of a circle, in metres."""
+
+    movements: PositiveInt = 4
+    """Counted movements per pair of circles."""
+
+    centre: tuple[float, float, float] = (5.5, 0.0, 0.8)
+    """Middle between the two circles in the machine's base frame: x, y, z in metres."""
+
+    diagonal_deg: float = Field(default=45.0, ge=0.0, le=90.0)
+    """Angle between the line through the circles and the x axis, in degrees."""
+
+    end: Literal["rest_inside", "rest_anywhere", "trigger"] = "rest_inside"
+    """What ends a movement: the tip at rest inside the circle, the tip at rest once most of the
+    way is done, or the trigger. With ``rest_inside`` an error cannot exceed the radius."""
+
+    trigger: str = "right.trigger"
+    """The button that ends a movement when ``end`` is ``trigger``."""
+
+    rest_speed: PositiveFloat = 0.02
+    """Tip speed below which the tip is at rest, in metres per second."""
+
+    rest_s: NonNegativeFloat = 0.2
+    """How long the tip must be at rest, in seconds."""
+
+    rest_after: float = Field(default=0.5, gt=0.0, le=1.0)
+    """Fraction of the way after which a rest ends a movement, when ``end`` is ``rest_anywhere``."""
+
+    onset_speed: PositiveFloat = 0.02
+    """Tip speed above which a movement has begun, in metres per second."""
+
+    onset_share: float = Field(default=0.05, ge=0.0, lt=1.0)
+    """The same as a fraction of the movement's peak speed; the larger of the two holds."""
+
+    onset_hold_s: NonNegativeFloat = 0.1
+    """How long the tip must stay above the onset speed, in seconds."""
+
+    limit_s: PositiveFloat = 30.0
+    """Longest a movement may take, in seconds; then it ends as a time-out."""

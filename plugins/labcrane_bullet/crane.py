@@ -1,0 +1,79 @@
+"""What both cranes have in common: their signals, their drives and their looks."""
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+
+from labcrane import (
+    Actuator,
+    Body,
+    Dynamics,
+    FloatArray,
+    Machine,
+    PluginError,
+    ProtocolError,
+    Run,
+    Value,
+)
+from labcrane_bullet.boxes import crane_boxes
+from labcrane_bullet.crane_state import CraneState, crane_signals
+from labcrane_bullet.pose import check_pose
+from labcrane_bullet.settings import CraneSettings
+
+ROUNDING_S = 1e-9
+
+
+class Crane(Dynamics):
+    """A crane whose joints follow speed commands through their actuators.
+
+    A subclass says how joints move at given speeds. A speed holds over its tick.
+    """
+
+    def __init__(self, settings: CraneSettings, machine: Machine) -> None:
+        self.signals = crane_signals(machine)
+        self._settings = settings
+        self._machine = machine
+        self._state = CraneState(machine)
+
+    def open(self, run: Run) -> None:
+        self._drive = run.command.find("command")
+        asked, there = self._drive.stop - self._drive.start, len(self._machine.joints)
+        if asked != there:
+            raise ProtocolError(
+                f"{run.command.owner} commands {asked} joints; this machine has {there} "
+                f"({', '.join(self._machine.names)})"
+            )
+        self._dt = 1.0 / run.rate_hz
+        self._actuator = Actuator(self._settings.actuator, self._machine.speeds, self._dt)
+        self.reset(self._machine.rest)
+
+    def state(self) -> FloatArray:
+        return self._state.values
+
+    def step(self, command: FloatArray, dt: float) -> FloatArray:
+        if abs(dt - self._dt) > ROUNDING_S:
+            raise PluginError(
+                f"a step of {dt:g} s was asked for; the crane was opened for ticks of "
+                f"{self._dt:g} s and cannot change them while it runs"
+            )
+        return self._move(self._actuator.follow(command[self._drive].tolist()))
+
+    def reset(self, pose: Sequence[float]) -> None:
+        angles = check_pose(self._machine, pose)
+        self._actuator.reset()
+        self._place(angles)
+        self._state.fill(angles, [0.0] * len(angles))
+
+    def bodies(self) -> Sequence[Body]:
+        return crane_boxes(self._machine)
+
+    def facts(self) -> Mapping[str, Value]:
+        actuator = self._settings.actuator.model_dump()
+        return {f"actuator.{name}": value for name, value in actuator.items()}
+
+    @abstractmethod
+    def _place(self, angles: Sequence[float]) -> None:
+        """Stand at ``angles`` in rad, as if nothing had happened before."""
+
+    @abstractmethod
+    def _move(self, speeds: Sequence[float]) -> FloatArray:
+        """Move for one tick at ``speeds`` in rad/s; return the filled state."""

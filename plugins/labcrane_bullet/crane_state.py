@@ -1,0 +1,66 @@
+"""The state array of a crane: what is in it, and how it is filled."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from labcrane import FloatArray, Machine, Signal
+
+
+def crane_signals(machine: Machine) -> tuple[Signal, ...]:
+    """Return what a crane's state holds, in order."""
+    return (
+        Signal("joint.angle", "rad", machine.names),
+        Signal("joint.velocity", "rad/s", machine.names),
+        Signal("tip.position", "m", ("x", "y", "z")),
+        Signal("tip.velocity", "m/s", ("x", "y", "z")),
+    )
+
+
+class CraneState:
+    """One array that is filled anew on every tick.
+
+    The tip's motion is scalar: with PyBullet it costs less than asking the engine for it, and
+    is the tip of the joint angles in the same array to the last digit.
+
+    Attributes
+    ----------
+    values
+        The state, shape ``(2 * n_joints + 6,)``.
+    """
+
+    def __init__(self, machine: Machine) -> None:
+        slew, *chain = machine.joints
+        self._base_x = machine.base_x
+        self._height = slew.d
+        self._slew_offset = slew.offset
+        self._links = tuple((joint.a, joint.offset) for joint in chain)
+        self.values: FloatArray = np.zeros(2 * len(machine.joints) + 6)
+
+    def fill(self, angles: Sequence[float], speeds: Sequence[float]) -> FloatArray:
+        """Return the state with joints at ``angles`` in rad, moving at ``speeds`` in rad/s."""
+        pitch, turning = 0.0, 0.0
+        radius, height, outward, upward = 0.0, self._height, 0.0, 0.0
+        for joint, (length, offset) in enumerate(self._links, start=1):
+            pitch += angles[joint] + offset
+            turning += speeds[joint]
+            forward, down = length * math.cos(pitch), length * math.sin(pitch)
+            radius += forward
+            height -= down
+            outward -= down * turning
+            upward -= forward * turning
+        bearing = angles[0] + self._slew_offset
+        ahead, left = math.cos(bearing), math.sin(bearing)
+        sideways = radius * speeds[0]
+        self.values[:] = (
+            *angles,
+            *speeds,
+            self._base_x + radius * ahead,
+            radius * left,
+            height,
+            outward * ahead - sideways * left,
+            outward * left + sideways * ahead,
+            upward,
+        )
+        return self.values

@@ -1,0 +1,26 @@
+"""A crane without an engine: every joint moves exactly at the speed its actuator gives."""
+
+from collections.abc import Sequence
+
+from labcrane import FloatArray
+from labcrane_bullet.crane import Crane
+
+
+class KinematicCrane(Crane):
+    """The velocity law itself: the reference for every engine.
+
+    Speeds are integrated exactly. A joint that comes to its limit stands there, with speed zero.
+    """
+
+    def _place(self, angles: Sequence[float]) -> None:
+        self._angles = list(angles)
+
+    def _move(self, speeds: Sequence[float]) -> FloatArray:
+        moved, angles = list(speeds), self._angles
+        for joint, (lowest, highest) in enumerate(self._machine.limits):
+            angle = angles[joint] + moved[joint] * self._dt
+            if not lowest <= angle <= highest:
+                angle = lowest if angle < lowest else highest
+                moved[joint] = 0.0
+            angles[joint] = angle
+        return self._state.fill(angles, moved)

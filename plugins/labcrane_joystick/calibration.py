@@ -1,0 +1,138 @@
+"""What was found out about the two sticks, and the file that keeps it."""
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import Field, ValidationError, model_validator
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from labcrane import DeviceError, Settings
+
+RUN_AGAIN = "run 'python -m labcrane_joystick' to identify and calibrate the sticks"
+
+
+class AxisRange(Settings):
+    """Where an axis rests and where it ends, as raw SDL numbers."""
+
+    minimum: int = Field(default=-32768, ge=-32768, le=32767)
+    """Raw number at the lower end."""
+    centre: int = Field(default=0, ge=-32768, le=32767)
+    """Raw number at rest."""
+    maximum: int = Field(default=32767, ge=-32768, le=32767)
+    """Raw number at the upper end."""
+
+    @model_validator(mode="after")
+    def _ascends(self) -> Self:
+        if not self.minimum < self.centre < self.maximum:
+            raise ValueError(
+                f"minimum, centre and maximum must ascend, but are {self.minimum}, "
+                f"{self.centre} and {self.maximum}"
+            )
+        return self
+
+    def scaled(self, raw: int) -> float:
+        """Return the axis in [-1, 1]: 0 at the centre, and each side linear to its own end.
+
+        Beyond a calibrated end the end's value holds.
+        """
+        centre = self.centre
+        if raw > centre:
+            end = self.maximum
+            return (raw - centre) / (end - centre) if raw < end else 1.0
+        end = self.minimum
+        return (raw - centre) / (centre - end) if raw > end else -1.0
+
+
+class Calibration(Settings):
+    """One hand's stick."""
+
+    port: str
+    """The socket it is plugged into."""
+    x: AxisRange = AxisRange()
+    """To the right."""
+    y: AxisRange = AxisRange()
+    """Towards the operator."""
+    twist: AxisRange = AxisRange()
+    """Clockwise."""
+    slider: AxisRange = AxisRange()
+    """It rests anywhere; its centre is the middle."""
+
+    @property
+    def axes(self) -> tuple[AxisRange, ...]:
+        """The ranges in the order of the stick's axes."""
+        return (self.x, self.y, self.twist, self.slider)
+
+
+class Calibrations(Settings):
+    """Both hands' sticks."""
+
+    date: str
+    """Day of the calibration, ISO 8601."""
+    left: Calibration
+    """The stick whose trigger was pulled for the left."""
+    right: Calibration
+    """The other."""
+
+    @property
+    def ports(self) -> tuple[str, str]:
+        """The sockets of the left and the right stick."""
+        return (self.left.port, self.right.port)
+
+
+def default_path() -> Path:
+    """Return the user's file: in ``$LABCRANE_CONFIG``, or else in ``~/.config/labcrane``."""
+    folder = os.environ.get("LABCRANE_CONFIG")
+    return (Path(folder) if folder else Path.home() / ".config" / "labcrane") / "joysticks.yaml"
+
+
+def load(path: Path, model: str) -> Calibrations | None:
+    """Return what ``path`` holds for sticks of ``model``; None when there is nothing yet."""
+    content = _read(path)
+    if model not in content:
+        return None
+    try:
+        return Calibrations.model_validate(content[model])
+    except ValidationError as error:
+        raise DeviceError(f"{path}: what it says of {model} {_why(error)}; {RUN_AGAIN}") from error
+
+
+def save(path: Path, model: str, found: Calibrations) -> None:
+    """Keep ``found`` in ``path``, and what it holds for other models."""
+    content = {**_read(path), model: found.model_dump()}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    # Written beside and renamed, so that a crash leaves the old file or the new one.
+    beside = path.with_name(path.name + ".new")
+    with beside.open("w", encoding="utf-8") as file:
+        file.write("# Written by python -m labcrane_joystick; raw SDL numbers.\n")
+        YAML().dump(content, file)
+        file.flush()
+        os.fsync(file.fileno())
+    beside.replace(path)
+
+
+def _read(path: Path) -> Mapping[str, Any]:
+    try:
+        content = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return {}
+    except (OSError, UnicodeDecodeError, YAMLError) as error:
+        raise DeviceError(f"{path} cannot be read: {error}; {_remove(path)}") from error
+    if not isinstance(content, dict):
+        raise DeviceError(f"{path} must hold a mapping of joystick models; {_remove(path)}")
+    return content
+
+
+def _remove(path: Path) -> str:
+    return f"remove it and {RUN_AGAIN}"
+
+
+def _why(error: ValidationError) -> str:
+    def one(place: Sequence[str | int], message: str) -> str:
+        return f"is wrong at {'.'.join(map(str, place)) or 'the top'}: {message}"
+
+    return ", ".join(
+        one(each["loc"], each["msg"].removeprefix("Value error, ")) for each in error.errors()
+    )

@@ -1,0 +1,23 @@
+"""Operators without a person: a simulated one, and a recorded one."""
+
+from collections.abc import Sequence
+
+from labcrane import InputDevice, Machine, Offer, hookimpl, offer
+from labcrane_operator.recorded import RecordedInput, RecordedSettings
+from labcrane_operator.settings import OperatorSettings
+
+
+@hookimpl
+def labcrane_inputs() -> Sequence[Offer[InputDevice]]:
+    def simulated(settings: OperatorSettings, machine: Machine) -> InputDevice:
+        from labcrane_operator.operator import SimulatedOperator
+
+        return SimulatedOperator(settings)
+
+    def recorded(settings: RecordedSettings, machine: Machine) -> InputDevice:
+        return RecordedInput(settings)
+
+    return (
+        offer("simulated_operator", OperatorSettings, simulated),
+        offer("recorded", RecordedSettings, recorded),
+    )

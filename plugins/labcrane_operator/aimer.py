@@ -1,0 +1,133 @@
+"""How an operator gets the tip into a target: aim, move, look, correct."""
+
+import math
+from enum import Enum, auto
+
+from labcrane_operator.noise import Noise
+from labcrane_operator.settings import OperatorSettings
+from labcrane_operator.sub_movement import Point, SubMovement, fitts_duration
+
+STILL = (0.0, 0.0, 0.0)
+
+
+class Doing(Enum):
+    """What the operator is at."""
+
+    WAITING = auto()  # for a target
+    REACTING = auto()  # to a target just seen
+    MOVING = auto()  # along a plan
+    LOOKING = auto()  # at where the plan ended
+    HOLDING = auto()  # at rest inside the target
+
+
+class Aimer:
+    """One trial's aimed movements.
+
+    A primary movement of least jerk, as long as Fitts' law says and scattered at its end, is
+    followed by corrective ones (after Meyer et al. 1988). The tip is steered along the plan with
+    a correction towards it; a plan that has run ahead of the machine waits for it.
+
+    Parameters
+    ----------
+    settings
+        How the operator moves.
+    noise
+        The trial's randomness.
+    slowness
+        What Fitts' law is multiplied by: practice and pace.
+    dt
+        Seconds per tick.
+    """
+
+    def __init__(
+        self, settings: OperatorSettings, noise: Noise, slowness: float, dt: float
+    ) -> None:
+        self._settings = settings
+        self._noise = noise
+        self._slowness = slowness
+        self._dt = dt
+        self._doing = Doing.WAITING
+        self._target: Point | None = None
+        self._plan: SubMovement | None = None
+        self._time = 0.0
+        self._wait = 0.0
+        self._press = 0.0
+
+    @property
+    def pressing(self) -> bool:
+        """Whether the trigger is pressed now."""
+        return self._doing is Doing.HOLDING and self._press > 0.0
+
+    def rest(self) -> None:
+        """There is no target: forget the last one."""
+        self._doing, self._target = Doing.WAITING, None
+
+    def move(self, tip: Point, speed: float, target: Point, radius: float) -> Point:
+        """Return the tip velocity in m/s that the hands ask for now.
+
+        Called once a tick that is not paused. ``tip`` and ``target`` are positions in m,
+        ``speed`` is the tip's in m/s, ``radius`` the target's in m.
+        """
+        if target != self._target:
+            self._see(target)
+        self._wait -= self._dt
+        off = math.dist(tip, target)
+        inside = off <= self._settings.inside * radius
+        if self._doing is Doing.HOLDING:
+            self._press -= self._dt
+            if inside:
+                return STILL
+            self._aim(tip, target, radius)
+        elif self._doing is Doing.REACTING:
+            if self._wait > 0.0:
+                return STILL
+            self._aim(tip, target, radius)
+        elif self._doing is Doing.LOOKING and self._wait <= 0.0:
+            if not inside:
+                self._aim(tip, target, radius)
+            elif speed < self._settings.still_m_s:
+                self._doing = Doing.HOLDING
+                return STILL
+        return self._follow(tip)
+
+    def _see(self, target: Point) -> None:
+        """Turn to a new target."""
+        settings = self._settings
+        self._doing, self._target = Doing.REACTING, target
+        self._wait = self._noise.reaction(settings.reaction_s, settings.reaction_sd)
+        self._press = settings.press_s
+
+    def _aim(self, tip: Point, target: Point, radius: float) -> None:
+        """Plan a sub-movement from where the tip is."""
+        settings = self._settings
+        duration = self._slowness * fitts_duration(
+            settings.fitts_a_s, settings.fitts_b_s, math.dist(tip, target), 2.0 * radius
+        )
+        end = self._noise.scatter(tip, target, settings.endpoint_noise)
+        self._plan = SubMovement(tip, end, duration)
+        self._doing, self._time = Doing.MOVING, 0.0
+
+    def _follow(self, tip: Point) -> Point:
+        """Return the velocity in m/s along the plan and towards it, with the hands' noise."""
+        settings, plan = self._settings, self._plan
+        if plan is None:
+            return STILL
+        (x, y, z), (vx, vy, vz) = plan.at(self._time)
+        ex, ey, ez = x - tip[0], y - tip[1], z - tip[2]
+        pace = self._advance(plan, math.sqrt(ex * ex + ey * ey + ez * ez))
+        gain = settings.gain_per_s
+        vx, vy, vz = pace * vx + gain * ex, pace * vy + gain * ey, pace * vz + gain * ez
+        if vx * vx + vy * vy + vz * vz < settings.still_m_s**2 and self._doing is Doing.LOOKING:
+            return STILL
+        nx, ny, nz = self._noise.motor()
+        sd = settings.motor_noise
+        return vx * (1.0 + sd * nx), vy * (1.0 + sd * ny), vz * (1.0 + sd * nz)
+
+    def _advance(self, plan: SubMovement, lag: float) -> float:
+        """Go on in the plan by a tick; return its pace, below 1 when the machine lags behind."""
+        pace = max(0.0, min(1.0, 2.0 - 2.0 * lag / self._settings.patience_m))
+        if self._doing is Doing.MOVING:
+            self._time += pace * self._dt
+            if self._time >= plan.duration:
+                self._doing, self._wait = Doing.LOOKING, self._settings.look_s
+        return pace

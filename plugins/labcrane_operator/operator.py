@@ -1,0 +1,89 @@
+"""A simulated operator that closes the loop through the scheme and the machine of the study."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from labcrane import FloatArray, Frame, InputDevice, Layout, Phase, Run, Signal, Tick, Trial, Value
+from labcrane_operator.aimer import STILL, Aimer
+from labcrane_operator.noise import Noise
+from labcrane_operator.settings import OperatorSettings
+
+STICK = ("x", "y", "twist", "slider", "trigger", "connected")
+
+
+class SimulatedOperator(InputDevice):
+    """Hands on a dual joystick that take the tip to the task's target.
+
+    They see the frame before, like a person, and steer through ``run.steer`` as the scheme needs.
+    Time is counted in ticks of the trial that were not paused, so a pause only shifts the plan.
+    At rest inside the target they press the trigger of the right stick once, for tasks that end
+    a movement by it.
+    """
+
+    signals = (Signal("left", "1", STICK), Signal("right", "1", STICK))
+
+    def __init__(self, settings: OperatorSettings) -> None:
+        self._settings = settings
+        axes = Layout("the operator", self.signals)
+        self._connected = [axes.index("left.connected"), axes.index("right.connected")]
+        self._trigger = axes.index("right.trigger")
+        self._out = np.zeros(axes.size)
+        self._rest = np.zeros(axes.size)
+        self._rest[self._connected] = 1.0
+        self._pace = 1.0
+        self._trial = 0
+        self._aimer: Aimer | None = None
+
+    def open(self, run: Run) -> None:
+        self._run = run
+        self._tip = run.state.find("tip.position")
+        self._velocity = run.state.find("tip.velocity")
+        self._shown = bool(run.task.signals)  # a task that shows nothing shows no target
+        if self._shown:
+            self._target = run.task.find("target.position")
+            self._radius = run.task.index("target.radius")
+        person = np.random.default_rng(run.participant_seed)
+        self._pace = math.exp(self._settings.pace_sd * float(person.standard_normal()))
+
+    def begin_trial(self, trial: Trial) -> None:
+        settings, dt = self._settings, 1.0 / self._run.rate_hz
+        gain = settings.learning_gain * math.exp(-settings.learning_rate * (trial.number - 1))
+        noise = Noise(trial.seed, math.exp(-dt / settings.motor_noise_s))
+        self._aimer = Aimer(settings, noise, self._pace * (1.0 + gain), dt)
+        self._trial = trial.number
+
+    def read(self, tick: Tick, seen: Frame) -> FloatArray:
+        aimer, out = self._aimer, self._out
+        out[:] = self._rest
+        if aimer is None or not self._sees(seen):  # what the last trial left is no target
+            return out
+        target = seen.task[self._target].tolist()
+        if math.isnan(target[0]):
+            aimer.rest()
+            return out
+        velocity = aimer.move(
+            tuple(seen.state[self._tip].tolist()),
+            math.hypot(*seen.state[self._velocity].tolist()),
+            tuple(target),
+            seen.task.item(self._radius),
+        )
+        if velocity is not STILL:
+            out[:] = self._run.steer(np.array(velocity), seen.state)
+            out[self._connected] = 1.0
+        if aimer.pressing:
+            out[self._trigger] = 1.0
+        return out
+
+    def facts(self) -> Mapping[str, Value]:
+        return {"simulated": True, "pace": self._pace}
+
+    def _sees(self, seen: Frame) -> bool:
+        """Say whether the frame shows this trial, going on."""
+        return (
+            self._shown
+            and seen.trial == self._trial
+            and seen.phase is Phase.RUNNING
+            and not seen.paused
+        )

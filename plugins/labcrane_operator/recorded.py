@@ -1,0 +1,83 @@
+"""The axes of a recorded session, played again."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from pydantic import PositiveInt
+
+from labcrane import (
+    FloatArray,
+    Frame,
+    InputDevice,
+    ProtocolError,
+    RecordingError,
+    Run,
+    Settings,
+    Signal,
+    Tick,
+    Value,
+    open_recording,
+)
+
+
+class RecordedSettings(Settings):
+    """Settings of :class:`RecordedInput`."""
+
+    file: Path
+    """A participant file; a relative path counts from the folder in which labcrane runs."""
+
+    session: PositiveInt = 1
+    """Which session of it."""
+
+
+class RecordedInput(InputDevice):
+    """Gives in each tick the axes that were recorded in the tick of the same number.
+
+    A session of the same protocol, machine and versions then goes the same way, bit for bit. When
+    the recording has ended the device is lost, and the session pauses or ends as its protocol says.
+    """
+
+    def __init__(self, settings: RecordedSettings) -> None:
+        self._settings = settings
+        try:
+            record = open_recording(settings.file).session(settings.session)
+        except RecordingError as error:
+            raise ProtocolError(str(error)) from error
+        recorded = record.streams["input"]
+        self.signals = _signals(tuple(map(str, recorded.data)), recorded.units)
+        self._axes: FloatArray = recorded.data.to_numpy(np.float64)
+        self._rate_hz = float(record.attrs["rate_hz"])
+        self._at_rest = np.zeros(self._axes.shape[1])
+
+    def open(self, run: Run) -> None:
+        if run.rate_hz != self._rate_hz:
+            raise ProtocolError(
+                f"{self._settings.file} was recorded at {self._rate_hz:g} Hz and cannot be played "
+                f"at {run.rate_hz:g} Hz; set rate_hz: {self._rate_hz:g}"
+            )
+
+    def read(self, tick: Tick, seen: Frame) -> FloatArray:
+        if tick.number < len(self._axes):
+            row: FloatArray = self._axes[tick.number]
+            return row
+        self.fault = f"the recording {self._settings.file} has ended"
+        return self._at_rest
+
+    def facts(self) -> Mapping[str, Value]:
+        return {"file": str(self._settings.file), "session": self._settings.session}
+
+
+def _signals(columns: Sequence[str], units: Mapping[str, str]) -> tuple[Signal, ...]:
+    """Return signals with these columns, in the same order."""
+    signals: list[Signal] = []
+    for column in columns:
+        name, _, component = column.rpartition(".")
+        if name and signals and signals[-1].name == name:
+            last = signals.pop()
+            signals.append(Signal(name, last.unit, (*last.components, component)))
+        elif name:
+            signals.append(Signal(name, units[column], (component,)))
+        else:
+            signals.append(Signal(column, units[column]))
+    return tuple(signals)

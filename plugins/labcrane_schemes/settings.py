@@ -1,0 +1,88 @@
+"""What a protocol may say about a scheme."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+
+from labcrane import Settings
+
+AxisName = Annotated[str, Field(pattern=r"^-?[a-z][a-z0-9_.]*$")]
+"""An axis of the input, ``left.x``; a leading minus turns it round, ``-right.y``."""
+
+DIRECTIONS = {"base": ("x", "y", "z"), "arm": ("radial", "tangential", "vertical")}
+"""What the stick moves the tip along, for each ``frame``."""
+
+
+class HandlingSettings(Settings):
+    """What every scheme does with a stick and near a joint limit."""
+
+    dead_zone: float = Field(default=0.05, ge=0.0, lt=1.0)
+    """Deflection below which nothing moves, as a share of full; the rest is rescaled from its
+    edge, so that motion begins without a jump."""
+
+    expo: float = Field(default=0.0, ge=0.0, le=1.0)
+    """Share of the cube in ``(1 - expo) x + expo x³``: larger is finer around the centre."""
+
+    soft_stop_deg: NonNegativeFloat = 5.0
+    """Distance from a joint limit, in degrees, over which the joint is slowed to a stop."""
+
+
+class JointVelocitySettings(HandlingSettings):
+    """Each axis turns one joint."""
+
+    map: dict[str, AxisName]
+    """Which axis turns which joint, one for every joint of the machine."""
+
+    speed: float = Field(default=1.0, gt=0.0, le=1.0)
+    """Joint speed at full deflection, as a fraction of the machine's joint speeds."""
+
+
+class EndEffectorSettings(HandlingSettings):
+    """Each axis moves the tip along one direction."""
+
+    map: dict[str, AxisName]
+    """Which axis moves the tip along which direction: x, y and z of the base frame, or radial,
+    tangential and vertical as seen from the slew axis (see ``frame``)."""
+
+    frame: Literal["base", "arm"] = "base"
+    """Whether the directions stay with the base or turn with the arm."""
+
+    speed_m_s: PositiveFloat = 0.5
+    """Tip speed at full deflection of one axis, in m/s."""
+
+    redundancy: Literal["minimum_norm", "hold_pitch"] = "minimum_norm"
+    """How the joints that are one too many are settled: by the smallest joint speeds, which
+    lets the tip pitch wander and takes load off a joint near its limit; or by keeping the tip
+    pitch, and stopping at the first limit."""
+
+    damping: float = Field(default=0.2, gt=0.0, le=1.0)
+    """Largest damping of the least squares, in metres, reached at a singularity."""
+
+    threshold_m: PositiveFloat = 0.5
+    """Smallest singular value of the planar Jacobian, in metres, below which damping begins."""
+
+    @model_validator(mode="after")
+    def _map_fits_frame(self) -> "EndEffectorSettings":
+        wanted = DIRECTIONS[self.frame]
+        if set(self.map) != set(wanted):
+            raise ValueError(
+                f"with frame {self.frame!r}, map needs an axis for each of {', '.join(wanted)}, "
+                f"but names {', '.join(self.map) or 'nothing'}"
+            )
+        return self
+
+
+class SwitchableSettings(Settings):
+    """Two schemes, and a button that changes between them during a trial."""
+
+    button: AxisName
+    """The button: pressed beyond half, it changes the scheme."""
+
+    joint_velocity: JointVelocitySettings
+    """One scheme; ``scheme.active`` is 0."""
+
+    end_effector: EndEffectorSettings
+    """The other scheme; ``scheme.active`` is 1."""
+
+    start: Literal["joint_velocity", "end_effector"] = "joint_velocity"
+    """The scheme in which every trial begins."""

@@ -1,0 +1,47 @@
+"""What a stick's deflection asks for: dead zone, then a cubic."""
+
+import math
+
+ROUNDING = 1e-16
+"""Share of the cube that is lost in rounding, and whose root would overflow."""
+
+
+class Shaping:
+    """A dead zone rescaled from its edge, and ``(1 - expo) x + expo x³``.
+
+    Parameters
+    ----------
+    dead_zone
+        Deflection in [0, 1) below which nothing is asked for.
+    expo
+        Share of the cube, in [0, 1].
+    """
+
+    def __init__(self, dead_zone: float, expo: float) -> None:
+        self._edge = dead_zone
+        self._expo = expo
+        self._linear = 1.0 - expo
+
+    def shape(self, push: float) -> float:
+        """Return the share of full speed, in [-1, 1], that a deflection in [-1, 1] asks for."""
+        beyond = abs(push) - self._edge
+        if beyond <= 0.0:
+            return 0.0
+        x = beyond / (1.0 - self._edge)
+        return math.copysign(x * (self._linear + self._expo * x * x), push)
+
+    def unshape(self, share: float) -> float:
+        """Return the deflection that asks for a share of full speed, both in [-1, 1]."""
+        if share == 0.0:
+            return 0.0
+        x = self._root(min(abs(share), 1.0))
+        return math.copysign(min(self._edge + (1.0 - self._edge) * x, 1.0), share)
+
+    def _root(self, share: float) -> float:
+        """Return the one real root of the cubic, after Cardano in its hyperbolic form."""
+        if self._expo < ROUNDING:
+            return share
+        if self._linear == 0.0:
+            return math.cbrt(share)
+        stretch = math.sqrt(self._linear / (3.0 * self._expo))
+        return 2.0 * stretch * math.sinh(math.asinh(1.5 * share / (self._linear * stretch)) / 3.0)

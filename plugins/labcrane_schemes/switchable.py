@@ -1,0 +1,56 @@
+"""Two schemes, and a button that changes between them."""
+
+import numpy as np
+
+from labcrane import Controller, FloatArray, Machine, Run, Signal, Trial
+from labcrane_schemes.axis_map import find_axis
+from labcrane_schemes.end_effector import EndEffector
+from labcrane_schemes.joint_velocity import JointVelocity
+from labcrane_schemes.log import scheme_signals
+from labcrane_schemes.settings import SwitchableSettings
+
+PRESSED = 0.5
+"""Value of a button above which it is down."""
+
+
+class Switchable(Controller):
+    """Joint-velocity or end-effector control, as the operator chooses during a trial."""
+
+    def __init__(self, settings: SwitchableSettings, machine: Machine) -> None:
+        self.signals = (*scheme_signals(machine), Signal("scheme.active", "1"))
+        self._schemes: tuple[Controller, Controller] = (
+            JointVelocity(settings.joint_velocity, machine),
+            EndEffector(settings.end_effector, machine),
+        )
+        self._button = settings.button
+        self._start = 0 if settings.start == "joint_velocity" else 1
+        self._active = self._start
+        self._down = True
+        self._out = np.zeros(sum(len(signal.columns) for signal in self.signals))
+
+    def open(self, run: Run) -> None:
+        self._index, self._sign = find_axis(run.axes, self._button)
+        for scheme in self._schemes:
+            scheme.open(run)
+
+    def begin_trial(self, trial: Trial) -> None:
+        self._active = self._start
+        self._down = True  # a button still held from the last trial is no new press
+
+    def command(self, axes: FloatArray, state: FloatArray) -> FloatArray:
+        down = self._sign * axes.item(self._index) > PRESSED
+        if down and not self._down:
+            self._active = 1 - self._active
+        self._down = down
+        return self._with_active(self._schemes[self._active].command(axes, state))
+
+    def rest(self) -> FloatArray:
+        return self._with_active(self._schemes[self._active].rest()).copy()
+
+    def steer(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
+        return self._schemes[self._active].steer(velocity, state)
+
+    def _with_active(self, command: FloatArray) -> FloatArray:
+        self._out[:-1] = command
+        self._out[-1] = self._active
+        return self._out

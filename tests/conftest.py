@@ -1,0 +1,12 @@
+"""LSL on this computer only, apart from any other test run, before anything imports pylsl."""
+
+import os
+import tempfile
+from pathlib import Path
+
+from labcrane.streams.network import LOOPBACK
+
+_FOLDER = tempfile.TemporaryDirectory(prefix="labcrane-tests-")
+_CONFIG = Path(_FOLDER.name) / "lsl_api.cfg"
+_CONFIG.write_text(LOOPBACK.replace("[lab]", f"[lab]\nSessionID = labcrane-tests-{os.getpid()}"))
+os.environ["LSLAPICFG"] = str(_CONFIG)

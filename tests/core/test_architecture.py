@@ -1,0 +1,74 @@
+"""The rules that keep plugins replaceable and start-up instant."""
+
+import ast
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PLUGINS = sorted(path for path in (ROOT / "plugins").iterdir() if (path / "__init__.py").exists())
+HEAVY = {"pybullet", "pygame", "pyo", "panda3d", "pandas", "h5py", "nicegui", "pylsl", "matplotlib"}
+AIMING = str(ROOT / "protocols" / "aiming" / "protocol.yaml")
+
+
+def imported_modules(source: str) -> set[str]:
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module)
+    return names
+
+
+@pytest.mark.parametrize("plugin", PLUGINS, ids=lambda path: path.name)
+def test_plugin_imports_only_labcranes_public_names(plugin: Path) -> None:
+    for module in plugin.rglob("*.py"):
+        names = imported_modules(module.read_text())
+        ours = {name for name in names if name.startswith("labcrane")}
+        foreign = {n for n in ours if n != "labcrane" and n.split(".")[0] != plugin.name}
+        assert not foreign, f"{module.relative_to(ROOT)} imports {foreign}"
+
+
+def test_core_never_imports_a_plugin() -> None:
+    for module in (ROOT / "labcrane").rglob("*.py"):
+        names = imported_modules(module.read_text())
+        assert not {name for name in names if name.startswith("labcrane_")}, module.name
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["plugins"], ["check", AIMING]])
+def test_looking_loads_nothing_heavy(arguments: list[str]) -> None:
+    program = (
+        "import json, sys\n"
+        "from labcrane.cli.app import main\n"
+        "status = main(json.loads(sys.argv[1]))\n"
+        "print(json.dumps([status, sorted(m.split('.')[0] for m in sys.modules)]))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, json.dumps(arguments)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    status, loaded = json.loads(done.stdout.splitlines()[-1])
+    assert status == 0, done.stdout + done.stderr
+    assert not HEAVY & set(loaded)
+
+
+def test_files_stay_short() -> None:
+    for folder in ("labcrane", "plugins"):
+        for module in (ROOT / folder).rglob("*.py"):
+            assert len(module.read_text().splitlines()) <= 300, module.relative_to(ROOT)
+
+
+def test_the_project_names_no_place_of_its_making() -> None:
+    tracked = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False
+    ).stdout.split("\0")
+    for name in filter(None, tracked):
+        path = ROOT / name
+        if path.suffix in {".py", ".md", ".toml", ".yaml", ".sh", ".c"} and path != Path(__file__):
+            assert "../shared" not in path.read_text(), name

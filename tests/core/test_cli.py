@@ -1,0 +1,125 @@
+"""The commands, as a user types them."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from rehearsal import SHORT
+
+import labcrane
+from labcrane.cli.app import main
+
+ROOT = Path(__file__).parents[2]
+AIMING = ROOT / "protocols" / "aiming" / "protocol.yaml"
+
+
+def labcrane_command(
+    *arguments: str, cwd: Path, said: str = ""
+) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "labcrane", *arguments],
+        cwd=cwd,
+        input=said,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_the_demo_names_a_participant_file_and_a_picture_that_exist(tmp_path: Path) -> None:
+    done = labcrane_command("demo", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    named = [line.split(":", 1)[1].strip() for line in done.stdout.splitlines()[-2:]]
+    recording, picture = (tmp_path / name for name in named)
+    assert len(labcrane.open_recording(recording).session(1).trials) == 8
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert done.stderr == ""
+
+
+def test_the_demo_can_be_run_again_and_overwrites_nothing(tmp_path: Path) -> None:
+    for _ in range(2):
+        assert labcrane_command("demo", cwd=tmp_path).returncode == 0
+    folders = sorted(path.name for path in (tmp_path / "labcrane-demo").iterdir())
+    assert folders == ["P001-SIMULATED", "P002-SIMULATED"]
+
+
+def test_a_mistake_ends_with_code_2_and_no_traceback(tmp_path: Path) -> None:
+    (tmp_path / "study.yaml").write_text(SHORT.replace("rate_hz", "rat_hz"))
+    done = labcrane_command("check", "study.yaml", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr == (
+        "labcrane: study.yaml:4: 'rat_hz' is not a key of the file; did you mean 'rate_hz'?\n"
+    )
+
+
+def test_a_real_session_without_joysticks_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "study.yaml").write_text(SHORT)
+    done = labcrane_command("run", "study.yaml", "--participant", "P001", "--local", cwd=tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.startswith("labcrane: ")
+    assert "joystick" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_fast_without_simulate_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "study.yaml").write_text(SHORT)
+    path = str(tmp_path / "study.yaml")
+    assert main(["run", path, "--participant", "P001", "--fast"]) == 2
+    assert "--fast needs --simulate" in capsys.readouterr().err
+
+
+def test_check_says_that_a_protocol_is_fine(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(AIMING)]) == 0
+    assert "study 'aiming' is fine: 1 session on the CH8 knuckle boom" in capsys.readouterr().out
+
+
+def test_plan_lists_every_participants_own_order(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", str(AIMING), "--participants", "3"]) == 0
+    said = capsys.readouterr().out
+    assert all(name in said for name in ("P001", "P002", "P003"))
+    assert "P004" not in said
+    assert "session 1 'acquisition': about" in said
+
+
+def test_a_planned_order_is_the_one_that_is_run() -> None:
+    from labcrane.plan import plan_session
+    from labcrane.registry import discover
+    from labcrane.study import load
+
+    study = load(AIMING, discover())
+    one, again, other = (plan_session(study, name, 1) for name in ("P001", "P001", "P002"))
+    assert one == again
+    assert one.blocks[0].levels != other.blocks[0].levels
+    (block,) = one.blocks
+    pairs = [trial.planned.condition["pair"] for trial in block.trials if not trial.planned.counted]
+    assert tuple(pairs) == block.levels["pairs"]
+    assert sum(trial.planned.counted for trial in block.trials) == 32
+
+
+def test_lines_of_a_pipe_are_orders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # A recorded operator needs no joystick, and is waited for like a person.
+    (tmp_path / "study.yaml").write_text(SHORT)
+    simulate = ["run", "study.yaml", "--participant", "P001", "--simulate", "--fast"]
+    assert labcrane_command(*simulate, cwd=tmp_path).returncode == 0
+    recorded = "{use: recorded, file: data/P001-SIMULATED/P001-SIMULATED.h5}"
+    (tmp_path / "again.yaml").write_text(SHORT.replace("{use: dual_joystick}", recorded))
+    done = labcrane_command(
+        "run", "again.yaml", "--participant", "P002", "--local",
+        cwd=tmp_path, said="note hello there\nnonsense\nend\n",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "'nonsense' is not an order; there is start, pause" in done.stdout
+    session = labcrane.open_recording(tmp_path / "data" / "P002" / "P002.h5").session(1)
+    names = session.events["name"].tolist()
+    assert "order.note" in names
+    assert session.events["data"][names.index("order.note")]["text"] == "hello there"
+    assert session.events["data"][names.index("session.end")]["reason"] == "by order"
+
+
+@pytest.mark.parametrize("command", ["demo", "run", "check", "plan", "plugins"])
+def test_every_command_has_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, "--help"]) == 0
+    assert "Usage" in capsys.readouterr().out

@@ -1,0 +1,195 @@
+"""What a session does with orders and faults, tick by tick."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rehearsal import SHORT, a_study, rehearse
+
+from labcrane import InputDevice, rig
+from labcrane.console import Command, Order
+from labcrane.records import Phase
+from labcrane.study import Study
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Study:
+    return a_study(tmp_path)
+
+
+def give(order: Order, text: str = "") -> list[Command]:
+    return [Command(order, text)]
+
+
+def test_an_undisturbed_session_runs_its_plan(study: Study) -> None:
+    seen = rehearse(study)
+    assert [t["trial"] for t in seen.trials()] == [2, 3]  # trial 1 is the approach
+    assert all(t["outcome"] == "success" for t in seen.trials())
+    assert [n for n in seen.names if n.split(".")[0] in {"step", "block", "session", "trial"}] == [
+        "step.start",
+        "block.start",
+        *["trial.start", "trial.end"] * 3,
+        "block.end",
+        "step.end",
+        "session.end",
+    ]
+
+
+def test_every_event_is_stamped_within_its_session_and_in_the_tick_it_tells_of(
+    study: Study,
+) -> None:
+    seen = rehearse(study)
+    for frame in seen.frames:
+        for event in frame.events:
+            if event.name in {"movement.onset", "movement.offset"}:  # known only afterwards
+                assert event.time <= frame.tick.due
+            else:
+                assert event.time == frame.tick.due
+
+
+def test_elapsed_counts_the_ticks_of_a_trial(study: Study) -> None:
+    seen = rehearse(study)
+    for number in (1, 2, 3):
+        elapsed = [frame.elapsed for frame in seen.frames if frame.trial == number]
+        np.testing.assert_allclose(elapsed, np.arange(len(elapsed)) / 240.0, rtol=0, atol=1e-12)
+
+
+def test_a_pause_holds_the_machine_and_the_trials_clock(study: Study) -> None:
+    plain = rehearse(study)
+    seen = rehearse(study, {200: give(Order.PAUSE), 500: give(Order.START)})
+    held = seen.frames[200:500]
+    assert all(frame.paused and not frame.command[:4].any() for frame in held)
+    assert {frame.elapsed for frame in held} == {seen.frames[200].elapsed}
+    assert np.ptp([frame.state[:4] for frame in held], axis=0).max() == 0.0
+    assert [e.data["by"] for e in seen.events("pause.start")] == ["examiner"]
+    (approach, *_) = seen.events("trial.end")
+    assert approach.data["paused"] == pytest.approx(300 / 240)
+    assert len(plain.trials()) == len(seen.trials())
+
+
+def test_a_repeated_trial_is_kept_and_run_again_as_a_new_attempt(study: Study) -> None:
+    first = rehearse(study)
+    start = next(n for n, frame in enumerate(first.frames) if frame.trial == 2)
+    seen = rehearse(study, {start + 50: give(Order.REPEAT)})
+    rows = [(t["trial"], t["attempt"], t["outcome"]) for t in seen.trials()]
+    assert rows == [(2, 1, "repeated"), (2, 2, "success"), (3, 1, "success")]
+    seeds = {t["seed"] for t in seen.trials()}
+    assert len(seeds) == 3
+
+
+def test_a_skipped_trial_is_a_row_without_results(study: Study) -> None:
+    first = rehearse(study)
+    start = next(n for n, frame in enumerate(first.frames) if frame.trial == 2)
+    seen = rehearse(study, {start + 50: give(Order.SKIP)})
+    row = seen.trials()[0]
+    assert row["outcome"] == "skipped"
+    assert row["movement_time"] is None
+    assert [t["trial"] for t in seen.trials()] == [2, 3]
+
+
+def test_an_ended_session_says_so_and_ends_its_trial(study: Study) -> None:
+    seen = rehearse(study, {300: give(Order.END)})
+    assert seen.frames[-1].tick.number <= 301
+    assert seen.events("trial.end")[-1].data["outcome"] == "ended"
+    assert seen.events("session.end")[0].data["reason"] == "by order"
+
+
+def test_an_order_that_makes_no_sense_is_refused_in_words(study: Study) -> None:
+    seen = rehearse(study, {5: give(Order.START), 6: give(Order.NOTE), 7: give(Order.COMPLETION)})
+    assert seen.events("order.start")[0].data["refused"] == "nothing waits to start"
+    assert seen.events("order.note")[0].data["refused"] == "a note needs words"
+    assert seen.events("order.completion")[0].data["refused"] == "completion is 1 or 0, not ''"
+
+
+def test_notes_and_the_completion_flag_are_in_the_record(study: Study) -> None:
+    orders = {5: give(Order.NOTE, "coughs"), 6: give(Order.COMPLETION, "0")}
+    seen = rehearse(study, orders)
+    assert seen.events("order.note")[0].data["text"] == "coughs"
+    assert seen.events("trial.end")[0].data["completion"] == 0
+
+
+def test_an_overridden_trial_outlasts_its_limit(tmp_path: Path) -> None:
+    text = SHORT.replace("movements: 2", "movements: 2, limit_s: 0.5")
+    study = a_study(tmp_path, text)
+    assert {t["outcome"] for t in rehearse(study).trials()} == {"timeout"}
+    seen = rehearse(study, {3: give(Order.OVERRIDE)})
+    approach, outward, _inward = seen.events("trial.end")
+    assert approach.data["outcome"] == "success"
+    assert outward.data["outcome"] == "timeout"  # it holds for one trial
+
+
+def test_people_are_waited_for(tmp_path: Path) -> None:
+    text = SHORT.replace("- block:", "- instructions: hello.md\n      - block:")
+    (tmp_path / "hello.md").write_text("Welcome")
+    study = a_study(tmp_path, text)
+    seen = rehearse(study, {40: give(Order.START), 90: give(Order.START)}, waits=True)
+    assert [e.data["what"] for e in seen.events("waiting")] == ["instructions", "aiming"]
+    waiting = seen.frames[:90]
+    assert all(frame.phase is Phase.IDLE and not frame.command[:4].any() for frame in waiting)
+    assert np.isnan([frame.task for frame in waiting]).all()
+    assert seen.frames[92].trial == 1
+
+
+def test_a_break_lasts_as_written_or_until_it_is_skipped(tmp_path: Path) -> None:
+    text = SHORT.replace("- block:", "- break: {seconds: 2}\n      - block:")
+    study = a_study(tmp_path, text)
+    for orders, ticks, left in (({}, 480, 0.0), ({100: give(Order.SKIP)}, 100, 380 / 240)):
+        seen = rehearse(study, orders)
+        start, end = seen.events("break.start")[0], seen.events("break.end")[0]
+        assert (end.time - start.time) * 240 == pytest.approx(ticks, abs=1.01)
+        assert end.data["left"] == pytest.approx(left, abs=1.01 / 240)
+
+
+class Unplugged:
+    """An input device whose plug is pulled between two ticks."""
+
+    def __init__(self, device: InputDevice, out: int, back: int) -> None:
+        self._device, self._gone = device, range(out, back)
+
+    def __getattr__(self, name: str) -> object:
+        return getattr(self._device, name)
+
+    def read(self, tick, seen):
+        self.fault = "the left stick is unplugged" if tick.number in self._gone else None
+        axes = self._device.read(tick, seen)
+        return np.zeros_like(axes) if self.fault else axes
+
+
+def test_lost_input_stops_the_machine_at_once_and_goes_on_when_it_is_back(study: Study) -> None:
+    the_rig = rig.build(study, simulated=True)
+    the_rig = replace(the_rig, input=Unplugged(the_rig.input, 300, 400))
+    seen = rehearse(study, the_rig=the_rig)
+    assert seen.events("input.lost")[0].data["why"] == "the left stick is unplugged"
+    assert seen.events("input.lost")[0].time == seen.frames[300].tick.due
+    assert all(frame.paused and not frame.command[:4].any() for frame in seen.frames[300:400])
+    assert seen.events("input.back")[0].time == seen.frames[400].tick.due
+    assert not seen.frames[400].paused
+    assert all(t["outcome"] == "success" for t in seen.trials())
+
+
+def test_lost_input_ends_the_session_when_the_protocol_says_so(tmp_path: Path) -> None:
+    study = a_study(tmp_path, SHORT + "on_fault: {input_lost: end}\n")
+    the_rig = rig.build(study, simulated=True)
+    the_rig = replace(the_rig, input=Unplugged(the_rig.input, 300, 400))
+    seen = rehearse(study, the_rig=the_rig)
+    assert seen.events("session.end")[0].data["reason"] == "input lost"
+    assert seen.frames[-1].tick.number <= 301
+
+
+def test_the_same_seed_gives_the_same_frames(study: Study) -> None:
+    one, two = rehearse(study), rehearse(study)
+    assert len(one.frames) == len(two.frames)
+    for a, b in zip(one.frames, two.frames, strict=True):
+        assert a.state.tobytes() == b.state.tobytes()
+        assert a.axes.tobytes() == b.axes.tobytes()
+
+
+def test_an_axis_that_the_device_does_not_have_is_refused_before_the_first_tick(
+    tmp_path: Path,
+) -> None:
+    from labcrane import ProtocolError
+
+    study = a_study(tmp_path, SHORT.replace("left.x", "left.z"))
+    with pytest.raises(ProtocolError, match=r"'left\.z'"):
+        rehearse(study)

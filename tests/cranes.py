@@ -1,0 +1,66 @@
+"""Cranes for tests: built as a rig builds them, opened, driven."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from labcrane import Dynamics, FloatArray, Machine
+from labcrane.testing import RATE_HZ, a_run
+from labcrane_bullet import labcrane_dynamics
+from labcrane_bullet.settings import CraneSettings
+
+needs_bullet = pytest.mark.skipif(
+    find_spec("pybullet") is None and not os.environ.get("CI"),
+    reason="pybullet has no wheels for this Python",
+)
+CRANES = ["kinematic_crane", pytest.param("bullet_crane", marks=needs_bullet)]
+MACHINES = ["ch8", "ch8_cranelike"]
+cranes = pytest.mark.parametrize("name", CRANES)
+machines = pytest.mark.parametrize("model", MACHINES)
+rates = pytest.mark.parametrize("rate_hz", [240.0, 1000.0])
+
+
+def build(name: str, machine: Machine, actuator: object = "ideal") -> Dynamics:
+    """Return a crane as a rig builds it."""
+    (build,) = (offer.build for offer in labcrane_dynamics() if offer.name == name)
+    return build(CraneSettings.model_validate({"actuator": actuator}), machine)
+
+
+@contextmanager
+def standing(
+    name: str, machine: Machine, rate_hz: float = RATE_HZ, actuator: object = "ideal"
+) -> Iterator[Dynamics]:
+    """Yield an open crane at its pose of rest."""
+    crane = build(name, machine, actuator)
+    try:
+        crane.open(replace(a_run(machine), rate_hz=rate_hz))
+        yield crane
+    finally:
+        crane.close()
+
+
+def drive(crane: Dynamics, commands: FloatArray, rate_hz: float = RATE_HZ) -> FloatArray:
+    """Return the state after every command, shape ``(n_ticks, n_state)``."""
+    return np.array([crane.step(command, 1 / rate_hz).copy() for command in commands])
+
+
+def random_poses(machine: Machine, count: int, seed: int = 1) -> FloatArray:
+    lowest, highest = np.array(machine.limits).T
+    return np.random.default_rng(seed).uniform(lowest, highest, (count, len(lowest)))
+
+
+def random_sticks(machine: Machine, rate_hz: float, seconds: float, seed: int = 1) -> FloatArray:
+    """Return smooth random commands around zero, up to about half of full speed."""
+    random = np.random.default_rng(seed)
+    time = np.arange(round(seconds * rate_hz)) / rate_hz
+    pushes = np.zeros((len(time), len(machine.joints)))
+    for _ in range(4):
+        hertz, phase = random.uniform(0.1, 0.6, pushes.shape[1]), random.uniform(0, 6, 4)
+        pushes += 0.2 * np.sin(2 * np.pi * np.outer(time, hertz) + phase)
+    rise = np.minimum(1.0, time / 0.5)[:, None]  # from rest, so that no motor is overpowered
+    return pushes * rise * machine.speeds

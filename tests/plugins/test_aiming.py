@@ -1,0 +1,228 @@
+"""The aiming task: its geometry, when a movement begins and ends, and its measures."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from labcrane import Phase, ProtocolError, Task, reach
+from labcrane.machine_file import load_machine
+from labcrane.testing import TaskContract, a_frame, a_run, a_trial, ch8, crane_at, opened
+from labcrane_aiming import labcrane_tasks
+from labcrane_aiming.aiming import Aiming
+from labcrane_aiming.pairs import index_of_difficulty, pairs
+from labcrane_aiming.settings import AimingSettings
+
+RATE_HZ = 240.0
+
+
+class TestContract(TaskContract):
+    @pytest.fixture
+    def task(self) -> Task:
+        offer = {offer.name: offer for offer in labcrane_tasks()}["aiming"]
+        return offer.build(AimingSettings(), ch8())
+
+
+# Far and near end points of the proposed geometry, x and y in m, and index of difficulty.
+GEOMETRY = {
+    2: ((6.207, 0.707), (4.793, -0.707), 2.322),
+    3: ((6.561, 1.061), (4.439, -1.061), 2.807),
+    4: ((6.914, 1.414), (4.086, -1.414), 3.170),
+    6: ((7.621, 2.121), (3.379, -2.121), 3.700),
+}
+
+
+@pytest.mark.parametrize(("distance", "expected"), GEOMETRY.items())
+def test_the_default_geometry_is_the_proposed_one(distance: float, expected: tuple) -> None:
+    far, near, difficulty = expected
+    left, right = (pair for pair in pairs(AimingSettings()) if pair.distance == distance)
+    assert left.far[:2] == pytest.approx(far, abs=5e-4)
+    assert left.near[:2] == pytest.approx(near, abs=5e-4)
+    assert right.far[:2] == pytest.approx((far[0], -far[1]), abs=5e-4)
+    assert math.dist(left.far, left.near) == pytest.approx(distance)
+    assert index_of_difficulty(distance, 0.5) == pytest.approx(difficulty, abs=5e-4)
+
+
+@pytest.mark.parametrize("machine", ["ch8", "ch8_cranelike"])
+def test_both_machines_reach_all_sixteen_circles(machine: str) -> None:
+    for pair in pairs(AimingSettings()):
+        for point in (pair.near, pair.far):
+            assert reach(load_machine(machine), point) is not None
+
+
+def test_a_block_has_32_counted_movements_and_8_approaches() -> None:
+    task = Aiming(AimingSettings(), ch8())
+    plan = task.plan(task.factors())
+    assert sum(planned.counted for planned in plan) == 32
+    assert sum(not planned.counted for planned in plan) == 8
+
+
+def test_every_movement_starts_where_the_last_one_ended() -> None:
+    task = Aiming(AimingSettings(), ch8())
+    plan = task.plan(task.factors())
+    for before, after in itertools.pairwise(plan):
+        if after.counted:
+            for axis in "xyz":
+                assert before.condition[f"target_{axis}"] == after.condition[f"start_{axis}"]
+
+
+def test_a_circle_out_of_reach_is_refused() -> None:
+    with pytest.raises(ProtocolError, match=r"is out of reach of the CH8 .*; move the centre"):
+        Aiming(AimingSettings(distances=(14.0,)), ch8())
+
+
+class Path:
+    """Plays a tip path to the task: positions along the way from start to target."""
+
+    def __init__(self, **settings: object) -> None:
+        self.task = Aiming(AimingSettings(distances=(2.0,), **settings), ch8())
+        self.planned = self.task.plan(self.task.factors())[1]  # near to far
+        self.start = np.array([self.planned.condition[f"start_{axis}"] for axis in "xyz"])
+        self.target = np.array([self.planned.condition[f"target_{axis}"] for axis in "xyz"])
+
+    def play(self, fractions, *, trigger=(), commands=()):
+        run = a_run(ch8(), task=self.task.signals)
+        tip, velocity = run.state.find("tip.position"), run.state.find("tip.velocity")
+        positions = self.start + np.outer(fractions, self.target - self.start)
+        speeds = np.gradient(positions, 1 / RATE_HZ, axis=0)
+        judgements = []
+        with opened(self.task, run):
+            self.task.begin_trial(a_trial(self.planned))
+            for number, (position, speed) in enumerate(zip(positions, speeds, strict=True)):
+                frame = a_frame(run, number, crane_at(run.machine, run.machine.rest))
+                frame.state[tip], frame.state[velocity] = position, speed
+                frame.axes[run.axes.index("right.trigger")] = number in trigger
+                frame.command[0] = number in commands
+                judgements.append(self.task.judge(frame))
+                if judgements[-1].phase.over:
+                    break
+        return judgements
+
+
+def minimum_jerk(seconds: float, before: float = 0.5, after: float = 1.0, end: float = 1.0):
+    """Fractions of the way: at rest, a minimum-jerk movement, at rest."""
+    s = np.arange(0, seconds, 1 / RATE_HZ) / seconds
+    way = end * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    return np.concatenate(
+        [np.zeros(round(before * RATE_HZ)), way, np.full(round(after * RATE_HZ), end)]
+    )
+
+
+def minimum_jerk_speed(s: float) -> float:
+    """Fraction of the way per movement time."""
+    return 30 * s**2 - 60 * s**3 + 30 * s**4
+
+
+def crossing(speed: float) -> float:
+    """The share of a minimum-jerk movement after which it is faster than ``speed``."""
+    low, high = 0.0, 0.5
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if minimum_jerk_speed(middle) < speed else (low, middle)
+    return low
+
+
+def test_onset_and_offset_are_where_the_speed_crosses_the_thresholds() -> None:
+    seconds, distance = 2.0, 2.0
+    judgements = Path().play(minimum_jerk(seconds))
+    results = judgements[-1].results
+    peak = minimum_jerk_speed(0.5) * distance / seconds
+    onset = crossing(max(0.02, 0.05 * peak) * seconds / distance) * seconds
+    offset = (1 - crossing(0.02 * seconds / distance)) * seconds
+    assert judgements[-1].phase is Phase.SUCCESS
+    assert results["reaction_time"] == pytest.approx(0.5 + onset, abs=1.5 / RATE_HZ)
+    assert results["movement_time"] == pytest.approx(offset - onset, abs=2.5 / RATE_HZ)
+    assert results["peak_speed"] == pytest.approx(peak, rel=1e-3)
+
+
+def test_the_onset_is_stamped_when_it_happened_though_it_is_known_only_at_the_end() -> None:
+    judgements = Path().play(minimum_jerk(2.0))
+    last = {event.name: event.time for event in judgements[-1].events}
+    results = judgements[-1].results
+    assert last["movement.onset"] == pytest.approx(results["reaction_time"])
+    assert last["movement.offset"] - last["movement.onset"] == pytest.approx(
+        results["movement_time"]
+    )
+
+
+@pytest.mark.parametrize("over", [-0.1, 0.0, 0.1])
+def test_the_signed_error_is_positive_beyond_the_centre(over: float) -> None:
+    results = Path().play(minimum_jerk(2.0, end=1.0 + over / 2.0))[-1].results
+    assert results["error_along"] == pytest.approx(over, abs=5e-4)  # not yet quite at rest
+    assert results["error"] == pytest.approx(abs(over), abs=5e-4)
+    assert results["error_across"] == pytest.approx(0.0, abs=1e-9)
+    assert results["error_bound"] == 0.25
+
+
+def test_a_straight_path_is_as_long_as_the_way() -> None:
+    results = Path().play(minimum_jerk(2.0))[-1].results
+    assert results["path_length"] == pytest.approx(2.0, abs=0.01)
+
+
+def test_rest_outside_the_circle_ends_nothing_when_it_must_be_inside() -> None:
+    judgements = Path().play(minimum_jerk(2.0, end=0.8))  # 0.4 m short of the centre
+    assert not judgements[-1].phase.over
+
+
+def test_a_crawl_into_the_circle_counts_as_rest_only_from_its_edge() -> None:
+    # 0.01 m/s is rest, and 0.3 m before the centre is outside.
+    crawl = 0.85 + np.arange(0, 20, 1 / RATE_HZ) * 0.01 / 2.0
+    approach = minimum_jerk(2.0, after=0.0, end=0.85)
+    last = Path().play(np.concatenate([approach, crawl[crawl < 1.0]]))[-1]
+    assert last.phase is Phase.SUCCESS
+    assert last.results["error"] == pytest.approx(0.25, abs=1e-3)
+    assert last.results["error"] <= last.results["error_bound"]
+
+
+def test_rest_anywhere_ends_a_movement_once_half_the_way_is_done() -> None:
+    short = Path(end="rest_anywhere").play(minimum_jerk(2.0, end=0.8))[-1]
+    assert short.phase is Phase.SUCCESS
+    assert short.results["error"] == pytest.approx(0.4, abs=1e-3)
+    assert math.isnan(short.results["error_bound"])
+    hesitant = Path(end="rest_anywhere").play(minimum_jerk(2.0, end=0.4))[-1]
+    assert not hesitant.phase.over
+
+
+def test_the_trigger_ends_a_movement_where_the_tip_is() -> None:
+    path = minimum_jerk(2.0)
+    pressed = round(2.0 * RATE_HZ)
+    judgements = Path(end="trigger").play(path, trigger=range(pressed, pressed + 20))
+    assert len(judgements) == pressed + 1
+    assert judgements[-1].phase is Phase.SUCCESS
+
+
+def test_a_trigger_held_from_before_ends_nothing() -> None:
+    path = minimum_jerk(2.0)
+    assert not Path(end="trigger").play(path, trigger=range(len(path)))[-1].phase.over
+
+
+def test_a_time_out_is_an_outcome_of_its_own_with_its_error_and_no_movement_time() -> None:
+    last = Path(limit_s=1.5).play(minimum_jerk(4.0))[-1]
+    assert last.phase is Phase.TIMEOUT
+    assert math.isnan(last.results["movement_time"])
+    assert last.results["error"] > 1.0
+
+
+def test_entries_are_counted_and_the_first_is_an_event() -> None:
+    through = np.concatenate(
+        [minimum_jerk(2.0, after=0.0, end=1.3), np.linspace(1.3, 1.0, 240), np.ones(240)]
+    )
+    judgements = Path().play(through)
+    assert judgements[-1].results["entries"] == 2
+    entered = [e for j in judgements for e in j.events if e.name == "target.entered"]
+    assert len(entered) == 1
+    assert entered[0].time == pytest.approx(judgements[-1].results["first_entry"])
+
+
+def test_the_first_command_is_an_event() -> None:
+    judgements = Path().play(minimum_jerk(2.0), commands=range(100, 400))
+    (event,) = (e for j in judgements for e in j.events if e.name == "command.onset")
+    assert event.time == pytest.approx(100 / RATE_HZ)
+    assert judgements[-1].results["command_onset"] == pytest.approx(100 / RATE_HZ)
+
+
+def test_a_twitch_is_no_onset() -> None:
+    twitch = np.concatenate([np.zeros(100), np.linspace(0, 0.01, 10), np.full(1000, 0.01)])
+    last = Path(limit_s=2.0).play(twitch)[-1]
+    assert math.isnan(last.results["reaction_time"])

@@ -1,0 +1,104 @@
+"""What the cranes find, refuse, leave behind and tell the record."""
+
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cranes import build, cranes, needs_bullet, standing
+
+from labcrane import PluginError, ProtocolError, Signal
+from labcrane.testing import RATE_HZ, a_run, ch8
+
+
+@cranes
+def test_the_joints_command_is_found_wherever_it_stands(name: str) -> None:
+    machine = ch8()
+    command = (
+        Signal("wish", "m/s", ("x", "y")),
+        Signal("command", "rad/s", machine.names),
+        Signal("scale", "1"),
+    )
+    crane = build(name, machine)
+    crane.open(a_run(machine, command=command))
+    try:
+        wanted = 0.1 * np.array(machine.speeds)
+        pushed = np.array([9.0, 9.0, *wanted, 9.0])
+        for _ in range(60):
+            state = crane.step(pushed, 1 / RATE_HZ)
+        np.testing.assert_allclose(state[4:8], wanted, rtol=1e-6)
+    finally:
+        crane.close()
+
+
+@cranes
+def test_a_scheme_for_another_machine_is_refused(name: str) -> None:
+    crane = build(name, ch8())
+    two = (Signal("command", "rad/s", ("slew", "boom")),)
+    with pytest.raises(ProtocolError, match=r"commands 2 joints; this machine has 4 \(slew,"):
+        crane.open(a_run(ch8(), command=two))
+    crane.close()
+
+
+@cranes
+def test_a_pose_the_machine_cannot_take_is_refused(name: str) -> None:
+    with standing(name, ch8()) as crane:
+        with pytest.raises(ProtocolError, match=r"elbow at 90\.00 degrees.*from -86 to 86"):
+            crane.reset([0.0, 0.0, np.radians(90), 0.0])
+        with pytest.raises(ProtocolError, match=r"pose of 2 angles.*has 4 joints"):
+            crane.reset([0.0, 0.0])
+
+
+@cranes
+def test_a_tick_of_another_length_is_refused(name: str) -> None:
+    with (
+        standing(name, ch8()) as crane,
+        pytest.raises(PluginError, match=r"step of 0\.01 s.*ticks of 0\.00416667 s"),
+    ):
+        crane.step(np.zeros(4), 0.01)
+
+
+@cranes
+def test_a_crane_closes_twice_and_without_having_been_opened(name: str) -> None:
+    crane = build(name, ch8())
+    crane.close()
+    crane.open(a_run(ch8()))
+    crane.close()
+    crane.close()
+
+
+@needs_bullet
+def test_the_engine_leaves_no_file_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with standing("bullet_crane", ch8()):
+        assert [file.name for file in tmp_path.rglob("*.urdf")] == ["crane.urdf"]
+    assert not list(tmp_path.iterdir())
+
+
+@cranes
+def test_the_record_says_which_delays_were_used(name: str) -> None:
+    facts: Mapping[str, object] = build(name, ch8(), "hydraulic").facts()
+    assert facts["actuator.dead_time_s"] == 0.06
+    assert facts["actuator.lag_s"] == 0.15
+    assert facts["actuator.rate_limit"] == 4.0
+    assert str(facts.get("engine", "")).startswith("pybullet") == (name == "bullet_crane")
+
+
+def test_without_pybullet_the_other_crane_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    for module in ("bullet_crane", "engine"):
+        monkeypatch.delitem(sys.modules, f"labcrane_bullet.{module}", raising=False)
+    with pytest.raises(PluginError, match=r"'bullet_crane' needs PyBullet.*'kinematic_crane'"):
+        build("bullet_crane", ch8())
+    build("kinematic_crane", ch8())
+
+
+def test_listing_the_offers_loads_no_engine() -> None:
+    program = (
+        "import sys, labcrane_bullet as b; names = [o.name for o in b.labcrane_dynamics()];"
+        "assert names == ['bullet_crane', 'kinematic_crane'], names;"
+        "assert 'pybullet' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)

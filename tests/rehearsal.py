@@ -1,0 +1,93 @@
+"""A session on a clock that does not wait, with orders given at set ticks."""
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from labcrane import loop, rig
+from labcrane.clock import ManualClock
+from labcrane.console import Command
+from labcrane.course import Course
+from labcrane.plan import plan_session
+from labcrane.records import Event, Frame, Run
+from labcrane.registry import discover
+from labcrane.study import Study, load
+
+SHORT = """\
+labcrane: 1
+study: rehearsal
+title: A short study
+rate_hz: 240
+machine: ch8
+input: {use: dual_joystick}
+scheme:
+  use: joint_velocity
+  map: {slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}
+dynamics: {use: kinematic_crane}
+tasks:
+  aiming: {use: aiming, distances: [2], movements: 2}
+sessions:
+  - name: only
+    steps:
+      - block: {task: aiming, pairs: 1}
+"""
+
+
+def a_study(folder: Path, text: str = SHORT) -> Study:
+    path = folder / "study.yaml"
+    path.write_text(text)
+    return load(path, discover())
+
+
+class ScriptedConsole:
+    """Gives orders at set ticks, and keeps what it is told."""
+
+    def __init__(self, orders: Mapping[int, Sequence[Command]] | None = None) -> None:
+        self._orders = orders or {}
+        self._tick = -1
+        self.told: list[Event] = []
+
+    def commands(self) -> list[Command]:
+        self._tick += 1
+        return list(self._orders.get(self._tick, ()))
+
+    def report(self, event: Event) -> None:
+        self.told.append(event)
+
+
+@dataclass
+class Rehearsal:
+    """What came of a session."""
+
+    run: Run
+    frames: list[Frame] = field(default_factory=list)
+
+    def events(self, name: str) -> list[Event]:
+        return [event for frame in self.frames for event in frame.events if event.name == name]
+
+    @property
+    def names(self) -> list[str]:
+        return [event.name for frame in self.frames for event in frame.events]
+
+    def trials(self) -> list[Mapping[str, object]]:
+        return [event.data for event in self.events("trial.end") if event.data["counted"]]
+
+
+def rehearse(
+    study: Study,
+    orders: Mapping[int, Sequence[Command]] | None = None,
+    *,
+    waits: bool = False,
+    the_rig: rig.Rig | None = None,
+) -> Rehearsal:
+    """Run the first session of P001 and keep every frame."""
+    plan = plan_session(study, "P001", 1)
+    the_rig = the_rig or rig.build(study, simulated=True)
+    with rig.opened(the_rig, study, plan.seed) as run:
+        course = Course(study, plan, the_rig, waits=waits)
+        seen = Rehearsal(run)
+        console = ScriptedConsole(orders)
+        keep = [lambda frame: seen.frames.append(copy.deepcopy(frame))]
+        loop.run(the_rig, run, course, ManualClock(start=1000.0), console, keep)
+    return seen
