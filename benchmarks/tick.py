@@ -107,8 +107,8 @@ def whole(study: Study, folder: Path, clock: Clock, count: int, *, lsl: bool) ->
         course = Course(study, plan, the_rig, waits=False)
         path = folder / f"{time.perf_counter_ns()}.xdf"
         with SessionJournal(path, columns(run), run.rate_hz) as journal, outlets(run, lsl) as push:
-            sinks = (FrameLog(journal, run).write, *push, end_of_tick)
-            loop.run(the_rig, run, course, clock, UntilTick(count), sinks)
+            log, onlookers = FrameLog(journal, run), (*push, end_of_tick)
+            loop.run(the_rig, run, course, clock, UntilTick(count), log, onlookers)
         path.unlink()
     return seen
 

@@ -19,6 +19,8 @@ class Order(StrEnum):
     NOTE = "note"  # put words into the record
     OVERRIDE = "override"  # let the running trial go on past its automatic ends
     COMPLETION = "completion"  # set the completion flag of the running trial: 1 or 0
+    LOST = "lost"  # said by the launcher, not by people: something outside the session failed
+    BACK = "back"  # and works again
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,8 @@ from labcrane.study import Study
 
 Ticks = Generator[None, Frame, None]
 
-EXAMINER, INPUT = "examiner", "input"
-"""Who can hold a session: it goes on when nobody does."""
+EXAMINER, INPUT, DISK = "examiner", "input", "disk"
+"""Who can hold a session, beside lost streams: it goes on when nobody does."""
 
 
 class Course:
@@ -42,6 +42,7 @@ class Course:
         self._rig = rig
         self._waits = waits
         self._rate_hz = study.protocol.rate_hz
+        self._on_fault = study.protocol.on_fault
         self._held_by: set[str] = set()
         self._notes: list[tuple[str, dict[str, Value]]] = []  # stamped with the tick they fall in
         self._attempt: Attempt | None = None
@@ -57,18 +58,19 @@ class Course:
         """Whether the operator's command reaches the machine in this tick."""
         return self._attempt is not None and not self._held_by
 
-    def heed(self, commands: Sequence[Command], fault: str | None) -> None:
-        """Take up orders, and what has become of the operator's controls."""
+    def heed(
+        self, commands: Sequence[Command], lost_input: str | None, disk_trouble: str | None
+    ) -> None:
+        """Take up orders, and what has become of the operator's controls and of the disk."""
         for command in commands:
-            self._obey(command)
-        if fault is not None and INPUT not in self._held_by:
-            self._note("input.lost", why=fault)
-            self._hold(INPUT)
-            if self._study.protocol.on_fault.input_lost == "end":
-                self._reasons_to_end.append("input lost")
-        elif fault is None and INPUT in self._held_by:
-            self._note("input.back")
-            self._release(INPUT)
+            if command.order is Order.LOST:
+                self._lose(command.text)
+            elif command.order is Order.BACK:
+                self._regain(command.text)
+            else:
+                self._obey(command)
+        self._watch(INPUT, lost_input)
+        self._watch(DISK, disk_trouble)
 
     def judge(self, frame: Frame) -> None:
         """Complete ``frame``: trial, phase, the task's values, and everything that happened."""
@@ -83,8 +85,8 @@ class Course:
     # The script
 
     def _session(self) -> Ticks:
-        for number, step in enumerate(self._plan.steps, start=1):
-            self._note("step.start", step=number, kind=step.kind)
+        for step in self._plan.steps:
+            self._note("step.start", step=step.number, kind=step.kind)
             if step.block:
                 yield from self._block(step.block)
             elif step.kind == "break":
@@ -92,7 +94,7 @@ class Course:
             else:
                 self._note("instructions.shown", text=step.text)
                 yield from self._gate("instructions")
-            self._note("step.end", step=number, kind=step.kind)
+            self._note("step.end", step=step.number, kind=step.kind)
             if self._reasons_to_end:
                 break
         self._note("session.end", reason=", ".join(self._reasons_to_end) or "complete")
@@ -199,6 +201,30 @@ class Course:
         if self._attempt is None:
             raise AssertionError("orders that need a trial are refused without one")
         return self._attempt
+
+    # Faults
+
+    def _watch(self, part: str, trouble: str | None) -> None:
+        """Hold the session while a part is in trouble."""
+        held = part in self._held_by
+        if trouble is not None and not held:
+            self._note(f"{part}.lost", why=trouble)
+            self._hold(part)
+            if part == INPUT and self._on_fault.input_lost == "end":
+                self._reasons_to_end.append("input lost")
+        elif trouble is None and held:
+            self._note(f"{part}.back")
+            self._release(part)
+
+    def _lose(self, what: str) -> None:
+        self._note("stream.lost", what=what)
+        if self._on_fault.stream_lost == "pause":
+            self._hold(what)
+
+    def _regain(self, what: str) -> None:
+        self._note("stream.back", what=what)
+        if what in self._held_by:
+            self._release(what)
 
     # What is written down
 

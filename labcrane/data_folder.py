@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,13 +47,9 @@ class DataFolder:
         """The HDF5 file with all sessions."""
         return self.path / f"{self.name}.h5"
 
-    def journal(self, session: int) -> Path:
-        """Return the journal of the session process."""
-        return self.path / f"ses-{session:02}_run.xdf"
-
     def sessions(self) -> list[int]:
-        """Return the sessions of which there is a journal."""
-        found = (re.match(r"ses-(\d+)_", entry.name) for entry in self.path.glob("ses-*_*.xdf"))
+        """Return the sessions that have been begun: those with a journal of their own."""
+        found = (re.match(r"ses-(\d+)_", entry.name) for entry in self.path.glob("ses-*_run*.xdf"))
         return sorted({int(match[1]) for match in found if match})
 
     def claim(self, session: int) -> None:
@@ -76,6 +73,24 @@ class DataFolder:
             raise ProtocolError(
                 f"participant {self.name} has already run session {session} (recorded in "
                 f"{self.path}: {done}); check the number, or give the next session"
+            )
+
+    def check_space(self, expected_s: float, bytes_per_s: float, reserve_s: float) -> None:
+        """Make sure that a session of twice the expected length fits, and its reserve.
+
+        Raises
+        ------
+        RecordingError
+            It does not; says how much there is, and how much is needed.
+        """
+        needed = (2.0 * expected_s + reserve_s) * bytes_per_s
+        free = shutil.disk_usage(self.path).free
+        if free < needed:
+            raise RecordingError(
+                f"the session needs up to {needed / 1e6:.0f} MB (twice its expected "
+                f"{expected_s / 60:.0f} minutes, and {reserve_s:.0f} s in reserve), and only "
+                f"{free / 1e6:.0f} MB are free at {self.path}; free some space, or give another "
+                "folder with --data"
             )
 
     def _cannot_write(self, why: str | None) -> str:

@@ -1,12 +1,16 @@
 """Frames into the journal: one row of numbers a tick, and the events beside it."""
 
 import time
-from collections.abc import Mapping
+from collections import deque
+from collections.abc import Callable, Mapping
+from functools import partial
 
 import numpy as np
 
+from labcrane.errors import RecordingError
 from labcrane.recording.journal import Column, SessionJournal
 from labcrane.records import Event, Frame, Phase, Run
+from labcrane.signals import FloatArray
 
 PHASES: Mapping[Phase, float] = {phase: float(code) for code, phase in enumerate(Phase)}
 """The number that stands for a phase in ``loop/phase``."""
@@ -36,19 +40,45 @@ def columns(run: Run) -> tuple[Column, ...]:
     )
 
 
-class FrameLog:
-    """Writes frames through to the journal, each before anybody else sees it."""
+CHUNK_BYTES = 16
+"""What the journal adds to a frame, about."""
 
-    def __init__(self, journal: SessionJournal, run: Run) -> None:
+
+def frame_bytes(run: Run) -> int:
+    """Return how much a frame adds to the journal, in bytes."""
+    return 8 * len(columns(run)) + CHUNK_BYTES
+
+
+class FrameLog:
+    """Writes frames through to the journal, each before anybody else sees it.
+
+    When the disk refuses, frames wait in memory, in order, and are written as soon as it takes
+    them again: while ``trouble`` is set nobody should produce data that matter.
+
+    Parameters
+    ----------
+    reserve
+        Free bytes below which the disk counts as full: before the first byte is lost.
+
+    Attributes
+    ----------
+    trouble
+        Why the disk cannot be trusted now, in words; None while all is well.
+    """
+
+    def __init__(self, journal: SessionJournal, run: Run, reserve: int = 0) -> None:
+        self.trouble: str | None = None
         self._journal = journal
+        self._reserve = reserve
         self._row = np.empty(len(columns(run)))
         start = len(LOOP)
-        self._slices = []
+        slices = []
         for layout in (run.axes, run.command, run.state, run.task):
-            self._slices.append(slice(start, start + layout.size))
+            slices.append(slice(start, start + layout.size))
             start += layout.size
-        self._axes, self._command, self._state, self._task = self._slices
+        self._axes, self._command, self._state, self._task = slices
         self._wrote = 0.0
+        self._waiting: deque[Callable[[], None]] = deque()
 
     def write(self, frame: Frame) -> None:
         """Write one frame and its events; when this returns, the operating system has them."""
@@ -66,11 +96,61 @@ class FrameLog:
         row[self._command] = frame.command
         row[self._state] = frame.state
         row[self._task] = frame.task
-        self._journal.write_frame(tick.due, row)
-        for event in frame.events:
-            self._journal.write_event(event, tick.number)
+        if self._waiting or not self._through(frame, row):
+            self._waiting.append(partial(self._journal.write_frame, tick.due, row.copy()))
+            self._write_events(frame)
+        if not self._waiting:
+            free = self._journal.free
+            self.trouble = None if free >= self._reserve else self._nearly_full(free)
         self._wrote = time.perf_counter() - began
 
     def note(self, event: Event) -> None:
         """Write an event that belongs to no frame, before the first tick."""
         self._journal.write_event(event, 0)
+
+    def close(self) -> None:
+        """Write what waits, if the disk takes it now, and close the journal.
+
+        Raises
+        ------
+        RecordingError
+            The disk still refuses; says how much could not be written.
+        """
+        self._catch_up()
+        waiting = len(self._waiting)
+        self._journal.close()
+        if waiting:
+            raise RecordingError(
+                f"{waiting} frames and events could not be written: {self.trouble}; what "
+                f"came before is in {self._journal.path}"
+            )
+
+    def _through(self, frame: Frame, row: FloatArray) -> bool:
+        """Write at once; whether the frame went in. Its events wait if they alone did not."""
+        try:
+            self._journal.write_frame(frame.tick.due, row)
+        except RecordingError as error:
+            self.trouble = str(error)
+            return False
+        self._write_events(frame)
+        return True
+
+    def _write_events(self, frame: Frame) -> None:
+        for event in frame.events:
+            self._waiting.append(partial(self._journal.write_event, event, frame.tick.number))
+        self._catch_up()
+
+    def _catch_up(self) -> None:
+        while self._waiting:
+            try:
+                self._waiting[0]()
+            except RecordingError as error:
+                self.trouble = str(error)
+                return
+            self._waiting.popleft()
+
+    def _nearly_full(self, free: int) -> str:
+        return (
+            f"only {free / 1e6:.0f} MB are free for {self._journal.path}, and "
+            f"{self._reserve / 1e6:.0f} MB are kept in reserve; free some space"
+        )

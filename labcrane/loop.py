@@ -7,6 +7,7 @@ import numpy as np
 from labcrane.clock import Clock, Tick, ticks
 from labcrane.console import Console
 from labcrane.course import Course
+from labcrane.frame_log import FrameLog
 from labcrane.records import Frame, Run
 from labcrane.rig import Rig
 
@@ -17,27 +18,29 @@ def run(
     course: Course,
     clock: Clock,
     console: Console,
-    sinks: Sequence[Callable[[Frame], None]],
+    log: FrameLog,
+    onlookers: Sequence[Callable[[Frame], None]],
 ) -> None:
     """Tick until the course is over.
 
-    Every frame goes to the ``sinks`` in their order: the journal first, then whoever looks on.
+    Every frame is written to the journal first, and only then shown to the ``onlookers``.
     """
     dt = 1.0 / this_run.rate_hz
     read, control, rest = rig.input.read, rig.controller.command, rig.controller.rest
     state, step = rig.dynamics.state, rig.dynamics.step
-    heed, judge = course.heed, course.judge
+    heed, judge, write = course.heed, course.judge, log.write
     no_task = np.full(this_run.task.size, np.nan)
 
     frame = _before(rig, this_run)
     for tick in ticks(clock, this_run.rate_hz):
         axes = read(tick, frame)
-        heed(console.commands(), rig.input.fault)
+        heed(console.commands(), rig.input.fault, log.trouble)
         command = control(axes, state()) if course.moving else rest()
         frame = Frame(tick, 0.0, axes, command, step(command, dt), no_task)
         judge(frame)
-        for sink in sinks:
-            sink(frame)
+        write(frame)
+        for show in onlookers:
+            show(frame)
         if course.over:
             return
 

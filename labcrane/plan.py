@@ -48,8 +48,9 @@ class PlannedBlock:
 
 @dataclass(frozen=True, slots=True)
 class PlannedStep:
-    """One step of a session: a text, a break, or a block."""
+    """One step of a session: a text, a break, or a block. Steps are counted from 1."""
 
+    number: int
     kind: str
     text: str = ""
     seconds: float = 0.0
@@ -90,16 +91,16 @@ class Planner:
     def __init__(self, study: Study, participant: str, session: int) -> None:
         self._study = study
         self._words = (study.protocol.study, participant, session)
+        self._steps = 0
         self._blocks = 0
         self._trials = 0
 
     def steps(self, step: Step) -> Iterator[PlannedStep]:
         """Yield a step of the protocol, once for each repetition."""
-        if step.block is None:
-            yield PlannedStep(step.kind, text=step.text, seconds=step.seconds)
-            return
-        for _ in range(step.block.repeat):
-            yield PlannedStep(step.kind, block=self._block(step.block, step.kind == "practice"))
+        for _ in range(step.block.repeat if step.block else 1):
+            self._steps += 1
+            block = self._block(step.block, step.kind == "practice") if step.block else None
+            yield PlannedStep(self._steps, step.kind, step.text, step.seconds, block)
 
     def _block(self, block: Block, practice: bool) -> PlannedBlock:  # noqa: FBT001 - one caller
         self._blocks += 1
@@ -129,8 +130,10 @@ def plan_session(study: Study, participant: str, session: int) -> SessionPlan:
     return SessionPlan(participant, session, written.name, seed, steps)
 
 
-def next_attempt(study: Study, plan: SessionPlan, trial: Trial) -> Trial:
-    """Return ``trial`` once more, with the seed of its next attempt."""
-    attempt = trial.attempt + 1
+def next_attempt(
+    study: Study, plan: SessionPlan, trial: Trial, attempt: int | None = None
+) -> Trial:
+    """Return ``trial`` once more, as its next attempt or a given one, with a seed of its own."""
+    attempt = attempt or trial.attempt + 1
     words = (study.protocol.study, plan.participant, plan.number, "trial", trial.number, attempt)
     return Trial(trial.number, attempt, derive(*words), trial.planned)

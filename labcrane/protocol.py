@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import (
-    BaseModel,
     ConfigDict,
     Field,
     NonNegativeFloat,
@@ -16,15 +15,13 @@ from pydantic import (
 )
 
 from labcrane.design.order import RULES
+from labcrane.offers import Settings
+from labcrane.stream_needs import StreamNeed, TimeLimits
 from labcrane.yaml_file import Place, YamlFile
 
 
-class Section(BaseModel):
-    """A part of a protocol: unknown keys are errors, values never change."""
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False
-    )
+class Section(Settings):
+    """A part of a protocol."""
 
 
 class Use(Section):
@@ -85,6 +82,13 @@ class OnFault(Section):
     input_lost: Literal["pause", "end"] = "pause"
     """The operator's controls are unplugged or fall silent: pause until they are back, or end the
     session. The machine is held at rest either way."""
+
+    stream_lost: Literal["pause", "mark"] = "pause"
+    """A required stream falls silent, or its recorder fails: pause until it is back, or go on and
+    mark it in the record."""
+
+    session_died: Literal["continue", "redo_trial", "redo_block"] = "redo_trial"
+    """The session's process died: where ``labcrane resume`` goes on."""
 
 
 class Block(Section):
@@ -171,6 +175,12 @@ class Protocol(Section):
 
     tasks: dict[str, Use] = Field(min_length=1)
     """What the operator is asked to do, by name."""
+
+    streams: dict[str, StreamNeed] = Field(default_factory=dict)
+    """Streams of others to be recorded, by the study's names for them."""
+
+    sync: TimeLimits = TimeLimits()
+    """How right the time stamps must be."""
 
     design: Design = Design()
 

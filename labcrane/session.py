@@ -1,31 +1,33 @@
 """Run one session: open the rig, lead it through its plan, leave a participant file."""
 
-import hashlib
-import platform
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from importlib.metadata import version
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from labcrane import loop, rig
-from labcrane.attempt import trial_units
 from labcrane.clock import Clock, ManualClock, SystemClock
+from labcrane.conclusion import SessionConclusion
 from labcrane.console import Console
+from labcrane.context import context
 from labcrane.course import Course
 from labcrane.data_folder import DataFolder
-from labcrane.frame_log import FrameLog, columns
+from labcrane.errors import ProtocolError
+from labcrane.frame_log import FrameLog, columns, frame_bytes
 from labcrane.plan import SessionPlan, plan_session
+from labcrane.progress import Policy, Progress, progress, remaining, within_limits
+from labcrane.recording.foreign_streams import Conclusion
 from labcrane.recording.journal import SessionJournal
 from labcrane.recording.participant_file import consolidate
-from labcrane.records import Event, Frame, Run
+from labcrane.recording.parts import journal_path, next_part, parts
+from labcrane.records import Event, Frame, Phase, Run
 from labcrane.rig import Rig
-from labcrane.study import Choice, Study
+from labcrane.streams.sync_report import SyncReport
+from labcrane.study import Study
 
-RECORDED_PACKAGES = ("labcrane", "numpy", "pybullet", "pygame", "pylsl", "pydantic")
+RESERVE_S = 60.0
+"""Seconds of recording for which the disk must always have room; below it the session pauses."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +46,10 @@ class Visit:
         Whether to run as fast as the machine can, without LSL; for simulations only.
     pilot
         Whether this is a trial run, to be stamped as one.
+    resumed
+        Whether the session goes on after its process died.
+    policy
+        Where it goes on; what the protocol says by default.
     """
 
     study: Study
@@ -53,42 +59,113 @@ class Visit:
     simulated: bool = False
     fast: bool = False
     pilot: bool = False
+    resumed: bool = False
+    policy: Policy | None = None
 
     @property
     def folder(self) -> DataFolder:
         """Where it is recorded."""
         return DataFolder(self.data, self.participant, self.pilot, self.simulated)
 
+    @property
+    def journal(self) -> Path:
+        """The first part of the session's journal."""
+        return journal_path(self.folder.path, self.session, "run")
+
+    @property
+    def streams_journal(self) -> Path:
+        """The first part of the journal of the streams of others."""
+        return journal_path(self.folder.path, self.session, "streams")
+
 
 def run(visit: Visit, console: Console) -> Path:
-    """Run a session to its end; return the participant file.
+    """Record a session in this process and consolidate it; return the participant file.
 
     Whatever ends it, what was recorded until then is in the file.
+    """
+    try:
+        record(visit, console)
+    finally:
+        if parts(visit.journal):
+            finish(visit)
+    return visit.folder.participant_file
+
+
+def finish(visit: Visit) -> SyncReport | None:
+    """Put what the journals hold into the participant file, with clocks corrected and judged.
+
+    Returns the session's sync report.
+    """
+    journals = [first for first in (visit.journal, visit.streams_journal) if parts(first)]
+    made: list[SessionConclusion] = []
+
+    def conclude(about: Mapping[str, Any]) -> Conclusion:
+        made.append(SessionConclusion(about))
+        return Conclusion(made[-1].correct, made[-1].report)
+
+    consolidate(visit.folder.participant_file, journals, conclude)
+    return made[-1].sync_report
+
+
+def record(visit: Visit, console: Console) -> None:
+    """Run a session to its end and write its journal.
 
     Raises
     ------
     ProtocolError, DeviceError, RecordingError
         Before anything is recorded: the session cannot be run.
     """
-    study, folder = visit.study, visit.folder
-    plan = plan_session(study, visit.participant, visit.session)
-    folder.claim(visit.session)
+    study = visit.study
+    whole = plan_session(study, visit.participant, visit.session)
+    so_far, plan = _go_on(visit, whole) if visit.resumed else (None, whole)
+    if so_far is None:
+        visit.folder.claim(visit.session)
     the_rig = rig.build(study, simulated=visit.simulated)
     clock: Clock = ManualClock() if visit.fast else SystemClock()
     with rig.opened(the_rig, study, plan.seed) as this_run:
+        if so_far is not None and so_far.angles:
+            the_rig.dynamics.reset(within_limits(study, so_far.angles))
+        second = frame_bytes(this_run) * this_run.rate_hz
+        visit.folder.check_space(plan.expected_s, second, RESERVE_S)
         course = Course(study, plan, the_rig, waits=not visit.simulated)
-        begin = Event("session.start", clock.now(), context(visit, plan, the_rig, this_run))
-        journal = SessionJournal(folder.journal(visit.session), columns(this_run), this_run.rate_hz)
+        journal = SessionJournal(next_part(visit.journal), columns(this_run), this_run.rate_hz)
+        log = FrameLog(journal, this_run, reserve=round(RESERVE_S * second))
         try:
-            log = FrameLog(journal, this_run)
-            log.note(begin)
+            for event in _opening(visit, plan, the_rig, this_run, so_far, clock.now()):
+                log.note(event)
             with _outlets(visit, this_run) as outlets:
-                sinks = (log.write, *outlets, _teller(console))
-                loop.run(the_rig, this_run, course, clock, console, sinks)
+                onlookers = (*outlets, _teller(console))
+                loop.run(the_rig, this_run, course, clock, console, log, onlookers)
         finally:
-            journal.close()
-            consolidate(folder.participant_file, [folder.journal(visit.session)])
-    return folder.participant_file
+            log.close()
+
+
+def _go_on(visit: Visit, whole: SessionPlan) -> tuple[Progress, SessionPlan]:
+    so_far = progress(visit.journal, visit.study.machine.names)
+    if so_far.complete:
+        raise ProtocolError(
+            f"session {visit.session} of {visit.folder.name} ran to its end, so there is nothing "
+            "to go on with; labcrane recover makes its participant file"
+        )
+    policy = visit.policy or visit.study.protocol.on_fault.session_died
+    return so_far, remaining(visit.study, whole, so_far, policy)
+
+
+def _opening(
+    visit: Visit,
+    plan: SessionPlan,
+    the_rig: Rig,
+    this_run: Run,
+    so_far: Progress | None,
+    now: float,
+) -> Iterator[Event]:
+    """Yield what is to be known before the first tick."""
+    about = context(visit, plan, the_rig, this_run)
+    yield Event("session.start", now, about)
+    if so_far is not None and so_far.interrupted is not None:
+        # The dead process could not close its trial; it is a row like any other.
+        lost = {**so_far.interrupted, "outcome": str(Phase.INTERRUPTED)}
+        yield Event("trial.end", now, lost)
 
 
 def _teller(console: Console) -> Callable[[Frame], None]:
@@ -112,60 +189,3 @@ def _outlets(visit: Visit, this_run: Run) -> Iterator[list[Callable[[Frame], Non
         yield [outlets.push]
     finally:
         outlets.close()
-
-
-def context(visit: Visit, plan: SessionPlan, the_rig: Rig, this_run: Run) -> dict[str, Any]:
-    """Return everything that whoever reads the recording must know, ready for JSON."""
-    study = visit.study
-    choices = {
-        "input": study.operator if visit.simulated else study.input,
-        "scheme": study.scheme,
-        "dynamics": study.dynamics,
-        **{f"tasks.{name}": choice for name, choice in study.task_choices.items()},
-    }
-    return {
-        "study": study.protocol.study,
-        "title": study.protocol.title,
-        "participant": visit.folder.name,
-        "session": visit.session,
-        "session_name": plan.name,
-        "started": datetime.now(UTC).isoformat(timespec="milliseconds"),
-        "simulated": visit.simulated,
-        "fast": visit.fast,
-        "pilot": visit.pilot,
-        "clock": "manual" if visit.fast else "lsl",
-        "rate_hz": this_run.rate_hz,
-        "seed": plan.seed,
-        "protocol": study.text,
-        "protocol_sha256": study.sha256,
-        "machine": study.machine_text,
-        "machine_sha256": hashlib.sha256(study.machine_text.encode()).hexdigest(),
-        "components": {part: _choice(choice) for part, choice in choices.items()},
-        "facts": the_rig.facts(),
-        "versions": _versions(),
-        "plan": [
-            {"block": block.number, "name": block.name, "trials": len(block.trials)}
-            for block in plan.blocks
-        ],
-        "trial_units": {
-            column: unit
-            for task in study.tasks.values()
-            for column, unit in trial_units(task).items()
-        },
-    }
-
-
-def _choice(choice: Choice) -> dict[str, Any]:
-    return {
-        "use": choice.name,
-        "plugin": choice.plugin,
-        "settings": choice.settings.model_dump(mode="json"),
-    }
-
-
-def _versions() -> dict[str, str]:
-    return {
-        "python": platform.python_version(),
-        "system": platform.platform(),
-        **{name: version(name) for name in RECORDED_PACKAGES if find_spec(name)},
-    }

@@ -56,6 +56,15 @@ class ScriptedConsole:
         self.told.append(event)
 
 
+class NoLog:
+    """A log on a disk that never fails, and keeps nothing."""
+
+    trouble = None
+
+    def write(self, frame: Frame) -> None:
+        """Nothing to do."""
+
+
 @dataclass
 class Rehearsal:
     """What came of a session."""
@@ -89,5 +98,5 @@ def rehearse(
         seen = Rehearsal(run)
         console = ScriptedConsole(orders)
         keep = [lambda frame: seen.frames.append(copy.deepcopy(frame))]
-        loop.run(the_rig, run, course, ManualClock(start=1000.0), console, keep)
+        loop.run(the_rig, run, course, ManualClock(start=1000.0), console, NoLog(), keep)
     return seen

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import typer
 from rich.console import Console
 
-from labcrane.cli import inspect, running
+from labcrane.cli import inspect, recording, running
 from labcrane.errors import LabcraneError, ProtocolError
 
 app = typer.Typer(
@@ -18,9 +18,14 @@ app = typer.Typer(
 )
 app.command("demo")(running.demo)
 app.command("run")(running.run)
+app.command("resume")(running.resume)
 app.command("check")(inspect.check)
 app.command("plan")(inspect.plan)
 app.command("plugins")(inspect.plugins)
+app.command("streams")(recording.streams)
+app.command("record")(recording.record)
+app.command("recover")(recording.recover)
+app.command("resync")(recording.resync)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,59 +1,78 @@
-"""Commands that run a session: demo and run."""
+"""Commands that run a session: demo, run and resume."""
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from labcrane.cli.inspect import ProtocolPath, out
-from labcrane.errors import ProtocolError
+from labcrane.errors import LabcraneError, ProtocolError
 
 if TYPE_CHECKING:
-    from labcrane.session import Visit
+    from labcrane.plan import SessionPlan
+    from labcrane.session_process import VisitOrder
 
-DEMO = "demo.yaml"
+Participant = Annotated[str, typer.Option(help="pseudonym: P001")]
+SessionNumber = Annotated[int, typer.Option(help="which of the protocol's sessions")]
+DataPath = Annotated[
+    Path | None, typer.Option(help="data folder; data/ beside the protocol by default")
+]
+Simulate = Annotated[
+    bool, typer.Option("--simulate", help="a simulated operator takes the controls")
+]
+Pilot = Annotated[bool, typer.Option("--pilot", help="a trial run: its files are stamped PILOT")]
+Local = Annotated[bool, typer.Option("--local", help="keep LSL streams on this computer")]
 
 
 def run(
     protocol: ProtocolPath,
-    participant: Annotated[str, typer.Option(help="pseudonym: P001")],
-    session: Annotated[int, typer.Option(help="which of the protocol's sessions")] = 1,
-    data: Annotated[
-        Path | None, typer.Option(help="data folder; data/ beside the protocol by default")
-    ] = None,
-    simulate: Annotated[
-        bool, typer.Option("--simulate", help="a simulated operator takes the controls")
-    ] = False,
+    participant: Participant,
+    session: SessionNumber = 1,
+    data: DataPath = None,
+    simulate: Simulate = False,
     fast: Annotated[
-        bool, typer.Option("--fast", help="with --simulate: as fast as the machine can")
+        bool, typer.Option("--fast", help="with --simulate: as fast as the machine can, no LSL")
     ] = False,
-    pilot: Annotated[
-        bool, typer.Option("--pilot", help="a trial run: its files are stamped PILOT")
-    ] = False,
-    local: Annotated[
-        bool, typer.Option("--local", help="keep LSL streams on this computer")
-    ] = False,
+    pilot: Pilot = False,
+    local: Local = False,
 ) -> None:
     """Run a session of a study."""
     if fast and not simulate:
         raise ProtocolError("--fast needs --simulate: people cannot be hurried")
+    from labcrane.session_process import VisitOrder
+
+    order = VisitOrder(
+        protocol, participant, session, data or protocol.parent / "data", simulate, pilot
+    )
     if local or simulate:
         _stay_on_this_computer()
-    from labcrane.registry import discover
-    from labcrane.session import Visit
-    from labcrane.study import load
+    if fast:
+        out.print(f"participant file: {_run_fast(order)}", markup=False)
+    else:
+        _launch(order)
 
-    visit = Visit(
-        load(protocol, discover()),
-        participant,
-        session,
-        data or protocol.parent / "data",
-        simulated=simulate,
-        fast=fast,
-        pilot=pilot,
-    )
-    out.print(f"participant file: {_lead(visit)}", markup=False)
+
+def resume(
+    protocol: ProtocolPath,
+    participant: Participant,
+    session: SessionNumber = 1,
+    data: DataPath = None,
+    policy: Annotated[
+        Literal["continue", "redo_trial", "redo_block"] | None,
+        typer.Option(help="where to go on; as the protocol says by default"),
+    ] = None,
+    simulate: Simulate = False,
+    pilot: Pilot = False,
+    local: Local = False,
+) -> None:
+    """Go on with a session whose process died."""
+    from labcrane.session_process import VisitOrder
+
+    folder = data or protocol.parent / "data"
+    if local or simulate:
+        _stay_on_this_computer()
+    _launch(VisitOrder(protocol, participant, session, folder, simulate, pilot, True, policy))
 
 
 def demo(
@@ -65,36 +84,64 @@ def demo(
 
     from labcrane.movement_picture import draw
     from labcrane.recording.recording import open_recording
-    from labcrane.registry import discover
-    from labcrane.session import Visit
-    from labcrane.study import load
+    from labcrane.session_process import VisitOrder
 
-    study = load(Path(str(files("labcrane") / DEMO)), discover())
-    visit = Visit(study, "P001", 1, data, simulated=True, fast=True)
+    order = VisitOrder(Path(str(files("labcrane") / "demo.yaml")), "P001", 1, data, simulated=True)
     number = 1
-    while visit.folder.path.exists():  # a demo can be run again; nothing is overwritten
+    while order.visit().folder.path.exists():  # a demo can be run again; nothing is overwritten
         number += 1
-        visit = replace(visit, participant=f"P{number:03}")
-    path = _lead(visit)
+        order = replace(order, participant=f"P{number:03}")
+    path = _run_fast(order)
     picture = path.with_suffix(".png")
     draw(open_recording(path).session(1), picture)
     out.print(f"participant file: {path}", markup=False)
     out.print(f"the movements:    {picture}", markup=False)
 
 
-def _lead(visit: "Visit") -> Path:
+def _run_fast(order: "VisitOrder") -> Path:
     from labcrane.cli.terminal import Terminal
     from labcrane.console import QueueConsole
     from labcrane.plan import plan_session
     from labcrane.session import run as run_session
 
-    blocks = plan_session(visit.study, visit.participant, visit.session).blocks
-    total = sum(
-        trial.planned.counted for block in blocks if not block.practice for trial in block.trials
-    )
+    visit = replace(order.visit(), fast=True)
+    plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
-    with Terminal(console, out, total, keys=not visit.simulated):
+    with Terminal(console, out, _counted(plan), keys=False):
         return run_session(visit, console)
+
+
+def _launch(order: "VisitOrder") -> None:
+    from labcrane.cli.sync import print_report
+    from labcrane.cli.terminal import Terminal
+    from labcrane.console import QueueConsole
+    from labcrane.launcher import Launcher
+    from labcrane.plan import plan_session
+
+    visit = order.visit()
+    plan = plan_session(visit.study, visit.participant, visit.session)
+    console = QueueConsole()
+    with Terminal(console, out, _counted(plan), keys=not visit.simulated) as terminal:
+        outcome = Launcher(order, console, terminal.say).run()
+    if outcome.sync_report is not None:
+        print_report(outcome.sync_report)
+    if visit.folder.participant_file.exists():
+        out.print(f"participant file: {visit.folder.participant_file}", markup=False)
+    if outcome.died is not None:
+        raise LabcraneError(
+            f"the session process died with exit code {outcome.died}; what it recorded is in the "
+            f"participant file; go on with: labcrane resume {order.protocol} --participant "
+            f"{order.participant} --session {order.session}"
+        )
+
+
+def _counted(plan: "SessionPlan") -> int:
+    return sum(
+        trial.planned.counted
+        for block in plan.blocks
+        if not block.practice
+        for trial in block.trials
+    )
 
 
 def _stay_on_this_computer() -> None:

@@ -83,6 +83,10 @@ class Terminal:
             self._listener.join()
         self._progress.stop()
 
+    def say(self, text: str) -> None:
+        """Print what did not come from the session."""
+        self._progress.print(text, markup=False, highlight=False)
+
     def _print(self) -> None:
         while (event := self._console.events.get()) is not None:
             if event.name == "trial.end" and event.data["counted"]:
@@ -154,10 +158,12 @@ def _line(event: Event) -> str | None:
             return f"break of {data['seconds']:g} s"
         case "block.start":
             return f"block {data['block']}: {data['block_name']}"
-        case "input.lost":
-            return f"INPUT LOST: {data['why']}"
-        case "input.back":
-            return "input is back"
+        case "input.lost" | "disk.lost":
+            return f"{event.name.upper().replace('.', ' ')}: {data['why']}"
+        case "stream.lost":
+            return f"STREAM LOST: {data['what']}"
+        case "input.back" | "disk.back" | "stream.back":
+            return f"{data.get('what', event.name.partition('.')[0])} is back"
         case "pause.start" | "pause.end":
             return f"{event.name.replace('.', ' ')} ({data['by']})"
         case name if name.startswith("order.") and data["refused"]:

@@ -16,6 +16,7 @@ REMEDIES = {
     errno.EDQUOT: "the disk quota is used up: free space, then go on",
     errno.EFBIG: "the file may grow no further: go on in a new part",
     errno.EROFS: "the disk is read-only: check it, or record into another folder",
+    errno.ESTALE: "the recording's folder was removed while it was written: end the session",
     errno.EIO: "the disk fails: stop the session and save what is on it",
 }
 
@@ -53,6 +54,7 @@ class AppendFile:
         self._ragged = False
         self.synced = 0
         self._failure: OSError | None = None
+        self._gone = False
         self._stop = threading.Event()
         self._thread = threading.Thread(target=self._keep_syncing, name=f"sync {path.name}")
         self._thread.daemon = True
@@ -77,6 +79,8 @@ class AppendFile:
             The block is not in the file; all before it are. It may be written again once the cause
             is gone. Also raised, before anything is written, when an earlier sync failed.
         """
+        if self._gone:
+            raise self._error("write", OSError(errno.ESTALE, "the file was removed"))
         if self._failure is not None:
             failure, self._failure = self._failure, None
             raise self._error("bring to disk", failure) from failure
@@ -128,6 +132,8 @@ class AppendFile:
     def _keep_syncing(self) -> None:
         while not self._stop.wait(self._sync_s):
             try:
+                # What is written to a file without a name is lost when it is closed.
+                self._gone = os.fstat(self._fd).st_nlink == 0
                 self.free = _free(self.path)
                 if self.size > self.synced:
                     size = self.size

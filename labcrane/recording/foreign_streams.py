@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from labcrane.recording.journal_reader import JournalState, state
+from labcrane.recording.journal_reader import JournalState, SessionLog, state
 from labcrane.recording.samples import Texts
 from labcrane.recording.stream_header import Channel, StreamHeader
 from labcrane.recording.xdf_reader import XdfFile, XdfStream, read_xdf
@@ -98,6 +98,27 @@ class Correction:
 
 
 Correct = Callable[[RecordedStream], Correction]
+
+
+@dataclass(frozen=True, slots=True)
+class Conclusion:
+    """What is worked out of a recording when it is put into the participant file.
+
+    Attributes
+    ----------
+    correct
+        Maps a stream's stamps onto our clock; called once for every stream.
+    report
+        Called last with the session's frames and events; what it returns is kept as the session's
+        sync report. None keeps no report.
+    """
+
+    correct: Correct
+    report: Callable[[SessionLog], Mapping[str, Any]] | None = None
+
+
+Conclude = Callable[[Mapping[str, Any]], Conclusion]
+"""Called with a session's context: the study may say more of a stream than its header."""
 
 
 def companion_headers(header: StreamHeader, number: int) -> dict[str, StreamHeader]:

@@ -4,6 +4,7 @@ HDF5 is never open for writing while people are recorded. Each session is added 
 the old one, which is brought to the disk, read again, and only then takes the old one's name.
 """
 
+import json
 import os
 import re
 import sys
@@ -17,8 +18,8 @@ import numpy as np
 
 from labcrane.errors import RecordingError
 from labcrane.recording.append_file import sync_folder
-from labcrane.recording.foreign_streams import Correct, RecordedStream, read_streams
-from labcrane.recording.hdf5_columns import node_names, write_attributes
+from labcrane.recording.foreign_streams import Conclude, RecordedStream, read_streams
+from labcrane.recording.hdf5_columns import node_names, write_attributes, write_text
 from labcrane.recording.journal_reader import JournalState, SessionLog, read_journal
 from labcrane.recording.parts import parts, session_of
 from labcrane.recording.session_group import write_session
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 FORMAT = "labcrane participant file"
 VERSION = "1"
+SYNC_REPORT = "sync_report"
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +77,7 @@ def group_name(session: int) -> str:
 
 
 def consolidate(
-    path: Path, journals: Sequence[Path], correct: Correct | None = None
+    path: Path, journals: Sequence[Path], conclude: Conclude | None = None
 ) -> Consolidated:
     """Put one session into a participant file, new or existing.
 
@@ -88,8 +90,9 @@ def consolidate(
         The participant file.
     journals
         First parts of the session's journals; further parts beside them are found.
-    correct
-        Maps the stamps of other clocks onto ours; without it, streams hold raw stamps only.
+    conclude
+        Gives what corrects the stamps of other clocks and makes the sync report; without it,
+        streams hold raw stamps only.
 
     Raises
     ------
@@ -103,7 +106,7 @@ def consolidate(
             left.unlink()  # by a consolidation that was killed
         temporary = path.with_name(f".{path.name}.{os.getpid()}")
         try:
-            _write(temporary, path, session, correct)
+            _write(temporary, path, session, conclude)
             _verify(temporary, path, session)
             _sync(temporary)
             temporary.replace(path)
@@ -153,7 +156,7 @@ def _read(path: Path, journals: Sequence[Path]) -> _Session:
     return _Session(sessions.pop(), log, streams, states + more_states)
 
 
-def _write(temporary: Path, path: Path, session: _Session, correct: Correct | None) -> None:
+def _write(temporary: Path, path: Path, session: _Session, conclude: Conclude | None) -> None:
     import h5py  # noqa: PLC0415 - loads for a second
 
     context = session.log.context
@@ -176,7 +179,11 @@ def _write(temporary: Path, path: Path, session: _Session, correct: Correct | No
         group = new.create_group(session.group)
         write_attributes(group, {"session": session.number, "participant": path.stem})
         write_session(group, session.log, session.journals)
-        write_streams(group, session.streams, correct)
+        conclusion = conclude(context) if conclude else None
+        write_streams(group, session.streams, conclusion.correct if conclusion else None)
+        if conclusion and conclusion.report:
+            report = conclusion.report(session.log)
+            write_text(group, SYNC_REPORT, json.dumps(report, ensure_ascii=False, allow_nan=False))
 
 
 @contextmanager

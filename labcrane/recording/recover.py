@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from labcrane.errors import RecordingError
-from labcrane.recording.foreign_streams import Correct
+from labcrane.recording.foreign_streams import Conclude
 from labcrane.recording.participant_file import Consolidated, consolidate, group_name, opened
 from labcrane.recording.parts import journal_path, parts, session_of
 
@@ -29,7 +29,7 @@ class Recovery:
     problem: str = ""
 
 
-def recover(folder: Path, correct: Correct | None = None) -> list[Recovery]:
+def recover(folder: Path, conclude: Conclude | None = None) -> list[Recovery]:
     """Consolidate every session below ``folder`` whose journals say more than its participant file.
 
     A participant's file has the name of the folder with the journals. May be killed and repeated
@@ -47,17 +47,17 @@ def recover(folder: Path, correct: Correct | None = None) -> list[Recovery]:
         for path in folder.rglob("ses-*.xdf")
         if (named := session_of(path)) is not None
     }
-    return [_recover(at, session, correct) for at, session in sorted(found)]
+    return [_recover(at, session, conclude) for at, session in sorted(found)]
 
 
-def _recover(folder: Path, session: int, correct: Correct | None) -> Recovery:
+def _recover(folder: Path, session: int, conclude: Conclude | None) -> Recovery:
     path = folder / f"{folder.resolve().name}.h5"
     firsts = [journal_path(folder, session, kind) for kind in ("run", "streams")]
     journals = [first for first in firsts if parts(first)]
     try:
         if _is_current(path, session, journals):
             return Recovery(path, session)
-        return Recovery(path, session, consolidate(path, journals, correct))
+        return Recovery(path, session, consolidate(path, journals, conclude))
     except RecordingError as error:
         return Recovery(path, session, problem=str(error))
 

@@ -48,12 +48,13 @@ def _write_stream(group: "h5py.Group", stream: RecordedStream, correct: Correct 
     write_numbers(group, "time_raw", stream.time_raw, "s")
     write_numbers(group, "starts", np.array(stream.starts, np.float64), "1")
     if correct is not None:
-        _write_time(group, stream, correct)
+        write_time(group, stream, correct)
     _write_beside(group, stream)
     _write_data(group.create_group("data"), stream)
 
 
-def _write_time(group: "h5py.Group", stream: RecordedStream, correct: Correct) -> None:
+def write_time(group: "h5py.Group", stream: RecordedStream, correct: Correct) -> None:
+    """Write a stream's corrected times and how right they are, or why there are none."""
     try:
         correction = correct(stream)
     except LabcraneError as error:  # one stream's clock must not keep a session from its file

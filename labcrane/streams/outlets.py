@@ -19,9 +19,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from labcrane.errors import StreamError
+from labcrane.recording.journal import event_text
 from labcrane.records import Frame, Run
 from labcrane.signals import FloatArray, Layout
-from labcrane.streams.markers import CODES, OTHER, payload
+from labcrane.streams.markers import CODES, OTHER
 
 if TYPE_CHECKING:
     import pylsl
@@ -82,7 +83,7 @@ class Outlets:
             return
         for event in frame.events:
             _check_stamp(event.time)
-            self._markers.push_sample([payload(event, frame.tick.number)], event.time)
+            self._markers.push_sample([event_text(event, frame.tick.number)], event.time)
             self._numbers.push_sample([self._codes.get(event.name, OTHER)], event.time)
 
     def close(self) -> None:

@@ -117,7 +117,7 @@ def test_missing_joysticks_are_told_before_anything_is_recorded(visit: Visit) ->
     people = replace(visit, simulated=False, fast=False)
     with desk(), pytest.raises(DeviceError, match="joystick"):
         run(people, ScriptedConsole())
-    assert not people.folder.journal(1).exists()
+    assert not people.journal.exists()
 
 
 def test_a_component_that_raises_leaves_what_was_recorded(

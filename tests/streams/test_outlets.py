@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 from labcrane.clock import Tick
-from labcrane.errors import PluginError, StreamError
+from labcrane.errors import StreamError
 from labcrane.machine_file import load_machine
+from labcrane.recording.journal import event_text
 from labcrane.records import Event, Frame
-from labcrane.streams.markers import CODES, OTHER, payload
+from labcrane.streams.markers import CODES, OTHER
 from labcrane.streams.outlets import Outlets, check_clock
 from labcrane.testing import a_frame, a_run
 
@@ -79,6 +80,8 @@ def test_markers_carry_the_event_and_the_time_it_happened(received):
     first, second = (json.loads(sample[0]) for sample in heard["markers"]["samples"])
     assert first == {"event": "trial.start", "tick": 50, "trial": 3, "pair": "Aé"}
     assert second == {"event": "crane.wobble", "tick": 150, "error": None, "depth": 1.5}
+    told = [event_text(e, f.tick.number) for f in frames for e in f.events]
+    assert [text for (text,) in heard["markers"]["samples"]] == told  # as in the journal
     assert heard["markers"]["stamps"] == [frames[50].tick.due, frames[150].tick.due + 0.001]
     assert heard["codes"]["stamps"] == heard["markers"]["stamps"]
 
@@ -125,8 +128,3 @@ def test_an_outlet_never_lets_liblsl_choose_the_time(run):
     with pytest.raises(StreamError, match="cannot be stamped"):
         outlets.push(frame)
     outlets.close()
-
-
-def test_event_data_cannot_rename_the_event():
-    with pytest.raises(PluginError, match="rename"):
-        payload(Event("trial.end", 1.0, {"event": "mine"}), 7)

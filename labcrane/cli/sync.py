@@ -1,0 +1,33 @@
+"""Prints how right time stamps are."""
+
+from typing import TYPE_CHECKING
+
+from rich.table import Table
+
+from labcrane.cli.inspect import out
+
+if TYPE_CHECKING:
+    from labcrane.streams.sync_report import SyncReport
+
+STYLES = {"PASS": "green", "WARN": "yellow", "FAIL": "red"}
+
+
+def print_report(report: "SyncReport") -> None:
+    """Print a sync report: a row per stream, the loop, and what to do."""
+    from labcrane.streams.sync_report import COLUMNS
+
+    verdict = report.verdict.value
+    out.print(f"sync report: [{STYLES[verdict]}]{verdict}[/]")
+    if report.streams:
+        table = Table(*COLUMNS)
+        for row in report.table():
+            table.add_row(*row, style=STYLES[row[1]])
+        out.print(table)
+    if loop := report.loop:
+        out.print(
+            f"loop: {loop.verdict.value}, {loop.ticks} ticks, {loop.late} late, {loop.dropped} "
+            f"missing; lateness p50 {1e3 * loop.lateness_p50_s:.3f} ms, "
+            f"p99 {1e3 * loop.lateness_p99_s:.3f} ms, most {1e3 * loop.lateness_max_s:.2f} ms"
+        )
+    for line in report.advice():
+        out.print(f"  {line}", markup=False)

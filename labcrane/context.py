@@ -1,0 +1,99 @@
+"""What whoever reads a recording must know, written at its start."""
+
+import hashlib
+import platform
+from datetime import UTC, datetime
+from importlib.metadata import version
+from importlib.util import find_spec
+from typing import Any, Protocol
+
+from labcrane.attempt import trial_units
+from labcrane.data_folder import DataFolder
+from labcrane.plan import SessionPlan
+from labcrane.records import Run
+from labcrane.rig import Rig
+from labcrane.study import Choice, Study
+
+RECORDED_PACKAGES = ("labcrane", "numpy", "pybullet", "pygame", "pylsl", "pydantic")
+
+
+class Recorded(Protocol):
+    """A session as far as its context goes."""
+
+    @property
+    def study(self) -> Study: ...
+    @property
+    def session(self) -> int: ...
+    @property
+    def simulated(self) -> bool: ...
+    @property
+    def fast(self) -> bool: ...
+    @property
+    def pilot(self) -> bool: ...
+    @property
+    def resumed(self) -> bool: ...
+    @property
+    def folder(self) -> DataFolder: ...
+
+
+def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> dict[str, Any]:
+    """Return everything that whoever reads the recording must know, ready for JSON."""
+    study = visit.study
+    choices = {
+        "input": study.operator if visit.simulated else study.input,
+        "scheme": study.scheme,
+        "dynamics": study.dynamics,
+        **{f"tasks.{name}": choice for name, choice in study.task_choices.items()},
+    }
+    return {
+        "study": study.protocol.study,
+        "title": study.protocol.title,
+        "participant": visit.folder.name,
+        "session": visit.session,
+        "session_name": plan.name,
+        "started": datetime.now(UTC).isoformat(timespec="milliseconds"),
+        "simulated": visit.simulated,
+        "fast": visit.fast,
+        "pilot": visit.pilot,
+        "resumed": visit.resumed,
+        "clock": "manual" if visit.fast else "lsl",
+        "rate_hz": this_run.rate_hz,
+        "seed": plan.seed,
+        "protocol": study.text,
+        "protocol_sha256": study.sha256,
+        "machine": study.machine_text,
+        "machine_sha256": hashlib.sha256(study.machine_text.encode()).hexdigest(),
+        "components": {part: _choice(choice) for part, choice in choices.items()},
+        "facts": the_rig.facts(),
+        "versions": _versions(),
+        "streams": {
+            label: need.model_dump(mode="json", exclude_none=True)
+            for label, need in study.protocol.streams.items()
+        },
+        "sync": study.protocol.sync.model_dump(mode="json"),
+        "plan": [
+            {"block": block.number, "name": block.name, "trials": len(block.trials)}
+            for block in plan.blocks
+        ],
+        "trial_units": {
+            column: unit
+            for task in study.tasks.values()
+            for column, unit in trial_units(task).items()
+        },
+    }
+
+
+def _choice(choice: Choice) -> dict[str, Any]:
+    return {
+        "use": choice.name,
+        "plugin": choice.plugin,
+        "settings": choice.settings.model_dump(mode="json"),
+    }
+
+
+def _versions() -> dict[str, str]:
+    return {
+        "python": platform.python_version(),
+        "system": platform.platform(),
+        **{name: version(name) for name in RECORDED_PACKAGES if find_spec(name)},
+    }

@@ -1,0 +1,175 @@
+"""Starts, watches and restarts the processes of a run.
+
+The session process owns the loop, the recorder process the streams of others. Either may die: the
+recorder is started again at once, and after the session's death everything recorded is put into
+the participant file, to be gone on with by ``labcrane resume``.
+"""
+
+import multiprocessing
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from typing import TYPE_CHECKING
+
+from labcrane.console import Command, Order, QueueConsole
+from labcrane.recorder_keeper import RecorderKeeper
+from labcrane.recording.parts import parts
+from labcrane.session import Visit, finish
+from labcrane.session_process import Ended, VisitOrder, serve
+from labcrane.streams.sync_report import SyncReport
+
+if TYPE_CHECKING:
+    from multiprocessing.context import SpawnProcess
+
+LOOK_S = 0.05
+"""How often the launcher looks after its processes: a dead recorder must be back in a second."""
+
+RECORDER = "recorder"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a run ended.
+
+    Attributes
+    ----------
+    died
+        Exit code of a session process that died; None when it ended in order.
+    sync_report
+        How right the session's time stamps are; None when nothing was recorded.
+    """
+
+    died: int | None = None
+    sync_report: SyncReport | None = None
+
+
+class Launcher:
+    """Runs one visit.
+
+    Parameters
+    ----------
+    console
+        Takes orders from people, and is told every event.
+    say
+        Tells people what the launcher itself has to say.
+    """
+
+    def __init__(
+        self, order: VisitOrder, console: QueueConsole, say: Callable[[str], None]
+    ) -> None:
+        self._order = order
+        self._visit: Visit = order.visit()
+        self._console = console
+        self._say = say
+        self._recorder: RecorderKeeper | None = None
+        self._lost: set[str] = set()
+        self.session_pid: int | None = None
+
+    def run(self) -> Outcome:
+        """Run the visit to its end and make its participant file.
+
+        Raises
+        ------
+        LabcraneError
+            The session could not be run, in the session process's own words.
+        """
+        visit = self._visit
+        if not visit.resumed:
+            visit.folder.claim(visit.session)
+        needs = visit.study.protocol.streams
+        if needs:
+            requests = [
+                need.request(label, required=not visit.simulated) for label, need in needs.items()
+            ]
+            self._recorder = RecorderKeeper(visit.streams_journal, requests)
+        report = None
+        try:
+            died = self._run() if self._gate() else None
+        finally:
+            if self._recorder:
+                self._recorder.stop()
+            if parts(visit.journal):
+                report = finish(visit)
+        return Outcome(died, report)
+
+    def _gate(self) -> bool:
+        """Wait until all required streams flow; whether the session may start."""
+        recorder = self._recorder
+        told: list[str] = []
+        while recorder is not None and not recorder.ready:
+            recorder.watch()
+            if recorder.status and recorder.complaints() != told:
+                told = recorder.complaints()
+                self._say("waiting for streams:\n" + "\n".join(f"  {line}" for line in told))
+            if any(command.order is Order.END for command in self._console.commands()):
+                return False
+            time.sleep(LOOK_S)
+        return True
+
+    def _run(self) -> int | None:
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        process = context.Process(target=serve, args=(self._order, theirs), name="session")
+        process.start()
+        theirs.close()
+        self.session_pid = process.pid
+        try:
+            return self._watch(process, ours)
+        finally:
+            ours.close()
+            process.join()
+
+    def _watch(self, process: "SpawnProcess", pipe: Connection) -> int | None:
+        """Return the exit code of a session that died, None of one that ended in order."""
+        while True:
+            try:
+                for command in self._console.commands():
+                    self._send(pipe, command)
+                ready = wait([pipe, process.sentinel], LOOK_S)
+            except KeyboardInterrupt:
+                self._send(pipe, Command(Order.END))
+                continue
+            ended = self._pass_events(pipe) if pipe in ready else None
+            if ended is not None:
+                if ended.error is not None:
+                    raise ended.error
+                return None
+            if process.sentinel in ready and not pipe.poll():
+                process.join()
+                return process.exitcode
+            self._watch_streams(pipe)
+
+    def _pass_events(self, pipe: Connection) -> Ended | None:
+        try:
+            while pipe.poll():
+                message = pipe.recv()
+                if isinstance(message, Ended):
+                    return message
+                self._console.report(message)
+        except (EOFError, OSError):
+            pass  # it died in the middle of a message; its exit code says how
+        return None
+
+    def _watch_streams(self, pipe: Connection) -> None:
+        recorder = self._recorder
+        if recorder is None:
+            return
+        if recorder.watch():
+            self._say("the recorder died and was started again")
+        lost = recorder.lost() if recorder.status else {RECORDER}
+        for what in sorted(lost - self._lost):
+            self._send(pipe, Command(Order.LOST, what))
+        for what in sorted(self._lost - lost):
+            self._send(pipe, Command(Order.BACK, what))
+        if lost != self._lost and lost:
+            for line in recorder.complaints():
+                self._say(line)
+        self._lost = lost
+
+    @staticmethod
+    def _send(pipe: Connection, command: Command) -> None:
+        try:
+            pipe.send(command)
+        except OSError:
+            return  # the session has ended this very moment

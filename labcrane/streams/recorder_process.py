@@ -1,0 +1,120 @@
+"""The recorder as a process: whom it listens to, and when it ends."""
+
+import contextlib
+import json
+import os
+import select
+import signal
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from labcrane.streams.network import use_loopback
+from labcrane.streams.outlets import check_clock
+from labcrane.streams.recorder import Orders, Recorder
+
+LOOK_S = 0.25
+STATUS_S = 1.0
+STATUS_FD = 1
+
+
+def run(orders: Orders) -> int:
+    """Record until told to stop, or until whoever started it has died."""
+    if orders.local:
+        use_loopback()
+    check_clock()
+    recorder = Recorder(orders.journal, orders.streams)
+    teller = _Teller()
+    with _no_blocking(STATUS_FD):
+        try:
+            for due in _watch(orders):
+                recorder.look()
+                if due:
+                    teller.tell(recorder.status())
+        finally:
+            whole = recorder.close()
+            if not whole:
+                teller.tell(recorder.status())
+    return 0 if whole else 1
+
+
+def _watch(orders: Orders) -> Iterator[bool]:
+    """Yield several times a second until it is time to end; True when a status is due."""
+    stopped = _signals()
+    session = _open_session(orders.session_pid)
+    inputs = {0} if session is None else {0, session}
+    ends = float("inf")
+    due = 0.0
+    while time.monotonic() < ends:
+        ready, _, _ = select.select([*inputs, stopped], [], [], LOOK_S)
+        if stopped in ready or (0 in ready and _told_to_stop(inputs)):
+            return
+        if session in ready:
+            inputs.discard(session)
+        # The pipe's end, or the session's: what its streams still send is recorded.
+        if ends == float("inf") and (0 not in inputs or (session and session not in inputs)):
+            ends = time.monotonic() + orders.grace_s
+        status = time.monotonic() >= due
+        if status:
+            due = time.monotonic() + STATUS_S
+        yield status
+
+
+def _told_to_stop(inputs: set[int]) -> bool:
+    """Whether the line just read says stop; at the pipe's end it is listened to no more."""
+    text = os.read(0, 4096)
+    if not text:
+        inputs.discard(0)
+    return b"stop" in text
+
+
+def _open_session(pid: int | None) -> int | None:
+    """Return a descriptor that becomes readable when the session process ends."""
+    if pid is None:
+        return None
+    try:
+        return os.pidfd_open(pid)
+    except ProcessLookupError:
+        ended, other = os.pipe()
+        os.close(other)
+        return ended
+
+
+def _signals() -> int:
+    """Return a descriptor that becomes readable when the process is asked to end."""
+    told, tell = os.pipe()
+    os.set_blocking(tell, False)
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, lambda *_: None)
+    signal.set_wakeup_fd(tell)
+    return told
+
+
+@contextlib.contextmanager
+def _no_blocking(descriptor: int) -> Iterator[None]:
+    """Let writes fail rather than wait for a reader that hangs."""
+    before = os.get_blocking(descriptor)
+    os.set_blocking(descriptor, False)
+    try:
+        yield
+    finally:
+        os.set_blocking(descriptor, before)
+
+
+class _Teller:
+    """Writes lines of status; a reader that hangs or has died misses some, but gets whole ones."""
+
+    def __init__(self) -> None:
+        self._rest = b""
+
+    def tell(self, status: Mapping[str, Any]) -> None:
+        """Write a line unless the reader has not taken the one before."""
+        if not self._rest:
+            self._rest = json.dumps(status).encode() + b"\n"
+        with contextlib.suppress(BlockingIOError, BrokenPipeError):
+            self._rest = self._rest[os.write(STATUS_FD, self._rest) :]
+
+
+if __name__ == "__main__":
+    sys.exit(run(Orders.of(json.loads(sys.argv[1]))))

@@ -1,0 +1,134 @@
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import pyxdf
+from recording.journals import write
+
+from labcrane import RecordingError
+from labcrane.recording.foreign_streams import (
+    Conclusion,
+    Correction,
+    RecordedStream,
+    companion_headers,
+)
+from labcrane.recording.participant_file import consolidate
+from labcrane.recording.recording import open_recording
+from labcrane.recording.recover import recover
+from labcrane.recording.stream_header import Channel, StreamHeader
+from labcrane.recording.xdf import XdfWriter
+
+EEG = StreamHeader(
+    "EEG / 1",
+    "EEG",
+    (Channel("Fz", "microvolts"), Channel("Cz", "microvolts"), Channel("Fz", "microvolts")),
+    "float32",
+    500.0,
+    "amp-7",
+)
+NOTES = StreamHeader("Keys", "Markers", (Channel("key"),), "string", 0.0, "kb")
+SILENT = StreamHeader("Gaze", "Gaze", (Channel("x"),), "double64", 200.0)
+
+
+def record(path: Path, count: int, first: int = 0) -> Path:
+    """Write a journal as the recorder does."""
+    with XdfWriter(path) as writer:
+        eeg = writer.add_stream(EEG)
+        beside = {
+            kind: writer.add_stream(header) for kind, header in companion_headers(EEG, eeg).items()
+        }
+        keys, _ = writer.add_stream(NOTES), writer.add_stream(SILENT)
+        stamps = np.arange(first, first + count) / 500
+        data = np.outer(np.arange(first, first + count), [1, 2, 3]).astype(np.float32)
+        writer.write_samples(eeg, stamps, data)
+        writer.write_texts(keys, [5.0, 6.0], [["a"], ["ż"]])
+        writer.write_sample(beside["probes"], 9.0, np.array([1.0, 8.0, 1e-4, 9.0]))
+        writer.write_offset(eeg, 1.0, 8.0)
+        writer.write_sample(beside["arrivals"], 9.1, np.array([count, 9.1]))
+        note = {"event": "reset", "samples": [0, count]}
+        writer.write_texts(beside["notes"], [9.2], [[json.dumps(note)]])
+    return path
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    folder = tmp_path / "P001"
+    folder.mkdir()
+    write(folder / "ses-01_run.xdf", 10)
+    record(folder / "ses-01_streams.xdf", 1000)
+    return folder
+
+
+def test_everything_known_of_a_stream_is_in_the_participant_file(folder: Path) -> None:
+    (done,) = recover(folder)
+    assert done.done is not None
+    assert done.done.streams == {"EEG / 1": 1000, "Keys": 2, "Gaze": 0}
+    session = open_recording(folder / "P001.h5").session(1)
+    eeg = session.streams["EEG _ 1"]
+    np.testing.assert_array_equal(eeg.time, np.arange(1000) / 500)
+    np.testing.assert_array_equal(eeg.data.to_numpy(), np.outer(np.arange(1000), [1, 2, 3]))
+    assert eeg.attrs["name"] == "EEG / 1"
+    assert eeg.attrs["corrected"] is False
+    assert list(session.streams["Keys"].data["key"]) == ["a", "ż"]
+    assert len(session.streams["Gaze"].time) == 0
+    with h5py.File(folder / "P001.h5") as file:
+        group = file["ses-01/streams/EEG _ 1"]
+        assert sorted(group["data"]) == ["Cz", "Fz", "Fz-2"]
+        assert group["clock/rtt"][:].tolist() == [1e-4]
+        assert group["arrival/count"][:].tolist() == [1000.0]
+        assert group["offsets/value"][:].tolist() == [8.0]
+        assert group["header"].asstr()[()] == EEG.xml
+        assert json.loads(group["notes/data"].asstr()[0])["event"] == "reset"
+
+
+def test_parts_of_a_stream_are_joined_where_its_source_is_the_same(folder: Path) -> None:
+    record(folder / "ses-01_streams.part2.xdf", 500, first=2000)
+    seen: dict[str, RecordedStream] = {}
+
+    def correct(stream: RecordedStream) -> Correction:
+        seen[stream.header.name] = stream
+        return Correction(stream.time_raw + 8.0, {"residual_p95": 1e-5, "verdict": "PASS"})
+
+    journals = [folder / "ses-01_run.xdf", folder / "ses-01_streams.xdf"]
+    consolidate(folder / "P001.h5", journals, lambda context: Conclusion(correct))
+    eeg = seen["EEG / 1"]
+    assert eeg.starts == (0, 1000)
+    assert [note.data["samples"] for note in eeg.notes] == [[0, 1000], [1000, 1500]]
+    np.testing.assert_array_equal(eeg.arrivals, [[1000, 9.1], [1500, 9.1]])
+    session = open_recording(folder / "P001.h5").session(1)
+    stream = session.streams["EEG _ 1"]
+    np.testing.assert_array_equal(stream.time, eeg.time_raw + 8.0)
+    np.testing.assert_array_equal(stream.time_raw, eeg.time_raw)
+    assert stream.attrs["verdict"] == "PASS"
+    assert stream.attrs["residual_p95"] == 1e-5
+    assert "Gaze-2" in session.streams  # no source id, so nobody knows that it is the same
+
+
+def test_a_clock_that_cannot_be_corrected_costs_no_session(folder: Path) -> None:
+    def correct(stream: RecordedStream) -> Correction:
+        raise RecordingError(f"no probes for {stream.header.name}")
+
+    (done,) = recover(folder, lambda context: Conclusion(correct))
+    assert done.problem == ""
+    eeg = open_recording(folder / "P001.h5").session(1).streams["EEG _ 1"]
+    assert eeg.attrs["uncorrected"] == "no probes for EEG / 1"
+    np.testing.assert_array_equal(eeg.time, eeg.time_raw)
+
+
+def test_a_session_of_streams_alone_is_a_session(folder: Path) -> None:
+    (folder / "ses-01_run.xdf").unlink()
+    (done,) = recover(folder)
+    assert done.problem == ""
+    session = open_recording(folder / "P001.h5").session(1)
+    assert list(session.streams) == ["EEG _ 1", "Gaze", "Keys"]
+    assert len(session.events) == len(session.trials) == 0
+
+
+def test_pyxdf_reads_the_streams_beside(folder: Path) -> None:
+    streams, _ = pyxdf.load_xdf(folder / "ses-01_streams.xdf", dejitter_timestamps=False)
+    named = {stream["info"]["name"][0]: stream for stream in streams}
+    assert named["EEG / 1|probes"]["info"]["desc"][0]["of"] == ["1"]
+    assert named["EEG / 1|probes"]["time_series"].tolist() == [[1.0, 8.0, 1e-4, 9.0]]
+    np.testing.assert_allclose(named["EEG / 1"]["time_stamps"], np.arange(1000) / 500 + 8.0)

@@ -1,0 +1,302 @@
+"""Corrected times against clocks whose truth is known in closed form."""
+
+import numpy as np
+import pytest
+from streams.synthetic import SourceClock, after_one_another, arrivals, probe, source
+
+from labcrane.errors import RecordingError
+from labcrane.streams.correction import Treatment, correct
+from labcrane.streams.dejitter import Dejitter
+from labcrane.streams.quality import Basis
+from labcrane.streams.raw import RawStream
+
+REGULAR = Treatment(rate_hz=500.0, dejitter=Dejitter.NONE)
+MARKERS = Treatment()
+
+
+@pytest.fixture
+def random():
+    return np.random.default_rng(3)
+
+
+def regular(duration=120.0, rate=500.0):
+    return 100.0 + np.arange(int(duration * rate)) / rate
+
+
+def irregular(random, duration=120.0):
+    return 100.0 + np.sort(random.uniform(0.0, duration, int(3 * duration)))
+
+
+def p95(corrected, times):
+    return float(np.quantile(np.abs(corrected.time - times), 0.95))
+
+
+@pytest.mark.parametrize("ppm", [-200.0, 0.0, 50.0, 200.0])
+def test_a_drifting_clock_is_followed_within_microseconds(random, ppm):
+    times = regular()
+    corrected = correct(source(SourceClock(ppm=ppm), times, random), REGULAR)
+    assert p95(corrected, times) < 3e-6
+    assert corrected.quality.drift_ppm == pytest.approx(ppm, abs=0.2)
+    assert corrected.quality.rate_hz == pytest.approx(500.0, rel=1e-6)
+    assert corrected.quality.gaps == 0
+
+
+@pytest.mark.parametrize("kind", ["regular", "irregular"])
+def test_a_wandering_clock_is_followed(random, kind):
+    times = regular(400) if kind == "regular" else irregular(random, 400)
+    raw = source(SourceClock(wander_s=0.001), times, random)
+    corrected = correct(raw, REGULAR if kind == "regular" else MARKERS)
+    assert p95(corrected, times) < 3e-5
+
+
+@pytest.mark.parametrize("kind", ["regular", "irregular"])
+@pytest.mark.parametrize("step", [0.3, -0.3, 40.0])
+def test_a_step_of_the_clock_moves_no_sample(random, kind, step):
+    times = regular() if kind == "regular" else irregular(random)
+    raw = source(SourceClock(step_s=step, step_at=161.234), times, random)
+    corrected = correct(raw, REGULAR if kind == "regular" else MARKERS)
+    assert np.abs(corrected.time - times).max() < 1e-5
+    assert [segment.basis for segment in corrected.segments] == [Basis.PROBES] * 2
+    assert corrected.quality.unsure == 0
+
+
+def test_a_small_step_is_found_between_regular_stamps(random):
+    times = regular()
+    raw = source(SourceClock(step_s=0.004, step_at=161.234), times, random)
+    corrected = correct(raw, REGULAR)
+    assert np.abs(corrected.time - times).max() < 1e-5
+    assert len(corrected.segments) == 2
+
+
+def test_a_small_step_of_a_marker_clock_is_owned_up_to(random):
+    times = irregular(random)
+    raw = source(SourceClock(step_s=0.004, step_at=161.234), times, random)
+    corrected = correct(raw, MARKERS)
+    wrong = np.abs(corrected.time - times) > 1e-5
+    unsure = corrected.segments[1].unsure
+    assert 0 < unsure <= 20
+    assert np.count_nonzero(wrong) <= unsure
+    assert np.abs(corrected.time - times).max() < 0.0041
+
+
+@pytest.mark.parametrize("kind", ["regular", "irregular"])
+@pytest.mark.parametrize("offset", [5000.0, -3.0, 999.9])
+def test_a_restarted_source_with_another_clock_moves_no_sample(random, kind, offset):
+    times = regular(60) if kind == "regular" else irregular(random, 60)
+    later = times + 64.0
+    first = source(SourceClock(), times, random)
+    second = source(SourceClock(offset=offset, ppm=-50.0), later, random)
+    raw = after_one_another(first, second, told=163.5)
+    corrected = correct(raw, REGULAR if kind == "regular" else MARKERS)
+    assert np.abs(corrected.time - np.r_[times, later]).max() < 1e-5
+
+
+def test_a_clock_known_for_seconds_only_does_not_borrow_the_rate_of_another(random):
+    times, later = regular(6), regular(60) + 10.0
+    raw = after_one_another(
+        source(SourceClock(ppm=100.0), times, random),
+        source(SourceClock(offset=5000.0, ppm=-100.0), later, random),
+        told=109.5,
+    )
+    corrected = correct(raw, REGULAR)
+    assert np.abs(corrected.time - np.r_[times, later]).max() < 5e-5
+
+
+@pytest.mark.parametrize("kind", ["regular", "irregular"])
+def test_a_chunk_that_holds_both_sources_is_cut_between_them(random, kind):
+    times = regular(60) if kind == "regular" else irregular(random, 60)
+    later = times + 64.0
+    first = source(SourceClock(), times, random)
+    second = source(SourceClock(offset=5000.0), later, random)
+    raw = after_one_another(first, second, told=163.5)
+    n = len(times)
+    resets = np.array([[163.5, n - 20.0, n + 30.0]])
+    raw = RawStream.of(raw.stamps, raw.probes, raw.arrivals, resets)
+    corrected = correct(raw, REGULAR if kind == "regular" else MARKERS)
+    assert np.abs(corrected.time - np.r_[times, later]).max() < 1e-5
+
+
+def test_a_marker_program_restarted_on_a_clock_nearly_the_same_is_cut_where_it_was_told(random):
+    """Neither its stamps nor their arrival show where the step of 20 ms is."""
+    times, later = irregular(random, 60), irregular(random, 60) + 61.0
+    first = source(SourceClock(), times, random)
+    second = source(SourceClock(offset=1000.02), later, random)
+    corrected = correct(after_one_another(first, second, told=160.9), MARKERS)
+    assert np.abs(corrected.time - np.r_[times, later]).max() < 1e-5
+    assert corrected.quality.unsure == 0
+
+
+@pytest.mark.parametrize("offset", [-700.0, 9000.0])
+def test_a_source_replaced_before_its_first_probe_is_placed_by_arrival(random, offset):
+    """Of the first clock nothing is known but when its samples came."""
+    times, later = regular(0.8), regular(60) + 4.0
+    first = SourceClock(offset=offset)(times)
+    second = SourceClock(offset=5000.0)
+    raw = RawStream.of(
+        np.r_[first, second(later)],
+        probes=probe(second, 104.2, 164.0, random),
+        arrivals=arrivals(np.r_[times, later]),
+    )
+    corrected = correct(raw, REGULAR)
+    error = np.abs(corrected.time - np.r_[times, later])
+    assert error[: len(times)].max() < 0.03
+    assert error[len(times) :].max() < 1e-5
+    assert corrected.quality.unprobed == len(times)
+
+
+def test_samples_that_the_network_held_up_keep_their_time(random):
+    times = regular()
+    raw = source(SourceClock(), times, random)
+    held = raw.arrivals.copy()
+    stuck = (held[:, 1] > 140.0) & (held[:, 1] < 175.0)
+    held[stuck, 1] = 175.0
+    corrected = correct(RawStream.of(raw.stamps, raw.probes, held), REGULAR)
+    assert np.abs(corrected.time - times).max() < 1e-5
+    assert len(corrected.segments) == 1
+
+
+def test_markers_may_tell_of_what_happened_before(random):
+    """An event's time is not the time it is sent."""
+    times = irregular(random)
+    stamped = times - random.uniform(0.0, 5.0, len(times))
+    clock = SourceClock()
+    raw = RawStream.of(clock(stamped), probe(clock, 100.3, 221.0, random), arrivals(times))
+    assert p95(correct(raw, MARKERS), stamped) < 5e-6
+
+
+@pytest.mark.parametrize("foreign", [1.7e9, -40_000.0])
+def test_stamps_of_a_clock_that_lsl_does_not_know_are_told(random, foreign):
+    """Some programs stamp with the time of day, or with what the device counts."""
+    times = regular(60)
+    honest = source(SourceClock(ppm=0.0), times, random)
+    raw = RawStream.of(honest.stamps + foreign, honest.probes, honest.arrivals)
+    corrected = correct(raw, REGULAR)
+    assert corrected.quality.lag_s == pytest.approx(-foreign, rel=1e-5)
+    assert corrected.quality.unprobed == 0
+
+
+def test_delay_of_probes_on_one_way_is_found_by_their_round_trips(random):
+    """Of eight exponential delays of 2 ms the shortest is 0.25 ms, and half of it the error."""
+    times = regular(300)
+    raw = source(SourceClock(), times, random, every=2.0, reply_s=0.002)
+    assert p95(correct(raw, REGULAR), times) < 5e-5
+    error = raw.probes[:, 0] + raw.probes[:, 1] - our_time(raw.probes[:, 0])
+    assert np.mean(np.abs(error)) > 1e-4
+
+
+def our_time(reading):
+    """Return our time when a clock of 1000 s and 100 ppm reads something."""
+    return (reading - 1000.0 + 100e-6 * 100.0) / (1 + 100e-6)
+
+
+def test_a_stray_probe_is_left_out(random):
+    times = regular()
+    raw = source(SourceClock(), times, random)
+    raw.probes[60, 1] += 0.5
+    corrected = correct(raw, REGULAR)
+    assert len(corrected.segments) == 1
+    assert p95(corrected, times) < 3e-6
+
+
+def test_a_long_time_without_probes_is_no_step(random):
+    times = regular(600)
+    raw = source(SourceClock(ppm=150.0), times, random)
+    away = (raw.probes[:, 3] > 200.0) & (raw.probes[:, 3] < 500.0)
+    corrected = correct(RawStream.of(raw.stamps, raw.probes[~away], raw.arrivals), REGULAR)
+    assert len(corrected.segments) == 1
+    assert p95(corrected, times) < 5e-5
+    assert corrected.quality.probe_age_s == pytest.approx(150.0, abs=2.0)
+
+
+def chunks(times, random, size=20, least=0.008, scatter=0.004):
+    """Return when each sample is stamped by a driver that stamps chunks when it sends them."""
+    last = times.reshape(-1, size)[:, -1]
+    sent = last + least + random.exponential(scatter, len(last))
+    behind = (np.arange(size) - (size - 1)) / 500.0
+    return (sent[:, None] + behind).ravel()
+
+
+@pytest.mark.parametrize(
+    ("treatment", "limit"),
+    [
+        (Treatment(rate_hz=500.0, latency_s=0.012), 2.5e-4),
+        (Treatment(rate_hz=500.0, dejitter=Dejitter.ENVELOPE, transport_s=0.008), 5e-5),
+    ],
+)
+def test_stamps_made_when_chunks_are_sent_are_evened(random, treatment, limit):
+    times = regular(300)
+    raw = source(SourceClock(), times, random, stamped=chunks(times, random))
+    assert p95(correct(raw, treatment), times) < limit
+
+
+def test_the_envelope_does_not_see_a_busy_computer(random):
+    times = regular(300)
+    stamped = chunks(times, random)
+    busy = np.repeat(random.exponential(0.004, len(times) // 20), 20) * (times > 250.0)
+    raw = source(SourceClock(), times, random, stamped=stamped + busy)
+    envelope = Treatment(rate_hz=500.0, dejitter=Dejitter.ENVELOPE, transport_s=0.008)
+    assert p95(correct(raw, envelope), times) < 1e-4
+
+
+def test_a_crystal_that_wanders_with_the_temperature_is_followed(random):
+    """A fifth of a millisecond in ten minutes, two parts in a million: one line would miss it."""
+    even = 100.0 + np.arange(90_000) / 100.0
+    times = even + 0.0002 * np.sin(2 * np.pi * even / 600.0)
+    corrected = correct(source(SourceClock(), times, random), Treatment(rate_hz=100.0))
+    assert np.abs(corrected.time - times).max() < 6e-5
+
+
+@pytest.mark.parametrize("treatment", [Treatment(), Treatment(rate_hz=500, can_drop_samples=True)])
+def test_markers_and_cameras_are_never_evened(random, treatment):
+    times = regular(60) + random.uniform(-0.0005, 0.0005, 30000)
+    corrected = correct(source(SourceClock(ppm=0.0), times, random), treatment)
+    assert np.abs(corrected.time - times).max() < 1e-5
+
+
+def test_missing_samples_are_not_evened_away(random):
+    times = np.delete(regular(60), slice(15000, 15400))
+    corrected = correct(source(SourceClock(), times, random), Treatment(rate_hz=500.0))
+    assert np.abs(corrected.time - times).max() < 1e-5
+    assert corrected.quality.gaps == 1
+    assert corrected.quality.longest_gap_s == pytest.approx(0.802, abs=1e-4)
+
+
+def test_a_counter_bridges_missing_samples(random):
+    whole = regular(60)
+    kept = np.delete(np.arange(len(whole)), slice(15000, 15010))
+    times = whole[kept]
+    stamped = chunks(whole, random)[kept]
+    raw = source(SourceClock(), times, random, stamped=stamped)
+    raw = RawStream.of(raw.stamps, raw.probes, raw.arrivals, index=kept.astype(float))
+    corrected = correct(raw, Treatment(500.0, dejitter=Dejitter.ENVELOPE, transport_s=0.008))
+    assert p95(corrected, times) < 1e-4
+    assert corrected.quality.dropped == 10
+
+
+def test_latency_is_subtracted_last(random):
+    times = regular(30)
+    raw = source(SourceClock(), times, random)
+    plain, late = (correct(raw, Treatment(500.0, latency_s=latency)) for latency in (0.0, 0.0516))
+    np.testing.assert_allclose(plain.time - late.time, 0.0516, atol=1e-9)
+
+
+def test_a_transport_delay_needs_the_envelope():
+    with pytest.raises(RecordingError, match="envelope"):
+        correct(RawStream.of(np.arange(9.0)), Treatment(rate_hz=500.0, transport_s=0.008))
+
+
+def test_correction_alters_nothing_and_can_be_repeated(random):
+    raw = source(SourceClock(wander_s=0.001), regular(30), random)
+    before = raw.stamps.copy(), raw.probes.copy(), raw.arrivals.copy()
+    first, second = correct(raw, Treatment(500.0)), correct(raw, Treatment(500.0))
+    np.testing.assert_array_equal(first.time, second.time)
+    for was, now in zip(before, (raw.stamps, raw.probes, raw.arrivals), strict=True):
+        np.testing.assert_array_equal(was, now)
+
+
+def test_a_stream_without_samples_or_probes_breaks_nothing():
+    assert len(correct(RawStream.of(np.empty(0)), REGULAR).time) == 0
+    unknown = correct(RawStream.of(np.arange(100.0)), REGULAR)
+    assert np.isnan(unknown.time).all()
+    assert unknown.segments[0].basis is Basis.NOTHING
+    assert unknown.quality.unprobed == 100

@@ -1,0 +1,180 @@
+"""The recorder process, with real sources that come, go, come back and misbehave."""
+
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyxdf
+from streams.emulation import Lab, stop, until, until_ready
+
+from labcrane.errors import StreamError
+from labcrane.recording.parts import parts
+from labcrane.recording.xdf_reader import read_xdf
+from labcrane.streams.discovery import discover
+from labcrane.streams.request import StreamRequest
+
+EEG = {"label": "EEG", "type": "EEG"}
+GAZE = {"label": "eyes", "name": "Gaze", "required": False, "rate_hz": 50, "channels": 3}
+
+
+@pytest.fixture
+def lab(tmp_path):
+    lab = Lab(tmp_path, Path("not needed"))
+    yield lab
+    lab.close()
+
+
+def named(status, name):
+    return next(one for one in status["streams"] if one["name"] == name)
+
+
+def events(stream):
+    return [note.data["event"] for note in stream.notes]
+
+
+def test_streams_that_come_late_return_or_never_send_are_all_recorded(lab):
+    first = lab.sender("Amplifier", "EEG", "amplifier-1")
+    lab.sender("Mute", "EEG", "amplifier-2", rate=-100.0)
+    recorder = lab.recorder(EEG | {"name": "Amplifier"}, EEG | {"label": "mute"}, GAZE)
+    status = until_ready_but_for(recorder, "Mute")
+    assert named(status, "Gaze")["condition"] == "absent"
+    lab.sender("Gaze", "Gaze", "")
+    status = until(recorder, lambda status: named(status, "Gaze")["samples"] > 0)
+    text = " ".join(named(status, "Gaze")["warnings"])
+    assert "has 2 channels, 3 are expected" in text
+    assert "nominal rate of 100 Hz, 50 Hz are expected" in text
+    assert "no source_id" in text or "made up by pylsl" in text
+    first.kill()
+    until(recorder, lambda status: named(status, "Amplifier")["condition"] == "silent")
+    lab.sender("Amplifier", "EEG", "amplifier-1", first=1_000_000)
+    status = until(recorder, lambda status: named(status, "Amplifier")["resets"] == 1)
+    status = until(recorder, lambda status: named(status, "Amplifier")["condition"] == "flows")
+    assert stop(recorder) == 0
+
+    streams = lab.streams()
+    counts = streams["Amplifier"].data[:, 0]
+    steps = np.diff(counts)
+    assert np.count_nonzero(steps != 1.0) == 1  # the restart, and nothing else, is a break
+    assert counts[-1] > 1_000_000
+    assert events(streams["Amplifier"]) == ["opened", "silent", "reset", "flows"]
+    assert len(streams["Mute"].time_raw) == 0
+    assert "warning" in events(streams["Gaze"])
+    assert streams["Amplifier"].header.channels[1].unit == "microvolts"
+    loaded, _ = pyxdf.load_xdf(lab.journal)
+    sizes = {one["info"]["name"][0]: len(one["time_stamps"]) for one in loaded}
+    assert sizes["Amplifier"] == len(counts)
+
+
+def until_ready_but_for(recorder, name):
+    def holds(status):
+        others = [s for s in status["streams"] if s["required"] and s["name"] != name]
+        return (
+            len(others) > 0
+            and all(one["sane"] for one in others)
+            and named(status, name)["condition"] == "empty"
+        )
+
+    status = until(recorder, holds)
+    assert not status["ready"]
+    assert any("no sample" in text for text in named(status, name)["warnings"])
+    return status
+
+
+@pytest.mark.parametrize("dies", ["session", "pipe"])
+def test_the_recorder_outlives_the_session_by_a_grace_and_closes_its_journal(lab, dies):
+    lab.sender("Amplifier", "EEG", "amplifier-1")
+    session = lab.start("-c", "import time; time.sleep(600)")
+    recorder = lab.recorder(EEG, session_pid=session.pid, grace_s=1.5)
+    until_ready(recorder)
+    died = time.perf_counter()
+    if dies == "session":
+        session.kill()
+    else:
+        recorder.stdin.close()
+        recorder.stdin = None
+    recorder.stdout.read()
+    assert recorder.wait(20) == 0
+    assert read_xdf(lab.journal).whole
+    after = lab.streams()["Amplifier"].time_raw[-1] - died
+    assert 1.0 < after < 6.0
+
+
+def test_a_killed_recorder_goes_on_in_the_next_part(lab):
+    lab.sender("Amplifier", "EEG", "amplifier-1")
+    first = lab.recorder(EEG)
+    until_ready(first)
+    first.kill()
+    first.wait()
+    died = time.perf_counter()
+    second = lab.recorder(EEG)
+    until_ready(second)
+    assert stop(second) == 0
+    assert [part.name for part in parts(lab.journal)] == [
+        "ses-01_streams.xdf",
+        "ses-01_streams.part2.xdf",
+    ]
+    stream = lab.streams()["Amplifier"]
+    before, after = np.split(stream.time_raw, [stream.starts[1]])
+    assert died - before[-1] < 0.2
+    assert len(after) > 0
+    assert (np.diff(stream.data[:, 0])[: len(before) - 1] == 1.0).all()
+    assert events(stream) == ["opened", "opened"]
+
+
+def test_two_programs_with_one_source_id_are_warned_of(lab):
+    lab.sender("Amplifier", "EEG", "same")
+    lab.sender("Amplifier", "EEG", "same")
+    recorder = lab.recorder(EEG)
+    status = until(recorder, lambda s: "2 programs" in " ".join(s["streams"][0]["warnings"]))
+    assert "'same'" in " ".join(status["streams"][0]["warnings"])
+    found = [one for one in discover(1.0) if one.name == "Amplifier"]
+    assert len(found) == 2
+    assert "2 programs" in found[0].warnings[-1]
+    assert stop(recorder) == 0
+    assert events(lab.streams()["Amplifier"]) == ["opened", "warning"]
+
+
+def test_a_required_stream_that_is_not_what_was_expected_holds_the_session_back(lab):
+    lab.sender("Amplifier", "EEG", "amplifier-1", rate=200.0)
+    recorder = lab.recorder(EEG | {"channels": 64})
+    status = until(recorder, lambda status: named_or_none(status, "Amplifier") == "flows")
+    assert not status["ready"]
+    assert status["streams"][0]["misfits"] == ["has 2 channels, 64 are expected"]
+    assert stop(recorder) == 0
+
+
+def named_or_none(status, name):
+    return next((s["condition"] for s in status["streams"] if s["name"] == name), None)
+
+
+def test_discovery_tells_rate_units_and_clock(lab):
+    lab.sender("Amplifier", "EEG", "amplifier-1")
+    deadline = time.monotonic() + 20.0
+    while not (found := [one for one in discover(0.5) if one.name == "Amplifier"]):
+        assert time.monotonic() < deadline
+    (one,) = found
+    assert (one.type, one.rate_hz, one.channels, one.format) == ("EEG", 100.0, 2, "float32")
+    assert one.units == ("1", "microvolts")
+    assert abs(one.offset_s) < 0.001
+    assert 0.0 < one.rtt_s < 0.1
+    assert one.warnings == ()
+
+
+def test_a_recorder_that_is_told_nonsense_says_what_it_understands():
+    orders = json.dumps({"journal": "x.xdf", "streams": [], "colour": "red"})
+    done = subprocess.run(
+        [sys.executable, "-m", "labcrane.streams.recorder", orders],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "cannot be told colour" in done.stderr
+
+
+def test_a_request_that_any_stream_would_meet_is_refused():
+    with pytest.raises(StreamError, match="give its type, name or source_id"):
+        StreamRequest("anything")

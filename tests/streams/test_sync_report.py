@@ -1,0 +1,158 @@
+"""What is said of time stamps, and of a recording that was not what it should have been."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from streams.synthetic import SourceClock, source
+
+from labcrane.errors import RecordingError
+from labcrane.recording.foreign_streams import Note, RecordedStream
+from labcrane.recording.stream_header import Channel, StreamHeader
+from labcrane.streams.quality import Quality
+from labcrane.streams.resync import corrector, resync, treatment_of
+from labcrane.streams.stream_report import judge_stream
+from labcrane.streams.sync_report import COLUMNS, SyncReport, judge_loop, never_came
+from labcrane.streams.verdict import Limit, Limits, Verdict
+
+EEG = StreamHeader("EEG", "EEG", (Channel("Cz", "microvolts"),), rate_hz=500.0, source_id="amp-1")
+
+
+def recorded(header=EEG, clock=None, times=None, notes=()):
+    times = 100.0 + np.arange(30_000) / 500.0 if times is None else times
+    raw = source(clock or SourceClock(), times, np.random.default_rng(3))
+    return RecordedStream(
+        header=header,
+        time_raw=raw.stamps,
+        data=np.zeros((len(times), 1)),
+        texts=[],
+        probes=raw.probes,
+        arrivals=raw.arrivals,
+        notes=(Note(100.0, {"event": "opened"}), *notes),
+        offsets=raw.probes[:, :2],
+    )
+
+
+def judged(stream):
+    return judge_stream(stream, resync(stream).quality, Limits())
+
+
+def test_a_stream_in_order_passes():
+    report = judged(recorded(clock=SourceClock(ppm=40.0)))
+    assert (report.verdict, report.findings, report.samples) == (Verdict.PASS, (), 30_000)
+
+
+@pytest.mark.parametrize(
+    ("change", "verdict", "text"),
+    [
+        ({"drift_ppm": -180.0}, Verdict.WARN, "runs -180 ppm off"),
+        ({"drift_ppm": 800.0}, Verdict.FAIL, "runs +800 ppm off"),
+        ({"residual_s": 0.001}, Verdict.WARN, "scatters by 1.000 ms"),
+        ({"rtt_p95_s": 0.008}, Verdict.WARN, "4.00 ms may be hidden"),
+        ({"probe_age_s": 50.0}, Verdict.FAIL, "up to 50 s without a clock probe"),
+        ({"rate_hz": 400.0}, Verdict.FAIL, "400.00 Hz instead of 500 Hz"),
+        ({"gaps": 2, "longest_gap_s": 0.4}, Verdict.WARN, "2 gaps, the longest 0.400 s"),
+        ({"lag_s": -1.7e9}, Verdict.FAIL, "its stamps lie -1700000000.000 s before"),
+        ({"dropped": 3}, Verdict.WARN, "3 samples are missing"),
+        ({"unsure": 12}, Verdict.WARN, "12 samples are near a step"),
+        ({"unprobed": 7}, Verdict.FAIL, "7 samples are of a clock that was never probed"),
+        ({"rtt_p50_s": math.nan}, Verdict.FAIL, "never probed"),
+    ],
+)
+def test_each_shortcoming_is_named_with_what_to_do(change, verdict, text):
+    stream = recorded(clock=SourceClock(ppm=40.0))
+    report = judge_stream(stream, replace(resync(stream).quality, **change), Limits())
+    assert report.verdict is verdict
+    (finding,) = report.findings
+    assert text in finding.text
+    assert len(finding.advice) > 10
+
+
+def test_what_is_not_known_fails():
+    assert Limit(1.0, 2.0).judge(math.nan) is Verdict.FAIL
+    assert Limit(1.0, 2.0).judge(1.0) is Verdict.PASS
+    assert Limit(1.0, 2.0).judge(2.0) is Verdict.WARN
+
+
+@pytest.mark.parametrize(("required", "verdict"), [(True, Verdict.FAIL), (False, Verdict.WARN)])
+def test_a_stream_without_samples_is_named_and_breaks_nothing(required, verdict):
+    empty = replace(recorded(), time_raw=np.empty(0), arrivals=np.empty((0, 2)))
+    report = judge_stream(empty, resync(empty).quality, Limits(), required=required)
+    assert report.verdict is verdict
+    assert "no sample came" in report.findings[0].text
+
+
+def test_restarts_and_warnings_of_the_recorder_are_told():
+    notes = (
+        Note(120.0, {"event": "reset", "samples": [10_000, 10_000]}),
+        Note(121.0, {"event": "warning", "text": "has no source_id: set one"}),
+    )
+    report = judged(recorded(clock=SourceClock(ppm=0.0), notes=notes))
+    assert [finding.text for finding in report.findings] == [
+        "its program was restarted 1 times",
+        "has no source_id",
+    ]
+
+
+def test_resets_in_a_later_part_count_from_its_first_sample():
+    times, later = 100.0 + np.arange(10_000) / 500.0, 130.0 + np.arange(20_000) / 500.0
+    first = recorded(times=times)
+    second = recorded(clock=SourceClock(offset=5000.0), times=later)
+    stream = replace(
+        first,
+        time_raw=np.r_[first.time_raw, second.time_raw],
+        probes=np.r_[first.probes, second.probes],
+        arrivals=np.r_[first.arrivals, second.arrivals + np.array([10_000, 0.0])],
+        notes=(*first.notes, *second.notes, Note(129.0, {"event": "reset", "samples": [0, 0]})),
+        starts=(0, 10_000),
+    )
+    corrected = resync(stream)
+    assert [segment.start for segment in corrected.segments] == [0, 10_000]
+    assert np.abs(corrected.time - np.r_[times, later]).max() < 1e-5
+
+
+def test_consolidation_gets_times_and_flat_figures():
+    correction = corrector()(recorded())
+    assert len(correction.time) == 30_000
+    assert correction.quality["drift_ppm"] == pytest.approx(100.0, abs=0.5)
+    assert correction.quality["dejitter"] == "least_squares"
+    assert all(isinstance(value, float | str) for value in correction.quality.values())
+
+
+def test_a_streams_own_header_says_how_it_is_read():
+    timing = {"synchronization": {"can_drop_samples": "true", "offset_mean": "0.0516"}}
+    treatment = treatment_of(replace(EEG, desc=timing))
+    assert treatment.can_drop_samples
+    assert treatment.latency_s == 0.0516
+    with pytest.raises(RecordingError, match="'soon', which is no number"):
+        treatment_of(replace(EEG, desc={"synchronization": {"offset_mean": "soon"}}))
+
+
+def test_late_ticks_and_missing_ones_are_judged():
+    due = np.arange(1000) / 240.0
+    woke = due + 0.0001
+    assert judge_loop(due, woke, 240.0, Limits()).verdict is Verdict.PASS
+    woke[:20] += 0.005
+    loop = judge_loop(due, woke, 240.0, Limits())
+    assert (loop.verdict, loop.late) == (Verdict.WARN, 20)
+    assert loop.lateness_max_s == pytest.approx(0.0051)
+    assert judge_loop(due, woke, 240.0, Limits(), dropped=1).verdict is Verdict.FAIL
+
+
+def test_the_report_is_a_table_advice_and_json():
+    bad = judge_stream(recorded(), Quality(), Limits())
+    good = judged(recorded(clock=SourceClock(ppm=40.0)))
+    due = np.arange(10) / 240.0
+    report = SyncReport(
+        (good, bad), judge_loop(due, due, 240.0, Limits()), never_came({"Gaze": True})
+    )
+    assert report.verdict is Verdict.FAIL
+    assert [len(row) for row in report.table()] == [len(COLUMNS)] * 2
+    assert report.table()[0][:4] == ("EEG", "PASS", "30000", "500.00")
+    assert report.advice()[0].startswith("FAIL Gaze was never on the network; start its program")
+    content = json.loads(json.dumps(report.as_json(), allow_nan=False))
+    assert content["verdict"] == "FAIL"
+    assert content["streams"][1]["quality"]["drift_ppm"] is None
+    assert SyncReport(()).verdict is Verdict.PASS
