@@ -117,13 +117,22 @@ class FrameLog:
             The disk still refuses; says how much could not be written.
         """
         self._catch_up()
-        waiting = len(self._waiting)
-        self._journal.close()
-        if waiting:
-            raise RecordingError(
-                f"{waiting} frames and events could not be written: {self.trouble}; what "
-                f"came before is in {self._journal.path}"
-            )
+        lost = len(self._waiting)
+        try:
+            self._journal.close()
+        except RecordingError as error:
+            if not lost:
+                raise
+            error.add_note(self._not_written(lost))
+            raise
+        if lost:
+            raise RecordingError(self._not_written(lost))
+
+    def _not_written(self, lost: int) -> str:
+        return (
+            f"{lost} frames and events could not be written: {self.trouble}; what came before is "
+            f"in {self._journal.path}"
+        )
 
     def _through(self, frame: Frame, row: FloatArray) -> bool:
         """Write at once; whether the frame went in. Its events wait if they alone did not."""

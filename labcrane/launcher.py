@@ -130,12 +130,13 @@ class Launcher:
             except KeyboardInterrupt:
                 self._send(pipe, Command(Order.END))
                 continue
-            ended = self._pass_events(pipe) if pipe in ready else None
+            # Also when it has died: what it said before is in the pipe.
+            ended = self._pass_events(pipe) if ready else None
             if ended is not None:
                 if ended.error is not None:
                     raise ended.error
                 return None
-            if process.sentinel in ready and not pipe.poll():
+            if process.sentinel in ready:
                 process.join()
                 return process.exitcode
             self._watch_streams(pipe)

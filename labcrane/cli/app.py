@@ -36,6 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return leaving.code if isinstance(leaving.code, int) else 0
     except LabcraneError as error:
         complaint = Console(stderr=True, soft_wrap=True)
-        complaint.print(f"labcrane: {error}", markup=False, highlight=False)
+        for line in (f"labcrane: {error}", *getattr(error, "__notes__", ())):
+            complaint.print(line, markup=False, highlight=False)
         return 2 if isinstance(error, ProtocolError) else 1
     return 0

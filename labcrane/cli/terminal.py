@@ -3,6 +3,7 @@
 Both run in threads of their own, so that a slow terminal never makes the loop wait.
 """
 
+import os
 import select
 import sys
 import threading
@@ -26,6 +27,9 @@ KEYS: Mapping[str, Order] = {
     "o": Order.OVERRIDE,
     "c": Order.COMPLETION,
 }
+PEOPLES = tuple(KEYS.values())
+"""The orders that people give."""
+
 HELP = (
     "space start/go on · p pause · r repeat · s skip · e end · n note · o override · c completion"
 )
@@ -93,7 +97,7 @@ class Terminal:
                 if not event.data["practice"] and event.data["outcome"] != "repeated":
                     self._progress.advance(self._bar)
                 self._progress.print(_trial_line(event.data), markup=False, highlight=False)
-            elif line := _line(event):
+            elif line := _event_line(event):
                 self._progress.print(line, markup=False, highlight=False)
 
     def _listen(self) -> None:
@@ -106,17 +110,24 @@ class Terminal:
                     self._key(sys.stdin.read(1).lower())
 
     def _listen_to_lines(self) -> None:
+        # Read past sys.stdin, whose buffer would keep the second of two lines from select.
+        descriptor, text = sys.stdin.fileno(), b""
         while not self._over.is_set():
-            if not select.select([sys.stdin], [], [], POLL_S)[0]:
+            if not select.select([descriptor], [], [], POLL_S)[0]:
                 continue
-            if not (line := sys.stdin.readline()):
+            if not (more := os.read(descriptor, 4096)):
                 return
-            word, _, text = line.strip().partition(" ")
-            if word in {order.value for order in Order}:
-                self._console.give(Command(Order(word), text.strip()))
-            elif word:
-                known = ", ".join(order.value for order in Order)
-                self._progress.print(f"{word!r} is not an order; there is {known}", markup=False)
+            *lines, text = (text + more).split(b"\n")
+            for line in lines:
+                self._line(line.decode(errors="replace").strip())
+
+    def _line(self, line: str) -> None:
+        word, _, text = line.partition(" ")
+        if word in {order.value for order in PEOPLES}:
+            self._console.give(Command(Order(word), text.strip()))
+        elif word:
+            known = ", ".join(order.value for order in PEOPLES)
+            self._progress.print(f"{word!r} is not an order; there is {known}", markup=False)
 
     def _key(self, key: str) -> None:
         order = KEYS.get(key)
@@ -147,7 +158,7 @@ def _trial_line(data: Mapping[str, object]) -> str:
     return f"trial {data['trial']}: {', '.join([str(data['outcome']), *measures])}"
 
 
-def _line(event: Event) -> str | None:
+def _event_line(event: Event) -> str | None:
     data = event.data
     match event.name:
         case "instructions.shown":

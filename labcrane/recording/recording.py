@@ -12,7 +12,7 @@ import numpy as np
 
 from labcrane.errors import RecordingError
 from labcrane.recording.journal import GROUPS
-from labcrane.recording.participant_file import group_name, opened
+from labcrane.recording.participant_file import SYNC_REPORT, group_name, opened
 from labcrane.signals import FloatArray
 
 if TYPE_CHECKING:
@@ -136,6 +136,15 @@ class SessionRecord:
     def context(self) -> dict[str, Any]:
         """Everything that was known when the session started."""
         content: dict[str, Any] = json.loads(self._text("context"))
+        return content
+
+    @cached_property
+    def sync_report(self) -> dict[str, Any]:
+        """How right the time stamps are, and what to do where they are not; empty if unknown."""
+        with opened(self._path) as file:
+            if SYNC_REPORT not in file[self._group]:
+                return {}
+        content: dict[str, Any] = json.loads(self._text(SYNC_REPORT))
         return content
 
     def _text(self, name: str) -> str:

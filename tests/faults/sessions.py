@@ -1,0 +1,131 @@
+"""Short sessions in processes of their own, to be killed."""
+
+import hashlib
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import h5py
+import psutil
+
+STUDY = """\
+labcrane: 1
+study: {study}
+title: A study that is killed
+rate_hz: 240
+machine: ch8
+input: {{use: dual_joystick}}
+scheme:
+  use: joint_velocity
+  map: {{slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}}
+dynamics: {{use: kinematic_crane}}
+tasks:
+  aiming: {{use: aiming, distances: [2], movements: 1, limit_s: 0.3}}
+sessions:
+  - name: first
+    steps:
+      - block: {{task: aiming, pairs: 1}}
+  - name: second
+    steps:
+      - block: {{task: aiming, pairs: 1}}
+      - break: {{seconds: 0.2}}
+      - block: {{task: aiming}}
+on_fault: {{session_died: redo_trial}}
+"""
+
+
+def labcrane(*arguments: object, **options: object) -> "subprocess.Popen[str]":
+    """Start labcrane as a user does."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "labcrane", *map(str, arguments)],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        **options,
+    )
+
+
+def run_second(protocol: Path, data: Path) -> "subprocess.Popen[str]":
+    """Start the second session in real time, as launcher, session and perhaps recorder."""
+    return labcrane(
+        "run", protocol, "--participant", "P001", "--session", 2, "--simulate", "--data", data
+    )
+
+
+def session_process(launcher: "subprocess.Popen[str]") -> psutil.Process | None:
+    """Return the session process of a launcher, while there is one."""
+    return _child(launcher, "spawn_main")
+
+
+def recorder_process(launcher: "subprocess.Popen[str]") -> psutil.Process | None:
+    """Return the recorder process of a launcher, while there is one."""
+    return _child(launcher, "labcrane.streams.recorder")
+
+
+def _child(launcher: "subprocess.Popen[str]", word: str) -> psutil.Process | None:
+    try:
+        for child in psutil.Process(launcher.pid).children():
+            if any(word in part for part in child.cmdline()) and child.is_running():
+                return child
+    except psutil.NoSuchProcess:
+        return None
+    return None
+
+
+def kill_all(launcher: "subprocess.Popen[str]") -> None:
+    """Kill a launcher and whatever it has started."""
+    processes = [psutil.Process(launcher.pid)]
+    processes += processes[0].children(recursive=True)
+    for process in processes:
+        process.kill()
+    psutil.wait_procs(processes, timeout=10)
+    launcher.communicate()
+
+
+@contextmanager
+def a_witness(study: str, into: Path) -> Iterator[None]:
+    """Let another process write down what it receives of a study's sessions."""
+    program = [sys.executable, str(Path(__file__).with_name("witness.py")), study]
+    with into.open("w") as file:
+        process = subprocess.Popen(program, stdout=file)
+        try:
+            yield
+        finally:
+            process.kill()
+            process.wait()
+
+
+def contents(path: Path, group: str) -> dict[str, str]:
+    """Return a hash of every dataset and every attribute below a group of a participant file."""
+    found: dict[str, str] = {}
+
+    def look(name: str, node: h5py.HLObject) -> None:
+        for key, value in node.attrs.items():
+            found[f"{name}@{key}"] = repr(value)
+        if isinstance(node, h5py.Dataset):
+            values = node.asstr()[()] if node.dtype.kind == "O" else node[()]
+            data = repr(values.tolist()) if hasattr(values, "tolist") else repr(values)
+            found[name] = hashlib.sha256(data.encode()).hexdigest()
+
+    with h5py.File(path) as file:
+        look("", file[group])
+        file[group].visititems(look)
+    return found
+
+
+def wait_for(condition: object, patience_s: float = 20.0) -> None:
+    """Wait until something has come about in another process; fail when it does not."""
+    deadline = time.monotonic() + patience_s
+    while not condition():
+        assert time.monotonic() < deadline, "it did not come about"
+        time.sleep(0.005)
+
+
+def unique(word: str) -> str:
+    """Return a study name that no other test run uses."""
+    return f"{word}-{os.getpid()}-{time.monotonic_ns() % 10**6}"

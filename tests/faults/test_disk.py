@@ -1,0 +1,138 @@
+"""A disk that fills up, or vanishes, while a session is recorded; and one that is read-only."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+from recording.test_full_disk import in_namespace, needs_mounts
+from rehearsal import SHORT, a_study
+
+from labcrane import RecordingError
+from labcrane.console import Command, Order
+from labcrane.session import Visit, record
+
+SESSION = """
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from rehearsal import SHORT, a_study
+
+from labcrane import open_recording, session
+from labcrane.console import Command, Order
+from labcrane.session import Visit, run
+
+folder = Path(sys.argv[1])
+ballast = folder / "ballast"
+session.RESERVE_S = 2.0  # so that a small disk will do
+
+
+class FillsTheDisk:
+    def __init__(self):
+        self.tick, self.told = -1, []
+
+    def commands(self):
+        self.tick += 1
+        if self.tick == FILL:
+            with ballast.open("wb", buffering=0) as file:
+                try:
+                    while file.write(bytes(4096)):
+                        pass
+                except OSError:
+                    pass
+        if self.tick == FREE:
+            ballast.unlink()
+        return []
+
+    def report(self, event):
+        self.told.append(event)
+
+
+study = a_study(Path(tempfile.mkdtemp()), SHORT)
+visit = Visit(study, "P001", 1, folder / "data", simulated=True)
+console = FillsTheDisk()
+path = run(visit, console)
+names = [event.name for event in console.told]
+assert names.count("disk.lost") == 1, names
+assert names.count("disk.back") == 1, names
+recorded = open_recording(path).session(1)
+ticks = recorded.streams["loop"].data["tick"].to_numpy()
+np.testing.assert_array_equal(ticks, np.arange(len(ticks)))  # no frame is missing
+assert recorded.events["name"].tolist()[1:] == names
+paused = recorded.streams["loop"].data["paused"].to_numpy()
+# The alarm comes with the frame that the disk refuses, or before; at most a second late.
+assert paused[FREE - 100 : FREE].all()
+assert not paused[: FILL].any()
+command = recorded.streams["command"].data.iloc[:, :4].to_numpy()
+assert not command[paused == 1].any()
+assert all(outcome == "success" for outcome in recorded.trials["outcome"])
+print("whole")
+"""
+
+
+@needs_mounts
+def test_a_session_on_a_full_disk_is_held_and_loses_no_frame(tmp_path: Path) -> None:
+    script = SESSION.replace("FILL", "400").replace("FREE", "1200")
+    done = in_namespace("size=48m", script, tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "whole" in done.stdout
+
+
+READ_ONLY = """
+import subprocess, sys, tempfile
+from pathlib import Path
+folder = Path(sys.argv[1])
+subprocess.run(["mount", "-o", "remount,ro", str(folder)], check=True)
+from rehearsal import SHORT, ScriptedConsole, a_study
+from labcrane import RecordingError
+from labcrane.session import Visit, run
+study = a_study(Path(tempfile.mkdtemp()), SHORT)
+try:
+    run(Visit(study, "P001", 1, folder / "data", simulated=True, fast=True), ScriptedConsole())
+except RecordingError as error:
+    print(error)
+"""
+
+
+@needs_mounts
+def test_a_read_only_data_folder_is_told_before_anything_runs(tmp_path: Path) -> None:
+    done = in_namespace("size=1m", READ_ONLY, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "cannot be written: Read-only file system; give another with --data" in done.stdout
+
+
+SMALL = READ_ONLY.replace(
+    'subprocess.run(["mount", "-o", "remount,ro", str(folder)], check=True)', ""
+)
+
+
+@needs_mounts
+def test_a_session_that_will_not_fit_is_refused_with_numbers(tmp_path: Path) -> None:
+    done = in_namespace("size=2m", SMALL, tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "the session needs up to" in done.stdout
+    assert "and only 2 MB are free" in done.stdout
+
+
+def test_a_folder_that_vanishes_holds_the_session(tmp_path: Path) -> None:
+    visit = Visit(a_study(tmp_path, SHORT), "P001", 1, tmp_path / "data", simulated=True)
+    told = []
+
+    class RemovesTheFolder:
+        tick = -1
+
+        def commands(self) -> list[Command]:
+            self.tick += 1
+            if self.tick == 100:
+                shutil.rmtree(visit.folder.path)
+            return [Command(Order.END)] if self.tick == 700 else []
+
+        def report(self, event) -> None:
+            told.append(event)
+
+    with pytest.raises(RecordingError, match="the file was removed") as caught:
+        record(visit, RemovesTheFolder())
+    assert "frames and events could not be written" in caught.value.__notes__[0]
+    (lost,) = (event for event in told if event.name == "disk.lost")
+    assert "the file was removed" in lost.data["why"]

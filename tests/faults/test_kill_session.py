@@ -1,0 +1,129 @@
+"""SIGKILL of a session at random moments of its life: nothing recorded is lost."""
+
+import json
+import random
+import shutil
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from faults.sessions import (
+    STUDY,
+    a_witness,
+    contents,
+    kill_all,
+    labcrane,
+    run_second,
+    session_process,
+    unique,
+)
+
+from labcrane import open_recording
+from labcrane.conclusion import conclude
+from labcrane.recording.recover import recover
+
+KILLS = 60
+
+
+@pytest.fixture(scope="module")
+def killed(tmp_path_factory: pytest.TempPathFactory):
+    """Kill a session at many moments, with a witness; return what became of it."""
+    folder = tmp_path_factory.mktemp("killed")
+    study = unique("kill")
+    protocol = folder / "study.yaml"
+    protocol.write_text(STUDY.format(study=study))
+    prepared = folder / "prepared"
+    arguments = ("--participant", "P001", "--simulate", "--fast", "--data", prepared)
+    first = labcrane("run", protocol, *arguments)
+    assert first.wait() == 0, first.communicate()
+    first.communicate()
+    random_moments = random.Random(20261)
+    runs = []
+    with a_witness(study, folder / "seen.jsonl"):
+        life = _whole_life(protocol, prepared, folder / "whole")
+        for number in range(KILLS):
+            data = folder / f"run-{number}"
+            shutil.copytree(prepared, data)
+            began = time.perf_counter()
+            launcher = run_second(protocol, data)
+            # Moments are spread evenly, each at random in its share of the life.
+            time.sleep(life * (number + random_moments.random()) / KILLS)
+            victim = session_process(launcher)
+            if victim is not None:
+                victim.kill()
+                launcher.communicate(timeout=60)  # it concludes what was recorded
+            elif launcher.poll() is None:
+                kill_all(launcher)  # at the start, or in the middle of consolidation
+            else:
+                launcher.communicate()
+            runs.append((data, victim is not None, began, time.perf_counter()))
+        time.sleep(0.5)  # what is under way to the witness
+    lines = (folder / "seen.jsonl").read_text().splitlines()
+    whole = [json.loads(line) for line in lines if line.startswith("[") and line.endswith("]")]
+    return prepared, runs, dict(whole)
+
+
+def _whole_life(protocol: Path, prepared: Path, data: Path) -> float:
+    shutil.copytree(prepared, data)
+    began = time.perf_counter()
+    launcher = run_second(protocol, data)
+    assert launcher.wait() == 0, launcher.communicate()
+    launcher.communicate()
+    return time.perf_counter() - began
+
+
+def test_kills_hit_the_session_in_all_its_stages(killed) -> None:
+    _, runs, _ = killed
+    in_session = sum(hit for _, hit, *_ in runs)
+    assert in_session >= KILLS // 4
+    assert KILLS - in_session >= 5  # the start and the consolidation
+
+
+def test_every_recording_opens_and_no_frame_is_missing(killed) -> None:
+    _, runs, seen = killed
+    witnessed = 0
+    for data, _, began, ended in runs:
+        for done in recover(data, conclude):
+            assert done.problem == ""
+        heard = {t: sample for t, sample in seen.items() if began <= t <= ended}
+        recording = open_recording(data / "P001-SIMULATED" / "P001-SIMULATED.h5")
+        if 2 not in recording.sessions:
+            assert not heard, "what was sent was written before"
+            continue
+        session = recording.session(2)
+        state = session.streams["state"]
+        ticks = session.streams["loop"].data["tick"].to_numpy()
+        np.testing.assert_array_equal(ticks, np.arange(len(ticks)))
+        rows = dict(zip(state.time.tolist(), state.data.to_numpy().tolist(), strict=True))
+        for stamp, sample in heard.items():
+            assert rows[stamp] == sample
+        witnessed += len(heard)
+    assert witnessed > 240, "the witness has hardly seen anything"
+
+
+def test_no_earlier_session_changes(killed) -> None:
+    prepared, runs, _ = killed
+    name = Path("P001-SIMULATED")
+    before = contents(prepared / name / "P001-SIMULATED.h5", "ses-01")
+    journal = (prepared / name / "ses-01_run.xdf").read_bytes()
+    for data, *_ in runs:
+        assert contents(data / name / "P001-SIMULATED.h5", "ses-01") == before
+        assert (data / name / "ses-01_run.xdf").read_bytes() == journal
+
+
+def test_a_killed_session_is_gone_on_with(killed) -> None:
+    _, runs, _ = killed
+    data = next(data for data, hit, *_ in runs[KILLS // 2 :] if hit)
+    protocol = data.parent / "study.yaml"
+    arguments = ("--participant", "P001", "--session", 2, "--simulate", "--data", data)
+    resumed = labcrane("resume", protocol, *arguments)
+    said, _ = resumed.communicate(timeout=60)
+    assert resumed.returncode == 0, said
+    session = open_recording(data / "P001-SIMULATED" / "P001-SIMULATED.h5").session(2)
+    assert session.events["name"].tolist().count("session.start") == 2
+    assert session.events["name"].tolist()[-1] == "session.end"
+    trials = session.trials
+    last = trials.groupby("trial").tail(1)
+    assert set(last["outcome"]) <= {"success", "timeout"}
+    assert len(last) == 3  # one movement in the first block, and two in the second

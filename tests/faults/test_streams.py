@@ -1,0 +1,161 @@
+"""A session beside the streams of others: the gate, a lost stream, a killed recorder."""
+
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from faults.sessions import STUDY, labcrane, recorder_process, unique, wait_for
+
+from labcrane import open_recording
+
+ROOT = Path(__file__).parents[1]
+NEEDS = """\
+streams:
+  eeg: {{source_id: {source}, rate_hz: 100, channels: 2, counter: Counter}}
+  gaze: {{source_id: {source}-gaze, required: false}}
+"""
+
+
+class Sender:
+    """A device whose first channel counts its samples."""
+
+    def __init__(self, source: str) -> None:
+        self._arguments = [sys.executable, str(ROOT / "streams" / "emulation" / "sender.py")]
+        self._arguments += ["Amplifier", "EEG", source, "100"]
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def start(self, first: int = 0) -> None:
+        self._process = subprocess.Popen([*self._arguments, str(first)])
+
+    def kill(self) -> None:
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            self._process = None
+
+
+class Conversation:
+    """What a launched session prints, and what it is told."""
+
+    def __init__(self, process: "subprocess.Popen[str]") -> None:
+        self.process = process
+        self.said: list[str] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        for line in self.process.stdout:
+            self.said.append(line.strip())
+
+    def until(self, words: str) -> None:
+        wait_for(lambda: any(words in line for line in self.said), patience_s=40.0)
+
+    def order(self, words: str) -> None:
+        self.process.stdin.write(words + "\n")
+        self.process.stdin.flush()
+
+    def end(self) -> str:
+        self.process.wait(60)
+        self._reader.join()
+        self.process.stdout.close()
+        self.process.stdin.close()
+        return "\n".join(self.said)
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]:
+    """Run a session in which everything happens; yield its folder and what was printed."""
+    folder = tmp_path_factory.mktemp("streams")
+    source = unique("amplifier")
+    text = STUDY.format(study=unique("streams"))
+    (folder / "first.yaml").write_text(text)
+    simulated = labcrane(
+        "run", "first.yaml", "--participant", "P001", "--simulate", "--fast", cwd=folder
+    )
+    simulated.communicate()
+    recorded = "{use: recorded, file: data/P001-SIMULATED/P001-SIMULATED.h5}"
+    text = text.replace("{use: dual_joystick}", recorded).replace("limit_s: 0.3", "limit_s: 30")
+    text = text.replace("session_died: redo_trial", "session_died: redo_trial, input_lost: pause")
+    (folder / "study.yaml").write_text(text + NEEDS.format(source=source))
+    sender = Sender(source)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "labcrane", "run", "study.yaml", "--participant", "P001", "--local"],
+        cwd=folder,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    said = Conversation(process)
+    try:
+        said.until("is not on the network")
+        sender.start()
+        said.until("space to start")
+        said.order("start")
+        said.until("block 1")
+        sender.kill()
+        said.until("STREAM LOST: eeg")
+        sender.start(first=100_000)
+        said.until("eeg is back")
+        first = recorder_process(process)
+        assert first is not None
+        first.kill()
+        said.until("STREAM LOST: recorder")
+        said.until("recorder is back")
+        said.order("note all is well again")
+        said.order("end")
+        yield folder / "data" / "P001" / "P001.h5", said.end()
+    finally:
+        sender.kill()
+        if process.poll() is None:
+            process.kill()
+            process.wait()
+
+
+def test_a_session_waits_for_its_streams_and_says_for_which(session) -> None:
+    _, said = session
+    assert "waiting for streams:" in said
+    waiting, started = said.index("is not on the network"), said.index("space to start")
+    assert waiting < started
+
+
+def test_a_lost_stream_pauses_the_session_until_it_is_back(session) -> None:
+    path, _ = session
+    events = open_recording(path).session(1).events
+    names = [
+        (name, data.get("what") or data.get("by"))
+        for name, data in zip(events["name"], events["data"], strict=True)
+        if name.split(".")[0] in {"stream", "pause"}
+    ]
+    lost = names.index(("stream.lost", "eeg"))
+    back = names.index(("stream.back", "eeg"))
+    assert ("pause.start", "eeg") in names[lost:back]
+    assert names[back + 1] == ("pause.end", "eeg")
+    assert ("stream.lost", "gaze") not in names  # it is not required
+
+
+def test_a_killed_recorder_is_back_within_a_second_and_a_half(session) -> None:
+    path, _ = session
+    folder = path.parent
+    assert (folder / "ses-01_streams.part2.xdf").exists()
+    stream = open_recording(path).session(1).streams["Amplifier"]
+    counter = stream.data["Counter"].to_numpy()
+    restarted = counter >= 100_000
+    steps = np.diff(counter[restarted])
+    # The sender never stopped: what is missing in its count is the recorder's gap, and it is one.
+    (gap,) = np.flatnonzero(steps > 1)
+    assert np.diff(stream.time_raw[restarted])[gap] <= 1.5
+
+
+def test_the_gaps_and_what_to_do_are_in_the_sync_report(session) -> None:
+    path, said = session
+    report = open_recording(path).session(1).sync_report
+    assert report["verdict"] == "FAIL"
+    (amplifier,) = (one for one in report["streams"] if one["name"] == "Amplifier")
+    assert any("gap" in finding["text"] for finding in amplifier["findings"])
+    assert any("gaze was never on the network" in one["text"] for one in report["missing"])
+    assert "sync report: FAIL" in said
