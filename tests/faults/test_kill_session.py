@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import pyxdf
 from faults.sessions import (
     STUDY,
     a_witness,
@@ -22,6 +23,7 @@ from faults.sessions import (
 from labcrane import open_recording
 from labcrane.conclusion import conclude
 from labcrane.recording.recover import recover
+from labcrane.recording.xdf_reader import read_xdf
 
 KILLS = 60
 
@@ -100,6 +102,18 @@ def test_every_recording_opens_and_no_frame_is_missing(killed) -> None:
             assert rows[stamp] == sample
         witnessed += len(heard)
     assert witnessed > 240, "the witness has hardly seen anything"
+
+
+def test_pyxdf_reads_every_journal(killed) -> None:
+    _, runs, _ = killed
+    journals = [journal for data, *_ in runs for journal in data.rglob("ses-02_*.xdf")]
+    assert len(journals) >= KILLS // 4
+    for journal in journals:
+        streams, _ = pyxdf.load_xdf(journal, dejitter_timestamps=False)
+        ours = {stream.header.name: stream for stream in read_xdf(journal).streams}
+        for theirs in streams:
+            (name,) = theirs["info"]["name"]
+            assert len(theirs["time_stamps"]) == len(ours[name].stamps)
 
 
 def test_no_earlier_session_changes(killed) -> None:

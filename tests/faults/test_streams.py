@@ -20,6 +20,9 @@ streams:
 """
 
 
+RECORDER_KILLS = 4
+
+
 class Sender:
     """A device whose first channel counts its samples."""
 
@@ -51,8 +54,8 @@ class Conversation:
         for line in self.process.stdout:
             self.said.append(line.strip())
 
-    def until(self, words: str) -> None:
-        wait_for(lambda: any(words in line for line in self.said), patience_s=40.0)
+    def until(self, words: str, times: int = 1) -> None:
+        wait_for(lambda: sum(words in line for line in self.said) >= times, patience_s=40.0)
 
     def order(self, words: str) -> None:
         self.process.stdin.write(words + "\n")
@@ -101,11 +104,12 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
         said.until("STREAM LOST: eeg")
         sender.start(first=100_000)
         said.until("eeg is back")
-        first = recorder_process(process)
-        assert first is not None
-        first.kill()
-        said.until("STREAM LOST: recorder")
-        said.until("recorder is back")
+        for kill in range(RECORDER_KILLS):
+            recorder = recorder_process(process)
+            assert recorder is not None
+            recorder.kill()
+            said.until("STREAM LOST: recorder", times=kill + 1)
+            said.until("recorder is back", times=kill + 1)
         said.order("note all is well again")
         said.order("end")
         yield folder / "data" / "P001" / "P001.h5", said.end()
@@ -140,15 +144,15 @@ def test_a_lost_stream_pauses_the_session_until_it_is_back(session) -> None:
 
 def test_a_killed_recorder_is_back_within_a_second_and_a_half(session) -> None:
     path, _ = session
-    folder = path.parent
-    assert (folder / "ses-01_streams.part2.xdf").exists()
+    parts = sorted(path.parent.glob("ses-01_streams*.xdf"))
+    assert len(parts) == 1 + RECORDER_KILLS
     stream = open_recording(path).session(1).streams["Amplifier"]
     counter = stream.data["Counter"].to_numpy()
     restarted = counter >= 100_000
-    steps = np.diff(counter[restarted])
-    # The sender never stopped: what is missing in its count is the recorder's gap, and it is one.
-    (gap,) = np.flatnonzero(steps > 1)
-    assert np.diff(stream.time_raw[restarted])[gap] <= 1.5
+    # The sender never stopped: what is missing in its count are the recorder's gaps.
+    gaps = np.flatnonzero(np.diff(counter[restarted]) > 1)
+    assert 1 <= len(gaps) <= RECORDER_KILLS
+    assert np.diff(stream.time_raw[restarted])[gaps].max() <= 1.5
 
 
 def test_the_gaps_and_what_to_do_are_in_the_sync_report(session) -> None:

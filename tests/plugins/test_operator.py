@@ -95,7 +95,7 @@ def test_reaction_times_are_lognormal_around_their_median() -> None:
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_targets_are_reached_from_rest_and_from_each_other(scheme: str) -> None:
     reached = []
-    for seed in range(4):
+    for seed in range(2):
         for distance in DISTANCES:
             for mirror in (-1, 1):
                 loop = Loop(scheme)
@@ -144,7 +144,7 @@ def test_without_noise_movement_time_follows_fitts_law_exactly_as_set() -> None:
 
 
 def test_movement_time_grows_with_the_index_of_difficulty_with_all_the_noise() -> None:
-    found = times("joint_velocity", range(8), **PRACTISED)
+    found = times("joint_velocity", range(5), **PRACTISED)
     bits = [math.log2(distance / 0.5 + 1) for distance in found]
     means = [np.mean(values) for values in found.values()]
     slope, _ = np.polyfit(bits, means, 1)

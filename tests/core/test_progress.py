@@ -1,0 +1,119 @@
+"""Going on after a crash: what is left of a session, by each policy."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rehearsal import SHORT, ScriptedConsole, a_study
+
+from labcrane import ProtocolError, open_recording
+from labcrane.plan import plan_session
+from labcrane.progress import progress, remaining
+from labcrane.session import Visit, finish, record, run
+
+TWO_BLOCKS = SHORT.replace(
+    "- block: {task: aiming, pairs: 1}",
+    "- block: {task: aiming, pairs: 1}\n      - block: {task: aiming, pairs: 2, name: second}",
+)
+
+
+class DiesError(Exception):
+    """Stands for a process that is gone."""
+
+
+class DiesInTrial(ScriptedConsole):
+    """Ends everything in the middle of a trial, as a killed process does."""
+
+    def __init__(self, trial: int, ticks: int = 100) -> None:
+        super().__init__()
+        self._trial, self._left = trial, ticks
+
+    def commands(self):
+        running = [e for e in self.told if e.name == "trial.start"]
+        if running and running[-1].data["trial"] == self._trial:
+            self._left -= 1
+        if self._left == 0:
+            raise DiesError
+        return []
+
+
+@pytest.fixture
+def visit(tmp_path: Path) -> Visit:
+    study = a_study(tmp_path, TWO_BLOCKS)
+    return Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=True)
+
+
+@pytest.fixture
+def died(visit: Visit) -> Visit:
+    """A session that died in trial 5, the second of its second block."""
+    with pytest.raises(DiesError):
+        record(visit, DiesInTrial(5))
+    return visit
+
+
+def test_progress_is_what_the_journal_says(died: Visit) -> None:
+    so_far = progress(died.journal, died.study.machine.names)
+    assert not so_far.complete
+    assert so_far.steps == {1}
+    assert so_far.done == {1, 2, 3, 4}
+    assert so_far.interrupted["trial"] == 5
+    finish(died)
+    state = open_recording(died.folder.participant_file).session(1).streams["state"].data
+    assert so_far.angles == tuple(state.iloc[-1, :4])
+
+
+@pytest.mark.parametrize(
+    ("policy", "trials"),
+    [
+        ("continue", [(6, 1), (7, 1), (8, 1), (9, 1)]),
+        ("redo_trial", [(5, 2), (6, 1), (7, 1), (8, 1), (9, 1)]),
+        ("redo_block", [(4, 2), (5, 2), (6, 2), (7, 2), (8, 2), (9, 2)]),
+    ],
+)
+def test_what_is_left_depends_on_the_policy(died: Visit, policy: str, trials: list) -> None:
+    plan = plan_session(died.study, "P001", 1)
+    so_far = progress(died.journal, died.study.machine.names)
+    left = remaining(died.study, plan, so_far, policy)
+    (step,) = left.steps
+    assert step.number == 2
+    assert [(trial.number, trial.attempt) for trial in step.block.trials] == trials
+    first = {(t.number, t.attempt): t.seed for block in plan.blocks for t in block.trials}
+    for trial in step.block.trials:
+        assert (trial.seed == first.get((trial.number, trial.attempt))) == (trial.attempt == 1)
+
+
+def test_a_resumed_session_goes_on_where_the_machine_stood_and_ends_whole(died: Visit) -> None:
+    path = run(replace(died, resumed=True, policy="redo_trial"), ScriptedConsole())
+    session = open_recording(path).session(1)
+    assert sorted(p.name for p in died.folder.path.glob("*.xdf")) == [
+        "ses-01_run.part2.xdf",
+        "ses-01_run.xdf",
+    ]
+    rows = list(session.trials[["trial", "attempt", "outcome"]].itertuples(index=False, name=None))
+    assert rows == [
+        (2, 1, "success"),
+        (3, 1, "success"),
+        (5, 1, "interrupted"),
+        (5, 2, "success"),
+        (6, 1, "success"),
+        (8, 1, "success"),
+        (9, 1, "success"),
+    ]
+    assert session.events["name"].tolist().count("session.start") == 2
+    state = session.streams["state"].data.to_numpy()
+    part = session.streams["loop"].data["tick"].to_numpy()
+    (border,) = np.flatnonzero(np.diff(part) < 0)
+    # One tick of the crane lies between the last frame before and the first one after.
+    assert np.abs(state[border + 1, :4] - state[border, :4]).max() < 0.01
+
+
+def test_a_session_that_is_complete_is_not_gone_on_with(visit: Visit) -> None:
+    run(visit, ScriptedConsole())
+    with pytest.raises(ProtocolError, match="session 1 of P001-SIMULATED ran to its end"):
+        run(replace(visit, resumed=True), ScriptedConsole())
+
+
+def test_a_session_that_was_never_begun_is_not_gone_on_with(visit: Visit) -> None:
+    with pytest.raises(ProtocolError, match="there is no session to go on with; start one with"):
+        run(replace(visit, resumed=True), ScriptedConsole())

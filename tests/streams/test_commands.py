@@ -1,0 +1,108 @@
+"""The commands about streams and recordings, as a user types them."""
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from labcrane import open_recording
+from labcrane.cli.app import main
+
+SENDER = Path(__file__).parent / "emulation" / "sender.py"
+
+
+@pytest.fixture(scope="module")
+def source() -> Iterator[str]:
+    source = f"commands-{os.getpid()}-{time.monotonic_ns()}"
+    arguments = ["Amplifier", "EEG", source, "100", "0"]
+    sender = subprocess.Popen([sys.executable, str(SENDER), *arguments])
+    yield source
+    sender.kill()
+    sender.wait()
+
+
+def labcrane(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "labcrane", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "COLUMNS": "200"},
+    )
+
+
+@pytest.fixture(scope="module")
+def recorded(source: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("recorded") / "alone"
+    done = labcrane("record", folder, "--stream", f"source_id={source}", "--seconds", 4)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_streams_lists_type_rate_units_host_and_offset(source: str) -> None:
+    done = labcrane("streams")
+    (line,) = (line for line in done.stdout.splitlines() if source in line)
+    assert "Amplifier" in line
+    assert "EEG" in line
+    assert "100" in line
+    assert "microvolts" in line
+    assert "+0.000" in line or "-0.000" in line  # the same clock
+
+
+def test_streams_are_recorded_without_an_experiment(recorded: Path) -> None:
+    stream = open_recording(recorded / "alone.h5").session(1).streams["Amplifier"]
+    assert len(stream.time) > 100
+    assert stream.attrs["corrected"]
+    np.testing.assert_array_equal(np.diff(stream.data["Counter"]), 1.0)
+
+
+def test_a_recording_is_never_written_over(recorded: Path, source: str) -> None:
+    done = labcrane("record", recorded, "--stream", f"source_id={source}", "--seconds", 1)
+    assert done.returncode == 1
+    assert "exists; give a new folder for the recording" in done.stderr
+
+
+def test_a_stream_is_named_by_what_lsl_knows(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["record", str(tmp_path / "new"), "--stream", "EEG"]) == 2
+    assert "stream 'EEG' must be type=..., name=... or source_id=..." in capsys.readouterr().err
+
+
+def test_recover_makes_the_file_again_of_the_journals(recorded: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "alone"
+    shutil.copytree(recorded, folder)
+    (folder / "alone.h5").unlink()
+    done = labcrane("recover", tmp_path)
+    assert done.returncode == 0, done.stderr
+    one = open_recording(recorded / "alone.h5").session(1).streams["Amplifier"]
+    two = open_recording(folder / "alone.h5").session(1).streams["Amplifier"]
+    np.testing.assert_array_equal(one.time, two.time)
+    assert "was complete" in labcrane("recover", tmp_path).stdout
+
+
+def test_recover_says_when_there_is_nothing(tmp_path: Path) -> None:
+    assert f"no journals below {tmp_path}" in labcrane("recover", tmp_path).stdout.replace("\n", "")
+
+
+def test_resync_corrects_again_from_the_file_alone(recorded: Path, tmp_path: Path) -> None:
+    path = tmp_path / "copied.h5"
+    shutil.copy(recorded / "alone.h5", path)
+    before = open_recording(path).session(1).streams["Amplifier"].time
+    with h5py.File(path, "a") as file:  # as if an older labcrane had corrected it worse
+        file["ses-01/streams/Amplifier/time"][:] += 1.0
+    done = labcrane("resync", path)
+    assert done.returncode == 0, done.stderr
+    assert "session 1: Amplifier" in done.stdout
+    stream = open_recording(path).session(1).streams["Amplifier"]
+    np.testing.assert_array_equal(stream.time, before)
+    np.testing.assert_array_equal(
+        stream.data, open_recording(recorded / "alone.h5").session(1).streams["Amplifier"].data
+    )
