@@ -8,13 +8,12 @@ import typer
 from rich.table import Table
 
 from labcrane.cli.inspect import out
+from labcrane.cli.network import Local, stay_on_this_computer
 from labcrane.errors import ProtocolError, RecordingError
 
 if TYPE_CHECKING:
     from labcrane.recorder_keeper import RecorderKeeper
     from labcrane.streams.request import StreamRequest
-
-Local = Annotated[bool, typer.Option("--local", help="only streams on this computer")]
 
 
 def streams(
@@ -23,7 +22,7 @@ def streams(
 ) -> None:
     """List the streams on the network."""
     if local:
-        _stay_on_this_computer()
+        stay_on_this_computer()
     from labcrane.streams.discovery import discover
 
     found = discover(wait)
@@ -58,7 +57,7 @@ def record(
 ) -> None:
     """Record streams without an experiment."""
     if local:
-        _stay_on_this_computer()
+        stay_on_this_computer()
     from labcrane.recorder_keeper import RecorderKeeper
     from labcrane.recording.parts import journal_path
 
@@ -140,9 +139,3 @@ def resync(
 
     for session, names in recorrect(file, conclude).items():
         out.print(f"session {session}: {', '.join(names) or 'no streams'}", markup=False)
-
-
-def _stay_on_this_computer() -> None:
-    from labcrane.streams.network import use_loopback
-
-    use_loopback()

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from labcrane.cli.inspect import ProtocolPath, out
+from labcrane.cli.network import Local, stay_on_this_computer
 from labcrane.errors import LabcraneError, ProtocolError
 
 if TYPE_CHECKING:
@@ -22,7 +23,6 @@ Simulate = Annotated[
     bool, typer.Option("--simulate", help="a simulated operator takes the controls")
 ]
 Pilot = Annotated[bool, typer.Option("--pilot", help="a trial run: its files are stamped PILOT")]
-Local = Annotated[bool, typer.Option("--local", help="keep LSL streams on this computer")]
 
 
 def run(
@@ -46,7 +46,7 @@ def run(
         protocol, participant, session, data or protocol.parent / "data", simulate, pilot
     )
     if local or simulate:
-        _stay_on_this_computer()
+        stay_on_this_computer()
     if fast:
         out.print(f"participant file: {_run_fast(order)}", markup=False)
     else:
@@ -71,7 +71,7 @@ def resume(
 
     folder = data or protocol.parent / "data"
     if local or simulate:
-        _stay_on_this_computer()
+        stay_on_this_computer()
     _launch(VisitOrder(protocol, participant, session, folder, simulate, pilot, True, policy))
 
 
@@ -79,7 +79,7 @@ def demo(
     data: Annotated[Path, typer.Option(help="where the recording goes")] = Path("labcrane-demo"),
 ) -> None:
     """Run a shortened aiming study with a simulated operator."""
-    _stay_on_this_computer()
+    stay_on_this_computer()
     from importlib.resources import files
 
     from labcrane.movement_picture import draw
@@ -142,9 +142,3 @@ def _counted(plan: "SessionPlan") -> int:
         if not block.practice
         for trial in block.trials
     )
-
-
-def _stay_on_this_computer() -> None:
-    from labcrane.streams.network import use_loopback
-
-    use_loopback()

@@ -3,6 +3,7 @@
 Both run in threads of their own, so that a slow terminal never makes the loop wait.
 """
 
+import codecs
 import os
 import select
 import sys
@@ -107,7 +108,7 @@ class Terminal:
         with _single_keys():
             while not self._over.is_set():
                 if select.select([sys.stdin], [], [], POLL_S)[0]:
-                    self._key(sys.stdin.read(1).lower())
+                    self._key(_read_key().lower())
 
     def _listen_to_lines(self) -> None:
         # Read past sys.stdin, whose buffer would keep the second of two lines from select.
@@ -143,7 +144,7 @@ class Terminal:
         """Read a line key by key, as the terminal gives single keys now."""
         self._progress.print(prompt, end="")
         text = ""
-        while (key := sys.stdin.read(1)) not in {"\n", "\r", ""}:
+        while (key := _read_key()) not in {"\n", "\r", ""}:
             text = text[:-1] if key in {"\x7f", "\b"} else text + key
         self._progress.print(text, markup=False)
         return text.strip()
@@ -181,6 +182,14 @@ def _event_line(event: Event) -> str | None:
             return f"{name.removeprefix('command.')}: {data['refused']}"
         case _:
             return None
+
+
+def _read_key() -> str:
+    """Return one key, past the buffer of sys.stdin: what that holds back, select does not see."""
+    letters = codecs.getincrementaldecoder("utf-8")(errors="replace")
+    while (byte := os.read(sys.stdin.fileno(), 1)) and not (key := letters.decode(byte)):
+        continue  # the rest of a letter is still to come
+    return key if byte else ""
 
 
 @contextmanager

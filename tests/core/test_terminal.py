@@ -1,0 +1,105 @@
+"""Keys of a real terminal give orders."""
+
+import os
+import pty
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from rehearsal import SHORT
+
+from labcrane import open_recording
+
+
+class TerminalUser:
+    """A person at a terminal: looks at what is printed, and presses keys."""
+
+    def __init__(self, command: list[str], folder: Path) -> None:
+        self._keys, terminal = pty.openpty()
+        self.process = subprocess.Popen(
+            command, cwd=folder, stdin=terminal, stdout=terminal, stderr=terminal
+        )
+        os.close(terminal)
+        self._seen = b""
+        self._reader = threading.Thread(target=self._look, daemon=True)
+        self._reader.start()
+
+    def _look(self) -> None:
+        while True:
+            try:
+                self._seen += os.read(self._keys, 4096)
+            except OSError:  # the program has closed its terminal
+                return
+
+    def until(self, words: str) -> None:
+        deadline = time.monotonic() + 40.0
+        while words.encode() not in self._seen:
+            assert time.monotonic() < deadline, f"{words!r} was not printed"
+            time.sleep(0.01)
+
+    def press(self, keys: str) -> None:
+        os.write(self._keys, keys.encode())
+
+    def leave(self) -> int:
+        status = self.process.wait(60)
+        self._reader.join()
+        os.close(self._keys)
+        return status
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A study whose operator is a recorded one, who is waited for like a person."""
+    (tmp_path / "first.yaml").write_text(SHORT)
+    simulate = ["run", "first.yaml", "--participant", "P001", "--simulate", "--fast"]
+    command = [sys.executable, "-m", "labcrane", *simulate]
+    subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
+    recorded = "{use: recorded, file: data/P001-SIMULATED/P001-SIMULATED.h5}"
+    (tmp_path / "study.yaml").write_text(SHORT.replace("{use: dual_joystick}", recorded))
+    return tmp_path
+
+
+def test_keys_start_pause_note_flag_and_end_a_session(folder: Path) -> None:
+    command = [sys.executable, "-m", "labcrane", "run", "study.yaml"]
+    user = TerminalUser([*command, "--participant", "P002", "--local"], folder)
+    user.until("space to start")
+    user.press(" ")
+    user.until("block 1")
+    user.press("p")
+    user.until("pause start (examiner)")
+    user.press("nhustet zwei Malx\x7f, ächzt\n")
+    user.press(" ")
+    user.until("pause end (examiner)")
+    user.press("c1\n")
+    user.press("z")  # no order: the keys are shown again
+    user.press("e")
+    assert user.leave() == 0
+    session = open_recording(folder / "data" / "P002" / "P002.h5").session(1)
+    given = {
+        name: data["text"]
+        for name, data in zip(session.events["name"], session.events["data"], strict=True)
+        if name.startswith("order.")
+    }
+    assert given == {
+        "order.start": "",
+        "order.pause": "",
+        "order.note": "hustet zwei Mal, ächzt",
+        "order.completion": "1",
+        "order.end": "",
+    }
+
+
+def test_an_interrupt_from_the_keyboard_ends_the_session_in_order(folder: Path) -> None:
+    command = [sys.executable, "-m", "labcrane", "run", "study.yaml"]
+    user = TerminalUser([*command, "--participant", "P002", "--local"], folder)
+    user.until("space to start")
+    user.press(" ")
+    user.until("block 1")
+    user.process.send_signal(2)
+    assert user.leave() == 0
+    session = open_recording(folder / "data" / "P002" / "P002.h5").session(1)
+    assert session.events["name"].tolist()[-1] == "session.end"
+    assert session.events["data"].tolist()[-1]["reason"] == "by order"
