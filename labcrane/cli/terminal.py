@@ -106,9 +106,8 @@ class Terminal:
             self._listen_to_lines()
             return
         with _single_keys():
-            while not self._over.is_set():
-                if select.select([sys.stdin], [], [], POLL_S)[0]:
-                    self._key(_read_key().lower())
+            while key := self._next_key():
+                self._key(key.lower())
 
     def _listen_to_lines(self) -> None:
         # Read past sys.stdin, whose buffer would keep the second of two lines from select.
@@ -140,11 +139,26 @@ class Terminal:
         else:
             self._console.give(Command(order))
 
+    def _next_key(self) -> str:
+        """Wait for a key; nothing when the session is over, or nobody is there any more.
+
+        Read past the buffer of sys.stdin: what that holds back, select does not see.
+        """
+        letters = codecs.getincrementaldecoder("utf-8")(errors="replace")
+        key = ""
+        while not key and not self._over.is_set():
+            if select.select([sys.stdin], [], [], POLL_S)[0]:
+                byte = os.read(sys.stdin.fileno(), 1)
+                if not byte:
+                    return ""
+                key = letters.decode(byte)  # nothing while the rest of a letter is to come
+        return key
+
     def _ask(self, prompt: str) -> str:
         """Read a line key by key, as the terminal gives single keys now."""
         self._progress.print(prompt, end="")
         text = ""
-        while (key := _read_key()) not in {"\n", "\r", ""}:
+        while (key := self._next_key()) not in {"\n", "\r", ""}:
             text = text[:-1] if key in {"\x7f", "\b"} else text + key
         self._progress.print(text, markup=False)
         return text.strip()
@@ -152,8 +166,8 @@ class Terminal:
 
 def _trial_line(data: Mapping[str, object]) -> str:
     measures = [
-        f"{name.replace('_', ' ')} {value:.3g}"
-        for name in ("movement_time", "error")
+        f"{name.replace('_', ' ')} {value:.3g} {unit}"
+        for name, unit in (("movement_time", "s"), ("error", "m"))
         if isinstance(value := data.get(name), float)
     ]
     return f"trial {data['trial']}: {', '.join([str(data['outcome']), *measures])}"
@@ -182,14 +196,6 @@ def _event_line(event: Event) -> str | None:
             return f"{name.removeprefix('command.')}: {data['refused']}"
         case _:
             return None
-
-
-def _read_key() -> str:
-    """Return one key, past the buffer of sys.stdin: what that holds back, select does not see."""
-    letters = codecs.getincrementaldecoder("utf-8")(errors="replace")
-    while (byte := os.read(sys.stdin.fileno(), 1)) and not (key := letters.decode(byte)):
-        continue  # the rest of a letter is still to come
-    return key if byte else ""
 
 
 @contextmanager
