@@ -1,14 +1,17 @@
-"""Keeps a recorder process running for as long as a recording lasts."""
+"""Keeps a recorder process running for as long as a recording lasts.
+
+A spare process has loaded everything and waits for its orders, so that a recorder that dies is
+replaced at once.
+"""
 
 import json
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from labcrane.streams.request import StreamRequest
 
@@ -33,6 +36,7 @@ class RecorderKeeper:
         self._orders = json.dumps(
             {"journal": str(journal), "streams": [asdict(request) for request in requests]}
         )
+        self._spare = _Recorder()
         self._process = self._start()
 
     @property
@@ -74,43 +78,52 @@ class RecorderKeeper:
 
     def stop(self) -> None:
         """Let the recorder write down what has come and close its journal."""
+        self._spare.stdin.close()  # it ends without having been told anything
+        self._spare.wait(PATIENCE_S)
+        self._spare.stdout.close()
         process = self._process
-        if process.stdin is None:
-            raise AssertionError("the recorder is started with a pipe")
         try:
             process.stdin.write("stop\n")
             process.stdin.close()
         except BrokenPipeError:
             pass  # it died this very moment; its journal is as whole as it can be
-        deadline = time.monotonic() + PATIENCE_S
         try:
-            process.wait(max(0.0, deadline - time.monotonic()))
+            process.wait(PATIENCE_S)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
         self._listener.join()
 
-    def _start(self) -> "subprocess.Popen[str]":
-        process = subprocess.Popen(  # noqa: S603 - our own program
-            [sys.executable, "-m", "labcrane.streams.recorder", self._orders],
+    def _start(self) -> "_Recorder":
+        """Give the spare recorder its orders, and have another one ready."""
+        ready = self._spare if self._spare.poll() is None else _Recorder()
+        process, self._spare = ready, _Recorder()
+        process.stdin.write(self._orders + "\n")
+        process.stdin.flush()
+        self._listener = threading.Thread(
+            target=self._listen, args=(process, self.restarts), daemon=True
+        )
+        self._listener.start()
+        return process
+
+    def _listen(self, process: "_Recorder", life: int) -> None:
+        for line in process.stdout:
+            if life == self.restarts:  # and not what a dead one had still to say
+                self.status = json.loads(line)
+
+
+class _Recorder(subprocess.Popen[str]):
+    """A recorder process that waits for its orders."""
+
+    stdin: IO[str]
+    stdout: IO[str]
+
+    def __init__(self) -> None:
+        super().__init__(
+            [sys.executable, "-m", "labcrane.streams.recorder"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
             # It closes its journal when told to, not when a key is pressed.
             start_new_session=True,
         )
-        self._listener = threading.Thread(target=self._listen, args=(process,), daemon=True)
-        self._listener.start()
-        return process
-
-    def _listen(self, process: "subprocess.Popen[str]") -> None:
-        if process.stdout is None:
-            raise AssertionError("the recorder is started with a pipe")
-        for line in process.stdout:
-            status = json.loads(line)
-            if process is self._process_or(process):
-                self.status = status
-
-    def _process_or(self, process: "subprocess.Popen[str]") -> "subprocess.Popen[str]":
-        """Return the present recorder; ``process`` itself while it is just being started."""
-        return getattr(self, "_process", process)

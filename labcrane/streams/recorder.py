@@ -7,6 +7,8 @@ part.
 
     python -m labcrane.streams.recorder '{"journal": "ses-01_streams.xdf", "streams": [...]}'
 
+Without the JSON it waits for it as the first line of its standard input.
+
 It reads ``stop`` on its standard input, and writes a line of JSON on its standard output every
 second: how each stream is, and whether all that is required flows.
 """
@@ -220,10 +222,15 @@ def _absent(request: StreamRequest) -> Health:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Record until told to stop; the process's exit status."""
-    from labcrane.streams.recorder_process import run  # noqa: PLC0415 - it imports this module
+    """Record until told to stop; the process's exit status.
 
-    return run(Orders.of(json.loads(arguments[0])))
+    Without arguments the process loads what it needs and waits for its orders, a line of JSON on
+    the standard input: a spare recorder takes over at once.
+    """
+    from labcrane.streams.recorder_process import await_orders, run  # noqa: PLC0415 - a cycle
+
+    orders = arguments[0] if arguments else await_orders()
+    return run(Orders.of(json.loads(orders))) if orders else 0
 
 
 if __name__ == "__main__":

@@ -39,6 +39,20 @@ def run(orders: Orders) -> int:
     return 0 if whole else 1
 
 
+def await_orders() -> str:
+    """Return the line of orders that comes on the standard input; nothing when none comes.
+
+    Read byte by byte: what a buffer holds back, select does not see afterwards.
+    """
+    import pylsl  # noqa: PLC0415 - the slow part of a start is done before the orders come
+
+    pylsl.library_version()
+    line = b""
+    while (byte := os.read(0, 1)) not in (b"", b"\n"):
+        line += byte
+    return line.decode()
+
+
 def _watch(orders: Orders) -> Iterator[bool]:
     """Yield several times a second until it is time to end; True when a status is due."""
     stopped = _signals()

@@ -59,22 +59,30 @@ def run_second(protocol: Path, data: Path) -> "subprocess.Popen[str]":
 
 def session_process(launcher: "subprocess.Popen[str]") -> psutil.Process | None:
     """Return the session process of a launcher, while there is one."""
-    return _child(launcher, "spawn_main")
+    for child in _children(launcher):
+        try:
+            if any("spawn_main" in part for part in child.cmdline()) and child.is_running():
+                return child
+        except psutil.NoSuchProcess:
+            continue
+    return None
 
 
 def recorder_process(launcher: "subprocess.Popen[str]") -> psutil.Process | None:
-    """Return the recorder process of a launcher, while there is one."""
-    return _child(launcher, "labcrane.streams.recorder")
-
-
-def _child(launcher: "subprocess.Popen[str]", word: str) -> psutil.Process | None:
-    try:
-        for child in psutil.Process(launcher.pid).children():
-            if any(word in part for part in child.cmdline()) and child.is_running():
-                return child
-    except psutil.NoSuchProcess:
-        return None
+    """Return the recorder process of a launcher that writes a journal, while there is one."""
+    for child in _children(launcher):
+        if any("labcrane.streams.recorder" in part for part in child.cmdline()) and any(
+            file.path.endswith(".xdf") for file in child.open_files()
+        ):
+            return child
     return None
+
+
+def _children(launcher: "subprocess.Popen[str]") -> list[psutil.Process]:
+    try:
+        return psutil.Process(launcher.pid).children()
+    except psutil.NoSuchProcess:
+        return []
 
 
 def kill_all(launcher: "subprocess.Popen[str]") -> None:

@@ -113,7 +113,8 @@ def test_pyxdf_reads_every_journal(killed) -> None:
         ours = {stream.header.name: stream for stream in read_xdf(journal).streams}
         for theirs in streams:
             (name,) = theirs["info"]["name"]
-            assert len(theirs["time_stamps"]) == len(ours[name].stamps)
+            if name != "labcrane.check":  # which our reader uses up
+                assert len(theirs["time_stamps"]) == len(ours[name].stamps)
 
 
 def test_no_earlier_session_changes(killed) -> None:

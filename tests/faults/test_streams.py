@@ -105,9 +105,8 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
         sender.start(first=100_000)
         said.until("eeg is back")
         for kill in range(RECORDER_KILLS):
-            recorder = recorder_process(process)
-            assert recorder is not None
-            recorder.kill()
+            wait_for(lambda: recorder_process(process) is not None)
+            recorder_process(process).kill()
             said.until("STREAM LOST: recorder", times=kill + 1)
             said.until("recorder is back", times=kill + 1)
         said.order("note all is well again")

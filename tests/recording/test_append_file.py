@@ -5,6 +5,7 @@ import resource
 import signal
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -13,41 +14,45 @@ from labcrane import RecordingError
 from labcrane.recording.append_file import AppendFile
 
 
-@pytest.fixture
-def limit() -> Iterator[int]:
-    """No file may grow beyond 1000 bytes: the kernel refuses, as on a full disk."""
+@contextmanager
+def limited() -> Iterator[None]:
+    """No file may grow beyond 1000 bytes: the kernel refuses, as on a full disk.
+
+    Within a test's body only: pytest itself writes, perhaps to a longer file, right after it.
+    """
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
-    yield 1000
-    resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    signal.signal(signal.SIGXFSZ, handler)
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
 
 
-@pytest.mark.usefixtures("limit")
 def test_a_block_that_does_not_fit_is_taken_back_whole(tmp_path: Path) -> None:
     path = tmp_path / "x"
-    file = AppendFile(path)
-    for _ in range(9):
-        file.write(b"a" * 101)
-    with pytest.raises(RecordingError, match=r"cannot write .*x: File too large; the 909 bytes"):
-        file.write(b"b" * 101)
-    assert path.read_bytes() == b"a" * 909
-    file.write(b"c" * 91)  # the rest of the room
-    with pytest.raises(RecordingError, match="in a new part"):
-        file.write(b"d")
-    file.close()
+    with limited():
+        file = AppendFile(path)
+        for _ in range(9):
+            file.write(b"a" * 101)
+        with pytest.raises(RecordingError, match=r"write .*x: File too large; the 909 bytes"):
+            file.write(b"b" * 101)
+        assert path.read_bytes() == b"a" * 909
+        file.write(b"c" * 91)  # the rest of the room
+        with pytest.raises(RecordingError, match="in a new part"):
+            file.write(b"d")
+        file.close()
     assert path.read_bytes() == b"a" * 909 + b"c" * 91
 
 
-@pytest.mark.usefixtures("limit")
 def test_writing_goes_on_once_there_is_room_again(tmp_path: Path) -> None:
     path = tmp_path / "x"
     file = AppendFile(path)
-    file.write(b"a" * 999)
-    with pytest.raises(RecordingError):
-        file.write(b"bb")
-    resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+    with limited():
+        file.write(b"a" * 999)
+        with pytest.raises(RecordingError):
+            file.write(b"bb")
     file.write(b"bb")
     file.close()
     assert path.read_bytes() == b"a" * 999 + b"bb"
