@@ -5,6 +5,7 @@ tests in ``labcrane.testing``.
 """
 
 from labcrane.actuator import PRESETS, Actuator, ActuatorSettings
+from labcrane.analysis.cohort import Participant
 from labcrane.clock import Tick
 from labcrane.errors import DeviceError, LabcraneError, PluginError, ProtocolError, RecordingError
 from labcrane.hookspecs import hookimpl
@@ -12,9 +13,11 @@ from labcrane.kinematics import Arm, frames, jacobian
 from labcrane.machine import Body, Joint, Machine
 from labcrane.offers import Offer, Settings, offer
 from labcrane.reach import reach
-from labcrane.recording.recording import open_recording
+from labcrane.recording.recording import SessionRecord, Stream, open_recording
+from labcrane.recording.stream_header import Channel, StreamHeader
+from labcrane.recording.xdf import XdfWriter
 from labcrane.records import Event, Frame, Judgement, Phase, Planned, Run, Trial, Value
-from labcrane.roles import Controller, Dynamics, InputDevice, Task
+from labcrane.roles import Controller, Dynamics, Exporter, InputDevice, Task
 from labcrane.signals import FloatArray, Layout, Signal
 
 __version__ = "0.1.0"
@@ -25,10 +28,12 @@ __all__ = [
     "ActuatorSettings",
     "Arm",
     "Body",
+    "Channel",
     "Controller",
     "DeviceError",
     "Dynamics",
     "Event",
+    "Exporter",
     "FloatArray",
     "Frame",
     "InputDevice",
@@ -38,18 +43,23 @@ __all__ = [
     "Layout",
     "Machine",
     "Offer",
+    "Participant",
     "Phase",
     "Planned",
     "PluginError",
     "ProtocolError",
     "RecordingError",
     "Run",
+    "SessionRecord",
     "Settings",
     "Signal",
+    "Stream",
+    "StreamHeader",
     "Task",
     "Tick",
     "Trial",
     "Value",
+    "XdfWriter",
     "frames",
     "hookimpl",
     "jacobian",

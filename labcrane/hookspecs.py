@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import pluggy
 
 from labcrane.offers import Offer
-from labcrane.roles import Controller, Dynamics, InputDevice, Task
+from labcrane.roles import Controller, Dynamics, Exporter, InputDevice, Task
 
 PROJECT = "labcrane"
 
@@ -39,4 +39,10 @@ def labcrane_dynamics() -> Sequence[Offer[Dynamics]]:
 @hookspec
 def labcrane_tasks() -> Sequence[Offer[Task]]:
     """Offer things for the operator to do."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_exporters() -> Sequence[Offer[Exporter]]:
+    """Offer formats into which recordings can be exported."""
     raise NotImplementedError

@@ -12,7 +12,7 @@ from labcrane import hookspecs
 from labcrane.errors import PluginError
 from labcrane.hookspecs import PROJECT
 from labcrane.offers import Offer
-from labcrane.roles import Component, Controller, Dynamics, InputDevice, Task
+from labcrane.roles import Component, Controller, Dynamics, Exporter, InputDevice, Task
 
 RoleT = TypeVar("RoleT", bound=Component)
 
@@ -38,6 +38,7 @@ ROLES: Mapping[type[Component], RoleEntry] = {
     Controller: RoleEntry("labcrane_controllers", "scheme"),
     Dynamics: RoleEntry("labcrane_dynamics", "dynamics"),
     Task: RoleEntry("labcrane_tasks", "task"),
+    Exporter: RoleEntry("labcrane_exporters", "exporter"),
 }
 
 

@@ -1,0 +1,15 @@
+"""From recordings to results.
+
+From the bottom up::
+
+    cohort         who is in a data folder, and who counts
+    movements      one movement's arrays, cut out of a session
+    smoothness, sticks, fitts, gaze    what is measured in them
+    measures       all of it, as a table with one row per movement
+    learning       learning curves, one per participant
+    anova, trends, reported    statistics
+    quality        how well the loop ran and the clocks agreed
+    figures, pages, report     the HTML report
+
+Nothing here is needed while people are recorded. What is heavy is imported when it is used.
+"""

@@ -1,0 +1,237 @@
+"""Who is in a data folder, and who counts."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from labcrane.errors import ProtocolError, RecordingError
+from labcrane.recording.recording import Recording, SessionRecord, open_recording
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TOMBSTONE = "erased.json"
+"""What erasing a participant leaves in the folder."""
+
+
+class Status(StrEnum):
+    """What a participant's data are. The order is that of the rules: the first that holds."""
+
+    ERASED = "erased"  # only a tombstone is left; cannot be included
+    UNREADABLE = "unreadable"  # no participant file, or a damaged one; cannot be included
+    SIMULATED = "simulated"
+    PILOT = "pilot"
+    HALF_FINISHED = "half-finished"  # a session ended early, or is still to come
+    COMPLETE = "complete"
+
+
+INCLUDABLE = (Status.SIMULATED, Status.PILOT, Status.HALF_FINISHED)
+"""What is left out unless it is asked for."""
+
+
+@dataclass(frozen=True)
+class Participant:
+    """One participant of a study, with what was recorded.
+
+    Attributes
+    ----------
+    name
+        Pseudonym with its stamps: ``P001``, ``P001-PILOT``.
+    path
+        The participant file.
+    status
+        What the data are.
+    why
+        The reason for the status, in words.
+    """
+
+    name: str
+    path: Path
+    status: Status
+    why: str
+
+    @property
+    def recording(self) -> Recording:
+        """The participant file; each call reads it anew, so that nothing piles up in memory."""
+        return open_recording(self.path)
+
+    @cached_property
+    def context(self) -> dict[str, Any]:
+        """What was known when the first session started."""
+        recording = self.recording
+        return recording.session(recording.sessions[0]).context
+
+    def sessions(self) -> Iterator[tuple[int, SessionRecord]]:
+        """Yield number and record of each session, one in memory at a time."""
+        recording = self.recording
+        for number in recording.sessions:
+            yield number, recording.session(number)
+
+    def codebook(self, measures: "pd.DataFrame") -> "pd.DataFrame":
+        """Return unit, meaning and source of every column of ``measures`` and of all streams."""
+        import pandas as pd  # noqa: PLC0415
+
+        from labcrane.analysis.codebook import stream_codebook, trial_codebook  # noqa: PLC0415
+
+        sessions = [session for _, session in self.sessions()]
+        tables = [trial_codebook(measures, sessions[0]), *map(stream_codebook, sessions)]
+        return pd.concat(tables).drop_duplicates(["table", "column"], ignore_index=True)
+
+    def measures(self) -> "pd.DataFrame":
+        """Return one row per counted movement of all sessions: condition, results, measures."""
+        from labcrane.analysis.measures import measure_participant  # noqa: PLC0415 - loads scipy
+
+        return measure_participant(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Cohort:
+    """The participants of a data folder, by what becomes of them.
+
+    Attributes
+    ----------
+    included
+        Whose data are used.
+    left_out
+        Whose are not; their ``status`` and ``why`` say the reason.
+    """
+
+    folder: Path
+    included: tuple[Participant, ...]
+    left_out: tuple[Participant, ...]
+
+    def listing(self) -> "pd.DataFrame":
+        """Return everybody with status and reason: what must stand beside every average."""
+        import pandas as pd  # noqa: PLC0415
+
+        rows = [
+            {"participant": person.name, "status": str(person.status), "included": word}
+            | {"why": person.why}
+            for people, word in ((self.included, "yes"), (self.left_out, "no"))
+            for person in people
+        ]
+        columns = ["participant", "status", "included", "why"]
+        table = pd.DataFrame(rows, columns=columns)
+        return table.sort_values("participant", ignore_index=True)
+
+
+def find_cohort(
+    folder: Path,
+    include: Iterable[str] = (),
+    progress: Callable[[int, int], None] | None = None,
+) -> Cohort:
+    """Look at every participant below ``folder``.
+
+    Complete participants are included. Others only when their status is named in ``include``.
+
+    Parameters
+    ----------
+    folder
+        The study's data folder.
+    include
+        Of simulated, pilot and half-finished, those to be used as well.
+    progress
+        Told how many participants have been looked at, of how many.
+
+    Raises
+    ------
+    ProtocolError
+        ``include`` names something else.
+    RecordingError
+        There is no such folder, or nobody is left to be used.
+    """
+    wanted = {Status.COMPLETE, *(_includable(word) for word in include)}
+    if not folder.is_dir():
+        raise RecordingError(f"there is no data folder {folder}; give the study's data folder")
+    folders = [entry for entry in sorted(folder.iterdir()) if _is_participant(entry)]
+    people = []
+    for number, entry in enumerate(folders, start=1):
+        people.append(_look(entry))
+        if progress is not None:
+            progress(number, len(folders))
+    included = tuple(person for person in people if person.status in wanted)
+    left_out = tuple(person for person in people if person.status not in wanted)
+    if not included:
+        raise RecordingError(_nobody(folder, left_out))
+    return Cohort(folder, included, left_out)
+
+
+def _includable(word: str) -> Status:
+    possible = {str(status): status for status in INCLUDABLE}
+    if word not in possible:
+        raise ProtocolError(
+            f"{word!r} cannot be included; possible: {', '.join(possible)} "
+            "(complete participants always are, erased and unreadable ones never)"
+        )
+    return possible[word]
+
+
+def _nobody(folder: Path, left_out: Sequence[Participant]) -> str:
+    if not left_out:
+        return f"there is no participant in {folder}; give the folder that holds P001/P001.h5"
+    counts = {str(s): sum(p.status is s for p in left_out) for s in Status}
+    found = ", ".join(f"{count} {status}" for status, count in counts.items() if count)
+    return (
+        f"nobody in {folder} can be used as asked: {found}; "
+        "include them by name: --include simulated"
+    )
+
+
+def _is_participant(entry: Path) -> bool:
+    if not entry.is_dir():
+        return False
+    names = (f"{entry.name}.h5", TOMBSTONE)
+    return any((entry / name).exists() for name in names) or any(entry.glob("ses-*.xdf"))
+
+
+def _look(folder: Path) -> Participant:
+    path = folder / f"{folder.name}.h5"
+    if (folder / TOMBSTONE).exists():
+        return Participant(folder.name, path, Status.ERASED, f"{TOMBSTONE} is in the folder")
+    try:
+        recording = open_recording(path)
+        if not recording.sessions:
+            return Participant(folder.name, path, Status.UNREADABLE, "holds no session")
+        status, why = _judge(recording)
+    except RecordingError as error:
+        return Participant(folder.name, path, Status.UNREADABLE, str(error))
+    return Participant(folder.name, path, status, why)
+
+
+def _judge(recording: Recording) -> tuple[Status, str]:
+    sessions = [recording.session(number) for number in recording.sessions]
+    for status, word in ((Status.SIMULATED, "simulated"), (Status.PILOT, "pilot")):
+        stamped = [
+            number
+            for number, session in zip(recording.sessions, sessions, strict=True)
+            if session.attrs.get(word) == "yes"
+        ]
+        if stamped:
+            return status, f"session {', '.join(map(str, stamped))} is stamped {word}"
+    for number, session in zip(recording.sessions, sessions, strict=True):
+        if (why := _unfinished(session)) is not None:
+            return Status.HALF_FINISHED, f"session {number} {why}"
+    planned, done = _planned(sessions[-1].protocol), len(sessions)
+    if done < planned:
+        return Status.HALF_FINISHED, f"{done} of {planned} sessions recorded"
+    return Status.COMPLETE, f"{done} of {planned} sessions recorded to their end"
+
+
+def _unfinished(session: SessionRecord) -> str | None:
+    """Return how a session ended before its end, or None when it did not."""
+    events = session.events
+    ends = events[events["name"] == "session.end"]
+    if ends.empty:
+        return "has no end: the program was killed"
+    reason = str(ends.iloc[-1]["data"].get("reason"))
+    return None if reason == "complete" else f"ended {reason}"
+
+
+def _planned(protocol: str) -> int:
+    """Return how many sessions a protocol has."""
+    from ruamel.yaml import YAML  # noqa: PLC0415
+
+    return len(YAML(typ="safe").load(protocol)["sessions"])

@@ -1,0 +1,218 @@
+"""All measures of a participant, one row per movement."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from labcrane.analysis.cohort import Participant
+from labcrane.analysis.gaze import gaze_measures, looks
+from labcrane.analysis.movements import Groups, Movement, cut, groups, machine_of
+from labcrane.analysis.smoothness import ldlj, path_ratio, sparc, sub_movements
+from labcrane.analysis.sticks import coordination, effort, limit_hits, reversals, stick_use
+from labcrane.machine import Machine
+from labcrane.recording.recording import SessionRecord
+from labcrane.signals import FloatArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SHORTEST = 8
+"""Movements of fewer ticks are not measured: their spectrum says nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeasureSettings:
+    """What measures depend on; stored beside every table of them.
+
+    Attributes
+    ----------
+    dead_zone
+        Deflection beyond which an axis is in use, as a fraction of full scale.
+    stick_axes
+        Last words of the names of axes that are sticks.
+    hysteresis
+        Change of an axis that makes a reversal, as a fraction of full scale.
+    sparc_highest_hz, sparc_least
+        Of :func:`~labcrane.analysis.smoothness.sparc`.
+    low_pass_hz, prominence
+        Of :func:`~labcrane.analysis.smoothness.sub_movements`.
+    limit_tolerance_deg
+        Distance in degrees at which a joint is at its limit.
+    """
+
+    dead_zone: float = 0.05
+    stick_axes: tuple[str, ...] = ("x", "y")
+    hysteresis: float = 0.02
+    sparc_highest_hz: float = 10.0
+    sparc_least: float = 0.05
+    low_pass_hz: float = 6.0
+    prominence: float = 0.05
+    limit_tolerance_deg: float = 0.1
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the settings by name, ready for JSON."""
+        return asdict(self)
+
+
+DEFAULTS = MeasureSettings()
+
+MEASURES: Mapping[str, tuple[str, str]] = {
+    "sequence": ("1", "position in the session of the pair of targets, from 1"),
+    "position": ("1", "position in the session of the movement among the counted ones, from 1"),
+    "constant_error": ("m", "signed error along the task axis, positive for too far"),
+    "absolute_error": ("m", "distance of the tip from the target's centre at the end"),
+    "amplitude": ("m", "way made along the task axis, from onset to offset"),
+    "path_ratio": ("1", "length of the way over the straight distance between its ends"),
+    "peak_speed_tip": ("m/s", "largest speed of the tip between onset and offset"),
+    "sub_movements": ("1", "peaks of the tip's speed"),
+    "sparc": ("1", "spectral arc length of the tip's speed"),
+    "ldlj": ("1", "log dimensionless jerk of the tip's speed"),
+    "reversals": ("1/s", "changes of direction of all stick axes together, per second"),
+    "simultaneous": ("1", "fraction of the movement time with two or more axes in use"),
+    "axes_used": ("1", "mean number of axes in use"),
+    "bimanual": ("1", "of the time with a stick in use, the fraction with more than one"),
+    "coordination": ("1", "largest cross-correlation of both sticks' deflections"),
+    "coordination_lag": ("s", "its lag, positive when the right stick follows"),
+    "effort": ("1", "root mean square of the joint commands, as a fraction of full speed"),
+    "limit_hits": ("1", "times a joint came to one of its limits"),
+}
+"""Unit and meaning of what is measured here; the trial table's own columns stand beside it."""
+
+
+def measure_participant(
+    participant: Participant, settings: MeasureSettings = DEFAULTS
+) -> "pd.DataFrame":
+    """Return one row per counted movement of all sessions of a participant."""
+    import pandas as pd  # noqa: PLC0415 - loads for a second
+
+    tables = []
+    for number, session in participant.sessions():
+        table = measure_session(session, settings)
+        table.insert(0, "participant", participant.name)
+        table.insert(1, "status", str(participant.status))
+        table.insert(2, "session", number)
+        table.insert(3, "session_name", str(session.attrs.get("session_name", "")))
+        tables.append(table)
+    return pd.concat(tables, ignore_index=True)
+
+
+def measure_session(
+    session: SessionRecord,
+    settings: MeasureSettings = DEFAULTS,
+    frames: Groups | None = None,
+) -> "pd.DataFrame":
+    """Return a session's trial table with the measures of each movement.
+
+    ``frames`` takes the place of the recorded frames: those of a replay.
+    """
+    import pandas as pd  # noqa: PLC0415
+
+    trials = session.trials
+    machine = machine_of(session)
+    rate_hz = float(session.attrs["rate_hz"])
+    seen = looks(session)
+    rows = []
+    for movement in cut(frames or groups(session), trials, rate_hz):
+        row = measure(movement, machine, settings)
+        span = movement.span
+        if seen is not None and span is not None:
+            due = movement.due
+            row |= gaze_measures(seen, due[0], due[span.start], due[span.stop - 1])
+        rows.append(row)
+    measured = pd.DataFrame(rows, index=trials.index)
+    order = pd.DataFrame(
+        {"sequence": _sequence(trials), "position": np.arange(1, len(trials) + 1)},
+        index=trials.index,
+    )
+    return pd.concat([trials, order, measured], axis=1)
+
+
+def _sequence(trials: "pd.DataFrame") -> "pd.Series[int]":
+    """Return which pair of targets, or which trial where there are no pairs, counted from 1."""
+    words = [name for name in ("block", "pair") if name in trials]
+    if "pair" not in words:
+        words = ["trial"]
+    changed = (trials[words] != trials[words].shift()).any(axis=1)
+    return changed.cumsum()
+
+
+def measure(movement: Movement, machine: Machine, settings: MeasureSettings) -> dict[str, float]:
+    """Return the measures of one movement; NaN where it has no onset or no offset."""
+    span = movement.span
+    nothing = {name: float("nan") for name in MEASURES if name not in {"sequence", "position"}}
+    errors = {
+        "constant_error": movement.result("error_along"),
+        "absolute_error": movement.result("error"),
+    }
+    if span is None or span.stop - span.start < SHORTEST:
+        return nothing | errors
+    speed, tip = movement.speed[span], movement.tip[span]
+    return {
+        **errors,
+        "amplitude": _along(movement, tip),
+        "path_ratio": path_ratio(tip),
+        "peak_speed_tip": float(speed.max()),
+        "sub_movements": sub_movements(
+            speed,
+            movement.rate_hz,
+            low_pass_hz=settings.low_pass_hz,
+            prominence=settings.prominence,
+        ),
+        "sparc": sparc(
+            speed,
+            movement.rate_hz,
+            highest_hz=settings.sparc_highest_hz,
+            least=settings.sparc_least,
+        ),
+        "ldlj": ldlj(speed, movement.rate_hz),
+        **_sticks(movement, span, settings),
+        **_machine_use(movement, span, machine, settings),
+    }
+
+
+def _along(movement: Movement, tip: FloatArray) -> float:
+    axis = movement.point("target") - movement.point("start")
+    return float((tip[-1] - tip[0]) @ axis / np.linalg.norm(axis))
+
+
+def _sticks(movement: Movement, span: slice, settings: MeasureSettings) -> dict[str, float]:
+    axes = {
+        name: values[span]
+        for name, values in movement.axes.items()
+        if name.rpartition(".")[2] in settings.stick_axes
+    }
+    if not axes:
+        return {}
+    seconds = (span.stop - span.start) / movement.rate_hz
+    use = stick_use(axes, settings.dead_zone)
+    turns = sum(reversals(values, settings.hysteresis) for values in axes.values())
+    found = {
+        "reversals": turns / seconds,
+        "simultaneous": use.simultaneous,
+        "axes_used": use.axes,
+        "bimanual": use.bimanual,
+    }
+    hands = [_deflection(axes, stick) for stick in sorted({n.rpartition(".")[0] for n in axes})]
+    if len(hands) == 2:  # noqa: PLR2004 - a pair of hands
+        peak, lag = coordination(hands[0], hands[1], movement.rate_hz)
+        found |= {"coordination": peak, "coordination_lag": lag}
+    return found
+
+
+def _deflection(axes: Mapping[str, FloatArray], stick: str) -> FloatArray:
+    """Return how far a stick is from its centre, shape ``(n,)``."""
+    own = [values for name, values in axes.items() if name.rpartition(".")[0] == stick]
+    deflection: FloatArray = np.linalg.norm(own, axis=0)
+    return deflection
+
+
+def _machine_use(
+    movement: Movement, span: slice, machine: Machine, settings: MeasureSettings
+) -> dict[str, float]:
+    tolerance = float(np.radians(settings.limit_tolerance_deg))
+    return {
+        "effort": effort(movement.command[span], np.array(machine.speeds)),
+        "limit_hits": limit_hits(movement.angles[span], np.array(machine.limits), tolerance),
+    }

@@ -1,0 +1,125 @@
+"""One movement's arrays, cut out of a session."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from labcrane.machine import Machine
+from labcrane.recording.recording import SessionRecord
+from labcrane.signals import FloatArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Groups = Mapping[str, "pd.DataFrame"]
+"""The columns of loop, input, command and state, one row per tick."""
+
+ROUNDING_S = 1e-9
+
+
+@dataclass(frozen=True)
+class Movement:
+    """One attempt at one trial, tick by tick, pauses left out.
+
+    Attributes
+    ----------
+    row
+        Its row of the trial table: condition and results.
+    rate_hz
+        Ticks per second.
+    due
+        On the run's clock, in seconds, shape ``(n,)``.
+    elapsed
+        Since the trial's start, in seconds, shape ``(n,)``.
+    tip, velocity
+        Of the end effector in m and m/s, shape ``(n, 3)``.
+    axes
+        By name, ``left.x``; each of shape ``(n,)``, in [-1, 1].
+    command, angles
+        Joint speeds asked for in rad/s and joint angles in rad, shape ``(n, n_joints)``.
+    """
+
+    row: Mapping[str, Any]
+    rate_hz: float
+    due: FloatArray
+    elapsed: FloatArray
+    tip: FloatArray
+    velocity: FloatArray
+    axes: Mapping[str, FloatArray]
+    command: FloatArray
+    angles: FloatArray
+
+    @cached_property
+    def speed(self) -> FloatArray:
+        """Speed of the tip in m/s, shape ``(n,)``."""
+        speed: FloatArray = np.linalg.norm(self.velocity, axis=1)
+        return speed
+
+    @cached_property
+    def span(self) -> slice | None:
+        """The ticks from onset to offset, both included; None when one of them is missing."""
+        onset, duration = self.result("reaction_time"), self.result("movement_time")
+        if np.isnan(onset) or np.isnan(duration):
+            return None
+        first = int(np.searchsorted(self.elapsed, onset - ROUNDING_S))
+        last = int(np.searchsorted(self.elapsed, onset + duration - ROUNDING_S))
+        return slice(first, last + 1)
+
+    def result(self, name: str) -> float:
+        """Return a number of the trial table; NaN when it was not measured."""
+        value = self.row.get(name, np.nan)
+        return float(value) if isinstance(value, int | float) else np.nan
+
+    def point(self, name: str) -> FloatArray:
+        """Return a point of the condition, ``start`` or ``target``, in m, shape ``(3,)``."""
+        return np.array([self.result(f"{name}_{axis}") for axis in "xyz"])
+
+
+def groups(session: SessionRecord) -> dict[str, "pd.DataFrame"]:
+    """Read what a session's movements are cut out of."""
+    return {
+        name: session.streams[name].data for name in ("loop", "input", "command", "state", "task")
+    }
+
+
+def machine_of(session: SessionRecord) -> Machine:
+    """Return the machine that was operated."""
+    from ruamel.yaml import YAML  # noqa: PLC0415
+
+    return Machine.model_validate(YAML(typ="safe").load(session.context["machine"]))
+
+
+def cut(frames: Groups, trials: "pd.DataFrame", rate_hz: float) -> Iterator[Movement]:
+    """Yield the movement of each row of the trial table."""
+    loop, state = frames["loop"], frames["state"]
+    due, trial = _array(loop, ["due"])[:, 0], _array(loop, ["trial"])[:, 0]
+    running = _array(loop, ["paused"])[:, 0] == 0.0
+    for _, row in trials.iterrows():
+        first, last = np.searchsorted(
+            due, [float(row["started"]) - ROUNDING_S, float(row["ended"]) + ROUNDING_S]
+        )
+        ticks = np.arange(first, last)
+        ticks = ticks[running[ticks] & (trial[ticks] == row["trial"])]
+        part = {name: table.iloc[ticks] for name, table in frames.items()}
+        yield Movement(
+            row=row.to_dict(),
+            rate_hz=rate_hz,
+            due=due[ticks],
+            elapsed=_array(part["loop"], ["elapsed"])[:, 0],
+            tip=_array(part["state"], _below(state, "tip.position")),
+            velocity=_array(part["state"], _below(state, "tip.velocity")),
+            axes={str(name): part["input"][name].to_numpy(np.float64) for name in part["input"]},
+            command=_array(part["command"], _below(part["command"], "command")),
+            angles=_array(part["state"], _below(state, "joint.angle")),
+        )
+
+
+def _below(table: "pd.DataFrame", signal: str) -> list[str]:
+    return [name for name in table if str(name).rpartition(".")[0] == signal]
+
+
+def _array(table: "pd.DataFrame", columns: list[str]) -> FloatArray:
+    return table[columns].to_numpy(np.float64)

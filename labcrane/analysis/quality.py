@@ -1,0 +1,91 @@
+"""How well the loop ran and the clocks agreed, one row per session and per stream."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from labcrane.analysis.cohort import Participant
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def loop_quality(participant: Participant) -> "pd.DataFrame":
+    """Return how late the loop's ticks were, one row per session.
+
+    Lateness is from when a tick was due to when it woke. A late tick is one whose lateness is a
+    period or more. A session on a clock that jumps (``--fast``) is never late.
+    """
+    import pandas as pd  # noqa: PLC0415 - loads for a second
+
+    rows = []
+    for number, session in participant.sessions():
+        loop = session.streams["loop"].data
+        lateness = (loop["woke"] - loop["due"]).to_numpy(np.float64)
+        wrote = loop["wrote"].to_numpy(np.float64)
+        rate_hz = float(session.attrs["rate_hz"])
+        rows.append(
+            {
+                "participant": participant.name,
+                "session": number,
+                "clock": session.attrs.get("clock", ""),
+                "ticks": len(loop),
+                "rate_hz": rate_hz,
+                "lateness_median_ms": 1e3 * float(np.median(lateness)),
+                "lateness_p99_ms": 1e3 * float(np.quantile(lateness, 0.99)),
+                "lateness_worst_ms": 1e3 * float(lateness.max()),
+                "late_ticks": int((lateness >= 1.0 / rate_hz).sum()),
+                "paused_s": float(loop["paused"].sum() / rate_hz),
+                "write_worst_ms": 1e3 * float(wrote.max()),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def sync_quality(participant: Participant) -> "pd.DataFrame":
+    """Return what the participant file says of the clocks of others, one row per stream.
+
+    Everything that the correction noted stands as a column of its own; ``corrected`` says whether
+    there is a time on our clock at all.
+    """
+    import pandas as pd  # noqa: PLC0415
+
+    rows: list[dict[str, Any]] = []
+    for number, session in participant.sessions():
+        for name, stream in session.streams.items():
+            if "corrected" not in stream.attrs:
+                continue  # our own: one clock
+            about = {key: value for key, value in stream.attrs.items() if key != "name"}
+            corrected = "yes" if about.pop("corrected") else "no"
+            rows.append(
+                {
+                    "participant": participant.name,
+                    "session": number,
+                    "stream": name,
+                    "corrected": corrected,
+                    "samples": len(stream.time),
+                    **about,
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def exclusions(movements: "pd.DataFrame") -> "pd.DataFrame":
+    """Return the movements that count for no average, with the reason."""
+    counted = is_result(movements)
+    out = movements.loc[
+        ~counted, ["participant", "session", "trial", "attempt", "outcome", "practice"]
+    ].copy()
+    out["why"] = [
+        "practice" if row.practice else f"outcome {row.outcome}"
+        for row in out.itertuples(index=False)
+    ]
+    return out.drop(columns="practice")
+
+
+def is_result(movements: "pd.DataFrame") -> "pd.Series[bool]":
+    """Return which movements are results: successful and no practice.
+
+    A repeated trial's attempts before the last have the outcome ``repeated``.
+    """
+    return (movements["outcome"] == "success") & (movements["practice"].astype(float) == 0.0)

@@ -1,0 +1,16 @@
+"""Exports recordings as MAT files, version 5, which MATLAB and Octave load."""
+
+from collections.abc import Sequence
+
+from labcrane import Exporter, Machine, Offer, hookimpl, offer
+from labcrane_matlab.settings import MatlabSettings
+
+
+@hookimpl
+def labcrane_exporters() -> Sequence[Offer[Exporter]]:
+    def matlab(settings: MatlabSettings, machine: Machine) -> Exporter:
+        from labcrane_matlab.matlab import Matlab
+
+        return Matlab(settings)
+
+    return (offer("matlab", MatlabSettings, matlab),)

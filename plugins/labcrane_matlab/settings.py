@@ -1,0 +1,10 @@
+"""What can be chosen for exports to MATLAB."""
+
+from labcrane import Settings
+
+
+class MatlabSettings(Settings):
+    """Settings of :class:`~labcrane_matlab.matlab.Matlab`."""
+
+    streams: bool = True
+    """Whether streams, one row per tick, are written beside movements and events."""

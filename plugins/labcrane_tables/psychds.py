@@ -1,0 +1,58 @@
+"""Psych-DS 1.0: CSV files with named keys, and a JSON-LD description of every column."""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+from labcrane import Exporter, Participant
+from labcrane_tables.frames import snake
+from labcrane_tables.settings import PsychDsSettings
+from labcrane_tables.tables import write_csv
+
+
+class PsychDs(Exporter):
+    """One CSV file of movements per participant and session.
+
+    Streams stay in the participant files: Psych-DS is for tables that people read.
+    """
+
+    def __init__(self, settings: PsychDsSettings) -> None:
+        self._settings = settings
+
+    def export(self, participants: Iterable[Participant], folder: Path) -> None:
+        (folder / "data").mkdir()
+        variables: dict[str, dict[str, str]] = {}
+        title = study = ""
+        for participant in participants:
+            context = participant.context
+            title, study = str(context.get("title", "")), str(context.get("study", ""))
+            measures = participant.measures()
+            book = participant.codebook(measures)
+            for row in book[book["table"] == "trials"].itertuples(index=False):
+                variables.setdefault(str(row.column), _variable(*map(str, row[1:])))
+            table = snake(measures)
+            for number, own in table.groupby("session"):
+                subject = _key(participant.name)
+                name = f"study-{_key(study)}_subject-{subject}_session-{number}_data.csv"
+                write_csv(own, folder / "data" / name)
+        description = {
+            "@context": "https://schema.org/",
+            "@type": "Dataset",
+            "name": title,
+            "description": self._settings.description or title,
+            "schemaVersion": "Psych-DS 1.0",
+            "variableMeasured": list(variables.values()),
+        }
+        text = json.dumps(description, indent=2, ensure_ascii=False) + "\n"
+        (folder / "dataset_description.json").write_text(text, encoding="utf-8")
+        (folder / "README.md").write_text(f"# {title}\n\nWritten by labcrane.\n", encoding="utf-8")
+
+
+def _key(text: str) -> str:
+    """Return a value of a file name's key: Psych-DS allows letters and digits."""
+    return "".join(letter for letter in text if letter.isalnum())
+
+
+def _variable(column: str, unit: str, description: str, source: str) -> dict[str, str]:
+    about = {"@type": "PropertyValue", "name": column, "description": f"{description}; {source}"}
+    return about | ({"unitText": unit} if unit else {})

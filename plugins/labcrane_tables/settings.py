@@ -1,0 +1,20 @@
+"""What can be chosen for exports as tables."""
+
+from typing import Literal
+
+from labcrane import Settings
+
+
+class TableSettings(Settings):
+    """Settings of :class:`~labcrane_tables.tables.Tables`."""
+
+    streams: Literal["both", "parquet", "csv", "none"] = "both"
+    """How streams, one row per tick, are written. Parquet is small and fast; R reads it with the
+    package arrow or nanoparquet, and CSV without any."""
+
+
+class PsychDsSettings(Settings):
+    """Settings of :class:`~labcrane_tables.psychds.PsychDs`."""
+
+    description: str = ""
+    """What the study is about; its title by default."""
