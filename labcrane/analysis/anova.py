@@ -59,8 +59,8 @@ def repeated_measures(movements: "pd.DataFrame", measure: str, factor: str) -> A
 
     Returns None with fewer than three whole participants or two levels.
     """
-    from scipy.stats import f as f_distribution  # noqa: PLC0415 - loads for a second
-    from statsmodels.stats.anova import AnovaRM  # noqa: PLC0415
+    from scipy.stats import f as f_distribution
+    from statsmodels.stats.anova import AnovaRM
 
     cells = movements.groupby(["participant", factor])[measure].mean().unstack()
     whole = cells.dropna()

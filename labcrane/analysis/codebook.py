@@ -20,7 +20,7 @@ MEASURED, WRITTEN = "computed from the frames by labcrane", "recorded by the ses
 
 def trial_codebook(measures: "pd.DataFrame", session: SessionRecord) -> "pd.DataFrame":
     """Return one row per column of the table of measures: column, unit, description, source."""
-    import pandas as pd  # noqa: PLC0415 - loads for a second
+    import pandas as pd
 
     units = session.context.get("trial_units", {})
     gaze = gaze_units(measures.columns)
@@ -41,7 +41,7 @@ def trial_codebook(measures: "pd.DataFrame", session: SessionRecord) -> "pd.Data
 
 def stream_codebook(session: SessionRecord) -> "pd.DataFrame":
     """Return the same of a session's streams; the table is the stream."""
-    import pandas as pd  # noqa: PLC0415
+    import pandas as pd
 
     rows = []
     for name, stream in session.streams.items():

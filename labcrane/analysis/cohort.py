@@ -72,9 +72,9 @@ class Participant:
 
     def codebook(self, measures: "pd.DataFrame") -> "pd.DataFrame":
         """Return unit, meaning and source of every column of ``measures`` and of all streams."""
-        import pandas as pd  # noqa: PLC0415
+        import pandas as pd
 
-        from labcrane.analysis.codebook import stream_codebook, trial_codebook  # noqa: PLC0415
+        from labcrane.analysis.codebook import stream_codebook, trial_codebook
 
         sessions = [session for _, session in self.sessions()]
         tables = [trial_codebook(measures, sessions[0]), *map(stream_codebook, sessions)]
@@ -82,7 +82,7 @@ class Participant:
 
     def measures(self) -> "pd.DataFrame":
         """Return one row per counted movement of all sessions: condition, results, measures."""
-        from labcrane.analysis.measures import measure_participant  # noqa: PLC0415 - loads scipy
+        from labcrane.analysis.measures import measure_participant
 
         return measure_participant(self)
 
@@ -105,7 +105,7 @@ class Cohort:
 
     def listing(self) -> "pd.DataFrame":
         """Return everybody with status and reason: what must stand beside every average."""
-        import pandas as pd  # noqa: PLC0415
+        import pandas as pd
 
         rows = [
             {"participant": person.name, "status": str(person.status), "included": word}
@@ -232,6 +232,6 @@ def _unfinished(session: SessionRecord) -> str | None:
 
 def _planned(protocol: str) -> int:
     """Return how many sessions a protocol has."""
-    from ruamel.yaml import YAML  # noqa: PLC0415
+    from ruamel.yaml import YAML
 
     return len(YAML(typ="safe").load(protocol)["sessions"])

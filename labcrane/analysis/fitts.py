@@ -58,7 +58,7 @@ class Regression:
 
 def regress(difficulty_bit: FloatArray, movement_time: FloatArray) -> Regression | None:
     """Fit Fitts' law; None with fewer than three points or a single difficulty."""
-    from scipy.stats import linregress, t  # noqa: PLC0415 - loads for a second
+    from scipy.stats import linregress, t
 
     x, y = np.asarray(difficulty_bit, float), np.asarray(movement_time, float)
     known = np.isfinite(x) & np.isfinite(y)
@@ -97,7 +97,7 @@ def throughput(movements: "pd.DataFrame", by: Sequence[str] = ("distance",)) -> 
     by
         The columns that make a condition.
     """
-    import pandas as pd  # noqa: PLC0415
+    import pandas as pd
 
     movements = movements.dropna(subset=["movement_time", "amplitude", "error_along"])
     everybody = _spread(movements, ["participant", *by])

@@ -84,7 +84,7 @@ def fit_curve(curve: str, n: FloatArray, values: FloatArray) -> LearningCurve | 
 
     Gains may be negative: who gets worse is fitted as well. The search starts at several rates.
     """
-    from scipy.optimize import least_squares  # noqa: PLC0415 - loads for a second
+    from scipy.optimize import least_squares
 
     known = np.isfinite(values)
     x, y = np.asarray(n, float)[known], np.asarray(values, float)[known]
@@ -143,7 +143,7 @@ def learning_curves(
 
     Returns one row per participant and curve; ``better`` is yes for the one with the lower AICc.
     """
-    import pandas as pd  # noqa: PLC0415
+    import pandas as pd
 
     rows: list[dict[str, object]] = []
     for participant, own in movements.groupby("participant"):

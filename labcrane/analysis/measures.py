@@ -85,7 +85,7 @@ def measure_participant(
     participant: Participant, settings: MeasureSettings = DEFAULTS
 ) -> "pd.DataFrame":
     """Return one row per counted movement of all sessions of a participant."""
-    import pandas as pd  # noqa: PLC0415 - loads for a second
+    import pandas as pd
 
     tables = []
     for number, session in participant.sessions():
@@ -107,7 +107,7 @@ def measure_session(
 
     ``frames`` takes the place of the recorded frames: those of a replay.
     """
-    import pandas as pd  # noqa: PLC0415
+    import pandas as pd
 
     trials = session.trials
     machine = machine_of(session)

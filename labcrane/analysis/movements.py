@@ -87,7 +87,7 @@ def groups(session: SessionRecord) -> dict[str, "pd.DataFrame"]:
 
 def machine_of(session: SessionRecord) -> Machine:
     """Return the machine that was operated."""
-    from ruamel.yaml import YAML  # noqa: PLC0415
+    from ruamel.yaml import YAML
 
     return Machine.model_validate(YAML(typ="safe").load(session.context["machine"]))
 

@@ -16,7 +16,7 @@ def loop_quality(participant: Participant) -> "pd.DataFrame":
     Lateness is from when a tick was due to when it woke. A late tick is one whose lateness is a
     period or more. A session on a clock that jumps (``--fast``) is never late.
     """
-    import pandas as pd  # noqa: PLC0415 - loads for a second
+    import pandas as pd
 
     rows = []
     for number, session in participant.sessions():
@@ -48,7 +48,7 @@ def sync_quality(participant: Participant) -> "pd.DataFrame":
     Everything that the correction noted stands as a column of its own; ``corrected`` says whether
     there is a time on our clock at all.
     """
-    import pandas as pd  # noqa: PLC0415
+    import pandas as pd
 
     rows: list[dict[str, Any]] = []
     for number, session in participant.sessions():

@@ -54,7 +54,7 @@ class Consistency:
 
 def check_reported(test: Reported) -> Consistency:
     """Recompute p and partial eta squared of a printed F test, rounding allowed for."""
-    from scipy.stats import f as distribution  # noqa: PLC0415 - loads for a second
+    from scipy.stats import f as distribution
 
     (f_low, f, f_high), (a_low, a, a_high), (b_low, b, b_high) = map(
         _printed, (test.f, test.df1, test.df2)

@@ -68,7 +68,7 @@ def sub_movements(
     Counted after a second-order Butterworth low-pass run forwards and backwards. A peak rises by
     at least ``prominence`` of the largest speed above what separates it from a higher one.
     """
-    from scipy.signal import butter, find_peaks, sosfiltfilt  # noqa: PLC0415 - loads for a second
+    from scipy.signal import butter, find_peaks, sosfiltfilt
 
     sections = butter(2, low_pass_hz, fs=rate_hz, output="sos")
     padded = np.concatenate([[0.0], speed, [0.0]])  # a movement that ends fast still has a peak

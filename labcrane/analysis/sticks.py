@@ -89,7 +89,7 @@ def coordination(left: FloatArray, right: FloatArray, rate_hz: float) -> tuple[f
         Correlation, -1 to 1, and lag, positive when the right hand follows the left; NaN when one
         of them never moved.
     """
-    from scipy.signal import correlate  # noqa: PLC0415 - loads for a second
+    from scipy.signal import correlate
 
     a, b = left - left.mean(), right - right.mean()
     power = float(np.sqrt((a @ a) * (b @ b)))
@@ -103,7 +103,7 @@ def coordination(left: FloatArray, right: FloatArray, rate_hz: float) -> tuple[f
 def effort(command: FloatArray, speeds: FloatArray) -> float:
     """Return the root mean square of the commands over all joints, as a fraction of full speed.
 
-    ``command`` is in rad/s, shape ``(n, n_joints)``, ``speeds`` the joints' largest, ``(n_joints,)``.
+    ``command`` is in rad/s, shape ``(n, n_joints)``; ``speeds`` has shape ``(n_joints,)``.
     """
     return float(np.sqrt(((command / speeds) ** 2).mean()))
 

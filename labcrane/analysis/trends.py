@@ -46,7 +46,7 @@ def linear_trend(movements: "pd.DataFrame", measure: str, along: str = "sequence
 
     An F test over all positions says that some differ; only this says in which direction.
     """
-    from scipy.stats import ttest_1samp  # noqa: PLC0415 - loads for a second
+    from scipy.stats import ttest_1samp
 
     slopes = []
     for _, own in movements.groupby("participant"):
@@ -72,7 +72,7 @@ def linear_trend(movements: "pd.DataFrame", measure: str, along: str = "sequence
 
 def holm(p: Sequence[float]) -> list[float]:
     """Return p-values corrected after Holm; a NaN is no test and does not count as one."""
-    from statsmodels.stats.multitest import multipletests  # noqa: PLC0415
+    from statsmodels.stats.multitest import multipletests
 
     tested = [value for value in p if not math.isnan(value)]
     if not tested:
@@ -123,7 +123,7 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel | None:
     does not converge, or has no variance left for them, the one without is fitted, and ``slopes``
     says so.
     """
-    import pandas as pd  # noqa: PLC0415
+    import pandas as pd
 
     kept = [measure, "sequence", "difficulty", "far_side", "participant"]
     table = movements[kept].dropna()
@@ -169,10 +169,10 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel | None:
 
 
 def _fit(formula: str, data: "pd.DataFrame", random: str) -> "object | None":
-    import warnings  # noqa: PLC0415
+    import warnings
 
-    from statsmodels.formula.api import mixedlm  # noqa: PLC0415
-    from statsmodels.tools.sm_exceptions import ConvergenceWarning  # noqa: PLC0415
+    from statsmodels.formula.api import mixedlm
+    from statsmodels.tools.sm_exceptions import ConvergenceWarning
 
     with warnings.catch_warnings():
         warnings.simplefilter("error", ConvergenceWarning)

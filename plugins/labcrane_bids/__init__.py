@@ -1,0 +1,16 @@
+"""Exports recordings as a BIDS 1.11 data set: motion, events, eye tracking."""
+
+from collections.abc import Sequence
+
+from labcrane import Exporter, Machine, Offer, hookimpl, offer
+from labcrane_bids.settings import BidsSettings
+
+
+@hookimpl
+def labcrane_exporters() -> Sequence[Offer[Exporter]]:
+    def bids(settings: BidsSettings, machine: Machine) -> Exporter:
+        from labcrane_bids.bids import Bids
+
+        return Bids(settings, machine)
+
+    return (offer("bids", BidsSettings, bids),)

@@ -1,0 +1,125 @@
+"""What describes the data set as a whole."""
+
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from labcrane import ProtocolError
+from labcrane_bids.events import HED_VERSION
+from labcrane_bids.files import MISSING, label, write_json, write_tsv
+from labcrane_bids.settings import BidsSettings
+
+if TYPE_CHECKING:
+    pass
+
+BIDS_VERSION = "1.11.1"
+
+
+def describe_dataset(
+    folder: Path, settings: BidsSettings, contexts: Sequence[Mapping[str, Any]]
+) -> None:
+    """Write ``dataset_description.json`` and the README."""
+    title = str(contexts[0].get("title", "")) if contexts else ""
+    versions = {str(context.get("versions", {}).get("labcrane", "")) for context in contexts}
+    description: dict[str, Any] = {
+        "Name": title or "labcrane",
+        "BIDSVersion": BIDS_VERSION,
+        "HEDVersion": HED_VERSION,
+        "DatasetType": "raw",
+        "GeneratedBy": [
+            {"Name": "labcrane", "Version": ", ".join(sorted(versions - {""})) or MISSING}
+        ],
+    }
+    approvals = [*settings.ethics, *_approvals(contexts)]
+    if approvals:
+        description["EthicsApprovals"] = list(dict.fromkeys(approvals))
+    if settings.authors:
+        description["Authors"] = list(settings.authors)
+    if settings.license:
+        description["License"] = settings.license
+    write_json(folder / "dataset_description.json", description)
+    dates = "moved to 1925 for each participant" if settings.shift_dates else "as recorded"
+    (folder / "README").write_text(
+        f"{title}\n\nWritten by labcrane. Motion holds the simulated machine (tracksys-crane) and "
+        "the operator's sticks; times are seconds from the first tick of the session, which is the "
+        f"acq_time of the scans file. Dates are {dates}. Participants of the status simulated are "
+        "no people. EEG and other streams are in the participant files and in labcrane's XDF "
+        "export.\n",
+        encoding="utf-8",
+    )
+
+
+def _approvals(contexts: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the approvals that the sessions were recorded under."""
+    found = []
+    for context in contexts:
+        approval = context.get("approval")
+        if isinstance(approval, Mapping):
+            words = [str(approval[key]) for key in ("board", "reference") if key in approval]
+            found.append(", ".join(words))
+    return found
+
+
+def describe_participants(folder: Path, rows: Sequence[Mapping[str, object]]) -> None:
+    """Write ``participants.tsv`` and what its columns are."""
+    import pandas as pd
+
+    write_tsv(folder / "participants.tsv", pd.DataFrame(rows))
+    write_json(
+        folder / "participants.json",
+        {
+            "age": {"Description": "age of the participant", "Units": "year"},
+            "sex": {"Description": "sex as reported", "Levels": {"F": "female", "M": "male"}},
+            "handedness": {
+                "Description": "handedness as reported",
+                "Levels": {"L": "left", "R": "right", "A": "ambidextrous"},
+            },
+            "group": {"Description": "group of the design"},
+            "status": {
+                "Description": "what the data are",
+                "Levels": {
+                    "complete": "all sessions recorded to their end",
+                    "half-finished": "a session ended early or was not recorded",
+                    "pilot": "a trial run",
+                    "simulated": "a program took the controls",
+                },
+            },
+        },
+    )
+
+
+def people_table(path: Path | None) -> dict[str, dict[str, str]]:
+    """Read what is known of the people, by pseudonym."""
+    if path is None:
+        return {}
+    if not path.is_file():
+        raise ProtocolError(f"there is no file {path} with age, sex, handedness and group")
+    with path.open(encoding="utf-8", newline="") as file:
+        reader = csv.DictReader(file)
+        if "participant" not in (reader.fieldnames or ()):
+            raise ProtocolError(f"{path} has no column participant; it has {reader.fieldnames}")
+        return {row["participant"]: {k: v for k, v in row.items() if v} for row in reader}
+
+
+def copy_phenotype(source: Path | None, folder: Path) -> None:
+    """Write each questionnaire as ``phenotype/NAME.tsv`` with its description."""
+    if source is None:
+        return
+    import pandas as pd
+
+    tables = sorted(source.glob("*.csv"))
+    if not tables:
+        raise ProtocolError(f"there is no CSV file in {source}; one per questionnaire is needed")
+    (folder / "phenotype").mkdir()
+    for path in tables:
+        described = path.with_suffix(".json")
+        if not described.is_file():
+            raise ProtocolError(f"{path} has no description; write {described} beside it")
+        table: pd.DataFrame = pd.read_csv(path)
+        names = [f"sub-{label(str(name))}" for name in table.pop("participant")]
+        table.insert(0, "participant_id", names)
+        write_tsv(folder / "phenotype" / f"{path.stem}.tsv", table)
+        content = json.loads(described.read_text(encoding="utf-8"))
+        write_json(folder / "phenotype" / f"{path.stem}.json", content)

@@ -1,0 +1,35 @@
+"""What can be chosen for exports as BIDS."""
+
+from pathlib import Path
+
+from pydantic import PositiveInt
+
+from labcrane import Settings
+
+
+class BidsSettings(Settings):
+    """Settings of :class:`~labcrane_bids.bids.Bids`."""
+
+    every: PositiveInt = 1
+    """Which ticks are written: 1 all of them, 3 every third. Motion files are text and cannot be
+    compressed; the participant file keeps all."""
+
+    shift_dates: bool = True
+    """Whether dates are moved, for each participant so that the first session is on 1 January
+    1925: intervals and times of day stay, dates cannot be traced."""
+
+    ethics: tuple[str, ...] = ()
+    """Ethics approvals, as in ``board, reference``; those in the recordings are added."""
+
+    authors: tuple[str, ...] = ()
+    """Who made the data set."""
+
+    license: str = ""
+    """SPDX name of the licence."""
+
+    people: Path | None = None
+    """A CSV file with the columns participant, age, sex, handedness and group, as far as known."""
+
+    phenotype: Path | None = None
+    """A folder of CSV files, one per questionnaire, each with a column participant and a JSON file
+    of the same name that says what its columns are."""
