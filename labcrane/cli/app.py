@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import typer
 from rich.console import Console
 
-from labcrane.cli import inspect, recording, running
+from labcrane.cli import inspect, recording, results, running
 from labcrane.errors import LabcraneError, ProtocolError
 
 app = typer.Typer(
@@ -26,6 +26,9 @@ app.command("streams")(recording.streams)
 app.command("record")(recording.record)
 app.command("recover")(recording.recover)
 app.command("resync")(recording.resync)
+app.command("export")(results.export)
+app.command("report")(results.report)
+app.command("replay")(results.replay)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

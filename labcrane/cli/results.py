@@ -1,0 +1,184 @@
+"""Commands that work on recordings: export, report, replay."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from labcrane.cli.inspect import out
+from labcrane.errors import ProtocolError, RecordingError
+
+if TYPE_CHECKING:
+    from labcrane.analysis.cohort import Cohort, Participant
+
+DataFolder = Annotated[Path, typer.Argument(metavar="DATA", help="the study's data folder")]
+Include = Annotated[
+    list[str] | None,
+    typer.Option(help="use also: simulated, pilot, half-finished; may be repeated"),
+]
+MANIFEST = "labcrane_export.json"
+
+
+def export(
+    data: DataFolder,
+    to: Annotated[
+        str, typer.Option(help="tables, matlab, bids, psychds, xdf; see labcrane plugins")
+    ],
+    folder: Annotated[Path, typer.Option("--out", help="a folder that is empty or new")],
+    include: Include = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", help="NAME=VALUE of the exporter; may be repeated")
+    ] = None,
+) -> None:
+    """Export recordings for R, MATLAB, BIDS, Psych-DS or EEG programs."""
+    from labcrane.analysis.movements import machine_of
+    from labcrane.registry import discover
+    from labcrane.roles import Exporter
+
+    offer = discover().find(Exporter, to)
+    chosen = _settings(offer.settings, settings or [], to)
+    if folder.exists() and any(folder.iterdir()):
+        raise ProtocolError(f"{folder} is not empty, and nothing is overwritten; give a new folder")
+    cohort = _cohort(data, include)
+    _, first = next(cohort.included[0].sessions())
+    exporter = offer.build(chosen, machine_of(first))
+    folder.mkdir(parents=True, exist_ok=True)
+    with _bar(f"export to {to}", len(cohort.included)) as advance:
+        exporter.export(_counted(cohort.included, advance), folder)
+    _write_manifest(folder, to, chosen.model_dump(mode="json"), cohort)
+    out.print(f"{to}: {folder}", markup=False)
+
+
+def report(
+    data: DataFolder,
+    folder: Annotated[Path, typer.Option("--out", help="where the report goes")] = Path(
+        "labcrane-report"
+    ),
+    include: Include = None,
+) -> None:
+    """Write an HTML report of a study: figures, measures, statistics, quality."""
+    from labcrane.analysis.report import write_report
+
+    cohort = _cohort(data, include)
+    with _bar("report", len(cohort.included)) as advance:
+        page = write_report(cohort, folder, progress=lambda done, of: advance())
+    out.print(f"report: {page}", markup=False)
+
+
+def replay(
+    recording: Annotated[Path, typer.Argument(metavar="FILE", help="a participant file")],
+    session: Annotated[int, typer.Option(help="which session")] = 1,
+    speed: Annotated[
+        float | None, typer.Option(help="show it over LSL, so many times as fast; 1 as it was")
+    ] = None,
+    protocol: Annotated[
+        Path | None, typer.Option(help="run this protocol instead of the recorded one")
+    ] = None,
+    machine: Annotated[
+        Path | None, typer.Option(help="operate this machine instead of the recorded one")
+    ] = None,
+    measures: Annotated[
+        Path | None, typer.Option(help="write the measures of what was replayed as CSV")
+    ] = None,
+) -> None:
+    """Run a recorded session again from its input, and compare every number."""
+    from labcrane.replay import replay as run_again
+
+    if speed is not None:
+        from labcrane.streams.network import use_loopback
+
+        use_loopback()
+    done = run_again(recording, session, protocol=protocol, machine=machine, speed=speed)
+    for part in done.parts:
+        out.print(f"differs: {part}", markup=False)
+    if measures is not None:
+        from labcrane.analysis.measures import measure_session
+        from labcrane.recording.recording import open_recording
+
+        record = open_recording(recording).session(session)
+        measure_session(record, frames=done.frames).to_csv(measures, index=False)
+        out.print(f"measures: {measures}", markup=False)
+    if done.difference is None:
+        out.print(f"{done.ticks} ticks replayed, every number the same bit for bit", markup=False)
+        return
+    first = done.difference
+    raise RecordingError(
+        f"tick {first.tick} is the first that differs: {first.column} was {first.recorded!r} and "
+        f"is {first.replayed!r}"
+        + ("" if done.parts else "; no part that is recorded differs, so look at the plugins")
+    )
+
+
+def _cohort(data: Path, include: list[str] | None) -> "Cohort":
+    from labcrane.analysis.cohort import find_cohort
+
+    cohort = find_cohort(data, include or ())
+    for person in cohort.left_out:
+        out.print(f"left out: {person.name}, {person.status}: {person.why}", markup=False)
+    return cohort
+
+
+@contextmanager
+def _bar(what: str, total: int) -> Iterator[Any]:
+    parts = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+    )
+    with Progress(*parts, console=out) as progress:
+        task = progress.add_task(what, total=total)
+        yield lambda: progress.advance(task)
+
+
+def _counted(participants: "Sequence[Participant]", advance: Any) -> "Iterator[Participant]":
+    for participant in participants:
+        yield participant
+        advance()
+
+
+def _settings(model: Any, words: list[str], name: str) -> Any:
+    """Return an exporter's settings from NAME=VALUE; values are YAML, as in a protocol."""
+    from pydantic import ValidationError
+    from ruamel.yaml import YAML
+
+    given = {}
+    for word in words:
+        key, separator, value = word.partition("=")
+        if not separator:
+            raise ProtocolError(f"--set {word!r} sets nothing; write NAME=VALUE")
+        given[key] = YAML(typ="safe").load(value)
+    try:
+        return model.model_validate(given)
+    except ValidationError as error:
+        known = ", ".join(model.model_fields) or "nothing"
+        problems = "; ".join(
+            f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()
+        )
+        raise ProtocolError(f"exporter {name!r} can set {known}; {problems}") from None
+
+
+def _write_manifest(folder: Path, to: str, settings: Any, cohort: "Cohort") -> None:
+    """Write what was exported and who was left out beside the export, for erasure and for readers.
+
+    BIDS and Psych-DS allow no further files, so it is hidden from them under ``.labcrane``.
+    """
+    import json
+    from datetime import UTC, datetime
+
+    from labcrane import __version__
+
+    (folder / ".labcrane").mkdir()
+    content = {
+        "labcrane": __version__,
+        "format": to,
+        "settings": settings,
+        "made": datetime.now(UTC).isoformat(timespec="seconds"),
+        "data": cohort.folder.name,
+        "participants": cohort.listing().to_dict("records"),
+    }
+    path = folder / ".labcrane" / MANIFEST
+    path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -1,0 +1,299 @@
+"""A recorded session run again from its input.
+
+The loop, the plan and the components are those of a session; the operator's axes, the orders of the
+people in the room and the faults of the controls come from the record, each at the tick at which
+it took effect. Nothing else changes a state, so the same versions give the same numbers, bit for bit.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from labcrane import loop, rig
+from labcrane.clock import ManualClock, SystemClock, Tick
+from labcrane.console import Command, Order
+from labcrane.course import Course
+from labcrane.errors import ProtocolError, RecordingError
+from labcrane.frame_log import PHASES, columns
+from labcrane.plan import plan_session
+from labcrane.recording.recording import SessionRecord, open_recording
+from labcrane.records import Event, Frame, Run
+from labcrane.registry import discover
+from labcrane.replay_parts import differing_parts, restore
+from labcrane.rig import Rig
+from labcrane.roles import InputDevice
+from labcrane.signals import FloatArray, Signal
+from labcrane.study import Study, load
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+COMPARED = ("tick", "trial", "elapsed", "phase", "paused")
+"""Of the loop's columns; when ticks woke is not the machine's doing."""
+
+STAMPS = ("-SIMULATED", "-PILOT")
+"""What is put behind a pseudonym, the last one first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """The first number that is not what was recorded.
+
+    Attributes
+    ----------
+    tick
+        In which tick, counted from 0.
+    column
+        Which: ``state.joint.angle.slew``; "length" when one of them is longer.
+    recorded, replayed
+        The two numbers; ticks for the length.
+    """
+
+    tick: int
+    column: str
+    recorded: float
+    replayed: float
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """What came of a replay.
+
+    Attributes
+    ----------
+    ticks
+        How many were run.
+    parts
+        Every part that mattered and is not what it was, in words.
+    difference
+        The first one, or None: every number is the recorded one, bit for bit.
+    frames
+        What was replayed, as the record has it: loop, input, command, state and task.
+    """
+
+    ticks: int
+    parts: tuple[str, ...]
+    difference: Difference | None
+    frames: Mapping[str, "pd.DataFrame"]
+
+
+def replay(
+    path: Path,
+    session: int,
+    *,
+    protocol: Path | None = None,
+    machine: Path | None = None,
+    speed: float | None = None,
+    sinks: Sequence[Callable[[Frame], None]] = (),
+) -> Replayed:
+    """Run a recorded session again, and compare every number.
+
+    Parameters
+    ----------
+    path, session
+        The participant file, and which of its sessions.
+    protocol
+        A protocol file to run instead of the recorded text.
+    machine
+        A machine file to operate instead of the recorded one.
+    speed
+        Show it on the LSL streams of a session, so many times as fast as it was; None runs as fast
+        as the computer can and shows nothing.
+    sinks
+        Called with every frame: whatever is to be measured now.
+
+    Raises
+    ------
+    RecordingError
+        There is no such session, or it was resumed after a crash and is not of one piece.
+    ProtocolError
+        The record's protocol cannot be run with what is installed.
+    """
+    record = open_recording(path).session(session)
+    if speed is not None and not speed > 0.0:
+        raise ProtocolError(f"a speed of {speed:g} shows nothing; give one above 0, as 2 for twice")
+    if (runs := int(record.events["part"].max())) > 1:
+        raise RecordingError(
+            f"session {session} of {path} was run in {runs} pieces; the state at a resumption is "
+            "not part of the input, so only sessions of one piece can be replayed"
+        )
+    with TemporaryDirectory(prefix="labcrane-replay-") as folder:
+        study = load(restore(record, Path(folder), protocol, machine), discover())
+    parts = differing_parts(record, study)
+    return _run(record, study, session, parts, speed, sinks)
+
+
+def _run(
+    record: SessionRecord,
+    study: Study,
+    session: int,
+    parts: tuple[str, ...],
+    speed: float | None,
+    sinks: Sequence[Callable[[Frame], None]],
+) -> Replayed:
+    script = _Script(record)
+    participant = str(record.context["participant"])
+    for stamp in STAMPS:
+        participant = participant.removesuffix(stamp)
+    plan = plan_session(study, participant, session)
+    machine = study.machine
+    controller, dynamics = study.scheme.build(machine), study.dynamics.build(machine)
+    the_rig = Rig(script.input, controller, dynamics, study.tasks)  # type: ignore[arg-type]
+    with ExitStack() as closing:
+        this_run = closing.enter_context(rig.opened(the_rig, study, plan.seed))
+        log = _Log(this_run, script.ticks)
+        course = Course(study, plan, the_rig, waits=not bool(record.context["simulated"]))
+        shown: list[Callable[[Frame], None]] = []
+        if speed is not None:
+            show = _Show(this_run, f"replay/{participant}/ses-{session:02}", speed)
+            closing.callback(show.close)
+            shown.append(show)
+        clock = ManualClock(start=script.start)
+        try:
+            loop.run(the_rig, this_run, course, clock, script, (*sinks, *shown, log))
+        except _RecordOver:
+            pass
+    return Replayed(log.ticks, parts, log.compare(record), log.frames())
+
+
+class _RecordOver(Exception):  # noqa: N818 - ends a loop, and is no error
+    """The last recorded tick has been run."""
+
+
+class _Input(InputDevice):
+    """Gives each tick what was recorded in it."""
+
+    def __init__(self, signals: tuple[Signal, ...], axes: FloatArray) -> None:
+        self.signals = signals
+        self._axes = axes
+        self.faults: list[tuple[int, str | None]] = []
+
+    def read(self, tick: Tick, seen: Frame) -> FloatArray:
+        while self.faults and self.faults[0][0] <= tick.number:
+            self.fault = self.faults.pop(0)[1]
+        row: FloatArray = self._axes[tick.number]
+        return row
+
+
+class _Script:
+    """Everything that entered the loop from outside, tick by tick; also the console."""
+
+    def __init__(self, record: SessionRecord) -> None:
+        recorded = record.streams["input"]
+        axes = recorded.data.to_numpy(np.float64)
+        self.input = _Input(signals_of(list(map(str, recorded.data)), recorded.units), axes)
+        self.ticks = len(axes)
+        self.start = float(record.streams["loop"].data["due"].iloc[0])
+        self._orders: dict[int, list[Command]] = {}
+        self._tick = -1
+        for event in record.events.itertuples(index=False):
+            tick, name = int(event.tick), str(event.name)
+            if name.startswith("order."):
+                order = Command(Order(name.removeprefix("order.")), event.data.get("text", ""))
+                self._orders.setdefault(tick, []).append(order)
+            elif name == "input.lost":
+                self.input.faults.append((tick, str(event.data["why"])))
+            elif name == "input.back":
+                self.input.faults.append((tick, None))
+
+    def commands(self) -> list[Command]:
+        """Return the orders of this tick."""
+        self._tick += 1
+        return self._orders.get(self._tick, [])
+
+    def report(self, event: Event) -> None:
+        """Nobody is told; the sinks see every event."""
+
+
+class _Log:
+    """Keeps every number of every frame, and ends the run where the record ends."""
+
+    def __init__(self, run: Run, ticks: int) -> None:
+        self._columns = columns(run)
+        self._rows = np.full((ticks, len(self._columns)), np.nan)
+        self.ticks = 0
+
+    def __call__(self, frame: Frame) -> None:
+        phase, tick = PHASES[frame.phase], frame.tick
+        loop_row = (*tick, 0.0, frame.trial, frame.elapsed, phase, frame.paused)
+        parts = (loop_row, frame.axes, frame.command, frame.state, frame.task)
+        self._rows[self.ticks] = np.concatenate(parts)
+        self.ticks += 1
+        if self.ticks == len(self._rows):
+            raise _RecordOver
+
+    def frames(self) -> dict[str, "pd.DataFrame"]:
+        import pandas as pd  # noqa: PLC0415 - loads for a second
+
+        return {
+            group: pd.DataFrame(
+                {
+                    column.label: self._rows[: self.ticks, number]
+                    for number, column in enumerate(self._columns)
+                    if column.group == group
+                }
+            )
+            for group in dict.fromkeys(column.group for column in self._columns)
+        }
+
+    def compare(self, record: SessionRecord) -> Difference | None:
+        """Return the first number that differs; NaN equals NaN, 0 does not equal -0."""
+        first: Difference | None = None
+        for number, column in enumerate(self._columns):
+            if column.group == "loop" and column.label not in COMPARED:
+                continue
+            name = f"{column.group}.{column.label}"
+            table = record.streams[column.group].data
+            if column.label not in table:
+                return Difference(0, name, np.nan, float(self._rows[0, number]))
+            recorded = table[column.label].to_numpy(np.float64)[: self.ticks]
+            replayed = np.ascontiguousarray(self._rows[: self.ticks, number])
+            same = recorded.view(np.int64) == replayed.view(np.int64)
+            same |= np.isnan(recorded) & np.isnan(replayed)
+            if not same.all():
+                at = int(np.argmin(same))
+                if first is None or at < first.tick:
+                    first = Difference(at, name, float(recorded[at]), float(replayed[at]))
+        if first is None and self.ticks < len(self._rows):
+            return Difference(self.ticks, "length", float(len(self._rows)), float(self.ticks))
+        return first
+
+
+class _Show:
+    """Puts frames on the streams of a session, at a pace."""
+
+    def __init__(self, run: Run, source: str, speed: float) -> None:
+        from labcrane.streams.outlets import Outlets  # noqa: PLC0415 - loads liblsl
+
+        self._outlets = Outlets(run, source)
+        self._clock = SystemClock()
+        self._start = self._clock.now()
+        self._step = 1.0 / (run.rate_hz * speed)
+        self.close = self._outlets.close
+
+    def __call__(self, frame: Frame) -> None:
+        due = self._start + frame.tick.number * self._step
+        self._clock.wait_until(due)
+        events = tuple(replace(event, time=due) for event in frame.events)
+        now = Tick(frame.tick.number, due, self._clock.now())
+        self._outlets.push(replace(frame, tick=now, events=events))
+
+
+def signals_of(names: Sequence[str], units: Mapping[str, str]) -> tuple[Signal, ...]:
+    """Return signals with these columns, in the same order."""
+    signals: list[Signal] = []
+    for column in names:
+        name, _, component = column.rpartition(".")
+        if name and signals and signals[-1].name == name:
+            last = signals.pop()
+            signals.append(Signal(name, last.unit, (*last.components, component)))
+        elif name:
+            signals.append(Signal(name, units[column], (component,)))
+        else:
+            signals.append(Signal(column, units[column]))
+    return tuple(signals)

@@ -1,0 +1,108 @@
+"""The parts of a recorded session: put together again, and compared with what is installed."""
+
+import json
+import platform
+from collections.abc import Iterator, Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from labcrane.recording.recording import SessionRecord
+from labcrane.study import Study
+
+IRRELEVANT = ("pygame", "pylsl")
+"""Of the recorded versions, those that bring input in or send frames out, and move nothing."""
+
+
+def restore(
+    record: SessionRecord, folder: Path, protocol: Path | None, machine: Path | None
+) -> Path:
+    """Write the recorded protocol and what it refers to into ``folder``; return its path.
+
+    A given ``protocol`` stays where it is, unless a ``machine`` is put into it.
+    """
+    from ruamel.yaml import YAML  # noqa: PLC0415 - only a replay needs it here
+
+    if protocol is not None and machine is None:
+        return protocol
+    text = record.protocol if protocol is None else protocol.read_text(encoding="utf-8")
+    content = YAML(typ="safe").load(text)
+    described = machine.read_text(encoding="utf-8") if machine else record.context["machine"]
+    (folder / "machine.yaml").write_text(described, encoding="utf-8")
+    content["machine"] = "machine.yaml"
+    _write_instructions(content, record, folder)
+    path = folder / "protocol.yaml"
+    path.write_text(json.dumps(content), encoding="utf-8")  # JSON is YAML
+    return path
+
+
+def _write_instructions(content: Mapping[str, Any], record: SessionRecord, folder: Path) -> None:
+    """Write the texts that were shown; those that were not change no state, and are left empty."""
+    events = record.events
+    shown = [
+        data.get("text", "") for data in events.loc[events["name"] == "instructions.shown", "data"]
+    ]
+    number = int(record.attrs["session"])
+    for at, session in enumerate(content["sessions"], start=1):
+        for step in session["steps"]:
+            if isinstance(step, dict) and "instructions" in step:
+                text = shown.pop(0) if at == number and shown else ""
+                path = folder / str(step["instructions"])
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(text, encoding="utf-8")
+
+
+def differing_parts(record: SessionRecord, study: Study) -> tuple[str, ...]:
+    """Return every part that matters and is not what it was, in words."""
+    from ruamel.yaml import YAML  # noqa: PLC0415
+
+    context = record.context
+    found = list(_versions(context.get("versions", {})))
+    yaml = YAML(typ="safe")
+    then, now = yaml.load(context["machine"]), yaml.load(study.machine_text)
+    found += _compared("machine", then, now)
+    choices = {
+        "scheme": study.scheme,
+        "dynamics": study.dynamics,
+        **{f"tasks.{name}": choice for name, choice in study.task_choices.items()},
+    }
+    for part, choice in choices.items():
+        recorded = context["components"].get(part)
+        chosen = {
+            "use": choice.name,
+            "plugin": choice.plugin,
+            "settings": choice.settings.model_dump(mode="json"),
+        }
+        found += _compared(part, recorded, chosen)
+    found += _compared("rate_hz", float(context["rate_hz"]), study.protocol.rate_hz)
+    return tuple(found)
+
+
+def _versions(recorded: Mapping[str, str]) -> Iterator[str]:
+    for name, then in recorded.items():
+        if name not in IRRELEVANT and (now := _installed(name)) != then:
+            yield f"{name}: recorded with {then}, now {now}"
+
+
+def _installed(name: str) -> str:
+    if name == "python":
+        return platform.python_version()
+    if name == "system":
+        return platform.platform()
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def _compared(name: str, then: object, now: object) -> Iterator[str]:
+    """Yield what differs in nested settings, by dotted path."""
+    if isinstance(then, Mapping) and isinstance(now, Mapping):
+        for key in dict.fromkeys([*then, *now]):
+            yield from _compared(f"{name}.{key}", then.get(key), now.get(key))
+    elif isinstance(then, list) and isinstance(now, list) and len(then) == len(now):
+        for at, (one, other) in enumerate(zip(then, now, strict=True)):
+            key = one.get("name", at) if isinstance(one, Mapping) else at
+            yield from _compared(f"{name}.{key}", one, other)
+    elif then != now:
+        yield f"{name}: recorded {then!r}, now {now!r}"
