@@ -2,15 +2,16 @@
 
 The loop, the plan and the components are those of a session; the operator's axes, the orders of the
 people in the room and the faults of the controls come from the record, each at the tick at which
-it took effect. Nothing else changes a state, so the same versions give the same numbers, bit for bit.
+it took effect. Nothing else changes a state, so the same versions give the
+same numbers, bit for bit.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from labcrane.clock import ManualClock, SystemClock, Tick
 from labcrane.console import Command, Order
 from labcrane.course import Course
 from labcrane.errors import ProtocolError, RecordingError
-from labcrane.frame_log import PHASES, columns
+from labcrane.frame_log import PHASES, FrameLog, columns
 from labcrane.plan import plan_session
 from labcrane.recording.recording import SessionRecord, open_recording
 from labcrane.records import Event, Frame, Run
@@ -146,7 +147,7 @@ def _run(
     the_rig = Rig(script.input, controller, dynamics, study.tasks)  # type: ignore[arg-type]
     with ExitStack() as closing:
         this_run = closing.enter_context(rig.opened(the_rig, study, plan.seed))
-        log = _Log(this_run, script.ticks)
+        log = _Log(this_run, script)
         course = Course(study, plan, the_rig, waits=not bool(record.context["simulated"]))
         shown: list[Callable[[Frame], None]] = []
         if speed is not None:
@@ -154,10 +155,8 @@ def _run(
             closing.callback(show.close)
             shown.append(show)
         clock = ManualClock(start=script.start)
-        try:
-            loop.run(the_rig, this_run, course, clock, script, (*sinks, *shown, log))
-        except _RecordOver:
-            pass
+        with suppress(_RecordOver):
+            loop.run(the_rig, this_run, course, clock, script, log, (*sinks, *shown))
     return Replayed(log.ticks, parts, log.compare(record), log.frames())
 
 
@@ -174,6 +173,8 @@ class _Input(InputDevice):
         self.faults: list[tuple[int, str | None]] = []
 
     def read(self, tick: Tick, seen: Frame) -> FloatArray:
+        if tick.number == len(self._axes):
+            raise _RecordOver
         while self.faults and self.faults[0][0] <= tick.number:
             self.fault = self.faults.pop(0)[1]
         row: FloatArray = self._axes[tick.number]
@@ -189,43 +190,58 @@ class _Script:
         self.input = _Input(signals_of(list(map(str, recorded.data)), recorded.units), axes)
         self.ticks = len(axes)
         self.start = float(record.streams["loop"].data["due"].iloc[0])
+        self.disk_trouble: str | None = None
+        self._disk: dict[int, str | None] = {}
         self._orders: dict[int, list[Command]] = {}
         self._tick = -1
         for event in record.events.itertuples(index=False):
-            tick, name = int(event.tick), str(event.name)
-            if name.startswith("order."):
-                order = Command(Order(name.removeprefix("order.")), event.data.get("text", ""))
-                self._orders.setdefault(tick, []).append(order)
-            elif name == "input.lost":
-                self.input.faults.append((tick, str(event.data["why"])))
-            elif name == "input.back":
-                self.input.faults.append((tick, None))
+            self._take(int(event.tick), str(event.name), event.data)
+
+    def _take(self, tick: int, name: str, data: Mapping[str, Any]) -> None:
+        """Note what an event says came from outside."""
+        part, _, what = name.rpartition(".")
+        if part == "order":
+            self._order(tick, Command(Order(what), data.get("text", "")))
+        elif part == "stream" and what in {"lost", "back"}:
+            self._order(tick, Command(Order(what), data["what"]))
+        elif part == "input" and what in {"lost", "back"}:
+            self.input.faults.append((tick, data.get("why")))
+        elif part == "disk" and what in {"lost", "back"}:
+            self._disk[tick] = data.get("why")
+
+    def _order(self, tick: int, command: Command) -> None:
+        self._orders.setdefault(tick, []).append(command)
 
     def commands(self) -> list[Command]:
         """Return the orders of this tick."""
         self._tick += 1
+        self.disk_trouble = self._disk.get(self._tick, self.disk_trouble)
         return self._orders.get(self._tick, [])
 
     def report(self, event: Event) -> None:
         """Nobody is told; the sinks see every event."""
 
 
-class _Log:
-    """Keeps every number of every frame, and ends the run where the record ends."""
+class _Log(FrameLog):
+    """Keeps every number of every frame instead of writing it to a journal."""
 
-    def __init__(self, run: Run, ticks: int) -> None:
+    def __init__(self, run: Run, script: "_Script") -> None:
+        self._script = script
         self._columns = columns(run)
-        self._rows = np.full((ticks, len(self._columns)), np.nan)
+        self._rows = np.full((script.ticks, len(self._columns)), np.nan)
         self.ticks = 0
 
-    def __call__(self, frame: Frame) -> None:
+    @property
+    def trouble(self) -> str | None:  # type: ignore[override]  # recorded, not found out
+        """What was wrong with the disk in this tick."""
+        return self._script.disk_trouble
+
+    def write(self, frame: Frame) -> None:
         phase, tick = PHASES[frame.phase], frame.tick
         loop_row = (*tick, 0.0, frame.trial, frame.elapsed, phase, frame.paused)
         parts = (loop_row, frame.axes, frame.command, frame.state, frame.task)
         self._rows[self.ticks] = np.concatenate(parts)
         self.ticks += 1
-        if self.ticks == len(self._rows):
-            raise _RecordOver
 
     def frames(self) -> dict[str, "pd.DataFrame"]:
         import pandas as pd  # noqa: PLC0415 - loads for a second

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from labcrane.signals import FloatArray
 
@@ -20,6 +21,7 @@ EXACT = 2**53
 
 GZIP_LEVEL = 1  # 4 takes twice as long and saves 2 to 4 % of shuffled float64
 CHUNK = 1 << 16
+TEXT_CHUNK_BYTES = 1 << 20
 COMPRESS_FROM = 64
 """Shorter columns are stored as they are: compressed chunks would be larger."""
 
@@ -45,18 +47,38 @@ def write_numbers(group: "h5py.Group", path: str, values: FloatArray, unit: str)
 
 
 def write_texts(group: "h5py.Group", path: str, texts: Sequence[str]) -> None:
-    """Write one column of texts."""
-    import h5py  # noqa: PLC0415 - loads for a second
+    """Write one column of texts, as UTF-8 bytes of one length.
 
-    values = np.array([clean(text) for text in texts], object)
-    group.create_dataset(path, data=values, dtype=h5py.string_dtype(), shape=(len(texts),))
+    Octave 7 loads no file with texts of variable length, nor with texts marked as UTF-8: it has no
+    conversion for either, and gives up on the whole file.
+    """
+    values = np.array([clean(text).encode() for text in texts], np.bytes_)
+    if len(values) < COMPRESS_FROM:
+        group.create_dataset(path, data=values)
+    else:
+        group.create_dataset(
+            path,
+            data=values,
+            chunks=(max(1, min(len(values), TEXT_CHUNK_BYTES // values.itemsize)),),
+            compression="gzip",
+            compression_opts=GZIP_LEVEL,
+        )
 
 
 def write_text(group: "h5py.Group", path: str, text: str) -> None:
     """Write one text."""
-    import h5py  # noqa: PLC0415
+    group.create_dataset(path, data=np.bytes_(clean(text).encode()))
 
-    group.create_dataset(path, data=clean(text), dtype=h5py.string_dtype())
+
+def texts_of(dataset: "h5py.Dataset") -> npt.NDArray[np.object_]:
+    """Return a column of texts, whether of one length or, from older files, of their own."""
+    texts: npt.NDArray[np.object_] = dataset.asstr("utf-8")[:]
+    return texts
+
+
+def text_of(dataset: "h5py.Dataset") -> str:
+    """Return one text."""
+    return str(dataset.asstr("utf-8")[()])
 
 
 def write_values(group: "h5py.Group", path: str, values: Sequence[Any], unit: str | None) -> None:

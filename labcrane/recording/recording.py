@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from labcrane.errors import RecordingError
+from labcrane.recording.hdf5_columns import text_of, texts_of
 from labcrane.recording.journal import GROUPS
 from labcrane.recording.participant_file import SYNC_REPORT, group_name, opened
 from labcrane.signals import FloatArray
@@ -149,7 +150,7 @@ class SessionRecord:
 
     def _text(self, name: str) -> str:
         with opened(self._path) as file:
-            return str(file[f"{self._group}/{name}"].asstr()[()])
+            return text_of(file[f"{self._group}/{name}"])
 
 
 class Recording:
@@ -228,4 +229,4 @@ def _columns(group: "h5py.Group") -> list[tuple[str, "h5py.Dataset"]]:
 
 
 def _values(dataset: "h5py.Dataset") -> Any:
-    return dataset.asstr()[:] if dataset.dtype.kind == "O" else dataset[:]
+    return texts_of(dataset) if dataset.dtype.kind in "OS" else dataset[:]

@@ -10,6 +10,7 @@ import numpy as np
 
 from labcrane.recording.append_file import sync_folder
 from labcrane.recording.foreign_streams import Conclude, Note, RecordedStream
+from labcrane.recording.hdf5_columns import text_of, texts_of
 from labcrane.recording.participant_file import opened
 from labcrane.recording.stream_group import write_time
 from labcrane.recording.stream_header import StreamHeader
@@ -47,7 +48,7 @@ def recorrect(path: Path, conclude: Conclude) -> dict[int, list[str]]:
 
 
 def _session(group: "h5py.Group", conclude: Conclude) -> list[str]:
-    conclusion = conclude(json.loads(group["context"].asstr()[()]))
+    conclusion = conclude(json.loads(text_of(group["context"])))
     names = list(group.get("streams", {}))
     for name in names:
         stream = group["streams"][name]
@@ -64,14 +65,14 @@ def read_stream(group: "h5py.Group") -> RecordedStream:
     """
     count = len(group["time_raw"])
     probes = [group[f"clock/{name}"][:] for name in ("remote_time", "offset", "rtt", "local")]
-    times, texts = group["notes/time"][:], group["notes/data"].asstr()[:]
+    times, texts = group["notes/time"][:], texts_of(group["notes/data"])
     offsets = (
         np.column_stack([group["offsets/time"][:], group["offsets/value"][:]])
         if "offsets" in group
         else np.empty((0, 2))
     )
     return RecordedStream(
-        header=StreamHeader.from_xml(group["header"].asstr()[()]),
+        header=StreamHeader.from_xml(text_of(group["header"])),
         time_raw=group["time_raw"][:],
         data=np.empty((count, 0)),
         texts=[],

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from labcrane.errors import RecordingError
 from labcrane.recording.foreign_streams import Conclude
+from labcrane.recording.hdf5_columns import texts_of
 from labcrane.recording.participant_file import Consolidated, consolidate, group_name, opened
 from labcrane.recording.parts import journal_path, parts, session_of
 
@@ -72,5 +73,5 @@ def _is_current(path: Path, session: int, journals: list[Path]) -> bool:
             return False
         made_of = file[f"{group_name(session)}/journals"]
         return on_disk == dict(
-            zip(made_of["name"].asstr()[:], made_of["size"][:].astype(int), strict=True)
+            zip(texts_of(made_of["name"]), made_of["size"][:].astype(int), strict=True)
         )

@@ -96,6 +96,7 @@ def test_a_read_only_folder_is_refused_at_the_start(tmp_path: Path) -> None:
 
 
 FULL_AT_THE_END = """
+import shutil
 import sys
 from pathlib import Path
 from labcrane import RecordingError
@@ -109,7 +110,7 @@ consolidate(path, [write(folder / "ses-01_run.xdf", 200)])
 before = path.read_bytes()
 journal = write(folder / "ses-02_run.xdf", 8000)
 ballast = folder / "ballast"
-ballast.write_bytes(bytes(270_000))
+ballast.write_bytes(bytes(shutil.disk_usage(folder).free - 50_000))
 names = sorted(entry.name for entry in folder.iterdir())
 try:
     consolidate(path, [journal])
