@@ -3,12 +3,18 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from labcrane.signals import FloatArray
+
 if TYPE_CHECKING:
     import pandas as pd
+
+
+LEAST_EIGENVALUE = 1e-4
+"""Of the correlation of random effects; below it one of them follows from the other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +174,8 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel | None:
     )
 
 
-def _fit(formula: str, data: "pd.DataFrame", random: str) -> "object | None":
+def _fit(formula: str, data: "pd.DataFrame", random: str) -> Any:
+    """Return the fitted model; None when it did not converge, or ended at a degenerate one."""
     import warnings
 
     from statsmodels.formula.api import mixedlm
@@ -176,8 +183,20 @@ def _fit(formula: str, data: "pd.DataFrame", random: str) -> "object | None":
 
     with warnings.catch_warnings():
         warnings.simplefilter("error", ConvergenceWarning)
+        # statsmodels takes every small variance for a boundary, in whatever unit it is.
+        warnings.filterwarnings("ignore", "The MLE may be on the boundary", ConvergenceWarning)
         try:
             found = mixedlm(formula, data, groups="participant", re_formula=random).fit(reml=True)
         except (ConvergenceWarning, np.linalg.LinAlgError):
             return None
-    return found
+    return None if _degenerate(found.cov_re.to_numpy(float)) else found
+
+
+def _degenerate(covariance: FloatArray) -> bool:
+    """Say whether a random effect has no variance of its own."""
+    variances = np.diag(covariance)
+    if variances.min() <= 0.0:
+        return True
+    spread = np.sqrt(variances)
+    correlation = covariance / np.outer(spread, spread)
+    return bool(np.linalg.eigvalsh(correlation).min() < LEAST_EIGENVALUE)

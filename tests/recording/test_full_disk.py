@@ -110,7 +110,7 @@ consolidate(path, [write(folder / "ses-01_run.xdf", 200)])
 before = path.read_bytes()
 journal = write(folder / "ses-02_run.xdf", 8000)
 ballast = folder / "ballast"
-ballast.write_bytes(bytes(shutil.disk_usage(folder).free - 50_000))
+ballast.write_bytes(bytes(shutil.disk_usage(folder).free - 120_000))
 names = sorted(entry.name for entry in folder.iterdir())
 try:
     consolidate(path, [journal])

@@ -21,6 +21,26 @@ from labcrane.machine_file import load_machine
 from labcrane.records import Frame, Phase, Planned, Run, Trial
 from labcrane.roles import Component, Controller, Dynamics, InputDevice, Task
 from labcrane.signals import FloatArray, Layout, Signal
+from labcrane.testing.exporters import ExporterContract
+
+__all__ = [
+    "RATE_HZ",
+    "STICKS",
+    "ControllerContract",
+    "DynamicsContract",
+    "ExporterContract",
+    "InputContract",
+    "TaskContract",
+    "a_frame",
+    "a_run",
+    "a_trial",
+    "ch8",
+    "check_array",
+    "check_signals",
+    "crane_at",
+    "crane_state",
+    "opened",
+]
 
 RATE_HZ = 240.0
 

@@ -1,0 +1,93 @@
+"""How long export and report take per participant, and how that grows.
+
+    python -m benchmarks.analysis [--participants 36] [--movements 4]
+
+Records one simulated session for each length, copies it to as many participants as asked, and runs
+the report and two exports in processes of their own. Time per participant and per movement should
+stay as it is when either grows, and so should the memory.
+"""
+
+import argparse
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+PROTOCOL = Path(__file__).parents[1] / "protocols" / "aiming" / "protocol.yaml"
+
+
+def record(folder: Path, movements: int) -> Path:
+    """Record one participant with eight pairs and so many movements each; return the file."""
+    text = PROTOCOL.read_text(encoding="utf-8")
+    text = text.replace("bullet_crane", "kinematic_crane")
+    text = text.replace("movements: 4", f"movements: {movements}")
+    folder.mkdir(parents=True)
+    (folder / "instructions.md").write_text("Move.", encoding="utf-8")
+    (folder / "protocol.yaml").write_text(text, encoding="utf-8")
+    command = "run protocol.yaml --participant P001 --simulate --fast --data data".split()
+    subprocess.run(
+        [sys.executable, "-m", "labcrane", *command],
+        cwd=folder,
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
+    return folder / "data" / "P001-SIMULATED" / "P001-SIMULATED.h5"
+
+
+def multiply(recording: Path, folder: Path, count: int) -> Path:
+    """Return a data folder with ``count`` participants, all with the same session."""
+    for number in range(1, count + 1):
+        name = f"P{number:03}-SIMULATED"
+        (folder / name).mkdir(parents=True)
+        shutil.copyfile(recording, folder / name / f"{name}.h5")
+    return folder
+
+
+def run(*words: str) -> tuple[float, float]:
+    """Run a command; return seconds and its largest memory in MB."""
+    program = (
+        "import resource, sys; from labcrane.cli.app import main; status = main(sys.argv[1:]); "
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024); sys.exit(status)"
+    )
+    began = time.perf_counter()
+    done = subprocess.run(
+        [sys.executable, "-c", program, *words, "--include", "simulated"],
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    return time.perf_counter() - began, float(done.stdout.split()[-1])
+
+
+def main() -> None:
+    """Print one line per command, number of participants and length."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--participants", type=int, default=36)
+    parser.add_argument("--movements", type=int, default=4)
+    asked = parser.parse_args()
+    most, length = asked.participants, asked.movements
+    cases = [(max(most // 4, 1), length), (max(most // 2, 1), length), (most, length)]
+    cases += [(max(most // 4, 1), 2 * length)]
+    print("command         participants  movements  s/participant  ms/movement  peak MB")
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder)
+        files = {n: record(root / f"length{n}", n) for n in {n for _, n in cases}}
+        for count, movements in cases:
+            data = multiply(files[movements], root / f"data-{count}-{movements}", count)
+            for at, words in enumerate((["report"], ["export", "--to", "tables"])):
+                out = root / f"out-{count}-{movements}-{at}"
+                seconds, memory = run(words[0], str(data), "--out", str(out), *words[1:])
+                each = seconds / count
+                print(
+                    f"{' '.join(words):16}{count:12}{8 * movements:11}{each:15.2f}"
+                    f"{1000 * each / (8 * movements):13.1f}{memory:9.0f}",
+                    flush=True,
+                )
+                shutil.rmtree(out)
+            shutil.rmtree(data)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,159 @@
+"""The contract of exporters, and a recorded participant for it."""
+
+from collections.abc import Iterator
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from labcrane.analysis.cohort import Participant, Status
+from labcrane.kinematics import Arm
+from labcrane.machine_file import load_machine
+from labcrane.recording.journal import Column, SessionJournal
+from labcrane.recording.participant_file import consolidate
+from labcrane.records import Event
+from labcrane.roles import Exporter
+
+RATE_HZ = 100.0
+MOVEMENT_S = 2.0
+TRIALS = 4
+
+POINT = ("x", "y", "z")
+
+
+def a_participant(folder: Path, name: str = "P001") -> Participant:
+    """Return a made-up participant, whose slew goes to and fro four times, in a file in ``folder``.
+
+    It goes as a minimum-jerk movement does; the sticks follow its speed.
+    """
+    path = folder / name / f"{name}.h5"
+    path.parent.mkdir()
+    journal = path.parent / "ses-01_run.xdf"
+    _write(journal, name)
+    consolidate(path, [journal])
+    return Participant(name, path, Status.COMPLETE, "made up")
+
+
+def _write(path: Path, name: str) -> None:
+    machine = load_machine("ch8")
+    machine_text = (files("labcrane") / "machines" / "ch8.yaml").read_text(encoding="utf-8")
+    joints = machine.names
+    columns = (
+        *(Column("loop", label, "1") for label in ("tick", "due", "woke", "wrote")),
+        *(Column("loop", label, "1") for label in ("trial", "elapsed", "phase", "paused")),
+        *(Column("input", label, "1") for label in ("left.x", "left.y", "right.x", "right.y")),
+        *(Column("command", f"command.{joint}", "rad/s") for joint in joints),
+        *(Column("state", f"joint.angle.{joint}", "rad") for joint in joints),
+        *(Column("state", f"tip.position.{axis}", "m") for axis in POINT),
+        *(Column("state", f"tip.velocity.{axis}", "m/s") for axis in POINT),
+        Column("task", "target.radius", "m"),
+    )
+    context = {
+        "study": "contract",
+        "title": "A made-up study",
+        "participant": name,
+        "session": 1,
+        "session_name": "only",
+        "started": "2026-01-02T03:04:05.678+00:00",
+        "simulated": False,
+        "pilot": False,
+        "rate_hz": RATE_HZ,
+        "protocol": "sessions: [{name: only}]",
+        "machine": machine_text,
+        "versions": {"labcrane": "0"},
+        "trial_units": {"movement_time": "s", "distance": "m", "error": "m"},
+    }
+    arm = Arm(machine)
+    with SessionJournal(path, columns, RATE_HZ) as journal:
+        journal.write_event(Event("session.start", 0.0, context), 0)
+        tick, dt = 0, 1.0 / RATE_HZ
+        before = np.array(arm.tip(machine.rest))
+        for trial in range(1, TRIALS + 1):
+            began = tick * dt
+            journal.write_event(Event("trial.start", began, {"trial": trial, "attempt": 1}), tick)
+            for step in range(round(MOVEMENT_S * RATE_HZ)):
+                s = (step + 1) * dt / MOVEMENT_S
+                way = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+                slew = 0.5 * (way if trial % 2 else 1.0 - way)
+                angles = (slew, *machine.rest[1:])
+                tip = np.array(arm.tip(angles))
+                push = 30.0 * s**2 * (1.0 - s) ** 2 / 2.0
+                row = [
+                    *(tick, tick * dt, tick * dt, 0.0, trial, step * dt, 1.0, 0.0),
+                    *(push, 0.0, push / 2.0, 0.0),
+                    *(push * 0.1, *(0.0 for _ in joints[1:])),
+                    *angles,
+                    *tip,
+                    *((tip - before) * RATE_HZ),
+                    0.25,
+                ]
+                journal.write_frame(tick * dt, np.array(row, np.float64))
+                before = tip
+                tick += 1
+            journal.write_event(Event("trial.end", (tick - 1) * dt, _row(trial, began)), tick - 1)
+        journal.write_event(Event("session.end", tick * dt, {"reason": "complete"}), tick - 1)
+
+
+def _row(trial: int, began: float) -> dict[str, float | int | str | bool | None]:
+    ends: dict[str, float] = {}
+    for name, y in (("start", 0.0), ("target", 1.0)):
+        ends |= {f"{name}_x": 5.0, f"{name}_y": y if trial % 2 else 1.0 - y, f"{name}_z": 1.0}
+    return {
+        "trial": trial,
+        "attempt": 1,
+        "block": 1,
+        "practice": False,
+        "counted": True,
+        "pair": "near" if trial <= TRIALS // 2 else "far",
+        "distance": 1.0,
+        "width": 0.5,
+        "difficulty": float(np.log2(3.0)),
+        "far_side": "left",
+        "direction": "outward",
+        **ends,
+        "outcome": "success",
+        "reaction_time": 0.1,
+        "movement_time": MOVEMENT_S - 0.2,
+        "error": 0.02,
+        "error_along": 0.01,
+        "started": began,
+        "ended": began + MOVEMENT_S - 1.0 / RATE_HZ,
+    }
+
+
+class ExporterContract:
+    """What every exporter must do. Provide the fixture ``exporter``."""
+
+    def test_an_export_has_files_of_every_participant(
+        self, exporter: Exporter, tmp_path: Path
+    ) -> None:
+        people = [a_participant(tmp_path, name) for name in ("P001", "P002")]
+        out = tmp_path / "out"
+        out.mkdir()
+        exporter.export(people, out)
+        names = " ".join(str(path.relative_to(out)) for path in out.rglob("*"))
+        contents = b"".join(path.read_bytes() for path in out.rglob("*") if path.is_file())
+        for person in people:
+            assert person.name in names or person.name.encode() in contents
+
+    def test_participants_are_gone_through_once(self, exporter: Exporter, tmp_path: Path) -> None:
+        person = a_participant(tmp_path)
+        out = tmp_path / "out"
+        out.mkdir()
+        asked: list[str] = []
+
+        def once() -> Iterator[Participant]:
+            asked.append(person.name)
+            yield person
+
+        exporter.export(once(), out)
+        assert asked == [person.name]
+
+    def test_recordings_are_not_touched(self, exporter: Exporter, tmp_path: Path) -> None:
+        person = a_participant(tmp_path)
+        before = person.path.read_bytes()
+        out = tmp_path / "out"
+        out.mkdir()
+        exporter.export([person], out)
+        assert person.path.read_bytes() == before
+        assert any(out.iterdir()), "nothing was written"

@@ -1,0 +1,32 @@
+"""A small study, recorded once for all tests of what comes after."""
+
+from pathlib import Path
+
+import pytest
+from results.recorded import record, study
+
+from labcrane.analysis.cohort import Cohort, find_cohort
+from labcrane.console import Command, Order
+
+
+@pytest.fixture(scope="session")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three people, one of them without an end, a pilot, a simulation, an erased one, a wreck."""
+    root = tmp_path_factory.mktemp("results")
+    folder = root / "data"
+    the_study = study(root)
+    record(the_study, folder, "P001", gaze=True)
+    record(the_study, folder, "P002", gaze=True)
+    record(the_study, folder, "P003", orders={900: [Command(Order.END)]})
+    record(the_study, folder, "P001", pilot=True)
+    record(the_study, folder, "P005", simulated=True)
+    (folder / "P006").mkdir()
+    (folder / "P006" / "erased.json").write_text("{}")
+    (folder / "P007").mkdir()
+    (folder / "P007" / "ses-01_run.xdf").write_bytes(b"XDF:")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def cohort(data: Path) -> Cohort:
+    return find_cohort(data)

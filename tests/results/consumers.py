@@ -1,0 +1,47 @@
+"""Programs of others that must read what labcrane writes."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+
+def needs(program: str, package: str) -> pytest.MarkDecorator:
+    """Skip on a laptop without the program; never where CI promises to install it."""
+    missing = shutil.which(program) is None
+    reason = f"{program} is not installed (Debian: {package})"
+    return pytest.mark.skipif(missing and os.environ.get("CI") != "true", reason=reason)
+
+
+needs_r = needs("Rscript", "r-base-core r-bioc-rhdf5 r-cran-hdf5r r-cran-afex")
+needs_octave = needs("octave-cli", "octave")
+
+
+def r(script: str, *arguments: object) -> str:
+    """Run a script in R; return what it prints."""
+    return _run(["Rscript", "--vanilla", "-e", script, *map(str, arguments)])
+
+
+def octave(script: str, argument: object) -> str:
+    """Run a script in Octave, with ``argument`` set to a path; return what it prints."""
+    return _run(["octave-cli", "-q", "--eval", f"argument = '{argument}';\n{script}"])
+
+
+def _run(command: list[str]) -> str:
+    environment = os.environ | {"LC_ALL": "C.UTF-8"}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 0, done.stderr + done.stdout
+    return done.stdout
+
+
+def table(text: str, marker: str = "|") -> dict[str, list[str]]:
+    """Return printed lines of the form ``key|value|value`` by their keys."""
+    rows = (line.split(marker) for line in text.splitlines() if marker in line)
+    return {key: values for key, *values in rows}
+
+
+def under(folder: Path) -> list[str]:
+    """Return all files below a folder, by their paths in it."""
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())

@@ -1,0 +1,173 @@
+"""BIDS: what the validator finds, and what it misses."""
+
+import gzip
+import io
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from results.consumers import under
+
+from labcrane import Exporter, ProtocolError
+from labcrane.analysis.cohort import Cohort
+from labcrane.testing import ExporterContract, ch8
+from labcrane_bids.bids import Bids
+from labcrane_bids.settings import BidsSettings
+
+VALIDATOR = shutil.which("bids-validator-deno", path=Path(sys.executable).parent)
+NAME = "sub-P001_ses-01_task-acquisition"
+MOTION = f"sub-P001/ses-01/motion/{NAME}"
+
+
+class TestBids(ExporterContract):
+    @pytest.fixture
+    def exporter(self) -> Exporter:
+        return Bids(BidsSettings(), ch8())
+
+
+@pytest.fixture(scope="module")
+def folder(cohort: Cohort, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("bids")
+    people = root / "people.csv"
+    people.write_text("participant,age,sex,handedness\nP001,24,F,R\n")
+    (root / "asked").mkdir()
+    (root / "asked" / "tlx.csv").write_text("participant,mental\nP001,35\nP002,40\n")
+    about = {"MeasurementToolMetadata": {"Description": "NASA-TLX"}, "mental": {"Units": "1"}}
+    (root / "asked" / "tlx.json").write_text(json.dumps(about))
+    settings = BidsSettings(
+        ethics=("Ethics board, 2026-17",),
+        authors=("A. Researcher",),
+        license="CC0-1.0",
+        people=people,
+        phenotype=root / "asked",
+    )
+    out = root / "out"
+    out.mkdir()
+    Bids(settings, ch8()).export(iter(cohort.included), out)
+    return out
+
+
+def errors(folder: Path) -> list[str]:
+    done = subprocess.run(
+        [str(VALIDATOR), "--json", str(folder)], capture_output=True, text=True, check=False
+    )
+    issues = json.loads(done.stdout)["issues"]["issues"]
+    return [f"{i['code']} {i.get('location')}" for i in issues if i["severity"] == "error"]
+
+
+validated = pytest.mark.skipif(
+    VALIDATOR is None and os.environ.get("CI") != "true", reason="pip install bids-validator-deno"
+)
+
+
+@validated
+def test_the_validator_reports_no_error(folder: Path) -> None:
+    assert errors(folder) == []
+
+
+@validated
+def test_the_validator_does_find_errors(folder: Path, tmp_path: Path) -> None:
+    broken = tmp_path / "broken"
+    shutil.copytree(folder, broken)
+    (broken / f"{MOTION}_tracksys-crane_motion.json").unlink()
+    events = broken / f"{MOTION}_events.tsv"
+    events.write_text(events.read_text().replace("Experiment-structure", "No-such-tag"))
+    found = " ".join(errors(broken))
+    assert "SIDECAR" in found or "MISSING" in found
+    assert "HED_ERROR" in found
+
+
+@pytest.mark.parametrize("system", ["crane", "joyL", "joyR"])
+def test_what_the_validator_misses(folder: Path, cohort: Cohort, system: str) -> None:
+    channels = pd.read_csv(folder / f"{MOTION}_tracksys-{system}_channels.tsv", sep="\t")
+    required = ["name", "component", "type", "tracked_point", "units"]
+    assert list(channels) == required
+    motion = (folder / f"{MOTION}_tracksys-{system}_motion.tsv").read_text()
+    first = motion.splitlines()[0].split("\t")
+    assert len(first) == len(channels)
+    assert all(np.isfinite(float(value)) for value in first)  # no header row
+    samples = np.loadtxt(io.StringIO(motion))
+    about = json.loads((folder / f"{MOTION}_tracksys-{system}_motion.json").read_text())
+    assert about["MotionChannelCount"] == samples.shape[1]
+    counted = {kind: about[f"{kind}ChannelCount"] for kind in set(channels["type"])}
+    assert counted == channels["type"].value_counts().to_dict()
+    assert about["SamplingFrequency"] == 120.0
+    assert about["SamplingFrequencyEffective"] == pytest.approx(120.0, rel=1e-6)
+    _, session = next(cohort.included[0].sessions())
+    recorded = session.streams["state" if system == "crane" else "input"]
+    for name, values in zip(channels["name"][1:], samples.T[1:], strict=True):
+        np.testing.assert_array_equal(values, recorded.data[name])
+    units = channels.set_index("name")["units"]
+    if system == "crane":
+        assert units[["tip.position.x", "tip.velocity.z", "joint.angle.slew"]].tolist() == [
+            "m",
+            "m/s",
+            "rad",
+        ]
+        assert channels.set_index("name")["type"]["joint.angle.slew"] == "JNTANG"
+    assert units["latency"] == "s"
+
+
+def test_events_are_seconds_from_the_first_sample(folder: Path, cohort: Cohort) -> None:
+    events = pd.read_csv(folder / f"{MOTION}_events.tsv", sep="\t", na_values="n/a")
+    measured = cohort.included[0].measures()
+    starts = events[(events["trial_type"] == "trial.start") & events["response_time"].notna()]
+    np.testing.assert_allclose(starts["response_time"], measured["reaction_time"])
+    np.testing.assert_allclose(starts["onset"], measured["started"] - 100.0, atol=1e-9)
+    np.testing.assert_allclose(starts["duration"], measured["ended"] - measured["started"])
+    onsets = events.loc[events["trial_type"] == "movement.onset", "HED"]
+    assert onsets.str.contains("Move, Machine").all()
+
+
+def test_dates_move_and_intervals_stay(folder: Path, cohort: Cohort, tmp_path: Path) -> None:
+    scans = pd.read_csv(folder / "sub-P001" / "ses-01" / "sub-P001_ses-01_scans.tsv", sep="\t")
+    assert set(scans["acq_time"].str[:10]) == {"1925-01-01"}
+    assert all((folder / "sub-P001" / "ses-01" / name).is_file() for name in scans["filename"])
+    Bids(BidsSettings(shift_dates=False, every=3), ch8()).export(cohort.included[:1], tmp_path)
+    kept = pd.read_csv(tmp_path / "sub-P001" / "ses-01" / "sub-P001_ses-01_scans.tsv", sep="\t")
+    started = cohort.included[0].context["started"]
+    assert kept["acq_time"][0][:23] == started[:23]
+    about = json.loads((tmp_path / f"{MOTION}_tracksys-crane_motion.json").read_text())
+    assert about["SamplingFrequency"] == 40.0
+
+
+def test_eye_tracking_is_physio_with_its_columns_described(folder: Path, cohort: Cohort) -> None:
+    path = folder / "sub-P001" / "ses-01" / "beh" / f"{NAME}_recording-eye1_physio"
+    about = json.loads(path.with_name(f"{path.name}.json").read_text())
+    assert about["PhysioType"] == "eyetrack"
+    assert about["Columns"] == ["timestamp", "x_coordinate", "y_coordinate", "aoi"]
+    assert set(about["Columns"]) <= set(about)
+    samples = np.loadtxt(gzip.open(path.with_name(f"{path.name}.tsv.gz")))
+    _, session = next(cohort.included[0].sessions())
+    eyes = session.streams["eyes"]
+    np.testing.assert_allclose(samples[:, 0], eyes.time - 100.0, atol=1e-9)
+    np.testing.assert_array_equal(samples[:, 1], eyes.data["x"])
+    assert about["StartTime"] == samples[0, 0]
+
+
+def test_people_ethics_and_questionnaires_are_where_bids_wants_them(folder: Path) -> None:
+    people = pd.read_csv(folder / "participants.tsv", sep="\t", keep_default_na=False)
+    assert people.iloc[0].tolist() == ["sub-P001", "24", "F", "R", "n/a", "complete"]
+    assert people.iloc[1].tolist() == ["sub-P002", "n/a", "n/a", "n/a", "n/a", "complete"]
+    about = json.loads((folder / "dataset_description.json").read_text())
+    assert about["EthicsApprovals"] == ["Ethics board, 2026-17"]
+    assert about["BIDSVersion"] == "1.11.1"
+    tlx = (folder / "phenotype" / "tlx.tsv").read_text()
+    assert tlx.splitlines()[1] == "sub-P001\t35"
+    assert "phenotype/tlx.json" in under(folder)
+
+
+def test_missing_files_of_people_are_named(cohort: Cohort, tmp_path: Path) -> None:
+    gone = BidsSettings(people=tmp_path / "gone.csv")
+    with pytest.raises(ProtocolError, match="there is no file .*gone.csv with age, sex"):
+        Bids(gone, ch8()).export(cohort.included, tmp_path)
+    (tmp_path / "out").mkdir()
+    empty = BidsSettings(phenotype=tmp_path / "out")
+    with pytest.raises(ProtocolError, match="there is no CSV file in .*; one per questionnaire"):
+        Bids(empty, ch8()).export(cohort.included[:1], tmp_path / "out")

@@ -1,0 +1,65 @@
+"""Who counts, and who is listed instead."""
+
+from pathlib import Path
+
+import pytest
+
+from labcrane import ProtocolError, RecordingError
+from labcrane.analysis.cohort import Cohort, find_cohort
+
+
+def test_only_complete_participants_are_included(cohort: Cohort) -> None:
+    assert [person.name for person in cohort.included] == ["P001", "P002"]
+
+
+def test_everybody_else_is_listed_with_a_reason(cohort: Cohort) -> None:
+    listing = cohort.listing().set_index("participant")
+    assert listing["status"].to_dict() == {
+        "P001": "complete",
+        "P001-PILOT": "pilot",
+        "P002": "complete",
+        "P003": "half-finished",
+        "P005-SIMULATED": "simulated",
+        "P006": "erased",
+        "P007": "unreadable",
+    }
+    assert listing.loc["P003", "why"] == "session 1 ended by order"
+    assert listing.loc["P001-PILOT", "why"] == "session 1 is stamped pilot"
+    assert "labcrane recover" in listing.loc["P007", "why"]
+    assert set(listing.loc[["P003", "P006"], "included"]) == {"no"}
+
+
+def test_others_are_included_by_their_status(data: Path) -> None:
+    found = find_cohort(data, ["half-finished", "simulated"])
+    names = [person.name for person in found.included]
+    assert names == ["P001", "P002", "P003", "P005-SIMULATED"]
+
+
+@pytest.mark.parametrize("status", ["erased", "unreadable", "everybody"])
+def test_what_cannot_be_included_is_refused(data: Path, status: str) -> None:
+    with pytest.raises(ProtocolError) as refusal:
+        find_cohort(data, [status])
+    assert str(refusal.value) == (
+        f"{status!r} cannot be included; possible: simulated, pilot, half-finished "
+        "(complete participants always are, erased and unreadable ones never)"
+    )
+
+
+def test_a_folder_without_anybody_to_use_says_what_is_in_it(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="there is no participant in"):
+        find_cohort(tmp_path)
+    with pytest.raises(RecordingError, match=r"there is no data folder .*; give the study's"):
+        find_cohort(tmp_path / "nowhere")
+    (tmp_path / "P001").mkdir()
+    (tmp_path / "P001" / "erased.json").touch()
+    with pytest.raises(RecordingError, match="can be used as asked: 1 erased; include them"):
+        find_cohort(tmp_path)
+
+
+def test_a_session_that_is_still_to_come_makes_a_participant_half_finished(tmp_path: Path) -> None:
+    from results.recorded import STUDY, record, study
+
+    second = "  - name: retention\n    steps:\n      - block: {task: aiming}\n"
+    record(study(tmp_path, STUDY + second), tmp_path / "data", "P001")
+    (person,) = find_cohort(tmp_path / "data", ["half-finished"]).included
+    assert person.why == "1 of 2 sessions recorded"

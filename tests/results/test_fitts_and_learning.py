@@ -1,0 +1,121 @@
+"""Laws recover the parameters of operators who follow them."""
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from labcrane.analysis.fitts import WIDTH_FACTOR, difficulty, regress, throughput
+from labcrane.analysis.learning import CURVES, fit_curve, learning_curves
+
+DISTANCES = np.repeat([2.0, 3.0, 4.0, 6.0], 8)
+
+
+def test_difficulty_is_that_of_the_studys_geometry() -> None:
+    bits = [difficulty(distance, 0.5) for distance in (2, 3, 4, 6)]
+    assert bits == pytest.approx([2.322, 2.807, 3.170, 3.700], abs=5e-4)
+
+
+def test_fitts_intervals_hold_the_true_parameters_as_often_as_they_say() -> None:
+    rng = np.random.default_rng(3)
+    bits = np.log2(DISTANCES / 0.5 + 1.0)
+    slopes = intercepts = 0
+    for _ in range(400):
+        fit = regress(bits, 1.0 + 2.5 * bits + rng.normal(0.0, 0.8, len(bits)))
+        assert fit is not None
+        slopes += fit.slope_ci[0] <= 2.5 <= fit.slope_ci[1]
+        intercepts += fit.intercept_ci[0] <= 1.0 <= fit.intercept_ci[1]
+    # 95 % of 400 are 380; 362 is four standard deviations below.
+    assert 362 <= slopes <= 397
+    assert 362 <= intercepts <= 397
+
+
+def test_a_line_through_nothing_is_not_drawn() -> None:
+    assert regress(np.array([1.0, 2.0]), np.array([1.0, 2.0])) is None
+    assert regress(np.ones(5), np.arange(5.0)) is None
+
+
+def movements(n: int, spread: float, seed: int = 1) -> pd.DataFrame:
+    rng = np.random.default_rng(seed)
+    frames = []
+    for participant in ("P001", "P002"):
+        for distance in (2.0, 4.0):
+            frames.append(
+                pd.DataFrame(
+                    {
+                        "participant": participant,
+                        "distance": distance,
+                        "movement_time": 5.0,
+                        "amplitude": distance,
+                        "error_along": rng.normal(0.05, spread, n),
+                        "error_bound": np.nan,
+                    }
+                )
+            )
+    return pd.concat(frames, ignore_index=True)
+
+
+def test_throughput_is_the_mean_of_means_with_the_true_spread() -> None:
+    table = throughput(movements(4000, spread=0.1))
+    wide = WIDTH_FACTOR * 0.1
+    expected = np.mean([math.log2(d / wide + 1.0) / 5.0 for d in (2.0, 4.0)])
+    assert table["throughput"].to_numpy() == pytest.approx(expected, rel=0.01)
+    assert set(table["pooled"]) == {"no"}
+
+
+@pytest.mark.parametrize(("n", "pooled"), [(14, "participant"), (15, "no"), (4, "study")])
+def test_few_ends_share_a_spread(n: int, pooled: str) -> None:
+    table = throughput(movements(n, spread=0.1))
+    assert set(table["pooled"]) == {pooled}
+    assert np.isfinite(table["throughput"]).all()
+
+
+@pytest.mark.parametrize("curve", ["exponential", "power"])
+def test_a_learning_curve_without_noise_is_found_exactly(curve: str) -> None:
+    n = np.arange(1.0, 9.0)
+    fit = fit_curve(curve, n, CURVES[curve](n, 6.0, 4.0, 0.5))
+    assert fit is not None
+    assert (fit.asymptote, fit.gain, fit.rate) == pytest.approx((6.0, 4.0, 0.5), rel=1e-4)
+
+
+def test_two_standard_errors_hold_the_true_rate_of_most_learners() -> None:
+    rng = np.random.default_rng(4)
+    n = np.arange(1.0, 33.0)
+    inside = {"asymptote": 0, "gain": 0, "rate": 0}
+    true = {"asymptote": 6.0, "gain": 4.0, "rate": 0.2}
+    for _ in range(100):
+        values = CURVES["exponential"](n, *true.values()) + rng.normal(0.0, 0.3, len(n))
+        fit = fit_curve("exponential", n, values)
+        assert fit is not None
+        for name, value in true.items():
+            error = abs(getattr(fit, name) - value)
+            inside[name] += error <= 2.04 * getattr(fit, f"{name}_se")
+    # 95 of 100 are expected; 86 is four standard deviations below.
+    assert all(count >= 86 for count in inside.values()), inside
+
+
+def test_the_better_curve_is_the_one_the_learner_follows() -> None:
+    rng = np.random.default_rng(5)
+    n = np.arange(1, 33)
+    tables = []
+    for name, curve in CURVES.items():
+        for person in range(10):
+            values = curve(n.astype(float), 6.0, 4.0, 0.6) + rng.normal(0.0, 0.1, len(n))
+            tables.append(
+                pd.DataFrame(
+                    {"participant": f"{name}-{person}", "sequence": n, "movement_time": values}
+                )
+            )
+    table = learning_curves(pd.concat(tables), "movement_time")
+    better = table[table["better"] == "yes"]
+    right = [who.startswith(curve) for who, curve in zip(better["participant"], better["curve"])]
+    assert np.mean(right) >= 0.9
+
+
+def test_an_asymptote_that_data_do_not_show_is_not_identified() -> None:
+    n = np.arange(1.0, 9.0)
+    still_falling = fit_curve("exponential", n, 10.0 - 0.5 * n)
+    assert still_falling is not None
+    assert not still_falling.identified
+    assert fit_curve("power", n[:3], n[:3]) is None

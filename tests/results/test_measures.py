@@ -1,0 +1,87 @@
+"""Measures of recorded movements, and gaze."""
+
+import math
+
+import numpy as np
+import pytest
+
+from labcrane.analysis.cohort import Cohort
+from labcrane.analysis.gaze import Looks, gaze_measures, looks
+from labcrane.analysis.measures import MEASURES, MeasureSettings, measure_session
+from labcrane.analysis.movements import cut, groups, machine_of
+from labcrane.testing.exporters import MOVEMENT_S, a_participant
+
+
+def test_a_minimum_jerk_movement_has_its_closed_forms(tmp_path) -> None:
+    table = a_participant(tmp_path).measures()
+    assert len(table) == 4
+    first = table.iloc[0]
+    assert first["sub_movements"] == 1
+    assert first["limit_hits"] == 0
+    assert first["simultaneous"] == pytest.approx(first["bimanual"], abs=0.2)
+    _, session = next(a_participant(tmp_path / "..", "P002").sessions())
+    movement = next(iter(cut(groups(session), session.trials, 100.0)))
+    x, y, _ = movement.tip[0]
+    radius = math.hypot(x - machine_of(session).base_x, y)
+    # Peak speed of a minimum-jerk movement is 1.875 times its mean speed.
+    expected = 1.875 * 0.5 * radius / MOVEMENT_S
+    assert first["peak_speed_tip"] == pytest.approx(expected, rel=5e-3)
+
+
+def test_recorded_results_and_measures_agree(cohort: Cohort) -> None:
+    table = cohort.included[0].measures()
+    np.testing.assert_allclose(table["peak_speed_tip"], table["peak_speed"], rtol=1e-12)
+    way = table["path_ratio"]
+    assert (way >= 1.0).all()
+    np.testing.assert_array_equal(table["absolute_error"], table["error"])
+    along = table["constant_error"] - (table["amplitude"] - table["distance"])
+    assert np.abs(along).max() <= 0.25 + 1e-9  # the movement began inside the other circle
+    assert set(MEASURES) <= set(table)
+    assert table["sequence"].tolist() == [1, 1, 2, 2, 3, 3, 4, 4]
+
+
+def test_settings_change_what_depends_on_them(cohort: Cohort) -> None:
+    _, session = next(cohort.included[0].sessions())
+    usual = measure_session(session)
+    other = measure_session(session, MeasureSettings(dead_zone=0.9, hysteresis=0.5))
+    assert (other["axes_used"] < usual["axes_used"]).all()
+    assert (other["reversals"] <= usual["reversals"]).all()
+    assert other["sparc"].equals(usual["sparc"])
+
+
+def test_a_movement_without_an_end_has_no_measures_but_its_error(data) -> None:
+    from labcrane.analysis.cohort import find_cohort
+
+    ended = find_cohort(data, ["half-finished"]).included[2].measures().iloc[-1]
+    assert ended["outcome"] == "ended"
+    assert math.isnan(ended["sparc"])
+    assert math.isnan(ended["path_ratio"])
+
+
+def test_dwell_and_first_look_are_those_of_the_eyes(cohort: Cohort) -> None:
+    """The made-up eyes look at area 1 in the first half of each second."""
+    _, session = next(cohort.included[0].sessions())
+    seen = looks(session)
+    assert seen is not None
+    table = cohort.included[0].measures()
+    for row in table.itertuples():
+        assert row.dwell_during_1 == pytest.approx(0.5 * row.movement_time, abs=0.3)
+        assert 0.0 <= row.dwell_before_1 <= row.reaction_time + 1e-9
+    machine = machine_of(session)
+    assert machine.names[0] == "slew"
+
+
+def test_looks_are_counted_to_the_sample() -> None:
+    time = np.arange(0.0, 1.0, 0.1)
+    seen = Looks(time, ["", "", "a", "a", "b", "", "a", "", "", ""])
+    found = gaze_measures(seen, started=0.0, onset=0.5, offset=0.9)
+    assert found["dwell_before_a"] == pytest.approx(0.2)
+    assert found["dwell_during_a"] == pytest.approx(0.1)
+    assert found["look_lead_a"] == pytest.approx(0.3)
+    assert found["look_lead_b"] == pytest.approx(0.1)
+
+
+def test_a_gap_in_the_eyes_is_no_look() -> None:
+    seen = Looks(np.array([0.0, 0.1, 0.2, 5.0, 5.1]), ["a"] * 5)
+    assert seen.dwell("a", 0.0, 10.0) == pytest.approx(0.1 + 0.1 + 0.2 + 0.1 + 0.1)
+    assert math.isnan(seen.first("b", 0.0, 10.0))

@@ -1,0 +1,179 @@
+"""A recorded session run again."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rehearsal import a_study
+from results.recorded import STUDY, record, study
+
+import labcrane
+from labcrane import Frame, ProtocolError, RecordingError
+from labcrane.analysis.measures import measure_session
+from labcrane.cli.app import main
+from labcrane.console import Command, Order
+from labcrane.recording.recording import open_recording
+from labcrane.replay import replay
+
+ROOT = Path(__file__).parents[2]
+CH8 = Path(labcrane.__file__).parent / "machines" / "ch8.yaml"
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("replay")
+    return record(study(root), root / "data", "P001", simulated=True)
+
+
+def changed_machine(folder: Path) -> Path:
+    path = folder / "faster.yaml"
+    path.write_text(CH8.read_text().replace("speed_deg_s: 26,", "speed_deg_s: 26.5,"))
+    return path
+
+
+def test_a_whole_session_on_the_engine_is_bit_identical(tmp_path: Path) -> None:
+    """The aiming study itself: 32 movements on PyBullet."""
+    text = (ROOT / "protocols" / "aiming" / "protocol.yaml").read_text()
+    (tmp_path / "instructions.md").write_text("Move.")
+    quick = "{use: simulated_operator, fitts_a_s: 0.3, fitts_b_s: 0.8, look_s: 0.1}"
+    text = text.replace("scheme:", f"operator: {quick}\nscheme:", 1)
+    path = record(a_study(tmp_path, text), tmp_path / "data", "P001", simulated=True)
+    session = open_recording(path).session(1)
+    assert len(session.trials) == 32
+    again = replay(path, 1)
+    assert again.difference is None
+    assert again.parts == ()
+    assert again.ticks == len(session.streams["state"].time)
+
+
+def test_a_changed_machine_is_named_with_the_first_tick_that_differs(
+    path: Path, tmp_path: Path
+) -> None:
+    again = replay(path, 1, machine=changed_machine(tmp_path))
+    assert again.parts == ("machine.joints.slew.speed_deg_s: recorded 26, now 26.5",)
+    first = again.difference
+    assert first is not None
+    session = open_recording(path).session(1)
+    before = again.frames["command"].iloc[: first.tick].to_numpy()
+    np.testing.assert_array_equal(
+        before, session.streams["command"].data.iloc[: first.tick].to_numpy()
+    )
+    column = first.column.removeprefix("command.")
+    assert first.recorded == session.streams["command"].data[column][first.tick]
+    # The slew's full speed is 26.5 / 26 of what it was, and the difference is no more than that.
+    assert first.replayed / first.recorded == pytest.approx(26.5 / 26.0, rel=1e-3)
+
+
+def test_a_changed_setting_is_named(path: Path, tmp_path: Path) -> None:
+    other = tmp_path / "study.yaml"
+    other.write_text(STUDY.replace("joint_velocity\n", "joint_velocity\n  dead_zone: 0.2\n"))
+    again = replay(path, 1, protocol=other)
+    assert any(part.startswith("scheme.settings.dead_zone: recorded") for part in again.parts)
+    assert again.difference is not None
+
+
+def test_another_version_is_named(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from labcrane import replay_parts
+
+    real = replay_parts.version
+    monkeypatch.setattr(
+        replay_parts, "version", lambda name: "0.0.9" if name == "numpy" else real(name)
+    )
+    again = replay(path, 1)
+    assert again.parts == (f"numpy: recorded with {np.__version__}, now 0.0.9",)
+    assert again.difference is None
+
+
+def test_orders_are_given_again_at_their_ticks(tmp_path: Path) -> None:
+    orders = {
+        300: [Command(Order.PAUSE)],
+        420: [Command(Order.START)],
+        600: [Command(Order.REPEAT)],
+        900: [Command(Order.SKIP), Command(Order.NOTE, "coughs")],
+        1500: [Command(Order.LOST, "eeg")],
+        1600: [Command(Order.BACK, "eeg")],
+        4000: [Command(Order.END)],
+    }
+    path = record(study(tmp_path), tmp_path / "data", "P001", simulated=True, orders=orders)
+    events = open_recording(path).session(1).events["name"].tolist()
+    assert {"order.pause", "order.repeat", "stream.lost", "stream.back"} <= set(events)
+    again = replay(path, 1)
+    assert again.difference is None
+    assert again.ticks == 4001
+
+
+def test_lost_controls_are_lost_again(tmp_path: Path) -> None:
+    """A recorded session as input ends, which is a fault of the controls, and then an end."""
+    first = record(study(tmp_path), tmp_path / "data", "P001", simulated=True)
+    text = STUDY.replace(
+        "operator: {use: simulated_operator, pace_sd: 0.2, fitts_a_s: 0.6, fitts_b_s: 1.2}",
+        f"operator: {{use: recorded, file: {first}}}\non_fault: {{input_lost: end}}",
+    ).replace("movements: 2}", "movements: 4}")
+    second = record(a_study(tmp_path, text), tmp_path / "more", "P001", simulated=True)
+    events = open_recording(second).session(1).events["name"].tolist()
+    assert "input.lost" in events
+    assert replay(second, 1).difference is None
+
+
+def test_measures_that_nobody_thought_of_are_taken_from_the_frames(path: Path) -> None:
+    heights: list[float] = []
+
+    def look(frame: Frame) -> None:
+        heights.append(float(frame.state[10]))
+
+    again = replay(path, 1, sinks=[look])
+    assert len(heights) == again.ticks
+    session = open_recording(path).session(1)
+    np.testing.assert_array_equal(heights, session.streams["state"].data["tip.position.z"])
+    recorded, replayed = measure_session(session), measure_session(session, frames=again.frames)
+    assert recorded.equals(replayed)
+
+
+def test_the_command_says_what_came_of_it(
+    path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = tmp_path / "measures.csv"
+    assert main(["replay", str(path), "--session", "1", "--measures", str(table)]) == 0
+    said = capsys.readouterr().out
+    assert "every number the same bit for bit" in said
+    assert table.read_text().count("\n") == 9
+    machine = str(changed_machine(tmp_path))
+    assert main(["replay", str(path), "--machine", machine]) == 1
+    out, err = capsys.readouterr()
+    assert "differs: machine.joints.slew.speed_deg_s: recorded 26, now 26.5" in out
+    assert "is the first that differs: command.command.slew was" in err
+
+
+def test_what_cannot_be_replayed_is_refused(path: Path) -> None:
+    with pytest.raises(RecordingError, match="has no session 2; it has 1"):
+        replay(path, 2)
+    with pytest.raises(ProtocolError, match="a speed of 0 shows nothing; give one above 0"):
+        replay(path, 1, speed=0.0)
+
+
+def test_a_replay_is_shown_on_the_streams_at_a_speed(path: Path) -> None:
+    import threading
+    import time
+
+    import pylsl
+
+    got: list[float] = []
+
+    def watch() -> None:
+        (info,) = pylsl.resolve_byprop("name", "labcrane.state", 1, 20.0)
+        inlet = pylsl.StreamInlet(info)
+        while len(got) < 3:
+            sample, _ = inlet.pull_sample(timeout=20.0)
+            if sample is None:
+                return
+            got.append(sample[0])
+
+    watcher = threading.Thread(target=watch)
+    watcher.start()
+    began = time.perf_counter()
+    again = replay(path, 1, speed=10.0)
+    took = time.perf_counter() - began
+    watcher.join()
+    assert len(got) == 3
+    assert again.difference is None
+    assert took >= (again.ticks - 1) / 120.0 / 10.0

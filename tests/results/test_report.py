@@ -1,0 +1,136 @@
+"""The report, and the commands."""
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pandas as pd
+import pytest
+from results.consumers import under
+
+from labcrane.analysis.cohort import Cohort, find_cohort
+from labcrane.analysis.quality import exclusions, is_result, loop_quality, sync_quality
+from labcrane.analysis.report import write_report
+from labcrane.cli.app import main
+
+
+@pytest.fixture(scope="module")
+def folder(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    cohort = find_cohort(data, ["half-finished", "simulated"])
+    out = tmp_path_factory.mktemp("report")
+    done: list[int] = []
+    page = write_report(cohort, out, progress=lambda number, of: done.append(number))
+    assert page == out / "report.html"
+    assert done == [1, 2, 3, 4]
+    return out
+
+
+def test_each_figure_is_svg_and_png_and_its_table_csv(folder: Path) -> None:
+    files = under(folder)
+    figures = {path.removesuffix(".svg") for path in files if path.endswith(".svg")}
+    assert {"figures/sequence_by_distance", "figures/fitts", "figures/P001_sticks"} <= figures
+    for figure in figures:
+        assert (folder / f"{figure}.png").read_bytes().startswith(b"\x89PNG")
+        ET.parse(folder / f"{figure}.svg")
+        assert len(pd.read_csv(folder / f"{figure.replace('figures', 'tables')}.csv"))
+
+
+def test_every_link_of_every_page_leads_somewhere(folder: Path) -> None:
+    pages = [folder / "report.html", *sorted((folder / "participants").iterdir())]
+    assert len(pages) == 5
+    for page in pages:
+        text = page.read_text()
+        targets = [
+            part.split('"')[0] for key in ('href="', 'src="') for part in text.split(key)[1:]
+        ]
+        assert targets
+        assert all((page.parent / target).is_file() for target in targets)
+
+
+def test_the_report_says_who_is_in_it_and_who_is_not(folder: Path) -> None:
+    page = (folder / "report.html").read_text()
+    assert "1 of 4 participants here are simulated." in page
+    assert "1 of 4 participants here are half-finished." in page
+    who = pd.read_csv(folder / "tables" / "participants.csv").set_index("participant")
+    assert who.loc["P001-PILOT", "included"] == "no"
+    assert who.loc["P006", "status"] == "erased"
+
+
+def test_figure_tables_hold_the_means_of_participants_means(folder: Path) -> None:
+    movements = pd.read_csv(folder / "tables" / "movements.csv")
+    table = pd.read_csv(folder / "tables" / "movement_time_by_sequence.csv").set_index("sequence")
+    kept = movements[is_result(movements)]
+    for sequence, own in kept.groupby("sequence"):
+        means = [group["movement_time"].mean() for _, group in own.groupby("participant")]
+        assert table.loc[sequence, "mean"] == pytest.approx(np.mean(means))
+        assert table.loc[sequence, "participants"] == len(means)
+
+
+def test_trials_that_are_no_results_are_listed_with_the_reason(data: Path) -> None:
+    cohort = find_cohort(data, ["half-finished"])
+    ended = cohort.included[2]
+    measures = ended.measures()
+    out = exclusions(measures)
+    assert set(out["why"]) == {"outcome ended"}
+    assert len(out) + is_result(measures).sum() == len(measures)
+
+
+def test_practice_is_no_result() -> None:
+    table = pd.DataFrame(
+        {
+            "participant": "P001",
+            "session": 1,
+            "trial": [1, 2, 3],
+            "attempt": 1,
+            "outcome": ["success", "timeout", "success"],
+            "practice": [1.0, 0.0, 0.0],
+        }
+    )
+    assert is_result(table).tolist() == [False, False, True]
+    assert exclusions(table)["why"].tolist() == ["practice", "outcome timeout"]
+
+
+def test_quality_is_that_of_the_record(cohort: Cohort) -> None:
+    loop = loop_quality(cohort.included[0]).iloc[0]
+    assert (loop["late_ticks"], loop["lateness_worst_ms"], loop["rate_hz"]) == (0, 0.0, 120.0)
+    sync = sync_quality(cohort.included[0]).iloc[0]
+    assert (sync["stream"], sync["corrected"]) == ("eyes", "yes")
+    assert sync["samples"] > 1000
+
+
+@pytest.mark.parametrize("to", ["tables", "matlab", "bids", "psychds", "xdf"])
+def test_export_writes_what_is_asked_for_and_who_was_left_out(
+    data: Path, tmp_path: Path, to: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert main(["export", str(data), "--to", to, "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "left out: P003, half-finished: session 1 ended by order" in said
+    assert "2/2" in said
+    about = json.loads((out / ".labcrane" / "labcrane_export.json").read_text())
+    assert about["format"] == to
+    assert sum(person["included"] == "yes" for person in about["participants"]) == 2
+    assert main(["export", str(data), "--to", to, "--out", str(out)]) == 2
+    assert "is not empty, and nothing is overwritten" in capsys.readouterr().err
+
+
+def test_wrong_words_are_refused(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(tmp_path / "out")
+    assert main(["export", str(data), "--to", "table", "--out", out]) == 1
+    assert "exporter 'table' is not installed; did you mean 'tables'?" in capsys.readouterr().err
+    assert main(["export", str(data), "--to", "tables", "--out", out, "--set", "streams=xls"]) == 2
+    assert "exporter 'tables' can set streams; streams: Input should be" in capsys.readouterr().err
+    assert main(["export", str(data), "--to", "bids", "--out", out, "--set", "every"]) == 2
+    assert "--set 'every' sets nothing; write NAME=VALUE" in capsys.readouterr().err
+
+
+def test_the_report_command_names_its_page(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["report", str(data), "--out", str(tmp_path / "report")]) == 0
+    said = capsys.readouterr().out
+    assert "2/2" in said
+    assert (tmp_path / "report" / "report.html").is_file()

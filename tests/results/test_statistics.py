@@ -1,0 +1,130 @@
+"""Statistics against R, and against what was published."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from results.consumers import needs_r, r, table
+from results.synthetic import cohort_of_36
+
+from labcrane.analysis.anova import greenhouse_geisser, repeated_measures
+from labcrane.analysis.report import anova_table, trend_table
+from labcrane.analysis.reported import Reported, check_reported
+from labcrane.analysis.trends import holm, linear_trend, mixed_model
+
+AFEX = """
+suppressMessages({library(afex); library(lme4)})
+d <- read.csv(commandArgs(TRUE)[1])
+say <- function(key, ...) cat(key, sprintf("%.17g", c(...)), sep = "|", fill = 10000)
+for (dv in c("movement_time", "absolute_error")) for (factor in c("sequence", "distance")) {
+  fit <- suppressMessages(suppressWarnings(
+    aov_ez("participant", dv, d, within = factor, fun_aggregate = mean)))
+  s <- suppressWarnings(summary(fit$Anova, multivariate = FALSE))
+  u <- s$univariate.tests[factor, ]; a <- s$pval.adjustments[factor, ]
+  eta <- anova(fit, es = "pes")[factor, "pes"]
+  say(paste(dv, factor), u["F value"], u["num Df"], u["den Df"], u["Pr(>F)"],
+      a["GG eps"], a["Pr(>F[GG])"], min(1, a["HF eps"]), eta)
+}
+m <- aggregate(movement_time ~ participant + sequence, d, mean)
+slopes <- sapply(split(m, m$participant), function(x) coef(lm(movement_time ~ sequence, x))[2])
+t <- t.test(slopes); say("trend", t$estimate, t$statistic, t$parameter, t$p.value, t$conf.int)
+say("holm", p.adjust(c(0.01, 0.04, 0.03, 0.005), "holm"))
+d$s <- d$sequence - mean(d$sequence); d$b <- d$difficulty - mean(d$difficulty)
+mm <- lmer(log(movement_time) ~ s + b + far_side + (1 + s | participant), d, REML = TRUE,
+           control = lmerControl(optCtrl = list(ftol_abs = 1e-12, xtol_abs = 1e-12)))
+say("fixed", fixef(mm)); say("se", sqrt(diag(as.matrix(vcov(mm))))); say("sigma", sigma(mm))
+"""
+
+
+@pytest.fixture(scope="module")
+def movements() -> pd.DataFrame:
+    return cohort_of_36()
+
+
+@pytest.fixture(scope="module")
+def in_r(movements: pd.DataFrame, tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
+    path: Path = tmp_path_factory.mktemp("afex") / "movements.csv"
+    movements.to_csv(path, index=False)
+    return table(r(AFEX, path))
+
+
+@needs_r
+@pytest.mark.parametrize("measure", ["movement_time", "absolute_error"])
+@pytest.mark.parametrize("factor", ["sequence", "distance"])
+def test_the_reports_anova_is_that_of_afex(
+    movements: pd.DataFrame, in_r: dict[str, list[str]], measure: str, factor: str
+) -> None:
+    rows = anova_table(movements).set_index(["measure", "factor"])
+    ours = rows.loc[(measure, factor)]
+    names = ["f", "df1", "df2", "p", "epsilon", "p_gg", "epsilon_hf", "eta2p"]
+    theirs = np.array(in_r[f"{measure} {factor}"], float)
+    np.testing.assert_allclose(ours[names].astype(float), theirs, rtol=1e-6, atol=1e-12)
+    assert (ours["n"], ours["left_out"]) == (36, "")
+    assert 0.3 < ours["epsilon"] < 1.0
+
+
+@needs_r
+def test_trend_and_holm_are_those_of_r(movements: pd.DataFrame, in_r: dict[str, list[str]]) -> None:
+    trend = linear_trend(movements, "movement_time")
+    assert trend is not None
+    ours = [trend.slope, trend.t, trend.df, trend.p, *trend.slope_ci]
+    np.testing.assert_allclose(ours, np.array(in_r["trend"], float), rtol=1e-9)
+    p = holm([0.01, 0.04, 0.03, 0.005])
+    np.testing.assert_allclose(p, np.array(in_r["holm"], float), rtol=1e-12)
+
+
+@needs_r
+def test_the_mixed_model_is_that_of_lme4(
+    movements: pd.DataFrame, in_r: dict[str, list[str]]
+) -> None:
+    model = mixed_model(movements, "movement_time")
+    assert model is not None
+    assert model.slopes
+    assert model.converged
+    named = ["Intercept", "sequence", "difficulty", "far_side[T.right]"]
+    terms = model.terms.set_index("term").loc[named]
+    np.testing.assert_allclose(terms["estimate"], np.array(in_r["fixed"], float), rtol=1e-3)
+    np.testing.assert_allclose(terms["se"], np.array(in_r["se"], float), rtol=5e-3)
+    assert model.residual_sd == pytest.approx(float(in_r["sigma"][0]), rel=1e-3)
+
+
+def test_the_papers_movement_time_is_consistent_and_its_accuracy_is_not() -> None:
+    time = check_reported(Reported("2.43", "5.27", "184.33", ".034", ".07"))
+    assert time.p_consistent
+    assert time.eta2p_consistent
+    assert time.p == pytest.approx(0.0340, abs=5e-5)
+    accuracy = check_reported(Reported("2.43", "3.53", "123.67", ".034", ".07"))
+    assert not accuracy.p_consistent
+    assert accuracy.p == pytest.approx(0.0586, abs=5e-5)
+    assert (accuracy.p_low, accuracy.p_high) == pytest.approx((0.0582, 0.0590), abs=2e-4)
+
+
+def test_epsilon_is_1_under_sphericity_and_least_for_one_varying_level() -> None:
+    rng = np.random.default_rng(8)
+    round_one = rng.standard_normal((200_000, 4))
+    assert greenhouse_geisser(round_one) == pytest.approx(1.0, abs=1e-3)
+    one_line = rng.standard_normal((50, 1)) * np.array([[0.0, 1.0, 2.0, 3.0]])
+    assert greenhouse_geisser(one_line) == pytest.approx(1.0 / 3.0)
+
+
+def test_who_lacks_a_level_is_left_out_of_the_test_by_name(movements: pd.DataFrame) -> None:
+    gone = (movements["participant"] == "P004") & (movements["sequence"] == 3)
+    test = repeated_measures(movements[~gone], "movement_time", "sequence")
+    assert test is not None
+    assert (test.n, test.left_out) == (35, ("P004",))
+    assert mixed_model(movements[~gone], "movement_time").participants == 36
+
+
+def test_two_participants_are_not_tested(movements: pd.DataFrame) -> None:
+    two = movements[movements["participant"] <= "P002"]
+    assert repeated_measures(two, "movement_time", "sequence") is None
+    assert linear_trend(two, "movement_time") is None
+    assert mixed_model(two, "movement_time") is None
+    assert anova_table(two).empty
+    assert trend_table(two).empty
+
+
+def test_a_test_that_was_not_made_is_not_corrected_for() -> None:
+    assert holm([0.02, math.nan]) == pytest.approx([0.02, math.nan], nan_ok=True)

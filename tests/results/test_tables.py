@@ -1,0 +1,135 @@
+"""Tables that R, pandas and Arrow open, and Psych-DS."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+from results.consumers import needs_r, r, table, under
+
+from labcrane import Exporter
+from labcrane.analysis.cohort import Cohort
+from labcrane.testing import ExporterContract, ch8
+from labcrane_tables.psychds import PsychDs
+from labcrane_tables.settings import PsychDsSettings, TableSettings
+from labcrane_tables.tables import Tables
+
+
+class TestTables(ExporterContract):
+    @pytest.fixture
+    def exporter(self) -> Exporter:
+        return Tables(TableSettings())
+
+
+class TestPsychDs(ExporterContract):
+    @pytest.fixture
+    def exporter(self) -> Exporter:
+        return PsychDs(PsychDsSettings())
+
+
+@pytest.fixture(scope="module")
+def folder(cohort: Cohort, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("tables")
+    Tables(TableSettings()).export(iter(cohort.included), out)
+    return out
+
+
+def test_pandas_and_arrow_read_what_was_measured(folder: Path, cohort: Cohort) -> None:
+    measured = pd.concat([person.measures() for person in cohort.included], ignore_index=True)
+    for read in (pd.read_csv(folder / "trials.csv"), pd.read_parquet(folder / "trials.parquet")):
+        assert list(read) == list(measured)
+        for name in ("movement_time", "sparc", "reversals", "dwell_during_1"):
+            np.testing.assert_allclose(read[name], measured[name], rtol=1e-15)
+    frames = pq.read_table(folder / "streams" / "P001_ses-01_frames.parquet").to_pandas()
+    _, session = next(cohort.included[0].sessions())
+    state = session.streams["state"]
+    np.testing.assert_array_equal(frames["time"], state.time)
+    np.testing.assert_array_equal(frames["state_tip_position_x"], state.data["tip.position.x"])
+    eyes = pd.read_csv(folder / "streams" / "P002_ses-01_eyes.csv.gz")
+    np.testing.assert_allclose(eyes["time"] - eyes["time_raw"], 5000.0, atol=1e-6)
+
+
+def test_the_codebook_has_every_column_and_the_units_of_the_file(folder: Path) -> None:
+    book = pd.read_csv(folder / "codebook.csv").set_index(["table", "column"])
+    for name, path in {
+        "trials": folder / "trials.csv",
+        "frames": folder / "streams" / "P001_ses-01_frames.csv.gz",
+    }.items():
+        assert set(pd.read_csv(path, nrows=1)) == set(book.loc[name].index)
+    assert book.loc[("trials", "movement_time"), "unit"] == "s"
+    assert book.loc[("trials", "difficulty"), "unit"] == "bit"
+    assert book.loc[("frames", "state_tip_velocity_x"), "unit"] == "m/s"
+    assert book["description"].notna().all()
+
+
+READ = """
+source(file.path(commandArgs(TRUE)[1], "read.R")); s <- read_labcrane(commandArgs(TRUE)[1])
+cat("tables", paste(names(s), collapse = " "), "\\n", sep = "|")
+cat("streams", paste(sort(names(s$streams)), collapse = " "), "\\n", sep = "|")
+cat("time", sprintf("%.17g", s$trials$movement_time), sep = "|"); cat("\\n")
+cat("na", sum(is.na(s$trials$movement_time)), sum(is.na(s$streams[[1]]$time)), sep = "|")
+cat("\\nslew", sprintf("%.17g", s$streams[["P001_ses-01_frames"]]$state_joint_angle_slew[1000]),
+    sep = "|")
+cat("\\ntitle", s$participants$status[1], class(s$trials$pair), sep = "|"); cat("\\n")
+"""
+
+
+@needs_r
+def test_read_r_loads_everything_in_one_call(folder: Path, cohort: Cohort) -> None:
+    said = table(r(READ, folder))
+    assert said["tables"][0] == "participants trials events codebook streams"
+    assert said["streams"][0] == (
+        "P001_ses-01_eyes P001_ses-01_frames P002_ses-01_eyes P002_ses-01_frames"
+    )
+    measured = pd.concat([person.measures() for person in cohort.included])
+    np.testing.assert_allclose(np.array(said["time"], float), measured["movement_time"], rtol=1e-15)
+    assert said["na"] == ["0", "0"]
+    _, session = next(cohort.included[0].sessions())
+    slew = session.streams["state"].data["joint.angle.slew"][999]
+    assert float(said["slew"][0]) == pytest.approx(slew, rel=1e-15)
+    assert said["title"] == ["complete", "character"]
+
+
+def test_events_are_those_of_the_file_and_the_context_stays_there(
+    folder: Path, cohort: Cohort
+) -> None:
+    events = pd.read_csv(folder / "events.csv")
+    parquet = pd.read_parquet(folder / "events.parquet")
+    own = [session.events for person in cohort.included for _, session in person.sessions()]
+    assert len(events) == len(parquet) == sum(map(len, own))
+    np.testing.assert_allclose(events["time"], pd.concat(own)["time"], rtol=1e-15)
+    assert events.loc[events["name"] == "session.start", "data"].eq("{}").all()
+    end = events[events["name"] == "trial.end"].iloc[0]
+    assert json.loads(end["data"])["outcome"] == "success"
+
+
+def test_streams_are_written_as_asked(cohort: Cohort, tmp_path: Path) -> None:
+    for form, endings in {"parquet": {".parquet"}, "csv": {".gz"}, "none": set()}.items():
+        out = tmp_path / form
+        out.mkdir()
+        Tables(TableSettings(streams=form)).export(cohort.included[:1], out)
+        assert {path.suffix for path in (out / "streams").iterdir()} == endings
+
+
+def test_psych_ds_describes_every_column_of_every_file(cohort: Cohort, tmp_path: Path) -> None:
+    """Psych-DS 1.0: names are key-value pairs that end in _data.csv, columns are all described."""
+    PsychDs(PsychDsSettings()).export(cohort.included, tmp_path)
+    assert under(tmp_path) == [
+        "README.md",
+        "data/study-results_subject-P001_session-1_data.csv",
+        "data/study-results_subject-P002_session-1_data.csv",
+        "dataset_description.json",
+    ]
+    about = json.loads((tmp_path / "dataset_description.json").read_text(encoding="utf-8"))
+    assert about["@type"] == "Dataset"
+    assert about["name"] == "Übung mit dem Kran"
+    described = {variable["name"]: variable for variable in about["variableMeasured"]}
+    for path in (tmp_path / "data").iterdir():
+        with path.open(newline="", encoding="utf-8") as file:
+            header, *rows = csv.reader(file)
+        assert set(header) == set(described)
+        assert len(rows) == 8
+    assert described["movement_time"]["unitText"] == "s"
