@@ -26,7 +26,16 @@ def record(folder: Path, movements: int) -> Path:
     folder.mkdir(parents=True)
     (folder / "instructions.md").write_text("Move.", encoding="utf-8")
     (folder / "protocol.yaml").write_text(text, encoding="utf-8")
-    command = "run protocol.yaml --participant P001 --simulate --fast --data data".split()
+    command = [
+        "run",
+        "protocol.yaml",
+        "--participant",
+        "P001",
+        "--simulate",
+        "--fast",
+        "--data",
+        "data",
+    ]
     subprocess.run(
         [sys.executable, "-m", "labcrane", *command],
         cwd=folder,

@@ -194,8 +194,9 @@ class _Script:
         self._disk: dict[int, str | None] = {}
         self._orders: dict[int, list[Command]] = {}
         self._tick = -1
-        for event in record.events.itertuples(index=False):
-            self._take(int(event.tick), str(event.name), event.data)
+        events = record.events
+        for tick, name, data in zip(events["tick"], events["name"], events["data"], strict=True):
+            self._take(int(tick), str(name), data)
 
     def _take(self, tick: int, name: str, data: Mapping[str, Any]) -> None:
         """Note what an event says came from outside."""

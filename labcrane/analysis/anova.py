@@ -68,7 +68,7 @@ def repeated_measures(movements: "pd.DataFrame", measure: str, factor: str) -> A
     n, levels = whole.shape
     if n < 3 or levels < 2:  # noqa: PLR2004 - fewer have no variance of the differences
         return None
-    long = whole.stack().rename("value").reset_index()
+    long = whole.reset_index().melt("participant", var_name=factor, value_name="value")
     row = AnovaRM(long, "value", "participant", within=[factor]).fit().anova_table.iloc[0]
     f, df1, df2 = float(row["F Value"]), float(row["Num DF"]), float(row["Den DF"])
     epsilon = greenhouse_geisser(whole.to_numpy(float))

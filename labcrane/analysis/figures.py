@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from labcrane.analysis.fitts import regress
 from labcrane.analysis.learning import CURVES
+from labcrane.signals import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -57,8 +58,7 @@ def over(movements: "pd.DataFrame", measure: str, by: list[str]) -> "pd.DataFram
         n, mean = len(values), float(values.mean())
         spread = float(values.std(ddof=1)) / np.sqrt(n) if n > 1 else np.nan
         reach = float(t.ppf(0.975, n - 1)) * spread if n > 1 else np.nan
-        levels = level if isinstance(level, tuple) else (level,)
-        rows.append((*levels, mean, mean - reach, mean + reach, n))
+        rows.append((*np.atleast_1d(level).tolist(), mean, mean - reach, mean + reach, n))
     columns = [*by, "mean", "ci_low", "ci_high", "participants"]
     return pd.DataFrame(rows, columns=columns)
 
@@ -104,7 +104,7 @@ def fitts(movements: "pd.DataFrame") -> Drawing:
     rows = []
     for participant, own in movements.groupby("participant"):
         rows.append(_line(str(participant), own["difficulty"], own["movement_time"]))
-    whole = regress(cells["difficulty"].to_numpy(float), cells["movement_time"].to_numpy(float))
+    whole = regress(_numbers(cells["difficulty"]), _numbers(cells["movement_time"]))
     rows.append(_line("all (participants' means)", cells["difficulty"], cells["movement_time"]))
     if whole is not None:
         x = np.array([cells["difficulty"].min(), cells["difficulty"].max()])
@@ -114,8 +114,12 @@ def fitts(movements: "pd.DataFrame") -> Drawing:
     return Drawing("fitts", "Fitts' law", figure, pd.DataFrame(rows))
 
 
+def _numbers(column: "pd.Series[Any]") -> FloatArray:
+    return np.asarray(column, np.float64)
+
+
 def _line(who: str, x: "pd.Series[float]", y: "pd.Series[float]") -> dict[str, object]:
-    fit = regress(x.to_numpy(float), y.to_numpy(float))
+    fit = regress(_numbers(x), _numbers(y))
     if fit is None:
         return {"participant": who}
     return {
@@ -174,7 +178,11 @@ def throughputs(table: "pd.DataFrame") -> Drawing:
     return Drawing("throughput", caption, figure, table)
 
 
-def _with_ci(axes: "Axes", x: object, table: "pd.DataFrame", color: str, label: str) -> None:
+def _with_ci(
+    axes: "Axes", x: "pd.Series[Any]", table: "pd.DataFrame", color: str, label: str
+) -> None:
     below, above = table["mean"] - table["ci_low"], table["ci_high"] - table["mean"]
     errors = np.nan_to_num(np.array([below, above], float))
-    axes.errorbar(x, table["mean"], errors, color=color, marker="o", ms=4, capsize=2, label=label)
+    axes.errorbar(
+        x.to_numpy(), table["mean"], errors, color=color, marker="o", ms=4, capsize=2, label=label
+    )

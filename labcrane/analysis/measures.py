@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -129,7 +129,7 @@ def measure_session(
     return pd.concat([trials, order, measured], axis=1)
 
 
-def _sequence(trials: "pd.DataFrame") -> "pd.Series[int]":
+def _sequence(trials: "pd.DataFrame") -> "pd.Series[Any]":
     """Return which pair of targets, or which trial where there are no pairs, counted from 1."""
     words = [name for name in ("block", "pair") if name in trials]
     if "pair" not in words:

@@ -105,7 +105,7 @@ def cut(frames: Groups, trials: "pd.DataFrame", rate_hz: float) -> Iterator[Move
         ticks = ticks[running[ticks] & (trial[ticks] == row["trial"])]
         part = {name: table.iloc[ticks] for name, table in frames.items()}
         yield Movement(
-            row=row.to_dict(),
+            row={str(name): value for name, value in row.items()},
             rate_hz=rate_hz,
             due=due[ticks],
             elapsed=_array(part["loop"], ["elapsed"])[:, 0],
@@ -118,7 +118,7 @@ def cut(frames: Groups, trials: "pd.DataFrame", rate_hz: float) -> Iterator[Move
 
 
 def _below(table: "pd.DataFrame", signal: str) -> list[str]:
-    return [name for name in table if str(name).rpartition(".")[0] == signal]
+    return [str(name) for name in table if str(name).rpartition(".")[0] == signal]
 
 
 def _array(table: "pd.DataFrame", columns: list[str]) -> FloatArray:

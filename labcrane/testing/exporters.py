@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -48,7 +49,7 @@ def _write(path: Path, name: str) -> None:
         *(Column("state", f"tip.velocity.{axis}", "m/s") for axis in POINT),
         Column("task", "target.radius", "m"),
     )
-    context = {
+    context: dict[str, Any] = {
         "study": "contract",
         "title": "A made-up study",
         "participant": name,

@@ -25,12 +25,12 @@ TAGS = {
     "pause.end": "(Experiment-control, Label/pause-end)",
     "break.start": "(Experiment-structure, Label/break-start)",
     "break.end": "(Experiment-structure, Label/break-end)",
-    "instructions.shown": "(Sensory-event, Visual-presentation, Instructional, Label/instructions-shown)",
+    "instructions.shown": "(Sensory-event, Instructional, Label/instructions-shown)",
 }
 """What each event is, in Hierarchical Event Descriptors; events of others have none.
 
-Each in brackets with a label of its own: tags at the same onset are joined, and HED refuses tags that
-are said twice.
+Each in brackets with a label of its own: tags at the same onset are joined, and HED refuses what is
+said twice.
 """
 
 COLUMNS = ("trial", "attempt", "block", "outcome", "pair", "direction")
@@ -51,20 +51,19 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
     ended = {(row["trial"], row["attempt"]): row for _, row in trials.iterrows()}
     rows = []
     tagged: set[tuple[float, str]] = set()
-    for event in events.itertuples(index=False):
-        data: dict[str, Any] = event.data
-        moment = (float(event.time), str(event.name))
+    for time, name, data in zip(events["time"], events["name"], events["data"], strict=True):
+        moment = (float(time), str(name))
         key = (data.get("trial"), data.get("attempt"))
-        row = ended.get(key) if event.name == "trial.start" else None
+        row = ended.get(key) if name == "trial.start" else None
         rows.append(
             {
-                "onset": event.time - zero,
-                "duration": 0.0 if row is None else row["ended"] - event.time,
-                "trial_type": event.name,
+                "onset": time - zero,
+                "duration": 0.0 if row is None else row["ended"] - time,
+                "trial_type": name,
                 "response_time": None if row is None else row.get("reaction_time"),
-                "HED": None if moment in tagged else TAGS.get(event.name),
+                "HED": None if moment in tagged else TAGS.get(name),
             }
-            | {name: data.get(name) for name in COLUMNS}
+            | {column: data.get(column) for column in COLUMNS}
         )
         tagged.add(moment)
     table = pd.DataFrame(rows)

@@ -38,7 +38,7 @@ def _recording(stream: Stream, zero: float) -> tuple["pd.DataFrame", dict[str, A
     rate_hz = float(stream.attrs.get("rate_hz", 0.0))
     if rate_hz == 0.0 and len(stream.time) > 1:
         rate_hz = float(1.0 / np.median(np.diff(stream.time)))
-    columns = list(samples)
+    columns = list(map(str, samples))
     about: dict[str, Any] = {
         "SamplingFrequency": rate_hz,
         "StartTime": float(samples["timestamp"].iloc[0]) if len(samples) else 0.0,

@@ -5,7 +5,7 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 from shutil import copyfile
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from labcrane import Exporter, Participant, SessionRecord
 from labcrane_tables.frames import snake, stream_tables
@@ -75,7 +75,7 @@ class _Growing:
     def __init__(self, stem: Path) -> None:
         self._csv = stem.with_suffix(".csv")
         self._parquet = stem.with_suffix(".parquet")
-        self._writer: object | None = None
+        self._writer: Any = None
 
     def add(self, table: "pd.DataFrame") -> None:
         import pyarrow as pa
@@ -84,12 +84,12 @@ class _Growing:
         rows = pa.Table.from_pandas(table, preserve_index=False)
         if self._writer is None:
             self._writer = parquet.ParquetWriter(self._parquet, rows.schema)
-        self._writer.write_table(rows)  # type: ignore[attr-defined]  # pyarrow has no types
+        self._writer.write_table(rows)
         table.to_csv(self._csv, mode="a", header=not self._csv.exists(), index=False)
 
     def close(self) -> None:
         if self._writer is not None:
-            self._writer.close()  # type: ignore[attr-defined]
+            self._writer.close()
 
 
 def write_csv(table: "pd.DataFrame", path: Path) -> None:

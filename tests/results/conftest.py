@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
-from results.recorded import record, study
 
 from labcrane.analysis.cohort import Cohort, find_cohort
 from labcrane.console import Command, Order
+from results.recorded import record, study
 
 
 @pytest.fixture(scope="session")

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from results.consumers import under
 
 from labcrane import Exporter, ProtocolError
 from labcrane.analysis.cohort import Cohort
 from labcrane.testing import ExporterContract, ch8
 from labcrane_bids.bids import Bids
 from labcrane_bids.settings import BidsSettings
+from results.consumers import under
 
 VALIDATOR = shutil.which("bids-validator-deno", path=Path(sys.executable).parent)
 NAME = "sub-P001_ses-01_task-acquisition"
@@ -143,7 +143,8 @@ def test_eye_tracking_is_physio_with_its_columns_described(folder: Path, cohort:
     assert about["PhysioType"] == "eyetrack"
     assert about["Columns"] == ["timestamp", "x_coordinate", "y_coordinate", "aoi"]
     assert set(about["Columns"]) <= set(about)
-    samples = np.loadtxt(gzip.open(path.with_name(f"{path.name}.tsv.gz")))
+    text = gzip.decompress(path.with_name(f"{path.name}.tsv.gz").read_bytes())
+    samples = np.loadtxt(io.BytesIO(text))
     _, session = next(cohort.included[0].sessions())
     eyes = session.streams["eyes"]
     np.testing.assert_allclose(samples[:, 0], eyes.time - 100.0, atol=1e-9)
@@ -165,9 +166,9 @@ def test_people_ethics_and_questionnaires_are_where_bids_wants_them(folder: Path
 
 def test_missing_files_of_people_are_named(cohort: Cohort, tmp_path: Path) -> None:
     gone = BidsSettings(people=tmp_path / "gone.csv")
-    with pytest.raises(ProtocolError, match="there is no file .*gone.csv with age, sex"):
+    with pytest.raises(ProtocolError, match=r"there is no file .*gone\.csv with age, sex"):
         Bids(gone, ch8()).export(cohort.included, tmp_path)
     (tmp_path / "out").mkdir()
     empty = BidsSettings(phenotype=tmp_path / "out")
-    with pytest.raises(ProtocolError, match="there is no CSV file in .*; one per questionnaire"):
+    with pytest.raises(ProtocolError, match=r"there is no CSV file in .*; one per questionnaire"):
         Bids(empty, ch8()).export(cohort.included[:1], tmp_path / "out")

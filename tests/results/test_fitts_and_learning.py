@@ -38,21 +38,20 @@ def test_a_line_through_nothing_is_not_drawn() -> None:
 
 def movements(n: int, spread: float, seed: int = 1) -> pd.DataFrame:
     rng = np.random.default_rng(seed)
-    frames = []
-    for participant in ("P001", "P002"):
-        for distance in (2.0, 4.0):
-            frames.append(
-                pd.DataFrame(
-                    {
-                        "participant": participant,
-                        "distance": distance,
-                        "movement_time": 5.0,
-                        "amplitude": distance,
-                        "error_along": rng.normal(0.05, spread, n),
-                        "error_bound": np.nan,
-                    }
-                )
-            )
+    cells = [(person, distance) for person in ("P001", "P002") for distance in (2.0, 4.0)]
+    frames = [
+        pd.DataFrame(
+            {
+                "participant": participant,
+                "distance": distance,
+                "movement_time": 5.0,
+                "amplitude": distance,
+                "error_along": rng.normal(0.05, spread, n),
+                "error_bound": np.nan,
+            }
+        )
+        for participant, distance in cells
+    ]
     return pd.concat(frames, ignore_index=True)
 
 
@@ -109,7 +108,10 @@ def test_the_better_curve_is_the_one_the_learner_follows() -> None:
             )
     table = learning_curves(pd.concat(tables), "movement_time")
     better = table[table["better"] == "yes"]
-    right = [who.startswith(curve) for who, curve in zip(better["participant"], better["curve"])]
+    right = [
+        who.startswith(curve)
+        for who, curve in zip(better["participant"], better["curve"], strict=True)
+    ]
     assert np.mean(right) >= 0.9
 
 

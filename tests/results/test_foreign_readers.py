@@ -5,9 +5,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from results.consumers import needs_octave, needs_r, octave, r, table
 
 from labcrane.analysis.cohort import Cohort
+from results.consumers import needs_octave, needs_r, octave, r, table
 
 RHDF5 = """
 suppressMessages(library(rhdf5)); file <- commandArgs(TRUE)[1]

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from results.consumers import needs_octave, octave, table, under
 from scipy.io import loadmat
 
 from labcrane import Exporter, RecordingError
@@ -14,6 +13,7 @@ from labcrane.testing import ExporterContract
 from labcrane_matlab import matlab
 from labcrane_matlab.matlab import Matlab, fields
 from labcrane_matlab.settings import MatlabSettings
+from results.consumers import needs_octave, octave, table, under
 
 
 class TestMatlab(ExporterContract):

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rehearsal import a_study
-from results.recorded import STUDY, record, study
 
 import labcrane
 from labcrane import Frame, ProtocolError, RecordingError
@@ -14,6 +13,7 @@ from labcrane.cli.app import main
 from labcrane.console import Command, Order
 from labcrane.recording.recording import open_recording
 from labcrane.replay import replay
+from results.recorded import STUDY, record, study
 
 ROOT = Path(__file__).parents[2]
 CH8 = Path(labcrane.__file__).parent / "machines" / "ch8.yaml"

@@ -7,12 +7,12 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pandas as pd
 import pytest
-from results.consumers import under
 
 from labcrane.analysis.cohort import Cohort, find_cohort
 from labcrane.analysis.quality import exclusions, is_result, loop_quality, sync_quality
 from labcrane.analysis.report import write_report
 from labcrane.cli.app import main
+from results.consumers import under
 
 
 @pytest.fixture(scope="module")

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from results.consumers import needs_r, r, table
-from results.synthetic import cohort_of_36
 
 from labcrane.analysis.anova import greenhouse_geisser, repeated_measures
 from labcrane.analysis.report import anova_table, trend_table
 from labcrane.analysis.reported import Reported, check_reported
 from labcrane.analysis.trends import holm, linear_trend, mixed_model
+from results.consumers import needs_r, r, table
+from results.synthetic import cohort_of_36
 
 AFEX = """
 suppressMessages({library(afex); library(lme4)})

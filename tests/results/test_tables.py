@@ -8,14 +8,14 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
-from results.consumers import needs_r, r, table, under
 
 from labcrane import Exporter
 from labcrane.analysis.cohort import Cohort
-from labcrane.testing import ExporterContract, ch8
+from labcrane.testing import ExporterContract
 from labcrane_tables.psychds import PsychDs
 from labcrane_tables.settings import PsychDsSettings, TableSettings
 from labcrane_tables.tables import Tables
+from results.consumers import needs_r, r, table, under
 
 
 class TestTables(ExporterContract):
