@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -58,7 +58,7 @@ def over(movements: "pd.DataFrame", measure: str, by: list[str]) -> "pd.DataFram
         n, mean = len(values), float(values.mean())
         spread = float(values.std(ddof=1)) / np.sqrt(n) if n > 1 else np.nan
         reach = float(t.ppf(0.975, n - 1)) * spread if n > 1 else np.nan
-        rows.append((*np.atleast_1d(level).tolist(), mean, mean - reach, mean + reach, n))
+        rows.append((*cast("tuple[Any, ...]", level), mean, mean - reach, mean + reach, n))
     columns = [*by, "mean", "ci_low", "ci_high", "participants"]
     return pd.DataFrame(rows, columns=columns)
 
