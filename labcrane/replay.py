@@ -11,24 +11,22 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from labcrane import loop, rig
 from labcrane.clock import ManualClock, SystemClock, Tick
-from labcrane.console import Command, Order
 from labcrane.course import Course
 from labcrane.errors import ProtocolError, RecordingError
 from labcrane.frame_log import PHASES, FrameLog, columns
 from labcrane.plan import plan_session
 from labcrane.recording.recording import SessionRecord, open_recording
-from labcrane.records import Event, Frame, Run
+from labcrane.records import Frame, Run
 from labcrane.registry import discover
 from labcrane.replay_parts import differing_parts, restore
+from labcrane.replay_script import RecordOver, Script
 from labcrane.rig import Rig
-from labcrane.roles import InputDevice
-from labcrane.signals import FloatArray, Signal
 from labcrane.study import Study, load
 
 if TYPE_CHECKING:
@@ -137,7 +135,7 @@ def _run(
     speed: float | None,
     sinks: Sequence[Callable[[Frame], None]],
 ) -> Replayed:
-    script = _Script(record)
+    script = Script(record)
     participant = str(record.context["participant"])
     for stamp in STAMPS:
         participant = participant.removesuffix(stamp)
@@ -155,78 +153,15 @@ def _run(
             closing.callback(show.close)
             shown.append(show)
         clock = ManualClock(start=script.start)
-        with suppress(_RecordOver):
+        with suppress(RecordOver):
             loop.run(the_rig, this_run, course, clock, script, log, (*sinks, *shown))
     return Replayed(log.ticks, parts, log.compare(record), log.frames())
-
-
-class _RecordOver(Exception):  # noqa: N818 - ends a loop, and is no error
-    """The last recorded tick has been run."""
-
-
-class _Input(InputDevice):
-    """Gives each tick what was recorded in it."""
-
-    def __init__(self, signals: tuple[Signal, ...], axes: FloatArray) -> None:
-        self.signals = signals
-        self._axes = axes
-        self.faults: list[tuple[int, str | None]] = []
-
-    def read(self, tick: Tick, seen: Frame) -> FloatArray:
-        if tick.number == len(self._axes):
-            raise _RecordOver
-        while self.faults and self.faults[0][0] <= tick.number:
-            self.fault = self.faults.pop(0)[1]
-        row: FloatArray = self._axes[tick.number]
-        return row
-
-
-class _Script:
-    """Everything that entered the loop from outside, tick by tick; also the console."""
-
-    def __init__(self, record: SessionRecord) -> None:
-        recorded = record.streams["input"]
-        axes = recorded.data.to_numpy(np.float64)
-        self.input = _Input(signals_of(list(map(str, recorded.data)), recorded.units), axes)
-        self.ticks = len(axes)
-        self.start = float(record.streams["loop"].data["due"].iloc[0])
-        self.disk_trouble: str | None = None
-        self._disk: dict[int, str | None] = {}
-        self._orders: dict[int, list[Command]] = {}
-        self._tick = -1
-        events = record.events
-        for tick, name, data in zip(events["tick"], events["name"], events["data"], strict=True):
-            self._take(int(tick), str(name), data)
-
-    def _take(self, tick: int, name: str, data: Mapping[str, Any]) -> None:
-        """Note what an event says came from outside."""
-        part, _, what = name.rpartition(".")
-        if part == "order":
-            self._order(tick, Command(Order(what), data.get("text", "")))
-        elif part == "stream" and what in {"lost", "back"}:
-            self._order(tick, Command(Order(what), data["what"]))
-        elif part == "input" and what in {"lost", "back"}:
-            self.input.faults.append((tick, data.get("why")))
-        elif part == "disk" and what in {"lost", "back"}:
-            self._disk[tick] = data.get("why")
-
-    def _order(self, tick: int, command: Command) -> None:
-        self._orders.setdefault(tick, []).append(command)
-
-    def commands(self) -> list[Command]:
-        """Return the orders of this tick."""
-        self._tick += 1
-        self.disk_trouble = self._disk.get(self._tick, self.disk_trouble)
-        return self._orders.get(self._tick, [])
-
-    def report(self, event: Event) -> None:
-        """Nobody is told; the sinks see every event."""
 
 
 class _Log(FrameLog):
     """Keeps every number of every frame instead of writing it to a journal."""
 
-    def __init__(self, run: Run, script: "_Script") -> None:
+    def __init__(self, run: Run, script: "Script") -> None:
         self._script = script
         self._columns = columns(run)
         self._rows = np.full((script.ticks, len(self._columns)), np.nan)
@@ -299,18 +234,3 @@ class _Show:
         events = tuple(replace(event, time=due) for event in frame.events)
         now = Tick(frame.tick.number, due, self._clock.now())
         self._outlets.push(replace(frame, tick=now, events=events))
-
-
-def signals_of(names: Sequence[str], units: Mapping[str, str]) -> tuple[Signal, ...]:
-    """Return signals with these columns, in the same order."""
-    signals: list[Signal] = []
-    for column in names:
-        name, _, component = column.rpartition(".")
-        if name and signals and signals[-1].name == name:
-            last = signals.pop()
-            signals.append(Signal(name, last.unit, (*last.components, component)))
-        elif name:
-            signals.append(Signal(name, units[column], (component,)))
-        else:
-            signals.append(Signal(column, units[column]))
-    return tuple(signals)

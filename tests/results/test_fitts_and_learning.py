@@ -1,13 +1,16 @@
 """Laws recover the parameters of operators who follow them."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from labcrane.analysis.cohort import find_cohort
 from labcrane.analysis.fitts import WIDTH_FACTOR, difficulty, regress, throughput
 from labcrane.analysis.learning import CURVES, fit_curve, learning_curves
+from results.recorded import STUDY, record, study
 
 DISTANCES = np.repeat([2.0, 3.0, 4.0, 6.0], 8)
 
@@ -121,3 +124,41 @@ def test_an_asymptote_that_data_do_not_show_is_not_identified() -> None:
     assert still_falling is not None
     assert not still_falling.identified
     assert fit_curve("power", n[:3], n[:3]) is None
+
+
+OPERATOR = (
+    "operator: {use: simulated_operator, fitts_a_s: 3.0, fitts_b_s: 3.0, reaction_sd: 0, "
+    "endpoint_noise: 0, motor_noise: 0, learning_gain: %s, learning_rate: 0.15}"
+)
+
+
+def simulated(folder: Path, gain: float) -> pd.DataFrame:
+    """Return the movements of an operator without noise: one sub-movement each."""
+    text = "\n".join(
+        OPERATOR % gain if line.startswith("operator:") else line for line in STUDY.splitlines()
+    ).replace("distances: [2, 3],", "distances: [2, 3, 4, 6],")
+    record(study(folder, text), folder / "data", "P001")
+    return find_cohort(folder / "data").included[0].measures()
+
+
+def test_fitts_law_of_a_simulated_operator_is_found_again(tmp_path: Path) -> None:
+    """The onset rule, 5 % of the peak speed, cuts 5.9 % off a minimum-jerk movement's start."""
+    table = simulated(tmp_path, gain=0.0)
+    fit = regress(table["difficulty"].to_numpy(), table["movement_time"].to_numpy())
+    assert fit is not None
+    assert (1.0 - 0.059) * 3.0 <= fit.slope <= 3.0
+    assert fit.r2 > 0.9999
+
+
+def test_the_learning_rate_of_a_simulated_operator_is_found_again(tmp_path: Path) -> None:
+    table = simulated(tmp_path, gain=0.5)
+    practised = 3.0 + 3.0 * table["difficulty"]
+    fit = fit_curve(
+        "exponential",
+        table["trial"].to_numpy(float),
+        (table["movement_time"] / practised).to_numpy(),
+    )
+    assert fit is not None
+    assert fit.identified
+    assert abs(fit.rate - 0.15) <= 2.0 * fit.rate_se
+    assert fit.rate_se < 0.02
