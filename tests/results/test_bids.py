@@ -13,9 +13,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from labcrane import Exporter, ProtocolError
+from labcrane import ProtocolError
 from labcrane.analysis.cohort import Cohort
-from labcrane.testing import ExporterContract, ch8
+from labcrane.testing import ch8
 from labcrane_bids.bids import Bids
 from labcrane_bids.settings import BidsSettings
 from results.consumers import under
@@ -23,12 +23,6 @@ from results.consumers import under
 VALIDATOR = shutil.which("bids-validator-deno", path=Path(sys.executable).parent)
 NAME = "sub-P001_ses-01_task-acquisition"
 MOTION = f"sub-P001/ses-01/motion/{NAME}"
-
-
-class TestBids(ExporterContract):
-    @pytest.fixture
-    def exporter(self) -> Exporter:
-        return Bids(BidsSettings(), ch8())
 
 
 @pytest.fixture(scope="module")

@@ -7,19 +7,12 @@ import pandas as pd
 import pytest
 from scipy.io import loadmat
 
-from labcrane import Exporter, RecordingError
+from labcrane import RecordingError
 from labcrane.analysis.cohort import Cohort
-from labcrane.testing import ExporterContract
 from labcrane_matlab import matlab
 from labcrane_matlab.matlab import Matlab, fields
 from labcrane_matlab.settings import MatlabSettings
 from results.consumers import needs_octave, octave, table, under
-
-
-class TestMatlab(ExporterContract):
-    @pytest.fixture
-    def exporter(self) -> Exporter:
-        return Matlab(MatlabSettings())
 
 
 @pytest.fixture(scope="module")

@@ -4,19 +4,10 @@ import json
 from pathlib import Path
 
 import numpy as np
-import pytest
 import pyxdf
 
-from labcrane import Exporter
 from labcrane.analysis.cohort import Cohort
-from labcrane.testing import ExporterContract
 from labcrane_xdf.merged import MergedXdf
-
-
-class TestMergedXdf(ExporterContract):
-    @pytest.fixture
-    def exporter(self) -> Exporter:
-        return MergedXdf()
 
 
 def test_pyxdf_opens_all_streams_on_corrected_clocks(cohort: Cohort, tmp_path: Path) -> None:

@@ -9,25 +9,11 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from labcrane import Exporter
 from labcrane.analysis.cohort import Cohort
-from labcrane.testing import ExporterContract
 from labcrane_tables.psychds import PsychDs
 from labcrane_tables.settings import PsychDsSettings, TableSettings
 from labcrane_tables.tables import Tables
 from results.consumers import needs_r, r, table, under
-
-
-class TestTables(ExporterContract):
-    @pytest.fixture
-    def exporter(self) -> Exporter:
-        return Tables(TableSettings())
-
-
-class TestPsychDs(ExporterContract):
-    @pytest.fixture
-    def exporter(self) -> Exporter:
-        return PsychDs(PsychDsSettings())
 
 
 @pytest.fixture(scope="module")

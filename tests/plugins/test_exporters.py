@@ -1,0 +1,14 @@
+"""Every bundled exporter keeps the contract of its role."""
+
+import pytest
+
+from labcrane import Exporter
+from labcrane.registry import discover
+from labcrane.testing import ExporterContract, ch8
+
+
+class TestExporters(ExporterContract):
+    @pytest.fixture(params=["tables", "psychds", "matlab", "bids", "xdf"])
+    def exporter(self, request: pytest.FixtureRequest) -> Exporter:
+        offer = discover().find(Exporter, request.param)
+        return offer.build(offer.settings(), ch8())
