@@ -29,6 +29,7 @@ def loop_quality(participant: Participant) -> "pd.DataFrame":
                 "participant": participant.name,
                 "session": number,
                 "clock": session.attrs.get("clock", ""),
+                "sync_verdict": session.sync_report.get("verdict", ""),
                 "ticks": len(loop),
                 "rate_hz": rate_hz,
                 "lateness_median_ms": 1e3 * float(np.median(lateness)),

@@ -94,6 +94,7 @@ def test_practice_is_no_result() -> None:
 def test_quality_is_that_of_the_record(cohort: Cohort) -> None:
     loop = loop_quality(cohort.included[0]).iloc[0]
     assert (loop["late_ticks"], loop["lateness_worst_ms"], loop["rate_hz"]) == (0, 0.0, 120.0)
+    assert loop["sync_verdict"] == cohort.included[0].recording.session(1).sync_report["verdict"]
     sync = sync_quality(cohort.included[0]).iloc[0]
     assert (sync["stream"], sync["corrected"]) == ("eyes", "yes")
     assert sync["samples"] > 1000
