@@ -116,7 +116,7 @@ def contents(path: Path, group: str) -> dict[str, str]:
         for key, value in node.attrs.items():
             found[f"{name}@{key}"] = repr(value)
         if isinstance(node, h5py.Dataset):
-            values = node.asstr()[()] if node.dtype.kind == "O" else node[()]
+            values = node.asstr("utf-8")[()] if node.dtype.kind in "OS" else node[()]
             data = repr(values.tolist()) if hasattr(values, "tolist") else repr(values)
             found[name] = hashlib.sha256(data.encode()).hexdigest()
 
