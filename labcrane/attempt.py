@@ -25,6 +25,7 @@ class Attempt:
             "block_name": block.name,
             "practice": block.practice,
             "counted": trial.planned.counted,
+            **({"group": block.group} if block.group else {}),
             **trial.planned.condition,
         }
         self.completion: bool | None = None

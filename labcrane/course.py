@@ -9,9 +9,11 @@ from collections.abc import Generator, Sequence
 from labcrane.attempt import Attempt
 from labcrane.console import Command, Order
 from labcrane.plan import PlannedBlock, PlannedStep, SessionPlan, next_attempt
+from labcrane.privacy import personal
 from labcrane.records import Event, Frame, Phase, Trial, Value
 from labcrane.rig import Rig
 from labcrane.study import Study
+from labcrane.warm_up import WarmUp
 
 Ticks = Generator[None, Frame, None]
 
@@ -49,6 +51,7 @@ class Course:
         self._stage = ""
         self._wishes: set[Order] = set()  # to start, skip or repeat what runs now
         self._reasons_to_end: list[str] = []
+        self._warm_up = WarmUp()
         self.over = False
         self._script = self._session()
         next(self._script)
@@ -86,11 +89,16 @@ class Course:
 
     def _session(self) -> Ticks:
         for step in self._plan.steps:
+            if step.block and not self._warm_up.begin(step.block):
+                continue
             self._note("step.start", step=step.number, kind=step.kind)
             if step.block:
                 yield from self._block(step.block)
             elif step.kind == "break":
                 yield from self._break(step)
+            elif step.kind == "consent":
+                self._note("consent.asked")  # what was confirmed is in the session's context
+                yield from self._gate("consent")
             else:
                 self._note("instructions.shown", text=step.text)
                 yield from self._gate("instructions")
@@ -126,9 +134,11 @@ class Course:
         self._note("block.start", **about, task=block.task, practice=block.practice)
         for trial in block.trials:
             yield from self._trial(block, trial)
-            if self._reasons_to_end:
+            if self._reasons_to_end or (block.until and self._warm_up.over):
                 break
         self._note("block.end", **about)
+        if (verdict := self._warm_up.verdict(block)) is not None:
+            self._note("practice.end", **about, **verdict)
 
     def _trial(self, block: PlannedBlock, trial: Trial) -> Ticks:
         task = self._study.tasks[block.task]
@@ -143,6 +153,8 @@ class Course:
             frame = yield
             attempt.judge(frame, self._wished_end())
         self._enter("")
+        if trial.planned.counted:
+            self._warm_up.count(block, attempt.phase)
         if attempt.phase is Phase.REPEATED:
             yield from self._trial(block, next_attempt(self._study, self._plan, trial))
 
@@ -161,7 +173,9 @@ class Course:
 
     def _obey(self, command: Command) -> None:
         refused = self._refusal(command)
-        self._note(f"order.{command.order}", text=command.text, refused=refused)
+        # What names a person must not be in the record, not even as a refused note.
+        text = "" if personal(command.text) else command.text
+        self._note(f"order.{command.order}", text=text, refused=refused)
         if refused is not None:
             return
         match command.order:
@@ -195,6 +209,8 @@ class Course:
                 return f"completion is 1 or 0, not {command.text!r}"
             case Order.NOTE if not command.text:
                 return "a note needs words"
+            case Order.NOTE if found := personal(command.text):
+                return f"a note must not hold {found}; write it without"
         return None
 
     def _running(self) -> Attempt:

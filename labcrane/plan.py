@@ -1,11 +1,13 @@
 """What a session of one participant consists of, before anything is opened."""
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from labcrane.design.order import RULES
+from labcrane.design.order import RULES, SQUARES, Turn
 from labcrane.design.seeds import derive
-from labcrane.protocol import Block, Step
+from labcrane.design.slots import group_of, place_of
+from labcrane.protocol import AS_WRITTEN, Block, Criterion, Step
 from labcrane.records import Planned, Trial
 from labcrane.study import Study
 
@@ -31,6 +33,10 @@ class PlannedBlock:
         The levels of each factor, in the order in which they come.
     trials
         First attempts, in order.
+    group
+        The participant's between-subject group; "" when the study has none.
+    until, last
+        When practice is enough, and whether no further round of it is planned.
     """
 
     name: str
@@ -39,6 +45,9 @@ class PlannedBlock:
     practice: bool
     levels: Mapping[str, tuple[str, ...]]
     trials: tuple[Trial, ...]
+    group: str = ""
+    until: Criterion | None = None
+    last: bool = True
 
     @property
     def expected_s(self) -> float:
@@ -66,13 +75,25 @@ class PlannedStep:
 
 @dataclass(frozen=True, slots=True)
 class SessionPlan:
-    """All steps of one session of one participant, in order."""
+    """All steps of one session of one participant, in order.
+
+    Attributes
+    ----------
+    seed
+        The participant's own.
+    slot
+        The participant's place in the design, counted from 1.
+    group
+        Between-subject group; "" when the study has none.
+    """
 
     participant: str
     number: int
     name: str
     seed: int
     steps: tuple[PlannedStep, ...]
+    slot: int = 1
+    group: str = ""
 
     @property
     def blocks(self) -> tuple[PlannedBlock, ...]:
@@ -88,8 +109,11 @@ class SessionPlan:
 class Planner:
     """Plans one session; counts its blocks and trials on the way."""
 
-    def __init__(self, study: Study, participant: str, session: int) -> None:
+    def __init__(self, study: Study, participant: str, session: int, slot: int) -> None:
         self._study = study
+        groups = tuple(study.protocol.design.groups)
+        self.group = group_of(study.protocol.study, groups, slot)
+        self._place = place_of(groups, slot)
         self._words = (study.protocol.study, participant, session)
         self._steps = 0
         self._blocks = 0
@@ -97,37 +121,89 @@ class Planner:
 
     def steps(self, step: Step) -> Iterator[PlannedStep]:
         """Yield a step of the protocol, once for each repetition."""
-        for _ in range(step.block.repeat if step.block else 1):
-            self._steps += 1
-            block = self._block(step.block, step.kind == "practice") if step.block else None
-            yield PlannedStep(self._steps, step.kind, step.text, step.seconds, block)
+        if step.block is None:
+            yield self._step(step, None)
+            return
+        rounds = step.block.until.rounds if step.block.until else 1
+        for _ in range(step.block.repeat):
+            for number in range(1, rounds + 1):
+                practice = step.kind == "practice"
+                yield self._step(step, self._block(step.block, practice, last=number == rounds))
 
-    def _block(self, block: Block, practice: bool) -> PlannedBlock:  # noqa: FBT001 - one caller
+    def _step(self, step: Step, block: PlannedBlock | None) -> PlannedStep:
+        self._steps += 1
+        return PlannedStep(self._steps, step.kind, step.text, step.seconds, block)
+
+    def _block(self, block: Block, practice: bool, *, last: bool) -> PlannedBlock:  # noqa: FBT001
         self._blocks += 1
         task = self._study.tasks[block.task]
         levels = {}
         for factor, written in task.factors().items():
-            rule = RULES[self._study.protocol.design.order.get(factor, "as_written")]
+            order = self._study.protocol.design.order.get(factor, AS_WRITTEN)
             seed = derive(*self._words, "order", factor, self._blocks)
-            levels[factor] = rule(written, seed)[: block.limits.get(factor)]
+            turn = Turn(seed, self._place + self._shift(factor))
+            ordered = RULES[order.rule](written, turn, order.times, order.in_a_row)
+            levels[factor] = ordered[: block.limits.get(factor)]
         trials = tuple(self._trial(planned) for planned in task.plan(levels))
         name = block.name or block.task
-        return PlannedBlock(name, self._blocks, block.task, practice, levels, trials)
+        return PlannedBlock(
+            name,
+            self._blocks,
+            block.task,
+            practice,
+            levels,
+            trials,
+            self.group,
+            until=block.until,
+            last=last,
+        )
+
+    def _shift(self, factor: str) -> int:
+        """Return by how many rows a further square is shifted, so that two squares get crossed.
+
+        Whenever all rows of the first square have been used, the others begin a row later.
+        """
+        orders = self._study.protocol.design.order
+        squares = [name for name, order in orders.items() if order.rule in SQUARES]
+        if factor not in squares[1:]:
+            return 0
+        factors = {
+            name: levels
+            for task in self._study.tasks.values()
+            for name, levels in task.factors().items()
+        }
+        rows = len(SQUARES[orders[squares[0]].rule](len(factors[squares[0]])))
+        return squares.index(factor) * (self._place // rows)
 
     def _trial(self, planned: Planned) -> Trial:
         self._trials += 1
         return Trial(self._trials, 1, derive(*self._words, "trial", self._trials, 1), planned)
 
 
-def plan_session(study: Study, participant: str, session: int) -> SessionPlan:
-    """Return what happens in ``session`` (from 1) of ``participant``."""
+def slot_by_name(participant: str) -> int:
+    """Return the slot that a pseudonym would have if all came in order: 7 for ``P007``.
+
+    For plans, pilots and simulations, which have no place in the register.
+    """
+    digits = re.search(r"\d+$", participant)
+    return max(1, int(digits[0])) if digits else 1
+
+
+def plan_session(
+    study: Study, participant: str, session: int, slot: int | None = None
+) -> SessionPlan:
+    """Return what happens in ``session`` (from 1) of ``participant``.
+
+    ``slot`` is the participant's in the register; without it, the one of the pseudonym's number.
+    """
     study.check_participant(participant)
     study.check_session(session)
+    slot = slot or slot_by_name(participant)
     written = study.protocol.sessions[session - 1]
-    planner = Planner(study, participant, session)
+    planner = Planner(study, participant, session, slot)
     steps = tuple(planned for step in written.steps for planned in planner.steps(step))
     seed = derive(study.protocol.study, participant)
-    return SessionPlan(participant, session, written.name, seed, steps)
+    return SessionPlan(participant, session, written.name, seed, steps, slot, planner.group)
 
 
 def next_attempt(

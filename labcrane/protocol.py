@@ -9,12 +9,13 @@ from pydantic import (
     ConfigDict,
     Field,
     NonNegativeFloat,
+    NonNegativeInt,
     PositiveFloat,
     PositiveInt,
     field_validator,
 )
 
-from labcrane.design.order import RULES
+from labcrane.design.order import LIMITED, RULES
 from labcrane.offers import Settings
 from labcrane.stream_needs import StreamNeed, TimeLimits
 from labcrane.yaml_file import Place, YamlFile
@@ -60,20 +61,51 @@ class Participants(Section):
         return pattern
 
 
+class Order(Section):
+    """In which order the levels of a factor come."""
+
+    rule: str
+    """``as_written``; ``shuffled``: all repetitions together; ``blocked``: each repetition by
+    itself; ``latin_square`` or ``williams``: each participant has a row of the square."""
+
+    times: PositiveInt = 1
+    """How often each level comes in a block."""
+
+    in_a_row: PositiveInt | None = None
+    """How often a level may come in a row, where the order is random."""
+
+
+AS_WRITTEN = Order(rule="as_written")
+
+
 class Design(Section):
     """What is varied, and how."""
 
-    order: dict[str, str] = Field(default_factory=dict)
-    """For each factor of the tasks, in which order its levels come: ``{pairs: shuffled}``.
-    Factors that are not named come as written."""
+    groups: dict[str, tuple[str, ...]] = Field(default_factory=dict)
+    """Between-subject groups, and the feedback that each is given: ``{none: [], visual:
+    [sphere]}``. Participants are spread over them equally."""
 
-    @field_validator("order")
+    order: dict[str, Order] = Field(default_factory=dict)
+    """For each factor of the tasks, in which order its levels come: ``{pairs: shuffled}``, or
+    ``{pairs: {rule: shuffled, times: 3, in_a_row: 2}}``. Factors that are not named come as
+    written."""
+
+    @field_validator("order", mode="before")
     @classmethod
-    def _rules_exist(cls, order: dict[str, str]) -> dict[str, str]:
-        for factor, rule in order.items():
-            if rule not in RULES:
+    def _rules_exist(cls, order: Any) -> Any:
+        if not isinstance(order, dict):
+            return order
+        long = {
+            factor: {"rule": said} if isinstance(said, str) else said
+            for factor, said in order.items()
+        }
+        for factor, said in long.items():
+            rule = said.get("rule") if isinstance(said, dict) else None
+            if isinstance(rule, str) and rule not in RULES:
                 raise ValueError(f"{factor} is {rule!r}; it can be {', '.join(sorted(RULES))}")
-        return order
+            if isinstance(rule, str) and said.get("in_a_row") and rule not in LIMITED:
+                raise ValueError(f"{factor} is {rule!r}, where nothing is random; drop in_a_row")
+        return long
 
 
 class OnFault(Section):
@@ -89,6 +121,16 @@ class OnFault(Section):
 
     session_died: Literal["continue", "redo_trial", "redo_block"] = "redo_trial"
     """The session's process died: where ``labcrane resume`` goes on."""
+
+
+class Criterion(Section):
+    """When practice is enough."""
+
+    successes: PositiveInt
+    """How many counted trials in a row must succeed."""
+
+    rounds: PositiveInt = 1
+    """How many times the block is run at most; whether it was enough is recorded."""
 
 
 class Block(Section):
@@ -108,6 +150,9 @@ class Block(Section):
     repeat: PositiveInt = 1
     """How many times the block is run, each time in a new order."""
 
+    until: Criterion | None = None
+    """For practice: it ends as soon as this is met."""
+
     @property
     def limits(self) -> dict[str, Any]:
         """How many levels of which factor, as written."""
@@ -124,7 +169,7 @@ class Break(Section):
 class Step(Section):
     """One step of a session, with what kind it is and what it needs."""
 
-    kind: Literal["instructions", "practice", "block", "break"]
+    kind: Literal["consent", "instructions", "practice", "block", "break"]
     text: str = ""
     file: str = ""
     block: Block | None = None
@@ -137,8 +182,18 @@ class Session(Section):
     name: str
     """Name of the session in the record."""
 
+    after_days: tuple[NonNegativeInt, NonNegativeInt] | None = None
+    """Earliest and latest day after the session before: ``[1, 3]``."""
+
     steps: tuple[Step, ...] = Field(min_length=1)
     """What happens, in order."""
+
+    @field_validator("after_days")
+    @classmethod
+    def _window_is_one(cls, days: tuple[int, int] | None) -> tuple[int, int] | None:
+        if days is not None and days[0] > days[1]:
+            raise ValueError(f"the earliest day, {days[0]}, is after the latest, {days[1]}")
+        return days
 
 
 class Protocol(Section):
@@ -226,10 +281,12 @@ def _sessions(source: YamlFile) -> Any:
     return found
 
 
-STEPS = ("instructions", "practice", "block", "break")
+STEPS = ("consent", "instructions", "practice", "block", "break")
 
 
 def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
+    if step == "consent":
+        return {"kind": step}
     if not (isinstance(step, dict) and len(step) == 1):
         source.problem(place, f"a step is one of {', '.join(STEPS)} with a value, not {step!r}")
         return None
@@ -244,7 +301,13 @@ def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
     if kind == "break":
         pause = source.check(Break, (*place, kind))
         return {"kind": kind, "seconds": pause.seconds} if pause else None
+    if kind == "consent":
+        source.problem(place, "consent is a step by itself: '- consent'")
+        return None
     block = source.check(Block, (*place, kind))
+    if block and block.until and kind != "practice":
+        source.problem((*place, kind, "until"), "only practice has a criterion; drop until")
+        return None
     return {"kind": kind, "block": block} if block else None
 
 

@@ -1,10 +1,29 @@
 """In which order the levels of a factor come."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-Rule = Callable[[Sequence[str], int], tuple[str, ...]]
+from labcrane.design.sampling import sequence
+from labcrane.design.squares import Square, latin_square, williams
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """Whose order is wanted.
+
+    Attributes
+    ----------
+    seed
+        What everything random in it follows from.
+    place
+        Counts the participants of a group from 0, by their slots in the design; says which row of
+        a square is theirs.
+    """
+
+    seed: int
+    place: int = 0
 
 
 def as_written(levels: Sequence[str], seed: int) -> tuple[str, ...]:
@@ -19,5 +38,58 @@ def shuffled(levels: Sequence[str], seed: int) -> tuple[str, ...]:
     return tuple(levels[index] for index in order)
 
 
-RULES: Mapping[str, Rule] = {"as_written": as_written, "shuffled": shuffled}
+def complete(levels: Sequence[str], turn: Turn, times: int, most: int | None) -> tuple[str, ...]:
+    """Shuffle all repetitions together: complete randomisation."""
+    if most is None:
+        return shuffled(tuple(levels) * times, turn.seed)
+    return sequence(levels, times, most, turn.seed)
+
+
+def blocked(levels: Sequence[str], turn: Turn, times: int, most: int | None) -> tuple[str, ...]:
+    """Shuffle each repetition by itself, so that all levels come before any comes again."""
+    random = np.random.default_rng(turn.seed)
+    chosen: list[str] = []
+    for _ in range(times):
+        order = random.permutation(len(levels))
+        # A level can be its own neighbour only where two repetitions meet.
+        while most == 1 and len(levels) > 1 and chosen and levels[order[0]] == chosen[-1]:
+            order = random.permutation(len(levels))
+        chosen += [levels[index] for index in order]
+    return tuple(chosen)
+
+
+def written(levels: Sequence[str], turn: Turn, times: int, most: int | None) -> tuple[str, ...]:
+    """Repeat the levels as the protocol has them."""
+    del turn, most
+    return tuple(levels) * times
+
+
+def _row_of(square: Callable[[int], Square]) -> "Rule":
+    def rule(levels: Sequence[str], turn: Turn, times: int, most: int | None) -> tuple[str, ...]:
+        del most
+        rows = square(len(levels))
+        return tuple(levels[index] for index in rows[turn.place % len(rows)]) * times
+
+    return rule
+
+
+Rule = Callable[[Sequence[str], Turn, int, int | None], tuple[str, ...]]
+"""Levels, whose turn, repetitions of each level, most in a row -> the order."""
+
+RULES: Mapping[str, Rule] = {
+    "as_written": written,
+    "shuffled": complete,
+    "blocked": blocked,
+    "latin_square": _row_of(latin_square),
+    "williams": _row_of(williams),
+}
 """What a protocol may say under ``design: order:``."""
+
+SQUARES: Mapping[str, Callable[[int], Square]] = {
+    "latin_square": latin_square,
+    "williams": williams,
+}
+"""Rules that give each participant a row of a square."""
+
+LIMITED = frozenset({"shuffled", "blocked"})
+"""Rules that can be told how often a level may come in a row."""

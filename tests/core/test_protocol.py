@@ -79,7 +79,7 @@ def test_the_protocol_of_these_tests_is_fine(complaint) -> None:
         ("use: kinematic_crane", "use: kinematic_crane, actuatr: ideal", "11: 'actuatr' is not a key of dynamics; did you mean 'actuator'?"),
         ("distances: [2, 3]", "distances: [2, -3]", "13: tasks.aiming.distances[2] is -3; it must be greater than 0"),
         ("distances: [2, 3]", "distances: 2 m", "13: tasks.aiming.distances is '2 m'; it must be a valid tuple"),
-        ("pairs: shuffled", "pairs: randomly", "15: design.order: pairs is 'randomly'; it can be as_written, shuffled"),
+        ("pairs: shuffled", "pairs: randomly", "15: design.order: pairs is 'randomly'; it can be as_written, blocked, latin_square, shuffled, williams"),
         ("pairs: shuffled", "paris: shuffled", "15: no task varies 'paris'; they vary pairs"),
         ("hello.md", "goodbye.md", None),
         ("- break:", "- brake:", "22: 'brake' is not a step; did you mean 'break'?"),

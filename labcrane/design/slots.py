@@ -1,0 +1,38 @@
+"""Slots: places in the design, each of one participant at a time.
+
+A slot says the between-subject group and the row of every square. Whoever drops out leaves a slot
+to the next one who comes, so that groups stay equal.
+"""
+
+from collections import Counter
+from collections.abc import Collection, Sequence
+
+from labcrane.design.order import shuffled
+from labcrane.design.seeds import derive
+
+
+def group_of(study: str, groups: Sequence[str], slot: int) -> str:
+    """Return the group of a slot, counted from 1; "" when the study has no groups.
+
+    Each run of as many slots as there are groups holds every group once, in an order of its own.
+    """
+    if not groups:
+        return ""
+    run, place = divmod(slot - 1, len(groups))
+    return shuffled(groups, derive(study, "groups", run + 1))[place]
+
+
+def place_of(groups: Sequence[str], slot: int) -> int:
+    """Return how many slots of the same group come before this one."""
+    return (slot - 1) // max(1, len(groups))
+
+
+def next_slot(study: str, groups: Sequence[str], taken: Collection[int]) -> int:
+    """Return the slot of the next participant: a free one, of the smallest group, the first such.
+
+    Slots are handed out in order, so that free ones among them were left by someone.
+    """
+    last = max(taken, default=0)
+    free = [slot for slot in range(1, last + 1) if slot not in taken] or [last + 1]
+    sizes = Counter(group_of(study, groups, slot) for slot in taken)
+    return min(free, key=lambda slot: (sizes[group_of(study, groups, slot)], slot))
