@@ -1,0 +1,110 @@
+"""The codebook: every column that a session records, with its unit and its source."""
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+
+from labcrane import rig
+from labcrane.attempt import UNITS, trial_units
+from labcrane.frame_log import LOOP
+from labcrane.plan import plan_session
+from labcrane.pseudonyms import pseudonyms
+from labcrane.records import Value
+from labcrane.signals import Layout
+from labcrane.study import Study
+
+CORE = "labcrane"
+ABOUT = ("trial", "attempt", "block", "block_name", "practice", "group", "outcome", "completion")
+"""Columns of the trial table that are labcrane's own, besides those with units."""
+
+EVENTS = (("time", "s"), ("tick", "1"), ("part", "1"), ("trial", "1"), ("name", ""), ("data", ""))
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column.
+
+    Attributes
+    ----------
+    table
+        Where it is: a group of the participant file.
+    name
+        Dotted path within the table.
+    unit
+        SI symbol; "1" when dimensionless, "" for texts.
+    source
+        Who makes it: labcrane, or a plugin and what it offers.
+    """
+
+    table: str
+    name: str
+    unit: str
+    source: str
+
+
+def codebook(study: Study) -> list[Column]:
+    """Return every column of frames, events and trials; nothing is opened for it."""
+    parts = rig.build(study, simulated=False)
+    tasks = {choice.name: choice for choice in study.task_choices.values()}
+    task_source = ", ".join(f"{choice.plugin}: {choice.name}" for choice in tasks.values())
+    found = [Column("loop", name, unit, CORE) for name, unit in LOOP]
+    for table, component, source in (
+        ("input", parts.input, f"{study.input.plugin}: {study.input.name}"),
+        ("command", parts.controller, f"{study.scheme.plugin}: {study.scheme.name}"),
+        ("state", parts.dynamics, f"{study.dynamics.plugin}: {study.dynamics.name}"),
+        ("task", next(iter(study.tasks.values())), task_source),
+    ):
+        layout = Layout(table, component.signals)
+        names = zip(layout.columns, layout.units, strict=True)
+        found += [Column(table, name, unit, source) for name, unit in names]
+    found += [Column("events", name, unit, CORE) for name, unit in EVENTS]
+    return found + _trials(study)
+
+
+def _trials(study: Study) -> list[Column]:
+    found: dict[str, Column] = {}
+    about = [name for name in ABOUT if name != "group" or study.protocol.design.groups]
+    for name in (*about, *UNITS):
+        found[name] = Column("trials", name, UNITS.get(name, ""), CORE)
+    for name, (task, values) in _conditions(study).items():
+        choice = study.task_choices[task]
+        unit = trial_units(study.tasks[task]).get(name, "" if _is_text(values) else "1")
+        found[name] = Column("trials", name, unit, f"{choice.plugin}: {choice.name}")
+    for task, choice in study.task_choices.items():
+        for signal in study.tasks[task].results:
+            for name in signal.columns:
+                source = f"{choice.plugin}: {choice.name}"
+                found[name] = Column("trials", name, signal.unit, source)
+    return list(found.values())
+
+
+def _conditions(study: Study) -> dict[str, tuple[str, list[Value]]]:
+    """Return what is varied, with all values, of one participant's plan."""
+    (someone,) = pseudonyms(study.protocol.participants.pattern, 1)
+    found: dict[str, tuple[str, list[Value]]] = {}
+    for number in range(1, len(study.protocol.sessions) + 1):
+        for block in plan_session(study, someone, number).blocks:
+            for trial in block.trials:
+                if trial.planned.counted:
+                    for name, value in trial.planned.condition.items():
+                        found.setdefault(name, (block.task, []))[1].append(value)
+    return found
+
+
+def _is_text(values: Sequence[Value]) -> bool:
+    return any(isinstance(value, str) for value in values)
+
+
+def rows(columns: Sequence[Column]) -> list[dict[str, str]]:
+    """Return the codebook ready for JSON."""
+    return [asdict(column) for column in columns]
+
+
+def as_csv(codebook_rows: Sequence[Mapping[str, str]]) -> str:
+    """Return the codebook as comma-separated values."""
+    out = io.StringIO()
+    writer = csv.DictWriter(out, ["table", "name", "unit", "source"], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(codebook_rows)
+    return out.getvalue()

@@ -1,0 +1,164 @@
+"""Approve a study, amend it, and see whether it still is what was approved."""
+
+import os
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+
+from labcrane.approval import codebook
+from labcrane.approval.difference import differences
+from labcrane.approval.lock import FORMAT, VERSION, Lock, lock_path, read_lock
+from labcrane.approval.materials import materials
+from labcrane.durable_file import copy
+from labcrane.errors import ProtocolError
+from labcrane.registry import Registry
+from labcrane.study import Study
+
+
+@dataclass(frozen=True, slots=True)
+class Grant:
+    """What a board has granted.
+
+    Attributes
+    ----------
+    board, reference
+        Who approved the study, and under which number.
+    valid_until
+        Last day on which a person may take part.
+    consent
+        The consent text, in the protocol's folder or below it.
+    """
+
+    board: str
+    reference: str
+    valid_until: date
+    consent: Path
+
+
+def approve(study: Study, registry: Registry, grant: Grant, today: date) -> Lock:
+    """Write the lock of a study that has none.
+
+    Raises
+    ------
+    ProtocolError
+        The study has a lock, or the grant is not possible.
+    """
+    if lock_path(study.path).exists():
+        raise ProtocolError(
+            f"{study.path} has been approved already, under "
+            f"{read_lock(study.path).approval['reference']!r}; record changes with labcrane amend"
+        )
+    lock = _lock(study, registry, grant, today, [])
+    lock.write()
+    return lock
+
+
+def amend(study: Study, registry: Registry, grant: Grant, why: str, today: date) -> Lock:
+    """Replace the lock by one of the study as it is now, and keep the history.
+
+    The lock that was replaced stays beside it, as ``protocol.lock.1.json``.
+
+    Raises
+    ------
+    ProtocolError
+        Nothing has changed, or the grant is not possible.
+    """
+    old = read_lock(study.path)
+    new = _lock(study, registry, grant, today, old.amendments)
+    changes = differences(old.content["materials"], new.content["materials"])
+    changes += [
+        f"approval: {name} was {old.approval[name]!r}, is {new.approval[name]!r}"
+        for name in ("board", "valid_until", "consent")
+        if old.approval[name] != new.approval[name]
+    ]
+    if not changes:
+        raise ProtocolError(
+            f"{study.path} is as it was approved; there is nothing to amend"
+        )
+    if not why.strip():
+        raise ProtocolError("an amendment needs a reason; give one with --why")
+    entry = {
+        "number": len(old.amendments) + 1,
+        "date": today.isoformat(),
+        "reference": grant.reference,
+        "why": why,
+        "changes": changes,
+        "replaces": old.seal,
+    }
+    kept = old.path.with_name(old.path.name.replace(".json", f".{entry['number']}.json"))
+    copy(old.path, kept)
+    amended = Lock(new.path, {**new.content, "history": [*old.amendments, entry]})
+    amended.write()
+    return amended
+
+
+def drift(study: Study, registry: Registry, lock: Lock) -> list[str]:
+    """Return what differs from what was approved, in words; nothing when nothing does."""
+    now = materials(study, registry, lock.consent)
+    return differences(lock.content["materials"], now)
+
+
+def verify(study: Study, registry: Registry, today: date) -> Lock:
+    """Return the lock of a study that may be run with people today.
+
+    Raises
+    ------
+    ProtocolError
+        It was not approved, the approval has expired, or the study is not the approved one; the
+        message has every difference on a line of its own.
+    """
+    lock = read_lock(study.path)
+    lock.check_date(today)
+    if changes := drift(study, registry, lock):
+        listed = "\n".join(f"  {change}" for change in changes)
+        raise ProtocolError(
+            f"{study.path} is not the study that was approved under "
+            f"{lock.approval['reference']!r}:\n{listed}\n"
+            "undo the changes, record the board's decision with labcrane amend, or use --pilot"
+        )
+    return lock
+
+
+def _lock(
+    study: Study, registry: Registry, grant: Grant, today: date, history: list[dict[str, object]]
+) -> Lock:
+    if grant.valid_until < today:
+        raise ProtocolError(
+            f"the approval ended on {grant.valid_until}, today is {today}; give the day until "
+            "which it is valid"
+        )
+    consent = _consent(study, grant.consent)
+    return Lock(
+        lock_path(study.path),
+        {
+            "format": FORMAT,
+            "format_version": VERSION,
+            "study": study.protocol.study,
+            "title": study.protocol.title,
+            "approval": {
+                "board": grant.board,
+                "reference": grant.reference,
+                "approved": today.isoformat(),
+                "valid_until": grant.valid_until.isoformat(),
+                "consent": consent.relative_to(study.path.parent).as_posix(),
+            },
+            "materials": materials(study, registry, consent),
+            "machine_title": study.machine.title,
+            "codebook": codebook.rows(codebook.codebook(study)),
+            "history": history,
+        },
+    )
+
+
+def _consent(study: Study, consent: Path) -> Path:
+    """Return the consent text as a path through the protocol's folder, with which it moves."""
+    if not consent.is_file():
+        raise ProtocolError(f"there is no consent text {consent}; give its file with --consent")
+    folder = Path(os.path.abspath(study.path.parent))  # noqa: PTH100 - links are left as they are
+    absolute = Path(os.path.abspath(consent))  # noqa: PTH100
+    if not absolute.is_relative_to(folder):
+        raise ProtocolError(
+            f"the consent text {consent} is not in the folder of the protocol, {folder}; put it "
+            "there, so that it moves with the study"
+        )
+    return study.path.parent / absolute.relative_to(folder)

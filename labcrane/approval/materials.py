@@ -1,0 +1,164 @@
+"""Everything that a protocol refers to, as plain data that can be compared and hashed."""
+
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
+from importlib.metadata import EntryPoint, entry_points, version
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from labcrane.approval.source_tree import hashes
+from labcrane.hookspecs import PROJECT
+from labcrane.registry import Registry
+from labcrane.study import Study
+from labcrane.yaml_file import YamlFile
+
+DATA = frozenset({".yaml", ".yml", ".json"})
+WORDS_ONLY = frozenset({"study", "title", "participants", "operator", "labcrane"})
+"""Keys of a protocol under which no plugin for people is named."""
+
+
+def materials(
+    study: Study,
+    registry: Registry,
+    consent: Path | None = None,
+    plugins: Iterable[EntryPoint] | None = None,
+) -> dict[str, Any]:
+    """Return what ``study`` consists of, ready for JSON.
+
+    The protocol and YAML or JSON files count as data: white space and comments in them do not
+    matter. Other texts count line by line, everything else, and all source, byte by byte. Nothing
+    in it depends on the computer or on where the study lies.
+
+    Parameters
+    ----------
+    consent
+        The consent text, which belongs to the study without being named in the protocol.
+    plugins
+        Installed plugins, instead of those that are really there.
+    """
+    protocol = YamlFile.read(study.path).data
+    folder = study.path.parent
+    named = {path.relative_to(folder).as_posix(): path for path in referred(protocol, folder)}
+    found: dict[str, Any] = {
+        "protocol": protocol,
+        "files": {name: content(path) for name, path in sorted(named.items())},
+        "machine": content_of_text(study.machine_text, data=True),
+        "settings": settings(study),
+        "plugins": _plugins(study, registry, protocol, plugins),
+        "labcrane": {"version": version("labcrane"), "files": hashes("labcrane")},
+    }
+    if consent is not None and consent.is_file():
+        found["consent"] = {consent.relative_to(folder).as_posix(): content(consent)}
+    return found
+
+
+def settings(study: Study) -> dict[str, Any]:
+    """Return the settings of every component for people, defaults included."""
+    choices = {"input": study.input, "scheme": study.scheme, "dynamics": study.dynamics}
+    choices |= {f"tasks.{name}": choice for name, choice in study.task_choices.items()}
+    return {part: choice.settings.model_dump(mode="json") for part, choice in choices.items()}
+
+
+def referred(data: object, folder: Path) -> list[Path]:
+    """Return the files that ``data`` names, and those that these name, below ``folder``.
+
+    Every text that is the path of a file counts, whatever stands before it; a folder counts with
+    all that is in it when it is written with a slash.
+    """
+    found: dict[Path, None] = {}
+    waiting = list(_strings(data))
+    while waiting:
+        for path in _paths(waiting.pop(), folder):
+            if path in found:
+                continue
+            found[path] = None
+            if path.suffix in DATA:
+                waiting += _strings(_parsed(path.read_text(encoding="utf-8")))
+    return list(found)
+
+
+def _paths(text: str, folder: Path) -> list[Path]:
+    if not text or len(text) > 255 or "\n" in text or "\0" in text:  # noqa: PLR2004 - NAME_MAX
+        return []
+    path = folder / text
+    if not path.resolve().is_relative_to(folder.resolve()):
+        return []
+    if path.is_file():
+        return [path]
+    if path.is_dir() and "/" in text:
+        return [file for file in sorted(path.rglob("*")) if file.is_file()]
+    return []
+
+
+def _strings(data: object) -> Iterator[str]:
+    if isinstance(data, str):
+        yield data
+    elif isinstance(data, Mapping):
+        for key, value in data.items():
+            yield str(key)
+            yield from _strings(value)
+    elif isinstance(data, list):
+        for value in data:
+            yield from _strings(value)
+
+
+def content(path: Path) -> dict[str, Any]:
+    """Return what a file says, as far as it can be compared in words."""
+    raw = path.read_bytes()
+    try:
+        text = raw.decode("utf-8")
+    except UnicodeDecodeError:
+        text = ""
+    if not text or "\0" in text or path.suffix == ".pdf":
+        return {"sha256": hashlib.sha256(raw).hexdigest()}
+    return content_of_text(text, data=path.suffix in DATA)
+
+
+def content_of_text(text: str, *, data: bool) -> dict[str, Any]:
+    """Return a text as data when it is YAML or JSON, else as lines, whatever ends them."""
+    if data and (parsed := _parsed(text)) is not None:
+        return {"data": parsed}
+    return {"lines": [line.rstrip("\r") for line in text.removesuffix("\n").split("\n")]}
+
+
+def _parsed(text: str) -> Any:
+    """Return YAML, of which JSON is a part, as plain data; None if it is none."""
+    try:
+        return _json_like(YAML(typ="safe").load(text))
+    except YAMLError:
+        return None
+
+
+def _json_like(value: object) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _json_like(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_json_like(item) for item in value]
+    return value if isinstance(value, bool | int | float | str | None) else str(value)
+
+
+def _plugins(
+    study: Study,
+    registry: Registry,
+    protocol: Mapping[str, Any],
+    plugins: Iterable[EntryPoint] | None,
+) -> dict[str, Any]:
+    """Return version and source of every plugin that offers something the protocol names."""
+    choices = (study.input, study.scheme, study.dynamics, *study.task_choices.values())
+    used = {choice.plugin for choice in choices}
+    said = set(
+        _strings({key: value for key, value in protocol.items() if key not in WORDS_ONLY})
+    )
+    for offers in registry.plugins.values():
+        used |= {plugin for name, plugin in offers.items() if name in said}
+    points = {point.name: point for point in plugins or entry_points(group=PROJECT)}
+    return {
+        name: {
+            "version": points[name].dist.version if points[name].dist else "unknown",
+            "files": hashes(points[name].module.split(".")[0]),
+        }
+        for name in sorted(used)
+    }

@@ -1,0 +1,125 @@
+"""The Methods paragraph of a paper, from the lock alone."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from labcrane.approval.lock import Lock
+
+
+def methods(lock: Lock) -> str:
+    """Return the paragraph, as Markdown."""
+    materials = lock.content["materials"]
+    protocol: Mapping[str, Any] = materials["protocol"]
+    sentences = [
+        f"The study “{lock.content['title']}” was approved by {lock.approval['board']} "
+        f"(reference {lock.approval['reference']}, valid until {lock.approval['valid_until']})"
+        + _amended(lock),
+        *_people(protocol),
+        f"Participants operated the {lock.content['machine_title']} "
+        f"({_use(protocol['dynamics'])}) with the input {_use(protocol['input'])} under the "
+        f"scheme {_use(protocol['scheme'])}",
+        f"The simulation ran at {_number(protocol.get('rate_hz', 240))} Hz, and every tick was "
+        "recorded",
+        *_tasks(protocol),
+        *_design(protocol),
+        *_sessions(protocol),
+        f"The software was labcrane {materials['labcrane']['version']} with the plug-ins "
+        + ", ".join(f"{name} {plugin['version']}" for name, plugin in materials["plugins"].items())
+        + f"; protocol, materials and source were locked (SHA-256 {lock.materials_sha256})",
+    ]
+    return ". ".join(sentences) + ".\n"
+
+
+def _amended(lock: Lock) -> str:
+    if not lock.amendments:
+        return ""
+    listed = ", ".join(
+        f"{entry['reference']} on {entry['date']} ({entry['why']})" for entry in lock.amendments
+    )
+    return f" and amended: {listed}"
+
+
+def _people(protocol: Mapping[str, Any]) -> list[str]:
+    planned = protocol.get("participants", {}).get("planned", 1)
+    said = [f"It was planned with {planned} participant{'s' * (planned != 1)}, under pseudonyms"]
+    if groups := protocol.get("design", {}).get("groups"):
+        said.append(
+            f"They were allocated to {len(groups)} groups ({', '.join(groups)}) in permuted "
+            f"blocks of {len(groups)}; places of those who dropped out were filled again"
+        )
+    return said
+
+
+def _tasks(protocol: Mapping[str, Any]) -> list[str]:
+    return [
+        f"Task {name} was {_use(task)} with {_listed(task)}"
+        if len(task) > 1
+        else f"Task {name} was {_use(task)}"
+        for name, task in protocol["tasks"].items()
+    ]
+
+
+ORDERS = {
+    "as_written": "in a fixed order",
+    "shuffled": "in a completely randomised order",
+    "blocked": "in randomised blocks",
+    "latin_square": "in the orders of a Latin square",
+    "williams": "in the orders of a Williams design, balanced for first-order carry-over",
+}
+
+
+def _design(protocol: Mapping[str, Any]) -> list[str]:
+    said = []
+    for factor, order in protocol.get("design", {}).get("order", {}).items():
+        rule = {"rule": order} if isinstance(order, str) else order
+        words = f"The levels of {factor} came {ORDERS[rule['rule']]}"
+        if rule.get("times", 1) > 1:
+            words += f", {rule['times']} times each"
+        if rule.get("in_a_row"):
+            words += f", no more than {rule['in_a_row']} in a row"
+        said.append(words)
+    return said
+
+
+def _sessions(protocol: Mapping[str, Any]) -> list[str]:
+    said = []
+    for number, session in enumerate(protocol["sessions"], start=1):
+        words = f"Session {number} ({session['name']})"
+        if days := session.get("after_days"):
+            words += f", {days[0]} to {days[1]} days after the one before,"
+        said.append(f"{words} consisted of {', '.join(map(_step, session['steps']))}")
+    return said
+
+
+def _step(step: str | Mapping[str, Any]) -> str:
+    if isinstance(step, str):
+        return step
+    ((kind, value),) = step.items()
+    if not isinstance(value, Mapping):
+        return f"{kind} ({value})"
+    name = value.get("name") or value.get("task")
+    times = value.get("repeat", 1)
+    label = f"{kind} {name}" if name else f"{kind} ({_listed(value)})"
+    return f"{times} times {label}" if times > 1 else label
+
+
+def _use(component: Mapping[str, Any]) -> str:
+    return str(component["use"]).replace("_", " ")
+
+
+def _listed(settings: Mapping[str, Any]) -> str:
+    return ", ".join(
+        f"{name.replace('_', ' ')} {_value(value)}"
+        for name, value in settings.items()
+        if name != "use"
+    )
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, list):
+        return " and ".join(map(_value, value)) if len(value) < 3 else ", ".join(map(_value, value))  # noqa: PLR2004 - a list of two is read aloud with "and"
+    return _number(value) if isinstance(value, float) else str(value)
+
+
+def _number(value: float) -> str:
+    return f"{value:g}"

@@ -1,0 +1,73 @@
+"""Files that are replaced whole: a kill leaves the old one or the new one, never a part."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from labcrane.errors import RecordingError
+
+PRIVATE_FILE = 0o600
+PRIVATE_FOLDER = 0o700
+"""Permissions of what concerns people: for the user only."""
+
+UNFINISHED = ".unfinished"
+"""How the name of a file ends that is being written beside the one it will replace."""
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write ``path`` for the user only, bring it to the disk, and give it its name at last."""
+    with replacing(path) as beside:
+        beside.write_text(text, encoding="utf-8", newline="\n")
+
+
+def copy(source: Path, path: Path) -> None:
+    """Copy a file in the same way."""
+    with replacing(path) as beside:
+        shutil.copyfile(source, beside)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a new file to be written; it takes the name ``path`` once it is on the disk.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be written; ``path`` is as it was.
+    """
+    beside = path.with_name(f".{path.name}{UNFINISHED}")
+    try:
+        make_folder(path.parent)
+        beside.unlink(missing_ok=True)  # left by a process that was killed
+        os.close(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, PRIVATE_FILE))
+        yield beside
+        with beside.open("rb") as file:
+            os.fsync(file.fileno())
+        beside.replace(path)
+    except OSError as error:
+        beside.unlink(missing_ok=True)
+        raise RecordingError(
+            f"cannot write {path}: {error.strerror or error}; it is as it was"
+        ) from error
+    sync_folder(path.parent)
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder and those above it, where they are missing, for the user only."""
+    for folder in reversed([path, *path.parents]):
+        if not folder.exists():
+            folder.mkdir(mode=PRIVATE_FOLDER, exist_ok=True)
+
+
+def sync_folder(path: Path) -> None:
+    """Bring the names in a folder to the disk, where the system can."""
+    try:
+        fd = os.open(path, os.O_RDONLY)
+    except PermissionError:  # Windows opens no folders, and needs no sync of them
+        return
+    try:
+        os.fsync(fd)
+    finally:
+        os.close(fd)

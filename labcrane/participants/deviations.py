@@ -1,0 +1,96 @@
+"""What did not go as the protocol says, from the events of a session."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+from labcrane.participants.places import Places
+from labcrane.participants.register import Deviation, Entry, changed, read
+from labcrane.recording.journal_reader import LoggedEvent, read_journal
+from labcrane.recording.parts import journal_path, parts
+
+ORDERS = {
+    "order.skip": "skipped",
+    "order.repeat": "trial repeated",
+    "order.override": "automatic end overridden",
+    "order.completion": "completion set by the examiner",
+}
+
+
+def of_events(session: int, events: Iterable[LoggedEvent]) -> list[Deviation]:
+    """Return the deviations among the events of one session, in order."""
+    found: list[Deviation] = []
+    trial, begun = 0, 0
+    for event in events:
+        if event.name == "trial.start":
+            trial = int(event.data.get("trial", 0))
+        if event.name == "session.start":
+            begun += 1
+            if begun > 1:
+                found.append(Deviation(what="restarted", session=session, detail="after a stop"))
+        elif (said := _said(event.name, event.data)) is not None:
+            what, detail = said
+            found.append(Deviation(what=what, session=session, trial=trial, detail=detail))
+        if event.name == "trial.end":
+            trial = 0
+    return found
+
+
+def _said(name: str, data: Mapping[str, Any]) -> tuple[str, str] | None:
+    """Return what kind of deviation an event is, and what else is to be said of it."""
+    if name in ORDERS and not data.get("refused"):
+        return ORDERS[name], str(data.get("text") or "")
+    if name == "input.lost":
+        return "input lost", str(data.get("why") or "")
+    if name == "break.end" and float(data.get("left") or 0) > 0:
+        return "break shortened", f"by {float(data['left']):.1f} s"
+    if name == "practice.end" and not data.get("met"):
+        return "practice criterion not met", f"{data.get('in_a_row')} of {data.get('wanted')}"
+    if name == "session.end" and data.get("reason") != "complete":
+        return "session ended early", str(data.get("reason") or "")
+    return None
+
+
+def of_journals(folder: Path, session: int) -> list[Deviation]:
+    """Return the deviations of a recorded session; one that was cut off is a deviation itself."""
+    found = parts(journal_path(folder, session, "run"))
+    if not found:
+        return []
+    log, _ = read_journal(found)
+    deviations = of_events(session, log.events)
+    if not any(event.name == "session.end" for event in log.events):
+        deviations.append(
+            Deviation(what="session cut off", session=session, detail="the program was stopped")
+        )
+    return deviations
+
+
+def settle(places: Places, participant: str, session: int) -> None:
+    """Write the deviations of a session that is over into the register.
+
+    A session that never came to be recorded was none, and is taken out.
+    """
+    recorded = bool(parts(journal_path(places.raw(participant), session, "run")))
+    found = of_journals(places.raw(participant), session)
+    with changed(places) as register:
+        entry = register.entry(participant)
+        if not recorded:
+            entry.sessions = [known for known in entry.sessions if known.session != session]
+        for sitting in entry.sessions:
+            if sitting.session == session:
+                sitting.deviations = found
+
+
+def all_deviations(places: Places) -> list[tuple[str, Deviation]]:
+    """Return every participant's deviations; those of killed sessions from their journals."""
+    return [
+        (name, deviation)
+        for name, entry in sorted(read(places).participants.items())
+        for deviation in (*entry.deviations, *_of_sessions(places.raw(name), entry))
+    ]
+
+
+def _of_sessions(folder: Path, entry: Entry) -> Iterable[Deviation]:
+    for sitting in sorted(entry.sessions, key=lambda sitting: sitting.session):
+        recorded = sitting.deviations
+        yield from of_journals(folder, sitting.session) if recorded is None else recorded

@@ -1,0 +1,120 @@
+"""Into the register: slot, consent, exclusion, notes."""
+
+from datetime import date
+from typing import Literal
+
+from labcrane.design.seeds import derive
+from labcrane.design.slots import group_of, next_slot
+from labcrane.errors import ProtocolError
+from labcrane.participants.places import Places
+from labcrane.participants.register import Consent, Deviation, Entry, Exclusion, Register, changed
+from labcrane.privacy import personal
+from labcrane.study import Study
+
+
+def enrol(places: Places, study: Study, participant: str, today: date) -> Entry:
+    """Give a participant a slot in the design; return the entry, the old one if there is one.
+
+    Raises
+    ------
+    ProtocolError
+        The pseudonym is not possible, was erased, or the register is of another study.
+    """
+    study.check_participant(participant)
+    with changed(places) as register:
+        return _entry(register, study, participant, today)
+
+
+def _entry(register: Register, study: Study, participant: str, today: date) -> Entry:
+    register.check_finished()
+    name = study.protocol.study
+    if register.study not in {"", name}:
+        raise ProtocolError(
+            f"the register is of study {register.study!r}, the protocol of {name!r}; give the "
+            "study's own data folder with --data"
+        )
+    register.study, register.pattern = name, study.protocol.participants.pattern
+    if participant in register.participants:
+        return register.participants[participant]
+    if any(stone.participant == participant for stone in register.tombstones):
+        raise ProtocolError(f"{participant} was erased; give the next participant a new pseudonym")
+    groups = tuple(study.protocol.design.groups)
+    slot = next_slot(name, groups, register.slots())
+    entry = Entry(
+        slot=slot,
+        group=group_of(name, groups, slot),
+        seed=derive(name, participant),
+        enrolled=today.isoformat(),
+    )
+    register.participants[participant] = entry
+    return entry
+
+
+def confirm_consent(
+    places: Places,
+    study: Study,
+    participant: str,
+    text: tuple[str, str],
+    today: date,
+    by: Literal["examiner", "participant"] = "examiner",
+) -> Entry:
+    """Record that a participant has consented, and enrol the participant if need be.
+
+    Parameters
+    ----------
+    text
+        File and version of the consent text in the lock.
+    """
+    study.check_participant(participant)
+    file, version = text
+    with changed(places) as register:
+        entry = _entry(register, study, participant, today)
+        if all(consent.version != version for consent in entry.consent):
+            entry.consent.append(
+                Consent(version=version, file=file, date=today.isoformat(), by=by)
+            )
+    return entry
+
+
+def exclude(
+    places: Places, participant: str, reason: str, today: date, *, keep_slot: bool = False
+) -> None:
+    """Record that a participant's data are not used, or that the participant has dropped out.
+
+    The slot is free for another one, unless it is to be kept.
+    """
+    check_words(reason, "reason")
+    with changed(places) as register:
+        entry = register.entry(participant)
+        entry.exclusion = Exclusion(date=today.isoformat(), reason=reason)
+        entry.holds_slot = keep_slot
+
+
+def note(places: Places, participant: str, text: str) -> None:
+    """Keep a note on a participant."""
+    check_words(text, "note")
+    with changed(places) as register:
+        register.entry(participant).notes.append(text)
+
+
+def waive(places: Places, participant: str, session: int, reason: str, today: date) -> None:
+    """Let a session be run out of its window, which is a deviation."""
+    check_words(reason, "reason")
+    with changed(places) as register:
+        entry = register.entry(participant)
+        entry.waivers[str(session)] = reason
+        entry.deviations.append(
+            Deviation(
+                what="window waived", session=session, detail=reason, date=today.isoformat()
+            )
+        )
+
+
+def check_words(text: str, what: str) -> None:
+    """Refuse words that lead to a person, or none at all."""
+    if not text.strip():
+        raise ProtocolError(f"a {what} needs words")
+    if found := personal(text):
+        raise ProtocolError(
+            f"the {what} holds {found}, which would lead to a person; write it without"
+        )

@@ -1,0 +1,238 @@
+"""The register: who takes part, without names.
+
+One JSON file, always replaced whole while a lock is held, so that two processes can write at once
+and a kill leaves it as it was before or after a change.
+"""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from labcrane.durable_file import write_text
+from labcrane.errors import ProtocolError, RecordingError
+from labcrane.participants.exclusive import exclusive
+from labcrane.participants.places import Places
+
+
+class Record(BaseModel):
+    """A part of the register."""
+
+    model_config = ConfigDict(
+        extra="forbid", use_attribute_docstrings=True, validate_assignment=True
+    )
+
+
+class Consent(Record):
+    """One confirmation that a person has consented."""
+
+    version: str
+    """Which text: the hash in the lock, shortened."""
+    file: str
+    date: str
+    by: Literal["examiner", "participant"]
+
+
+class Deviation(Record):
+    """Something that did not go as the protocol says."""
+
+    what: str
+    session: int = 0
+    """0 where it belongs to no session."""
+    trial: int = 0
+    """0 where it belongs to no trial."""
+    detail: str = ""
+    date: str = ""
+
+
+class Sitting(Record):
+    """One session that was begun."""
+
+    session: int
+    date: str
+    """Day on which it began, ISO."""
+    lock: str
+    """Seal of the lock under which it was run."""
+    amendment: int
+    """How many amendments the study had then."""
+    consent: str
+    """Version of the consent text."""
+    deviations: list[Deviation] | None = None
+    """None until they have been taken from the recording."""
+
+
+class Exclusion(Record):
+    """Why a participant's data are not used, or why the participant left."""
+
+    date: str
+    reason: str
+
+
+class Entry(Record):
+    """One participant.
+
+    A participant who was excluded or has dropped out leaves the slot to another one; ``slot``
+    remains, since it says what the participant's sessions were.
+    """
+
+    slot: int = Field(ge=1)
+    group: str = ""
+    seed: int
+    enrolled: str
+    holds_slot: bool = True
+    consent: list[Consent] = Field(default_factory=list)
+    sessions: list[Sitting] = Field(default_factory=list)
+    exclusion: Exclusion | None = None
+    waivers: dict[str, str] = Field(default_factory=dict)
+    """Sessions that may be run out of their window, and why."""
+    notes: list[str] = Field(default_factory=list)
+    deviations: list[Deviation] = Field(default_factory=list)
+    formerly: list[str] = Field(default_factory=list)
+    """Pseudonyms under which the data were recorded by mistake."""
+
+
+class Export(Record):
+    """Where data of participants have gone."""
+
+    date: str
+    exporter: str
+    folder: str
+    files: dict[str, list[str]]
+    """The participants in each file, by its path in the folder."""
+
+
+class Tombstone(Record):
+    """What is left of a participant who was erased."""
+
+    participant: str
+    date: str
+    reason: str
+
+
+class Owed(Record):
+    """Copies under a pseudonym that are to be removed once their folder can be reached."""
+
+    participant: str
+    to: str | None = None
+    """The right pseudonym; None when the participant was erased."""
+    folder: str
+    files: dict[str, list[str]] = Field(default_factory=dict)
+    """The participants in each file of an export; empty for a store."""
+
+
+class Work(Record):
+    """Something that has been begun, and is to be finished by whoever comes next."""
+
+    kind: Literal["erase", "relabel"]
+    participant: str
+    to: str = ""
+    reason: str = ""
+    date: str
+
+
+class Register(Record):
+    """Everything that is kept about the participants of one study."""
+
+    format: Literal["labcrane register"] = "labcrane register"
+    format_version: Literal[1] = 1
+    study: str = ""
+    pattern: str = ""
+    """What pseudonyms of the study match."""
+    participants: dict[str, Entry] = Field(default_factory=dict)
+    exports: list[Export] = Field(default_factory=list)
+    stores: dict[str, dict[str, str]] = Field(default_factory=dict)
+    """The lab's stores, and the SHA-256 of every file that labcrane has put there."""
+    tombstones: list[Tombstone] = Field(default_factory=list)
+    owed: list[Owed] = Field(default_factory=list)
+    work: Work | None = None
+
+    def check_finished(self) -> None:
+        """Raise :class:`ProtocolError` while something that was begun is not finished."""
+        if self.work is not None:
+            raise ProtocolError(
+                f"labcrane {self.work.kind} {self.work.participant} was interrupted; any call of "
+                "labcrane erase, relabel or transfer finishes it"
+            )
+
+    def entry(self, participant: str) -> Entry:
+        """Return a participant, or say who there is."""
+        if participant in self.participants:
+            return self.participants[participant]
+        for stone in self.tombstones:
+            if stone.participant == participant:
+                raise ProtocolError(f"participant {participant} was erased on {stone.date}")
+        known = ", ".join(sorted(self.participants)) or "nobody"
+        raise ProtocolError(
+            f"participant {participant} is not in the register; it has {known}"
+        )
+
+    def slots(self) -> dict[int, str]:
+        """Return who holds which slot."""
+        return {
+            entry.slot: name for name, entry in self.participants.items() if entry.holds_slot
+        }
+
+
+def read(places: Places) -> Register:
+    """Return the register as it is; an empty one if there is none.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be read, or was edited into something impossible.
+    """
+    path = places.register
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return Register()
+    try:
+        register = Register.model_validate(json.loads(text, object_pairs_hook=_each_once))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise RecordingError(_damaged(places, f"{where}: {first['msg']}")) from error
+    except ValueError as error:
+        raise RecordingError(_damaged(places, str(error))) from error
+    holders: dict[int, str] = {}
+    for name, entry in register.participants.items():
+        if entry.holds_slot and holders.setdefault(entry.slot, name) != name:
+            both = f"{holders[entry.slot]} and {name} both have slot {entry.slot}"
+            raise RecordingError(_damaged(places, both))
+    return register
+
+
+def _damaged(places: Places, why: str) -> str:
+    return (
+        f"the register {places.register} is damaged: {why}; restore it from a backup, labcrane "
+        "never leaves it like this"
+    )
+
+
+def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in found:
+            raise ValueError(f"{key!r} is in it twice")
+        found[key] = value
+    return found
+
+
+@contextmanager
+def changed(places: Places) -> Iterator[Register]:
+    """Give the register to be changed; it is written when the block ends without an error."""
+    with exclusive(places.register_lock):
+        register = read(places)
+        yield register
+        text = register.model_dump_json(indent=1)
+        write_text(places.register, text + "\n")
+
+
+def begun(places: Places, work: Work, check: Callable[[Register], None]) -> None:
+    """Write down what is about to be done, after ``check`` has let it pass."""
+    with changed(places) as register:
+        register.check_finished()
+        check(register)
+        register.work = work

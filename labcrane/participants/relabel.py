@@ -1,0 +1,143 @@
+"""Repair a wrong participant number."""
+
+import re
+import shutil
+from datetime import date
+from pathlib import Path
+
+from labcrane.durable_file import copy, make_folder, replacing, sync_folder
+from labcrane.errors import ProtocolError
+from labcrane.participants.copies import Reach, edit_exports, forget_export, remove_from_stores
+from labcrane.participants.enrolment import check_words
+from labcrane.participants.erasure import forget_store
+from labcrane.participants.places import Places
+from labcrane.participants.register import (
+    Deviation,
+    Entry,
+    Register,
+    Work,
+    begun,
+    changed,
+    read,
+)
+from labcrane.participants.transfer import transfer
+from labcrane.recording.relabelling import (
+    relabel_journal,
+    relabel_participant_file,
+    renaming,
+)
+
+
+def begin(places: Places, old: str, new: str, reason: str, today: date) -> None:
+    """Write down that ``old`` was really ``new``: from here on it will be repaired.
+
+    Raises
+    ------
+    ProtocolError
+        ``old`` has no data, or ``new`` is not possible or has data of its own.
+    """
+    check_words(reason, "reason")
+
+    def check(register: Register) -> None:
+        register.entry(old)
+        if old == new or not re.fullmatch(register.pattern, new):
+            raise ProtocolError(
+                f"{old} cannot become {new!r}: it takes another pseudonym that matches "
+                f"{register.pattern!r}"
+            )
+        if any(stone.participant == new for stone in register.tombstones):
+            raise ProtocolError(f"{new} was erased; nobody can have that pseudonym again")
+        known = register.participants.get(new)
+        if places.raw(new).exists() or (known and known.sessions):
+            raise ProtocolError(
+                f"{new} has recordings of its own; relabel {new} first, to where they belong"
+            )
+
+    work = Work(kind="relabel", participant=old, to=new, reason=reason, date=today.isoformat())
+    begun(places, work, check)
+
+
+def carry_out(places: Places, work: Work) -> Reach:
+    """Relabel; may be killed and repeated at any moment."""
+    old, new, reach = work.participant, work.to, Reach()
+    _relabel_folder(places, old, new, reach)
+    register = read(places)
+    edit_exports(register, old, new, reach)
+    remove_from_stores(register, old, reach)
+    with changed(places) as now:
+        if old in now.participants:
+            now.participants[new] = _merged(now, work)
+            del now.participants[old]
+        forget_export(now, old, new)
+        forget_store(now, old)
+        now.owed += reach.owed
+    for store in (Path(name) for name in read(places).stores):
+        if store.is_dir():
+            transfer(places, store)
+    with changed(places) as now:
+        now.work = None
+    return reach
+
+
+def _relabel_folder(places: Places, old: str, new: str, reach: Reach) -> None:
+    """Make the new folder beside the old one, give it its name at last, remove the old one."""
+    source, target = places.raw(old), places.raw(new)
+    beside = target.with_name(f".{new}.relabelled")
+    if source.is_dir() and not target.exists():
+        make_folder(beside)
+        _relabel_files(source, beside, old, new)
+        sync_folder(beside)
+        beside.rename(target)
+        sync_folder(target.parent)
+    if source.is_dir():
+        shutil.rmtree(source)
+    reach.changed += [str(path) for path in sorted(target.glob("*"))]
+
+
+def _relabel_files(source: Path, target: Path, old: str, new: str) -> None:
+    rename = renaming(old, new)
+    sizes: dict[str, int] = {}
+    for path in sorted(source.glob("*.xdf")):
+        journal = target / rename(path.name)
+        relabel_journal(path, journal, old, new)
+        sizes[journal.name] = journal.stat().st_size
+    for path in sorted(source.rglob("*")):
+        place = target / rename(path.relative_to(source).as_posix())
+        if not path.is_file() or path.suffix == ".xdf":
+            continue
+        if path.suffix == ".h5":
+            with replacing(place) as beside:
+                relabel_participant_file(path, beside, old, new, sizes)
+        else:
+            copy(path, place)
+
+
+def _merged(register: Register, work: Work) -> Entry:
+    """Return the entry of the right pseudonym: what was run, whoever it was meant for."""
+    wrong = register.participants[work.participant]
+    meant = register.participants.get(work.to)
+    detail = (
+        f"run as {work.participant}, with slot {wrong.slot}{_group(wrong)} and seed {wrong.seed}"
+    )
+    if meant is not None:
+        detail += f", instead of slot {meant.slot}{_group(meant)} and seed {meant.seed}"
+    deviation = Deviation(
+        what="wrong participant number",
+        detail=f"{detail}: {work.reason}",
+        date=work.date,
+    )
+    entry = wrong.model_copy(deep=True)
+    entry.formerly.append(work.participant)
+    entry.deviations.append(deviation)
+    if meant is not None:
+        known = {consent.version for consent in meant.consent}
+        entry.consent = [*meant.consent, *(c for c in entry.consent if c.version not in known)]
+        entry.notes = [*meant.notes, *entry.notes]
+        entry.deviations = [*meant.deviations, *entry.deviations]
+        entry.formerly = [*meant.formerly, *entry.formerly]
+        entry.exclusion = meant.exclusion or entry.exclusion
+    return entry
+
+
+def _group(entry: Entry) -> str:
+    return f" (group {entry.group})" if entry.group else ""
