@@ -1,7 +1,7 @@
 """Whether a session may be run, and what the register keeps of it.
 
-Two calls in :mod:`labcrane.session`: :func:`gate` before anything opens, :func:`conclude` after it
-is over.
+Two calls where a session is run: :func:`gate` before anything opens, which may be repeated, and
+:func:`dismiss` when its participant file is written.
 """
 
 from dataclasses import dataclass
@@ -110,7 +110,7 @@ def gate(visit: Visiting, today: date | None = None) -> Admission:
     )
 
 
-def conclude(visit: Visiting) -> None:
+def dismiss(visit: Visiting) -> None:
     """Write into the register how the session went, and keep its files to the user."""
     if visit.folder.path.is_dir():
         keep_private(visit.folder.path)

@@ -59,6 +59,8 @@ def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> 
         "clock": "manual" if visit.fast else "lsl",
         "rate_hz": this_run.rate_hz,
         "seed": plan.seed,
+        "slot": plan.slot,
+        "group": plan.group,
         "protocol": study.text,
         "protocol_sha256": study.sha256,
         "machine": study.machine_text,

@@ -89,10 +89,10 @@ class Course:
 
     def _session(self) -> Ticks:
         for step in self._plan.steps:
-            if step.block and not self._warm_up.begin(step.block):
-                continue
             self._note("step.start", step=step.number, kind=step.kind)
-            if step.block:
+            if step.block and not self._warm_up.begin(step.block):
+                pass  # practice has been enough; the step is done, also for who goes on later
+            elif step.block:
                 yield from self._block(step.block)
             elif step.kind == "break":
                 yield from self._break(step)

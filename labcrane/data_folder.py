@@ -6,6 +6,7 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
+from labcrane.durable_file import make_folder
 from labcrane.errors import ProtocolError, RecordingError
 
 
@@ -63,7 +64,7 @@ class DataFolder:
             The folder cannot be written.
         """
         try:
-            self.path.mkdir(parents=True, exist_ok=True)
+            make_folder(self.path)
         except OSError as error:
             raise RecordingError(self._cannot_write(error.strerror)) from error
         if not os.access(self.path, os.W_OK | os.X_OK):

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import TYPE_CHECKING
 
+from labcrane.admission import gate
 from labcrane.console import Command, Order, QueueConsole
 from labcrane.recorder_keeper import RecorderKeeper
 from labcrane.recording.parts import parts
@@ -75,6 +76,7 @@ class Launcher:
             The session could not be run, in the session process's own words.
         """
         visit = self._visit
+        gate(visit)
         if not visit.resumed:
             visit.folder.claim(visit.session)
         needs = visit.study.protocol.streams

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from labcrane import loop, rig
+from labcrane.admission import dismiss, gate
 from labcrane.clock import Clock, ManualClock, SystemClock
 from labcrane.conclusion import SessionConclusion
 from labcrane.console import Console
@@ -22,7 +23,6 @@ from labcrane.recording.journal import SessionJournal
 from labcrane.recording.participant_file import consolidate
 from labcrane.recording.parts import journal_path, next_part, parts
 from labcrane.records import Event, Frame, Phase, Run
-from labcrane.rig import Rig
 from labcrane.streams.sync_report import SyncReport
 from labcrane.study import Study
 
@@ -104,6 +104,7 @@ def finish(visit: Visit) -> SyncReport | None:
         return Conclusion(made[-1].correct, made[-1].report)
 
     consolidate(visit.folder.participant_file, journals, conclude)
+    dismiss(visit)
     return made[-1].sync_report
 
 
@@ -116,7 +117,8 @@ def record(visit: Visit, console: Console) -> None:
         Before anything is recorded: the session cannot be run.
     """
     study = visit.study
-    whole = plan_session(study, visit.participant, visit.session)
+    admission = gate(visit)
+    whole = plan_session(study, visit.participant, visit.session, admission.slot)
     so_far, plan = _go_on(visit, whole) if visit.resumed else (None, whole)
     if so_far is None:
         visit.folder.claim(visit.session)
@@ -127,11 +129,12 @@ def record(visit: Visit, console: Console) -> None:
             the_rig.dynamics.reset(within_limits(study, so_far.angles))
         second = frame_bytes(this_run) * this_run.rate_hz
         visit.folder.check_space(plan.expected_s, second, RESERVE_S)
+        about = context(visit, plan, the_rig, this_run) | admission.context
         course = Course(study, plan, the_rig, waits=not visit.simulated)
         journal = SessionJournal(next_part(visit.journal), columns(this_run), this_run.rate_hz)
         log = FrameLog(journal, this_run, reserve=round(RESERVE_S * second))
         try:
-            for event in _opening(visit, plan, the_rig, this_run, so_far, clock.now()):
+            for event in _opening(about, so_far, clock.now()):
                 log.note(event)
             with _outlets(visit, this_run) as outlets:
                 onlookers = (*outlets, _teller(console))
@@ -151,16 +154,8 @@ def _go_on(visit: Visit, whole: SessionPlan) -> tuple[Progress, SessionPlan]:
     return so_far, remaining(visit.study, whole, so_far, policy)
 
 
-def _opening(
-    visit: Visit,
-    plan: SessionPlan,
-    the_rig: Rig,
-    this_run: Run,
-    so_far: Progress | None,
-    now: float,
-) -> Iterator[Event]:
+def _opening(about: Mapping[str, Any], so_far: Progress | None, now: float) -> Iterator[Event]:
     """Yield what is to be known before the first tick."""
-    about = context(visit, plan, the_rig, this_run)
     yield Event("session.start", now, about)
     if so_far is not None and so_far.interrupted is not None:
         # The dead process could not close its trial; it is a row like any other.

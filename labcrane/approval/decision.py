@@ -72,9 +72,7 @@ def amend(study: Study, registry: Registry, grant: Grant, why: str, today: date)
         if old.approval[name] != new.approval[name]
     ]
     if not changes:
-        raise ProtocolError(
-            f"{study.path} is as it was approved; there is nothing to amend"
-        )
+        raise ProtocolError(f"{study.path} is as it was approved; there is nothing to amend")
     if not why.strip():
         raise ProtocolError("an amendment needs a reason; give one with --why")
     entry = {

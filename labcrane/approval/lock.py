@@ -56,7 +56,7 @@ class Lock:
     @property
     def consent(self) -> Path:
         """The consent text."""
-        return self.path.parent / self.approval["consent"]
+        return self.path.parent / str(self.approval["consent"])
 
     @property
     def consent_version(self) -> str:

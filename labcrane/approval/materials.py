@@ -149,16 +149,15 @@ def _plugins(
     """Return version and source of every plugin that offers something the protocol names."""
     choices = (study.input, study.scheme, study.dynamics, *study.task_choices.values())
     used = {choice.plugin for choice in choices}
-    said = set(
-        _strings({key: value for key, value in protocol.items() if key not in WORDS_ONLY})
-    )
+    said = set(_strings({key: value for key, value in protocol.items() if key not in WORDS_ONLY}))
     for offers in registry.plugins.values():
         used |= {plugin for name, plugin in offers.items() if name in said}
     points = {point.name: point for point in plugins or entry_points(group=PROJECT)}
+    return {name: _plugin(points[name]) for name in sorted(used)}
+
+
+def _plugin(point: EntryPoint) -> dict[str, Any]:
     return {
-        name: {
-            "version": points[name].dist.version if points[name].dist else "unknown",
-            "files": hashes(points[name].module.split(".")[0]),
-        }
-        for name in sorted(used)
+        "version": point.dist.version if point.dist else "unknown",
+        "files": hashes(point.module.split(".")[0]),
     }

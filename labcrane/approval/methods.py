@@ -71,7 +71,7 @@ ORDERS = {
 def _design(protocol: Mapping[str, Any]) -> list[str]:
     said = []
     for factor, order in protocol.get("design", {}).get("order", {}).items():
-        rule = {"rule": order} if isinstance(order, str) else order
+        rule: Mapping[str, Any] = {"rule": order} if isinstance(order, str) else order
         words = f"The levels of {factor} came {ORDERS[rule['rule']]}"
         if rule.get("times", 1) > 1:
             words += f", {rule['times']} times each"

@@ -3,12 +3,13 @@
 Importing this must stay instant: a command imports what it needs when it runs.
 """
 
+import os
 from collections.abc import Sequence
 
 import typer
 from rich.console import Console
 
-from labcrane.cli import inspect, recording, results, running
+from labcrane.cli import approval, inspect, people, recording, results, running, upkeep
 from labcrane.errors import LabcraneError, ProtocolError
 
 app = typer.Typer(
@@ -29,10 +30,26 @@ app.command("resync")(recording.resync)
 app.command("export")(results.export)
 app.command("report")(results.report)
 app.command("replay")(results.replay)
+app.command("approve")(approval.approve)
+app.command("amend")(approval.amend)
+app.command("methods")(approval.methods)
+app.command("participants")(people.participants)
+app.command("consent")(people.consent)
+app.command("exclude")(people.exclude)
+app.command("note")(people.note)
+app.command("waive")(people.waive)
+app.command("deviations")(people.deviations)
+app.command("erase")(upkeep.erase)
+app.command("relabel")(upkeep.relabel)
+app.command("transfer")(upkeep.transfer)
+
+PRIVATE = 0o077
+"""What labcrane writes is about people: nobody but the user may read it."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit status: 2 for what cannot be run as written."""
+    before = os.umask(PRIVATE)
     try:
         app(args=None if arguments is None else list(arguments))
     except SystemExit as leaving:
@@ -42,4 +59,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for line in (f"labcrane: {error}", *getattr(error, "__notes__", ())):
             complaint.print(line, markup=False, highlight=False)
         return 2 if isinstance(error, ProtocolError) else 1
+    finally:
+        os.umask(before)
     return 0

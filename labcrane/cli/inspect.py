@@ -34,8 +34,13 @@ def plan(
     participant: Annotated[
         str | None, typer.Option(help="one participant only, by pseudonym")
     ] = None,
+    export: Annotated[
+        Path | None, typer.Option(help="write the whole allocation into this CSV file as well")
+    ] = None,
 ) -> None:
     """Show blocks, each participant's order, and how long a session is likely to take."""
+    from labcrane.allocation import allocate, as_csv, balance
+    from labcrane.durable_file import write_text
     from labcrane.plan import plan_session
     from labcrane.pseudonyms import pseudonyms
     from labcrane.registry import discover
@@ -45,13 +50,15 @@ def plan(
     count = participants or study.protocol.participants.planned
     names = [participant] if participant else pseudonyms(study.protocol.participants.pattern, count)
     for number, session in enumerate(study.protocol.sessions, start=1):
-        table = Table("participant", "block", "trials", "order", "minutes")
+        table = Table("participant", "slot", "seed", "block", "trials", "order", "minutes")
         for name in names:
             session_plan = plan_session(study, name, number)
             for block in session_plan.blocks:
                 counted = sum(trial.planned.counted for trial in block.trials)
                 table.add_row(
                     name,
+                    f"{session_plan.slot}{f' {block.group}' if block.group else ''}",
+                    str(session_plan.seed),
                     f"{block.number} {block.name}{' (practice)' if block.practice else ''}",
                     str(counted),
                     "; ".join(
@@ -62,6 +69,13 @@ def plan(
         whole = plan_session(study, names[0], number).expected_s / 60
         out.print(f"session {number} {session.name!r}: about {whole:.0f} minutes")
         out.print(table)
+    allotments = allocate(study, dict.fromkeys(names))
+    if not participant:
+        for line in balance(study, allotments):
+            out.print(line, markup=False)
+    if export:
+        write_text(export, as_csv(allotments))
+        out.print(f"allocation: {export}", markup=False)
 
 
 def plugins() -> None:

@@ -8,6 +8,7 @@ import typer
 
 from labcrane.cli.inspect import ProtocolPath, out
 from labcrane.cli.network import Local, stay_on_this_computer
+from labcrane.cli.people import ask_for_consent
 from labcrane.errors import LabcraneError, ProtocolError
 
 if TYPE_CHECKING:
@@ -119,6 +120,7 @@ def _launch(order: "VisitOrder") -> None:
     from labcrane.plan import plan_session
 
     visit = order.visit()
+    ask_for_consent(visit)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
     with Terminal(console, out, _counted(plan), keys=not visit.simulated) as terminal:

@@ -26,12 +26,6 @@ class Turn:
     place: int = 0
 
 
-def as_written(levels: Sequence[str], seed: int) -> tuple[str, ...]:
-    """Return the levels in the protocol's order; ``seed`` does not matter."""
-    del seed
-    return tuple(levels)
-
-
 def shuffled(levels: Sequence[str], seed: int) -> tuple[str, ...]:
     """Return the levels in a random order that follows from ``seed``."""
     order = np.random.default_rng(seed).permutation(len(levels))

@@ -1,9 +1,11 @@
 """Random sequences in which no level comes more than so often in a row."""
 
 import random
+from bisect import bisect_right
 from collections import Counter
 from collections.abc import Sequence
 from functools import cache
+from itertools import accumulate
 
 from labcrane.errors import ProtocolError
 
@@ -48,17 +50,13 @@ def sequence(levels: Sequence[str], times: int, most: int, seed: int) -> tuple[s
             if left[level] and not (again and run >= most):
                 others = tuple(sorted(left[other] for other in left if other != level))
                 weights[level] = _ways(others, left[level] - 1, run + 1 if again else 1, most)
-        total = sum(weights.values())
-        if total == 0:
+        bounds = list(accumulate(weights.values()))
+        if not bounds or bounds[-1] == 0:
             raise ProtocolError(
                 f"{len(left)} levels, {times} times each, cannot be ordered with no more than "
                 f"{most} in a row; allow more in a row"
             )
-        number = draw.randrange(total)
-        for level, weight in weights.items():
-            if number < weight:
-                break
-            number -= weight
+        level = list(weights)[bisect_right(bounds, draw.randrange(bounds[-1]))]
         last, run = level, run + 1 if level == last else 1
         left[level] -= 1
         chosen.append(level)

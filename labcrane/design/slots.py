@@ -6,6 +6,7 @@ to the next one who comes, so that groups stay equal.
 
 from collections import Counter
 from collections.abc import Collection, Sequence
+from functools import lru_cache
 
 from labcrane.design.order import shuffled
 from labcrane.design.seeds import derive
@@ -19,7 +20,12 @@ def group_of(study: str, groups: Sequence[str], slot: int) -> str:
     if not groups:
         return ""
     run, place = divmod(slot - 1, len(groups))
-    return shuffled(groups, derive(study, "groups", run + 1))[place]
+    return _run_of(study, tuple(groups), run + 1)[place]
+
+
+@lru_cache(maxsize=10_000)
+def _run_of(study: str, groups: tuple[str, ...], number: int) -> tuple[str, ...]:
+    return shuffled(groups, derive(study, "groups", number))
 
 
 def place_of(groups: Sequence[str], slot: int) -> int:

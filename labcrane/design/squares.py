@@ -15,8 +15,6 @@ def williams(n: int) -> Square:
     ``n`` the reversed rows are added, ``2 n`` in all, and each pair occurs twice (Williams 1949,
     Australian Journal of Scientific Research A 2, 149; first row after Bradley 1958, JASA 53, 525).
     """
-    first = [0]
-    for step in range(1, n):
-        first.append((step + 1) // 2 if step % 2 else n - step // 2)
+    first = [(step + 1) // 2 if step % 2 else (n - step // 2) % n for step in range(n)]
     rows = tuple(tuple((item + row) % n for item in first) for row in range(n))
     return rows if n % 2 == 0 else rows + tuple(row[::-1] for row in rows)

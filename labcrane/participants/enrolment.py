@@ -70,9 +70,7 @@ def confirm_consent(
     with changed(places) as register:
         entry = _entry(register, study, participant, today)
         if all(consent.version != version for consent in entry.consent):
-            entry.consent.append(
-                Consent(version=version, file=file, date=today.isoformat(), by=by)
-            )
+            entry.consent.append(Consent(version=version, file=file, date=today.isoformat(), by=by))
     return entry
 
 
@@ -104,9 +102,7 @@ def waive(places: Places, participant: str, session: int, reason: str, today: da
         entry = register.entry(participant)
         entry.waivers[str(session)] = reason
         entry.deviations.append(
-            Deviation(
-                what="window waived", session=session, detail=reason, date=today.isoformat()
-            )
+            Deviation(what="window waived", session=session, detail=reason, date=today.isoformat())
         )
 
 

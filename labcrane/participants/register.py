@@ -164,15 +164,11 @@ class Register(Record):
             if stone.participant == participant:
                 raise ProtocolError(f"participant {participant} was erased on {stone.date}")
         known = ", ".join(sorted(self.participants)) or "nobody"
-        raise ProtocolError(
-            f"participant {participant} is not in the register; it has {known}"
-        )
+        raise ProtocolError(f"participant {participant} is not in the register; it has {known}")
 
     def slots(self) -> dict[int, str]:
         """Return who holds which slot."""
-        return {
-            entry.slot: name for name, entry in self.participants.items() if entry.holds_slot
-        }
+        return {entry.slot: name for name, entry in self.participants.items() if entry.holds_slot}
 
 
 def read(places: Places) -> Register:

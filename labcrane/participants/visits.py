@@ -10,7 +10,9 @@ from labcrane.participants.register import Entry, Register, Sitting, changed
 from labcrane.study import Study
 
 
-def check_visit(register: Register, study: Study, participant: str, session: int, today: date) -> None:
+def check_visit(
+    register: Register, study: Study, participant: str, session: int, today: date
+) -> None:
     """Raise :class:`ProtocolError` unless ``participant`` may be run today."""
     entry = register.entry(participant)
     if register.study != study.protocol.study:
@@ -39,9 +41,7 @@ def check_group(study: Study, participant: str, entry: Entry) -> None:
         )
 
 
-def _check_window(
-    study: Study, participant: str, entry: Entry, session: int, today: date
-) -> None:
+def _check_window(study: Study, participant: str, entry: Entry, session: int, today: date) -> None:
     if session == 1:
         return
     begun = {sitting.session: date.fromisoformat(sitting.date) for sitting in entry.sessions}
@@ -51,7 +51,7 @@ def _check_window(
             "comes after it"
         )
     window = study.protocol.sessions[session - 1].after_days
-    if window is None or str(session) in entry.waivers:
+    if window is None or str(session) in entry.waivers or session in begun:
         return
     first, last = (begun[session - 1] + timedelta(days) for days in window)
     if not first <= today <= last:

@@ -155,7 +155,7 @@ class AppendFile:
 def _create(path: Path) -> int:
     """Open a new file, and make its name as durable as its content."""
     try:
-        fd = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, 0o644)
+        fd = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, 0o600)
     except FileExistsError as error:
         raise RecordingError(
             f"{path} exists already and is not overwritten; go on in a new part"

@@ -78,8 +78,7 @@ def _write_stream(writer: XdfWriter, stream: XdfStream, rename: Rename, old: str
         part = slice(start, start + SAMPLES)
         if header.format == "string":
             rows = [
-                tuple(_with_record(rename(text), old) for text in row)
-                for row in stream.texts[part]
+                tuple(_with_record(rename(text), old) for text in row) for row in stream.texts[part]
             ]
             writer.write_texts(number, stream.stamps[part].tolist(), rows)
         else:

@@ -3,7 +3,7 @@
 import hashlib
 from collections import Counter
 
-from labcrane.design.order import as_written, shuffled
+from labcrane.design.order import RULES, Turn, shuffled
 from labcrane.design.seeds import derive
 
 LEVELS = ("a", "b", "c", "d")
@@ -23,7 +23,7 @@ def test_words_cannot_run_into_one_another() -> None:
 
 
 def test_as_written_changes_nothing() -> None:
-    assert as_written(LEVELS, 5) == LEVELS
+    assert RULES["as_written"](LEVELS, Turn(5), 1, None) == LEVELS
 
 
 def test_shuffled_is_a_permutation_that_follows_from_the_seed() -> None:

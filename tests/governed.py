@@ -1,0 +1,75 @@
+"""An approved study of which sessions can be run with a person who is not there."""
+
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+
+from rehearsal import SHORT, ScriptedConsole
+
+from labcrane.approval.decision import Grant, approve
+from labcrane.approval.lock import Lock
+from labcrane.participants.enrolment import confirm_consent
+from labcrane.participants.places import Places
+from labcrane.registry import discover
+from labcrane.session import Visit, run
+from labcrane.study import Study, load
+
+TODAY = date.today()
+PERSON = "{use: simulated_operator}"
+"""The simulated operator in the place of the joysticks: to labcrane, a person like any other."""
+
+GOVERNED = SHORT.replace("{use: dual_joystick}", PERSON).replace(
+    "distances: [2], movements: 2", "distances: [2], movements: 1"
+)
+GROUPED = GOVERNED.replace(
+    "sessions:", "design:\n  groups: {none: [], visual: [sphere], sound: [tone]}\nsessions:"
+)
+
+
+@dataclass
+class Lab:
+    """A study's folder, approved."""
+
+    folder: Path
+    text: str = GOVERNED
+
+    def __post_init__(self) -> None:
+        self.protocol = self.folder / "study.yaml"
+        self.protocol.write_text(self.text)
+        (self.folder / "consent_v2.txt").write_text("I take part.\nI can stop at any time.\n")
+        self.places = Places(self.folder / "data")
+
+    @property
+    def study(self) -> Study:
+        return load(self.protocol, discover())
+
+    def approve(self) -> Lock:
+        return approve(self.study, discover(), self.grant(), TODAY)
+
+    def grant(self) -> Grant:
+        last = TODAY.replace(year=TODAY.year + 1, day=1)
+        return Grant("Ethics board", "KB-12/2026", last, self.folder / "consent_v2.txt")
+
+    def consent(self, participant: str) -> None:
+        from labcrane.approval.lock import read_lock
+
+        version = read_lock(self.protocol).consent_version
+        text = ("consent_v2.txt", version)
+        confirm_consent(self.places, self.study, participant, text, TODAY)
+
+    def visit(self, participant: str, session: int = 1, **stamps: bool) -> Visit:
+        return Visit(self.study, participant, session, self.places.root, **stamps)
+
+    def run(self, participant: str, orders=None) -> Path:
+        """Run a session on the quick: no clock to wait for, no streams, START at every gate."""
+        self.consent(participant)
+        return run(self.visit(participant, fast=True), Willing(orders))
+
+
+class Willing(ScriptedConsole):
+    """Starts whatever waits, and gives the orders of a script."""
+
+    def commands(self):
+        from labcrane.console import Command, Order
+
+        return [Command(Order.START), *super().commands()]
