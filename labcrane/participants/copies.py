@@ -53,11 +53,12 @@ def record_export(
     files
         The participants in each file; paths in ``folder``.
     """
-    folder = folder.resolve()
+    folder, root = folder.resolve(), places.root.resolve()
+    inside = folder.is_relative_to(root)  # the data folder may move, and its exports with it
     entry = Export(
         date=today.isoformat(),
         exporter=exporter,
-        folder=str(folder),
+        folder=folder.relative_to(root).as_posix() if inside else str(folder),
         files={
             (folder / path).relative_to(folder).as_posix(): sorted(set(names))
             for path, names in files.items()
@@ -71,7 +72,7 @@ def record_export(
         ]  # fmt: skip
 
 
-def edit_exports(register: Register, old: str, new: str | None, reach: Reach) -> None:
+def edit_exports(places: Places, register: Register, old: str, new: str | None, reach: Reach) -> None:
     """Take ``old`` out of all exports, or put ``new`` in its place.
 
     Tables are edited row by row; files of the participant alone are removed, or renamed with
@@ -79,10 +80,10 @@ def edit_exports(register: Register, old: str, new: str | None, reach: Reach) ->
     repeated at any moment.
     """
     for export in register.exports:
-        folder = Path(export.folder)
+        folder = places.root / export.folder
         concerned = {name: people for name, people in export.files.items() if old in people}
         if concerned and not folder.is_dir():
-            owed = Owed(participant=old, to=new, folder=export.folder, files=concerned)
+            owed = Owed(participant=old, to=new, folder=str(folder), files=concerned)
             reach.owed.append(owed)
             continue
         for name, people in concerned.items():

@@ -62,7 +62,7 @@ def carry_out(places: Places, work: Work) -> Erased:
     for folder in places.all_raw(participant):
         shutil.rmtree(folder)
         reach.removed.append(str(folder))
-    edit_exports(register, participant, None, reach)
+    edit_exports(places, register, participant, None, reach)
     remove_from_stores(register, participant, reach)
     with changed(places) as now:
         now.participants.pop(participant, None)

@@ -62,7 +62,7 @@ def carry_out(places: Places, work: Work) -> Reach:
     old, new, reach = work.participant, work.to, Reach()
     _relabel_folder(places, old, new, reach)
     register = read(places)
-    edit_exports(register, old, new, reach)
+    edit_exports(places, register, old, new, reach)
     remove_from_stores(register, old, reach)
     with changed(places) as now:
         if old in now.participants:

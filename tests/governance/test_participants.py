@@ -1,0 +1,322 @@
+"""The register, consent, session windows and deviations."""
+
+import json
+import multiprocessing
+import os
+import signal
+import stat
+import subprocess
+import sys
+import time
+from collections import Counter
+from datetime import date, timedelta
+from pathlib import Path
+
+import pytest
+from governed import GOVERNED, GROUPED, TODAY, Lab, Willing
+
+import labcrane
+from labcrane import DeviceError, ProtocolError, RecordingError
+from labcrane.admission import gate
+from labcrane.console import Command, Order
+from labcrane.participants import enrolment
+from labcrane.participants.deviations import all_deviations
+from labcrane.participants.places import Places
+from labcrane.participants.register import changed, read
+from labcrane.privacy import personal
+
+TWO_SESSIONS = GOVERNED + (
+    "  - name: retention\n    after_days: [1, 3]\n    steps:\n"
+    "      - block: {task: aiming, pairs: 1}\n"
+)
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Lab:
+    lab = Lab(tmp_path)
+    lab.approve()
+    return lab
+
+
+def test_a_participant_without_consent_is_refused(lab: Lab) -> None:
+    with pytest.raises(
+        ProtocolError,
+        match=r"P001 has not consented to consent_v2\.txt \(version [0-9a-f]{12}\); once .* confirm",
+    ):
+        gate(lab.visit("P001"))
+    lab.consent("P001")
+    assert gate(lab.visit("P001")).slot == 1
+
+
+def test_a_session_leaves_approval_consent_slot_and_group_in_the_file(tmp_path: Path) -> None:
+    lab = Lab(tmp_path, GROUPED)
+    lock = lab.approve()
+    lab.run("P005")  # the first to come, whatever the number
+    entry = read(lab.places).participants["P005"]
+    assert entry.slot == 1
+    session = labcrane.open_recording(lab.places.raw("P005") / "P005.h5").session(1)
+    assert session.attrs["slot"] == 1
+    assert session.attrs["group"] == entry.group
+    assert set(session.trials["group"]) == {entry.group}
+    assert session.attrs["approval"] == "KB-12/2026"
+    assert session.attrs["lock"] == lock.seal
+    assert session.attrs["consent_version"] == lock.consent_version
+    assert session.attrs["consent_date"] == TODAY.isoformat()
+    (sitting,) = entry.sessions
+    assert (sitting.session, sitting.lock, sitting.deviations) == (1, lock.seal, [])
+
+
+def test_everything_about_people_is_for_the_user_only(lab: Lab) -> None:
+    lab.run("P001")
+    assert stat.S_IMODE(lab.places.root.stat().st_mode) == 0o700
+    found = list(lab.places.root.rglob("*"))
+    assert {path.relative_to(lab.places.root).parts[0] for path in found} == {"register", "P001"}
+    for path in found:
+        assert stat.S_IMODE(path.stat().st_mode) == (0o700 if path.is_dir() else 0o600), path
+
+
+def test_what_did_not_go_as_planned_is_listed(lab: Lab) -> None:
+    orders = {40: [Command(Order.SKIP)], 60: [Command(Order.REPEAT)], 90: [Command(Order.OVERRIDE)]}
+    lab.run("P001", orders | {120: [Command(Order.END)]})
+    found = [(d.what, d.trial > 0) for _, d in all_deviations(lab.places)]
+    assert found == [
+        ("skipped", True), ("trial repeated", True), ("automatic end overridden", True),
+        ("session ended early", False),
+    ]  # fmt: skip
+    (sitting,) = read(lab.places).participants["P001"].sessions
+    assert [deviation.what for deviation in sitting.deviations] == [what for what, _ in found]
+
+
+def test_the_deviations_of_a_session_that_was_killed_come_from_its_journal(lab: Lab) -> None:
+    lab.consent("P001")
+    child = os.fork()
+    if child == 0:
+        from labcrane.session import run
+
+        class Killer(Willing):
+            def commands(self):
+                if self._tick == 100:
+                    os.kill(os.getpid(), signal.SIGKILL)
+                return super().commands()
+
+        try:
+            run(lab.visit("P001", fast=True), Killer({50: [Command(Order.SKIP)]}))
+        finally:
+            os._exit(1)
+    _, status = os.waitpid(child, 0)
+    assert os.WIFSIGNALED(status)
+    assert [d.what for _, d in all_deviations(lab.places)] == ["skipped", "session cut off"]
+
+
+def test_a_session_that_never_was_recorded_was_none(lab: Lab) -> None:
+    lab.consent("P001")
+    gate(lab.visit("P001"))
+    assert len(read(lab.places).participants["P001"].sessions) == 1
+    assert all_deviations(lab.places) == []
+    lab.run("P001")
+    (sitting,) = read(lab.places).participants["P001"].sessions
+    assert sitting.deviations == []
+
+
+def test_a_session_out_of_its_window_is_refused_and_can_be_waived(tmp_path: Path) -> None:
+    lab = Lab(tmp_path, TWO_SESSIONS)
+    lab.approve()
+    lab.consent("P001")
+    with pytest.raises(ProtocolError, match="P001 has not run session 1; session 2 comes after it"):
+        gate(lab.visit("P001", 2))
+    lab.run("P001")
+    first, last = TODAY + timedelta(1), TODAY + timedelta(3)
+    for day in (TODAY, last + timedelta(1)):
+        with pytest.raises(
+            ProtocolError,
+            match=f"session 2 of participant P001 is due {first} to {last}, 1 to 3 days after "
+            f"session 1; today is {day}; labcrane waive lets it be run, as a deviation",
+        ):
+            gate(lab.visit("P001", 2), day)
+    for day in (first, last):
+        gate(lab.visit("P001", 2), day)
+    enrolment.waive(lab.places, "P001", 2, "was ill", TODAY)
+    gate(lab.visit("P001", 2), last + timedelta(9))
+    assert [(d.what, d.session, d.detail) for _, d in all_deviations(lab.places)] == [
+        ("window waived", 2, "was ill")
+    ]
+
+
+def test_who_is_excluded_leaves_the_slot_to_the_next_and_is_not_run(lab: Lab) -> None:
+    for name in ("P001", "P002", "P003"):
+        lab.consent(name)
+    enrolment.exclude(lab.places, "P002", "moved away", TODAY)
+    lab.consent("P004")
+    slots = {name: entry.slot for name, entry in read(lab.places).participants.items()}
+    assert slots == {"P001": 1, "P002": 2, "P003": 3, "P004": 2}
+    with pytest.raises(ProtocolError, match=r"P002 was excluded on .*: moved away"):
+        gate(lab.visit("P002"))
+
+
+def test_a_participant_in_two_groups_is_refused(tmp_path: Path) -> None:
+    lab = Lab(tmp_path, GROUPED)
+    lab.approve()
+    lab.consent("P001")
+    other = {"none": "visual", "visual": "sound", "sound": "none"}
+    with changed(lab.places) as register:
+        entry = register.participants["P001"]
+        planned, entry.group = entry.group, other[entry.group]
+        written = entry.group
+    with pytest.raises(
+        ProtocolError,
+        match=f"P001 would be in two groups: enrolled in '{written}', but slot 1 of the protocol "
+        f"is in '{planned}'",
+    ):
+        gate(lab.visit("P001"))
+
+
+@pytest.mark.parametrize(
+    ("edit", "said"),
+    [
+        (lambda text: text[:100], "is damaged: .*; restore it from a backup"),
+        (lambda text: text.replace('"P002"', '"P001"'), "'P001' is in it twice"),
+        (lambda text: text.replace('"slot": 2', '"slot": 1'), "P001 and P002 both have slot 1"),
+        (lambda text: text.replace('"slot": 2', '"slot": 0'), "slot: .* greater than or equal to 1"),
+    ],
+)  # fmt: skip
+def test_a_register_edited_into_the_impossible_is_refused(lab: Lab, edit, said: str) -> None:
+    for name in ("P001", "P002"):
+        lab.consent(name)
+    lab.places.register.write_text(edit(lab.places.register.read_text()))
+    with pytest.raises(RecordingError, match=said):
+        gate(lab.visit("P001"))
+
+
+def test_another_studys_register_is_refused(lab: Lab) -> None:
+    lab.consent("P001")
+    with changed(lab.places) as register:
+        register.study = "welding"
+    with pytest.raises(ProtocolError, match="the register is of study 'welding', the protocol of"):
+        gate(lab.visit("P001"))
+    with pytest.raises(ProtocolError, match="the register is of study 'welding', the protocol of"):
+        lab.consent("P002")
+
+
+def test_a_pseudonym_that_does_not_match_is_refused(lab: Lab) -> None:
+    for name in ("Anna", "P01", "P00001", "P001 "):
+        with pytest.raises(ProtocolError, match="does not match the protocol's pattern"):
+            lab.consent(name)
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("write to anna.nowak@uni.example", "an e-mail address"),
+        ("call +48 600 123 456", "a telephone number"),
+        ("call 0171/1234567 tomorrow", "a telephone number"),
+        ("(22) 555-12-34", "a telephone number"),
+        ("tel:600123456", "a telephone number"),
+        ("555.123.4567", "a telephone number"),
+        ("left-handed, wears glasses", None),
+        ("trial 12 of 2026-11-21 at 14:30:05 was 3.25 m off", None),
+        ("0.123 0.456 0.789 m", None),
+        ("seen @ block 3", None),
+    ],
+)
+def test_what_leads_to_a_person_is_found(text: str, found: str | None) -> None:
+    assert personal(text) == found
+
+
+def test_a_note_that_leads_to_a_person_is_refused_everywhere(lab: Lab) -> None:
+    lab.consent("P001")
+    for refused in (
+        lambda: enrolment.note(lab.places, "P001", "anna@uni.example"),
+        lambda: enrolment.exclude(lab.places, "P001", "call +48 600 123 456", TODAY),
+    ):
+        with pytest.raises(ProtocolError, match="which would lead to a person; write it without"):
+            refused()
+    lab.run("P001", {30: [Command(Order.NOTE, "mail anna@uni.example")]})
+    enrolment.note(lab.places, "P001", "left-handed")
+    assert read(lab.places).participants["P001"].notes == ["left-handed"]
+    path = lab.places.raw("P001") / "P001.h5"
+    (event,) = [
+        data
+        for name, data in labcrane.open_recording(path).session(1).events[["name", "data"]].values
+        if name == "order.note"
+    ]
+    assert event["text"] == ""
+    assert "an e-mail address" in event["refused"]
+    for path in lab.places.files():
+        assert b"anna@" not in path.read_bytes()
+
+
+def _enrol(folder: Path, names: list[str]) -> None:
+    lab = Lab.__new__(Lab)
+    lab.folder, lab.protocol = folder, folder / "study.yaml"
+    lab.places = Places(folder / "data")
+    for name in names:
+        lab.consent(name)
+
+
+def test_processes_that_write_at_once_lose_nothing_and_share_no_slot(tmp_path: Path) -> None:
+    lab = Lab(tmp_path, GROUPED)
+    lab.approve()
+    names = [f"P{number:03}" for number in range(1, 31)]
+    children = [
+        multiprocessing.get_context("fork").Process(target=_enrol, args=(tmp_path, names[at::3]))
+        for at in range(3)
+    ]
+    for child in children:
+        child.start()
+    for child in children:
+        child.join()
+        assert child.exitcode == 0
+    entries = read(lab.places).participants
+    assert sorted(entries) == names
+    assert sorted(entry.slot for entry in entries.values()) == list(range(1, 31))
+    assert set(Counter(entry.group for entry in entries.values()).values()) == {10}
+
+
+WRITER = """
+import sys
+from pathlib import Path
+from labcrane.participants.places import Places
+from labcrane.participants.register import Entry, changed
+number = 0
+while True:
+    with changed(Places(Path(sys.argv[1]))) as register:
+        number = max((entry.slot for entry in register.participants.values()), default=0) + 1
+        register.participants[f"P{number:04}"] = Entry(slot=number, seed=1, enrolled="2026-01-01")
+    print(number, flush=True)
+"""
+
+
+def test_a_kill_during_a_write_leaves_a_whole_register(tmp_path: Path) -> None:
+    places, last = Places(tmp_path / "data"), 0
+    for round_number in range(1, 6):
+        child = subprocess.Popen(
+            [sys.executable, "-c", WRITER, str(places.root)], stdout=subprocess.PIPE, text=True
+        )
+        with child:
+            for _ in range(3):
+                last = int(child.stdout.readline())
+            time.sleep(0.0011 * round_number)  # somewhere within a write
+            child.kill()
+        slots = sorted(entry.slot for entry in read(places).participants.values())
+        assert slots == list(range(1, len(slots) + 1))
+        assert len(slots) >= last
+
+
+def test_no_name_is_asked_for_or_kept(lab: Lab) -> None:
+    lab.consent("P001")
+    register = json.loads(lab.places.register.read_text())
+    assert not {"name", "email", "phone"} & set(register["participants"]["P001"])
+
+
+def test_people_need_joysticks_and_leave_no_session_when_there_are_none(tmp_path: Path) -> None:
+    from virtual_sticks import desk
+
+    lab = Lab(tmp_path, GOVERNED.replace("{use: simulated_operator}", "{use: dual_joystick}"))
+    lab.approve()
+    lab.consent("P001")
+    from labcrane.session import run
+
+    with desk(), pytest.raises(DeviceError, match="joystick"):
+        run(lab.visit("P001"), Willing())
+    assert all_deviations(lab.places) == []
+    assert date.fromisoformat(read(lab.places).participants["P001"].enrolled) == TODAY
