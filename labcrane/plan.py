@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from labcrane.design.order import RULES, SQUARES, Turn
 from labcrane.design.seeds import derive
 from labcrane.design.slots import group_of, place_of
-from labcrane.protocol import AS_WRITTEN, Block, Criterion, Step
+from labcrane.design.words import AS_WRITTEN, Criterion
+from labcrane.protocol import Block, Step
 from labcrane.records import Planned, Trial
 from labcrane.study import Study
 

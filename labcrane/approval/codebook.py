@@ -65,8 +65,9 @@ def codebook(study: Study) -> list[Column]:
 def _trials(study: Study) -> list[Column]:
     found: dict[str, Column] = {}
     about = [name for name in ABOUT if name != "group" or study.protocol.design.groups]
-    for name in (*about, *UNITS):
-        found[name] = Column("trials", name, UNITS.get(name, ""), CORE)
+    units = {**UNITS, "practice": "1"}  # a truth value, recorded as 1 or 0
+    for name in (*about, *units):
+        found[name] = Column("trials", name, units.get(name, ""), CORE)
     for name, (task, values) in _conditions(study).items():
         choice = study.task_choices[task]
         unit = trial_units(study.tasks[task]).get(name, "" if _is_text(values) else "1")

@@ -72,7 +72,9 @@ def record_export(
         ]  # fmt: skip
 
 
-def edit_exports(places: Places, register: Register, old: str, new: str | None, reach: Reach) -> None:
+def edit_exports(
+    places: Places, register: Register, old: str, new: str | None, reach: Reach
+) -> None:
     """Take ``old`` out of all exports, or put ``new`` in its place.
 
     Tables are edited row by row; files of the participant alone are removed, or renamed with

@@ -55,7 +55,9 @@ def test_a_mistake_ends_with_code_2_and_no_traceback(tmp_path: Path) -> None:
 
 def test_a_real_session_without_joysticks_is_refused(tmp_path: Path) -> None:
     (tmp_path / "study.yaml").write_text(SHORT)
-    done = labcrane_command("run", "study.yaml", "--participant", "P001", "--local", cwd=tmp_path)
+    done = labcrane_command(
+        "run", "study.yaml", "--participant", "P001", "--local", "--pilot", cwd=tmp_path
+    )
     assert done.returncode == 1
     assert done.stderr.startswith("labcrane: ")
     assert "joystick" in done.stderr
@@ -107,12 +109,12 @@ def test_lines_of_a_pipe_are_orders(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     recorded = "{use: recorded, file: data/P001-SIMULATED/P001-SIMULATED.h5}"
     (tmp_path / "again.yaml").write_text(SHORT.replace("{use: dual_joystick}", recorded))
     done = labcrane_command(
-        "run", "again.yaml", "--participant", "P002", "--local",
+        "run", "again.yaml", "--participant", "P002", "--local", "--pilot",
         cwd=tmp_path, said="note hello there\nnonsense\nend\n",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "'nonsense' is not an order; there is start, pause" in done.stdout
-    session = labcrane.open_recording(tmp_path / "data" / "P002" / "P002.h5").session(1)
+    session = labcrane.open_recording(tmp_path / "data" / "P002-PILOT" / "P002-PILOT.h5").session(1)
     names = session.events["name"].tolist()
     assert "order.note" in names
     assert session.events["data"][names.index("order.note")]["text"] == "hello there"

@@ -114,7 +114,7 @@ def test_a_data_folder_that_cannot_be_written_is_refused(visit: Visit, tmp_path:
 
 
 def test_missing_joysticks_are_told_before_anything_is_recorded(visit: Visit) -> None:
-    people = replace(visit, simulated=False, fast=False)
+    people = replace(visit, simulated=False, fast=False, pilot=True)
     with desk(), pytest.raises(DeviceError, match="joystick"):
         run(people, ScriptedConsole())
     assert not people.journal.exists()

@@ -113,7 +113,7 @@ def test_a_thousand_enrolments_with_dropouts_keep_group_sizes_within_one(count: 
         if taken and chance.random() < 0.35:
             taken.remove(chance.choice(sorted(taken)))
         taken.add(next_slot("study", groups, taken))
-        sizes = Counter({group: 0 for group in groups})
+        sizes = Counter(dict.fromkeys(groups, 0))
         sizes.update(group_of("study", groups, slot) for slot in taken)
         assert max(sizes.values()) - min(sizes.values()) <= 1
 

@@ -65,7 +65,9 @@ def test_the_approved_study_may_be_run(lab: Lab) -> None:
 
 def test_white_space_comments_and_line_ends_are_no_drift(lab: Lab) -> None:
     text = lab.protocol.read_text()
-    lab.protocol.write_text("# a comment\n\n" + text.replace("rate_hz: 240", "rate_hz:    240.0 # x"))
+    lab.protocol.write_text(
+        "# a comment\n\n" + text.replace("rate_hz: 240", "rate_hz:    240.0 # x")
+    )
     hello = lab.folder / "hello.md"
     hello.write_bytes(hello.read_bytes().replace(b"\n", b"\r\n"))
     machine = lab.folder / "mine.yaml"
@@ -127,9 +129,7 @@ def test_one_item_of_a_questionnaire_is_told_also_when_another_file_names_it(lab
     form = lab.folder / "forms" / "effort.yaml"
     form.write_text("items:\n  - How hard was it?\n  - How tired are you?\n")
     (lab.folder / "forms.yaml").write_text("after: forms/effort.yaml\n")
-    told = compared(
-        lab, {"questionnaires": "forms.yaml"}, lambda: edit(form, "hard", "very hard")
-    )
+    told = compared(lab, {"questionnaires": "forms.yaml"}, lambda: edit(form, "hard", "very hard"))
     assert told == [
         "file forms/effort.yaml: items[1] was 'How hard was it?', is 'How very hard was it?'"
     ]
@@ -302,7 +302,7 @@ def test_a_study_is_approved_once(lab: Lab) -> None:
 @pytest.mark.parametrize(
     ("consent", "until", "said"),
     [
-        ("nowhere.pdf", 9, r"there is no consent text .*nowhere\.pdf; give its file with --consent"),
+        ("nowhere.pdf", 9, r"there is no consent text .*nowhere\.pdf; give its file with"),
         ("../consent.txt", 9, r"is not in the folder of the protocol"),
         ("consent_v2.txt", -1, r"the approval ended on .*, today is"),
     ],

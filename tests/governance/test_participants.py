@@ -41,7 +41,7 @@ def lab(tmp_path: Path) -> Lab:
 def test_a_participant_without_consent_is_refused(lab: Lab) -> None:
     with pytest.raises(
         ProtocolError,
-        match=r"P001 has not consented to consent_v2\.txt \(version [0-9a-f]{12}\); once .* confirm",
+        match=r"P001 has not consented to consent_v2\.txt \(version [0-9a-f]{12}\); once .* conf",
     ):
         gate(lab.visit("P001"))
     lab.consent("P001")
@@ -176,7 +176,7 @@ def test_a_participant_in_two_groups_is_refused(tmp_path: Path) -> None:
         (lambda text: text[:100], "is damaged: .*; restore it from a backup"),
         (lambda text: text.replace('"P002"', '"P001"'), "'P001' is in it twice"),
         (lambda text: text.replace('"slot": 2', '"slot": 1'), "P001 and P002 both have slot 1"),
-        (lambda text: text.replace('"slot": 2', '"slot": 0'), "slot: .* greater than or equal to 1"),
+        (lambda text: text.replace('"slot": 2', '"slot": 0'), "slot: .* greater than or equal to"),
     ],
 )  # fmt: skip
 def test_a_register_edited_into_the_impossible_is_refused(lab: Lab, edit, said: str) -> None:

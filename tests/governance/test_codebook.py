@@ -1,0 +1,199 @@
+"""Methods paragraph, codebook and allocation: against what is recorded and planned."""
+
+import csv
+import io
+from collections import Counter
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from governed import GROUPED, TODAY, Lab
+from rehearsal import ScriptedConsole, a_study
+
+import labcrane
+from labcrane import ProtocolError
+from labcrane.allocation import allocate, as_csv, balance
+from labcrane.approval.codebook import codebook
+from labcrane.approval.decision import Grant, amend
+from labcrane.approval.lock import read_lock
+from labcrane.approval.methods import methods
+from labcrane.cli.app import main
+from labcrane.plan import plan_session
+from labcrane.registry import discover
+from labcrane.session import Visit, run
+
+FACTORS = GROUPED.replace("distances: [2]", "distances: [2, 3]").replace(", pairs: 1", "")
+FRAMES = ("loop", "input", "command", "state", "task")
+
+
+def ordered(rule: str, text: str = FACTORS) -> str:
+    return text.replace("design:", f"design:\n  order: {{pairs: {rule}}}")
+
+
+def test_every_recorded_column_is_in_the_codebook_with_its_unit(tmp_path: Path) -> None:
+    lab = Lab(tmp_path, GROUPED)
+    lab.approve()
+    session = labcrane.open_recording(lab.run("P001")).session(1)
+    rows = read_lock(lab.protocol).content["codebook"]
+    book = {(row["table"], row["name"]): row for row in rows}
+    assert len(book) == len(rows)
+    recorded = {
+        (name, column): unit
+        for name in FRAMES
+        for column, unit in session.streams[name].units.items()
+    }
+    assert {key: book[key]["unit"] for key in recorded} == recorded
+    assert {name for table, name in book if table == "trials"} == set(session.trials.columns)
+    assert {name for table, name in book if table == "events"} == set(session.events.columns)
+    units = session.context["trial_units"]
+    for name in session.trials.columns:
+        numbers = session.trials[name].dtype.kind == "f"
+        assert book["trials", name]["unit"] == (units.get(name, "1") if numbers else ""), name
+    assert book["trials", "movement_time"]["source"] == "aiming: aiming"
+    assert book["state", "joint.angle.slew"]["source"] == "bullet: kinematic_crane"
+    assert not {key for key in book if key[0] in FRAMES} - set(recorded)
+
+
+def test_the_codebook_needs_no_joysticks(tmp_path: Path) -> None:
+    from rehearsal import SHORT
+
+    columns = codebook(a_study(tmp_path, SHORT))
+    assert {"left.x", "right.trigger"} <= {column.name for column in columns}
+
+
+def test_the_methods_paragraph_says_what_was_approved_and_done(tmp_path: Path) -> None:
+    text = ordered("{rule: blocked, times: 3, in_a_row: 1}").replace(
+        "steps:", "after_days: [0, 3]\n    steps:\n      - consent"
+    )
+    lab = Lab(tmp_path, text)
+    lock = lab.approve()
+    said = methods(lock)
+    for words in (
+        "“A short study” was approved by Ethics board (reference KB-12/2026, valid until",
+        "3 groups (none, visual, sound) in permuted blocks of 3",
+        "CH8 knuckle boom",
+        "at 240 Hz",
+        "distances 2 and 3, movements 1",
+        "The levels of pairs came in randomised blocks, 3 times each, no more than 1 in a row",
+        "Session 1 (only), 0 to 3 days after the one before, consisted of consent, block aiming",
+        f"labcrane {labcrane.__version__}",
+        lock.materials_sha256,
+    ):
+        assert words in said
+    (tmp_path / "study.yaml").write_text(text.replace("movements: 1", "movements: 2"))
+    grant = Grant("Ethics board", "A1", lab.grant().valid_until, lock.consent)
+    amended = methods(amend(lab.study, discover(), grant, "too easy", TODAY))
+    assert f"and amended: A1 on {TODAY} (too easy)" in amended
+
+
+def test_methods_writes_the_codebook_beside_the_protocol(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lab = Lab(tmp_path)
+    lab.approve()
+    assert main(["methods", str(lab.protocol)]) == 0
+    assert "was approved by Ethics board" in capsys.readouterr().out
+    rows = list(csv.DictReader((tmp_path / "study.codebook.csv").read_text().splitlines()))
+    assert rows == read_lock(lab.protocol).content["codebook"]
+
+
+def orders(text: str, folder: Path, count: int) -> list[tuple[str, ...]]:
+    study = a_study(folder, text)
+    found = []
+    for slot in range(1, count + 1):
+        plan = plan_session(study, "P001", 1, slot)
+        found.append(plan.blocks[0].levels["pairs"])
+    return found
+
+
+@pytest.mark.parametrize(("rule", "count"), [("williams", 12), ("latin_square", 12)])
+def test_within_each_group_every_row_of_the_square_is_used(
+    tmp_path: Path, rule: str, count: int
+) -> None:
+    study = a_study(tmp_path, ordered(rule))
+    plans = [plan_session(study, "P001", 1, slot) for slot in range(1, count + 1)]
+    by_group: dict[str, list[tuple[str, ...]]] = {}
+    for plan in plans:
+        by_group.setdefault(plan.group, []).append(plan.blocks[0].levels["pairs"])
+    assert {group: len(found) for group, found in by_group.items()} == {
+        "none": 4, "visual": 4, "sound": 4,
+    }  # fmt: skip
+    for found in by_group.values():
+        assert len(set(found)) == 4
+        placed = Counter((at, level) for order in found for at, level in enumerate(order))
+        assert set(placed.values()) == {1}
+        if rule == "williams":
+            followed = Counter(pair for order in found for pair in pairwise(order))
+            assert set(followed.values()) == {1}
+            assert len(followed) == 12
+
+
+def test_repetitions_and_runs_are_as_the_protocol_says(tmp_path: Path) -> None:
+    rule = "{rule: shuffled, times: 3, in_a_row: 1}"
+    for order in orders(ordered(rule), tmp_path, 3):
+        assert set(Counter(order).values()) == {3}
+        assert all(a != b for a, b in pairwise(order))
+
+
+def test_the_balance_of_36_participants_is_checked_and_exported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "study.yaml"
+    path.write_text(ordered("williams"))
+    export = tmp_path / "plan.csv"
+    assert main(["plan", str(path), "--participants", "36", "--export", str(export)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "balanced: groups of equal size: none 12, visual 12, sound 12" in said
+    for group in ("none", "visual", "sound"):
+        where = f"pairs (williams, group {group})"
+        assert f"balanced: {where}: every level in every position 3 times" in said
+        assert f"balanced: {where}: every level follows every other 3 times" in said
+    assert "not balanced" not in said
+    rows = list(csv.DictReader(export.read_text().splitlines()))
+    assert len(rows) == 36
+    study = labcrane_study(path)
+    for row in (rows[0], rows[20]):
+        plan = plan_session(study, row["participant"], 1)
+        assert (row["group"], int(row["seed"]), int(row["slot"])) == (
+            plan.group, plan.seed, plan.slot,
+        )  # fmt: skip
+        assert tuple(row["order"].split()) == plan.blocks[0].levels["pairs"]
+
+
+def labcrane_study(path: Path):
+    from labcrane.study import load
+
+    return load(path, discover())
+
+
+def test_what_is_not_balanced_is_told_with_what_would_be(tmp_path: Path) -> None:
+    study = a_study(tmp_path, ordered("williams"))
+    names = {f"P{number:03}": None for number in range(1, 8)}
+    told = balance(study, allocate(study, names))
+    assert told[0].startswith("not balanced: groups: ")
+    assert told[0].endswith("they are equal for a multiple of 3 participants")
+    assert any("a multiple of 4 participants per group" in line for line in told[1:])
+    assert len(list(csv.reader(io.StringIO(as_csv(allocate(study, names)))))) == 8
+
+
+def test_a_simulated_participants_slot_is_its_number(tmp_path: Path) -> None:
+    study = a_study(tmp_path, ordered("latin_square"))
+    visit = Visit(study, "P011", 1, tmp_path / "data", simulated=True, fast=True)
+    session = labcrane.open_recording(run(visit, ScriptedConsole())).session(1)
+    plan = plan_session(study, "P011", 1, 11)
+    assert session.attrs["slot"] == 11
+    assert session.attrs["group"] == plan.group
+    assert not (tmp_path / "data" / "register").exists()
+
+
+@pytest.mark.parametrize(
+    ("order", "said"),
+    [
+        ("{rule: williams, in_a_row: 2}", "pairs is 'williams', where nothing is random; drop in"),
+        ("{rule: random}", "pairs is 'random'; it can be as_written, blocked, latin_square, shuf"),
+        ("{rule: shuffled, times: 0}", r"times is 0; it must be greater than 0"),
+    ],
+)  # fmt: skip
+def test_an_impossible_order_is_told(tmp_path: Path, order: str, said: str) -> None:
+    with pytest.raises(ProtocolError, match=said):
+        a_study(tmp_path, ordered(order))
