@@ -57,6 +57,12 @@ def transfer(places: Places, store: Path) -> Transferred:
                 continue
             _one(places, store, register, name, path, done)
         done.only_here += [f"{participant}/{ses}: not finished" for ses in sorted(unfinished)]
+    done.only_here += [
+        f"{folder.name}: not of a participant in the register; pilots and simulations stay here"
+        for folder in sorted(places.root.iterdir())
+        if folder.is_dir() and folder.name not in register.participants
+        and folder not in {places.register.parent, places.exports}
+    ]  # fmt: skip
     return done
 
 

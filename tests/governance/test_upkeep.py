@@ -356,6 +356,7 @@ def test_a_number_of_another_length_fits(lab: Lab) -> None:
 
 def test_transfer_copies_proves_and_lists_what_is_only_here(lab: Lab) -> None:
     unfinished_session = lab.places.raw("P001") / "ses-02_run.xdf"
+    (lab.places.root / "P009-PILOT").mkdir()
     unfinished_session.write_bytes((lab.places.raw("P001") / "ses-01_run.xdf").read_bytes())
     done = unfinished.move(lab.places, store_of(lab))
     assert sorted(done.copied) == [
@@ -363,9 +364,13 @@ def test_transfer_copies_proves_and_lists_what_is_only_here(lab: Lab) -> None:
         for file in (f"{name}.h5", "ses-01_run.xdf")
     ]  # fmt: skip
     assert done.equal == 6
-    assert done.only_here == ["P001/ses-02: not finished"]
+    assert done.only_here == [
+        "P001/ses-02: not finished",
+        "P009-PILOT: not of a participant in the register; pilots and simulations stay here",
+    ]
     store = files(store_of(lab) / "rehearsal")
     here = files(lab.places.root)
+    assert len(store) == 6
     assert all(here[name] == sha for name, sha in store.items())
     again = unfinished.move(lab.places, store_of(lab))
     assert (again.copied, again.equal) == ([], 6)

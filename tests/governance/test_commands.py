@@ -1,0 +1,110 @@
+"""The commands about people, as the examiner types them, with real processes."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from governed import GOVERNED, TODAY
+
+import labcrane
+from labcrane.cli.app import main
+
+
+@pytest.fixture
+def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "study.yaml").write_text(GOVERNED)
+    (tmp_path / "consent.txt").write_text("I take part.\n")
+    return tmp_path
+
+
+def say(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -> str:
+    assert main(arguments) == status
+    said = capsys.readouterr()
+    return " ".join((said.out + said.err).split())
+
+
+def approve(capsys: pytest.CaptureFixture[str]) -> str:
+    return say(
+        capsys, "approve", "study.yaml", "--board", "Ethics board", "--reference", "KB-1",
+        "--valid-until", f"{TODAY.year + 1}-12-31", "--consent", "consent.txt",
+    )  # fmt: skip
+
+
+def run_session(said: str) -> subprocess.CompletedProcess[str]:
+    run = ["run", "study.yaml", "--participant", "P001", "--local"]
+    return subprocess.run(
+        [sys.executable, "-m", "labcrane", *run],
+        input=said,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_from_approval_to_erasure(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "approved until" in approve(capsys)
+    refused = run_session("")
+    assert refused.returncode == 2
+    assert "P001 has not consented to consent.txt" in refused.stderr
+    assert "slot 1, seed" in say(capsys, "consent", "study.yaml", "P001")
+    done = run_session("note hello\nend\n")
+    assert done.returncode == 0, done.stderr
+    session = labcrane.open_recording("data/P001/P001.h5").session(1)
+    assert session.attrs["approval"] == "KB-1"
+    assert "session ended early" in say(capsys, "deviations")
+    assert str(TODAY) in say(capsys, "participants")
+    say(capsys, "note", "P001", "left-handed")
+    assert "P001: left-handed" in say(capsys, "participants")
+    Path("store").mkdir()
+    assert "2 files are equal on both sides" in say(capsys, "transfer", "store")
+    assert "P001 is P003 now" in say(capsys, "relabel", "P001", "P003")
+    assert "run as P001, with slot 1" in say(capsys, "deviations")
+    said = say(capsys, "erase", "P003", "--reason", "withdrew")
+    assert "P003 is erased. labcrane cannot reach backups" in said
+    assert f"P003 erased on {TODAY}: withdrew" in say(capsys, "participants")
+    assert not list(study.rglob("*.h5"))
+
+
+def test_a_change_is_refused_in_words_and_amended(
+    study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    approve(capsys)
+    say(capsys, "consent", "study.yaml", "P001")
+    Path("study.yaml").write_text(GOVERNED.replace("movements: 1", "movements: 3"))
+    said = say(capsys, "consent", "study.yaml", "P002", status=2)
+    assert "protocol: tasks.aiming.movements was 1, is 3" in said
+    refused = run_session("")
+    assert refused.returncode == 2
+    assert "protocol: tasks.aiming.movements was 1, is 3" in refused.stderr
+    assert not Path("data/P001").exists()
+    said = say(capsys, "amend", "study.yaml", "--why", "more", "--reference", "KB-1-A1")
+    assert "amendment 1: protocol: tasks.aiming.movements was 1, is 3" in said
+    assert "P002 has consented" in say(capsys, "consent", "study.yaml", "P002")
+    assert json.loads(Path("study.lock.json").read_text())["approval"]["board"] == "Ethics board"
+
+
+def test_a_date_that_is_none_is_told(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    said = say(
+        capsys, "approve", "study.yaml", "--board", "B", "--reference", "R",
+        "--valid-until", "next year", "--consent", "consent.txt", status=2,
+    )  # fmt: skip
+    assert "'next year' is no date; write it as 2027-12-31" in said
+
+
+def test_who_is_not_in_the_register_is_told(
+    study: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    approve(capsys)
+    say(capsys, "consent", "study.yaml", "P001")
+    for command in (
+        ["exclude", "P009", "--reason", "ill"],
+        ["note", "P009", "left-handed"],
+        ["waive", "P009", "--session", "2", "--reason", "ill"],
+        ["erase", "P009", "--reason", "withdrew"],
+        ["relabel", "P009", "P010"],
+    ):
+        said = say(capsys, *command, status=2)
+        assert "participant P009 is not in the register; it has P001" in said
