@@ -12,24 +12,27 @@ PRIVATE_FILE = 0o600
 PRIVATE_FOLDER = 0o700
 """Permissions of what concerns people: for the user only."""
 
+SHARED_FILE = 0o644
+"""Permissions of what belongs to the study: colleagues read it."""
+
 UNFINISHED = ".unfinished"
 """How the name of a file ends that is being written beside the one it will replace."""
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write ``path`` for the user only, bring it to the disk, and give it its name at last."""
-    with replacing(path) as beside:
+def write_text(path: Path, text: str, mode: int = PRIVATE_FILE) -> None:
+    """Write ``path``, bring it to the disk, and give it its name at last."""
+    with replacing(path, mode) as beside:
         beside.write_text(text, encoding="utf-8", newline="\n")
 
 
-def copy(source: Path, path: Path) -> None:
+def copy(source: Path, path: Path, mode: int = PRIVATE_FILE) -> None:
     """Copy a file in the same way."""
-    with replacing(path) as beside:
+    with replacing(path, mode) as beside:
         shutil.copyfile(source, beside)
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def replacing(path: Path, mode: int = PRIVATE_FILE) -> Iterator[Path]:
     """Give a new file to be written; it takes the name ``path`` once it is on the disk.
 
     Raises
@@ -45,6 +48,7 @@ def replacing(path: Path) -> Iterator[Path]:
         yield beside
         with beside.open("rb") as file:
             os.fsync(file.fileno())
+        beside.chmod(mode)
         beside.replace(path)
     except OSError as error:
         beside.unlink(missing_ok=True)

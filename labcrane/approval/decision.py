@@ -9,7 +9,7 @@ from labcrane.approval import codebook
 from labcrane.approval.difference import differences
 from labcrane.approval.lock import FORMAT, VERSION, Lock, lock_path, read_lock
 from labcrane.approval.materials import materials
-from labcrane.durable_file import copy
+from labcrane.durable_file import SHARED_FILE, copy
 from labcrane.errors import ProtocolError
 from labcrane.registry import Registry
 from labcrane.study import Study
@@ -84,7 +84,7 @@ def amend(study: Study, registry: Registry, grant: Grant, why: str, today: date)
         "replaces": old.seal,
     }
     kept = old.path.with_name(old.path.name.replace(".json", f".{entry['number']}.json"))
-    copy(old.path, kept)
+    copy(old.path, kept, SHARED_FILE)
     amended = Lock(new.path, {**new.content, "history": [*old.amendments, entry]})
     amended.write()
     return amended

@@ -96,8 +96,9 @@ def _lines(what: str, before: list[str], now: list[str]) -> Iterator[str]:
     matcher = SequenceMatcher(None, before, now, autojunk=False)
     for kind, old, old_end, new, new_end in matcher.get_opcodes():
         if kind != "equal":
-            was, is_now = "\n".join(before[old:old_end]), "\n".join(now[new:new_end])
-            yield f"{what}: line {old + 1} was {was!r}, is {is_now!r}"
+            was = "\n".join(before[old:old_end]) if old < old_end else _NOTHING
+            is_now = "\n".join(now[new:new_end]) if new < new_end else _NOTHING
+            yield f"{what}: line {old + 1} {_change(was, is_now)}"
 
 
 def _sources(what: str, before: Tree, now: Tree) -> Iterator[str]:

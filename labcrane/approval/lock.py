@@ -7,7 +7,7 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from labcrane.durable_file import write_text
+from labcrane.durable_file import SHARED_FILE, write_text
 from labcrane.errors import ProtocolError
 
 FORMAT = "labcrane lock"
@@ -76,7 +76,7 @@ class Lock:
     def write(self) -> None:
         """Write the lock; a kill leaves the old one or the new one."""
         text = json.dumps({**self.content, SEAL: self.seal}, indent=1, ensure_ascii=False)
-        write_text(self.path, text + "\n")
+        write_text(self.path, text + "\n", SHARED_FILE)
 
 
 def lock_path(protocol: Path) -> Path:

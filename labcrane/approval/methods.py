@@ -59,6 +59,9 @@ def _tasks(protocol: Mapping[str, Any]) -> list[str]:
     ]
 
 
+UNITS = {"s": "s", "hz": "Hz", "m": "m", "deg": "degrees"}
+"""Units at the end of a setting's name."""
+
 ORDERS = {
     "as_written": "in a fixed order",
     "shuffled": "in a completely randomised order",
@@ -108,11 +111,15 @@ def _use(component: Mapping[str, Any]) -> str:
 
 
 def _listed(settings: Mapping[str, Any]) -> str:
-    return ", ".join(
-        f"{name.replace('_', ' ')} {_value(value)}"
-        for name, value in settings.items()
-        if name != "use"
-    )
+    return ", ".join(_setting(name, value) for name, value in settings.items() if name != "use")
+
+
+def _setting(name: str, value: Any) -> str:
+    """Return a setting in words; a unit at the end of its name goes behind the value."""
+    words, _, unit = name.rpartition("_")
+    if unit not in UNITS:
+        words, unit = name, ""
+    return f"{words.replace('_', ' ')} {_value(value)}{f' {UNITS[unit]}' if unit else ''}"
 
 
 def _value(value: Any) -> str:

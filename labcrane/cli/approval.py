@@ -73,12 +73,12 @@ def methods(
     from labcrane.approval.codebook import as_csv
     from labcrane.approval.lock import read_lock
     from labcrane.approval.methods import methods as paragraph
-    from labcrane.durable_file import write_text
+    from labcrane.durable_file import SHARED_FILE, write_text
 
     lock = read_lock(protocol)
     path = codebook or protocol.with_name(f"{protocol.stem}.codebook.csv")
     out.print(paragraph(lock), markup=False)
-    write_text(path, as_csv(lock.content["codebook"]))
+    write_text(path, as_csv(lock.content["codebook"]), SHARED_FILE)
     out.print(f"codebook: {path}", markup=False)
 
 

@@ -12,6 +12,14 @@ ProtocolPath = Annotated[Path, typer.Argument(metavar="PROTOCOL", help="the stud
 out = Console(soft_wrap=True, highlight=False)
 
 
+def whole_table(*titles: str) -> Table:
+    """Return a table that breaks what does not fit, and cuts nothing off."""
+    table = Table()
+    for title in titles:
+        table.add_column(title, overflow="fold")
+    return table
+
+
 def check(protocol: ProtocolPath) -> None:
     """Check a protocol and everything it refers to, without running it."""
     from labcrane.registry import discover
@@ -40,7 +48,7 @@ def plan(
 ) -> None:
     """Show blocks, each participant's order, and how long a session is likely to take."""
     from labcrane.allocation import allocate, as_csv, balance
-    from labcrane.durable_file import write_text
+    from labcrane.durable_file import SHARED_FILE, write_text
     from labcrane.plan import plan_session
     from labcrane.pseudonyms import pseudonyms
     from labcrane.registry import discover
@@ -50,7 +58,7 @@ def plan(
     count = participants or study.protocol.participants.planned
     names = [participant] if participant else pseudonyms(study.protocol.participants.pattern, count)
     for number, session in enumerate(study.protocol.sessions, start=1):
-        table = Table("participant", "slot", "seed", "block", "trials", "order", "minutes")
+        table = whole_table("participant", "slot", "seed", "block", "trials", "order", "minutes")
         for name in names:
             session_plan = plan_session(study, name, number)
             for block in session_plan.blocks:
@@ -74,7 +82,7 @@ def plan(
         for line in balance(study, allotments):
             out.print(line, markup=False)
     if export:
-        write_text(export, as_csv(allotments))
+        write_text(export, as_csv(allotments), SHARED_FILE)
         out.print(f"allocation: {export}", markup=False)
 
 

@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.table import Table
 
 from labcrane.cli.approval import today
-from labcrane.cli.inspect import ProtocolPath, out
+from labcrane.cli.inspect import ProtocolPath, out, whole_table
 
 if TYPE_CHECKING:
     from labcrane.session import Visit
@@ -28,7 +27,7 @@ def participants(data: Data = HERE) -> None:
     from labcrane.participants.register import read
 
     register = read(Places(data))
-    table = Table("participant", "slot", "group", "seed", "consent", "sessions", "excluded")
+    table = whole_table("participant", "slot", "group", "seed", "consent", "sessions", "excluded")
     for name, entry in sorted(register.participants.items()):
         table.add_row(
             name,
@@ -118,7 +117,7 @@ def deviations(data: Data = HERE) -> None:
     from labcrane.participants.places import Places
 
     found = all_deviations(Places(data))
-    table = Table("participant", "session", "trial", "what", "detail")
+    table = whole_table("participant", "session", "trial", "what", "detail")
     for name, deviation in found:
         where = [str(number) if number else "-" for number in (deviation.session, deviation.trial)]
         table.add_row(name, *where, deviation.what, deviation.detail)

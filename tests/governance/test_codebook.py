@@ -65,6 +65,7 @@ def test_the_methods_paragraph_says_what_was_approved_and_done(tmp_path: Path) -
     text = ordered("{rule: blocked, times: 3, in_a_row: 1}").replace(
         "steps:", "after_days: [0, 3]\n    steps:\n      - consent"
     )
+    text = text.replace("movements: 1}", "movements: 1, limit_s: 20}")
     lab = Lab(tmp_path, text)
     lock = lab.approve()
     said = methods(lock)
@@ -73,7 +74,7 @@ def test_the_methods_paragraph_says_what_was_approved_and_done(tmp_path: Path) -
         "3 groups (none, visual, sound) in permuted blocks of 3",
         "CH8 knuckle boom",
         "at 240 Hz",
-        "distances 2 and 3, movements 1",
+        "distances 2 and 3, movements 1, limit 20 s",
         "The levels of pairs came in randomised blocks, 3 times each, no more than 1 in a row",
         "Session 1 (only), 0 to 3 days after the one before, consisted of consent, block aiming",
         f"labcrane {labcrane.__version__}",

@@ -104,6 +104,18 @@ def test_another_line_of_the_instructions_is_refused(lab: Lab) -> None:
     ]
 
 
+def test_lines_that_come_or_go_are_told(lab: Lab) -> None:
+    hello = lab.folder / "hello.md"
+    hello.write_text("Hello.\nPlease hold both sticks.\nThank you.\n")
+    assert refusal(lab) == ["file hello.md: line 3 is new: 'Thank you.'"]
+    hello.write_text("Hello.\n")
+    assert refusal(lab) == ["file hello.md: line 2 is gone; it was 'Please hold both sticks.'"]
+
+
+def test_colleagues_can_read_the_lock(lab: Lab) -> None:
+    assert lock_path(lab.protocol).stat().st_mode & 0o777 == 0o644
+
+
 def compared(lab: Lab, data: dict[str, object], change) -> list[str]:
     """Return what is told when something changes that a protocol with ``data`` names."""
     study = lab.study
