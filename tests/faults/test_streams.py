@@ -86,7 +86,17 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
     (folder / "study.yaml").write_text(text + NEEDS.format(source=source))
     sender = Sender(source)
     process = subprocess.Popen(
-        [sys.executable, "-m", "labcrane", "run", "study.yaml", "--participant", "P001", "--local"],
+        [
+            sys.executable,
+            "-m",
+            "labcrane",
+            "run",
+            "study.yaml",
+            "--participant",
+            "P001",
+            "--local",
+            "--pilot",
+        ],
         cwd=folder,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
@@ -111,7 +121,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
             said.until("recorder is back", times=kill + 1)
         said.order("note all is well again")
         said.order("end")
-        yield folder / "data" / "P001" / "P001.h5", said.end()
+        yield folder / "data" / "P001-PILOT" / "P001-PILOT.h5", said.end()
     finally:
         sender.kill()
         if process.poll() is None:
