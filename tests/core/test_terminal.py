@@ -64,7 +64,7 @@ def folder(tmp_path: Path) -> Path:
 
 def test_keys_start_pause_note_flag_and_end_a_session(folder: Path) -> None:
     command = [sys.executable, "-m", "labcrane", "run", "study.yaml"]
-    user = TerminalUser([*command, "--participant", "P002", "--local"], folder)
+    user = TerminalUser([*command, "--participant", "P002", "--local", "--pilot"], folder)
     user.until("space to start")
     user.press(" ")
     user.until("block 1")
@@ -77,7 +77,7 @@ def test_keys_start_pause_note_flag_and_end_a_session(folder: Path) -> None:
     user.press("z")  # no order: the keys are shown again
     user.press("e")
     assert user.leave() == 0
-    session = open_recording(folder / "data" / "P002" / "P002.h5").session(1)
+    session = open_recording(folder / "data" / "P002-PILOT" / "P002-PILOT.h5").session(1)
     given = {
         name: data["text"]
         for name, data in zip(session.events["name"], session.events["data"], strict=True)
@@ -94,12 +94,12 @@ def test_keys_start_pause_note_flag_and_end_a_session(folder: Path) -> None:
 
 def test_an_interrupt_from_the_keyboard_ends_the_session_in_order(folder: Path) -> None:
     command = [sys.executable, "-m", "labcrane", "run", "study.yaml"]
-    user = TerminalUser([*command, "--participant", "P002", "--local"], folder)
+    user = TerminalUser([*command, "--participant", "P002", "--local", "--pilot"], folder)
     user.until("space to start")
     user.press(" ")
     user.until("block 1")
     user.process.send_signal(2)
     assert user.leave() == 0
-    session = open_recording(folder / "data" / "P002" / "P002.h5").session(1)
+    session = open_recording(folder / "data" / "P002-PILOT" / "P002-PILOT.h5").session(1)
     assert session.events["name"].tolist()[-1] == "session.end"
     assert session.events["data"].tolist()[-1]["reason"] == "by order"
