@@ -1,6 +1,6 @@
 """Who is in a data folder, and who counts."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -13,20 +13,21 @@ from labcrane.recording.recording import Recording, SessionRecord, open_recordin
 if TYPE_CHECKING:
     import pandas as pd
 
-TOMBSTONE = "erased.json"
-"""What erasing a participant leaves in the folder."""
-
 
 class Status(StrEnum):
     """What a participant's data are. The order is that of the rules: the first that holds."""
 
-    ERASED = "erased"  # only a tombstone is left; cannot be included
+    ERASED = "erased"  # only a tombstone is left in the register; cannot be included
+    EXCLUDED = "excluded"  # in the register, with a reason; cannot be included
     UNREADABLE = "unreadable"  # no participant file, or a damaged one; cannot be included
     SIMULATED = "simulated"
     PILOT = "pilot"
     HALF_FINISHED = "half-finished"  # a session ended early, or is still to come
     COMPLETE = "complete"
 
+
+Struck = tuple[Status, str]
+"""Whether somebody was erased or excluded, and why."""
 
 INCLUDABLE = (Status.SIMULATED, Status.PILOT, Status.HALF_FINISHED)
 """What is left out unless it is asked for."""
@@ -122,6 +123,7 @@ def find_cohort(
     folder: Path,
     include: Iterable[str] = (),
     progress: Callable[[int, int], None] | None = None,
+    struck: Mapping[str, Struck] | None = None,
 ) -> Cohort:
     """Look at every participant below ``folder``.
 
@@ -135,6 +137,8 @@ def find_cohort(
         Of simulated, pilot and half-finished, those to be used as well.
     progress
         Told how many participants have been looked at, of how many.
+    struck
+        Whom the register says not to count, and why, by name: they are listed, never used.
 
     Raises
     ------
@@ -148,10 +152,14 @@ def find_cohort(
         raise RecordingError(f"there is no data folder {folder}; give the study's data folder")
     folders = [entry for entry in sorted(folder.iterdir()) if _is_participant(entry)]
     people = []
+    struck = struck or {}
+    gone = [name for name in struck if not any(entry.name == name for entry in folders)]
     for number, entry in enumerate(folders, start=1):
-        people.append(_look(entry))
+        people.append(_look(entry, struck.get(entry.name)))
         if progress is not None:
             progress(number, len(folders))
+    people += [Participant(name, folder / name / f"{name}.h5", *struck[name]) for name in gone]
+    people.sort(key=lambda person: person.name)
     included = tuple(person for person in people if person.status in wanted)
     left_out = tuple(person for person in people if person.status not in wanted)
     if not included:
@@ -164,7 +172,7 @@ def _includable(word: str) -> Status:
     if word not in possible:
         raise ProtocolError(
             f"{word!r} cannot be included; possible: {', '.join(possible)} "
-            "(complete participants always are, erased and unreadable ones never)"
+            "(complete participants always are, erased, excluded and unreadable ones never)"
         )
     return possible[word]
 
@@ -183,14 +191,13 @@ def _nobody(folder: Path, left_out: Sequence[Participant]) -> str:
 def _is_participant(entry: Path) -> bool:
     if not entry.is_dir():
         return False
-    names = (f"{entry.name}.h5", TOMBSTONE)
-    return any((entry / name).exists() for name in names) or any(entry.glob("ses-*.xdf"))
+    return (entry / f"{entry.name}.h5").exists() or any(entry.glob("ses-*.xdf"))
 
 
-def _look(folder: Path) -> Participant:
+def _look(folder: Path, struck: Struck | None) -> Participant:
     path = folder / f"{folder.name}.h5"
-    if (folder / TOMBSTONE).exists():
-        return Participant(folder.name, path, Status.ERASED, f"{TOMBSTONE} is in the folder")
+    if struck is not None:
+        return Participant(folder.name, path, *struck)
     try:
         recording = open_recording(path)
         if not recording.sessions:

@@ -110,6 +110,8 @@ def measure_session(
     import pandas as pd
 
     trials = session.trials
+    if trials.empty:  # a session that ended before its first result has no columns either
+        return trials
     machine = machine_of(session)
     rate_hz = float(session.attrs["rate_hz"])
     seen = looks(session)

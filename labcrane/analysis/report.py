@@ -91,7 +91,7 @@ def _who(page: Page, cohort: Cohort, everything: "pd.DataFrame") -> None:
     page.heading("Participants and exclusions")
     page.say(
         "Complete participants are included; simulated, pilot and half-finished ones only when "
-        "asked for; erased and unreadable ones never."
+        "asked for; erased, excluded and unreadable ones never."
     )
     page.table("participants", cohort.listing())
     out = exclusions(everything)

@@ -12,7 +12,7 @@ from labcrane.cli.inspect import out
 from labcrane.errors import ProtocolError, RecordingError
 
 if TYPE_CHECKING:
-    from labcrane.analysis.cohort import Cohort, Participant
+    from labcrane.analysis.cohort import Cohort, Participant, Struck
 
 DataFolder = Annotated[Path, typer.Argument(metavar="DATA", help="the study's data folder")]
 Include = Annotated[
@@ -49,6 +49,7 @@ def export(
     with _bar(f"export to {to}", len(cohort.included)) as advance:
         exporter.export(_counted(cohort.included, advance), folder)
     _write_manifest(folder, to, chosen.model_dump(mode="json"), cohort)
+    _keep_track(data, to, folder, cohort)
     out.print(f"{to}: {folder}", markup=False)
 
 
@@ -115,10 +116,49 @@ def replay(
 def _cohort(data: Path, include: list[str] | None) -> "Cohort":
     from labcrane.analysis.cohort import find_cohort
 
-    cohort = find_cohort(data, include or ())
+    cohort = find_cohort(data, include or (), struck=_struck(data))
     for person in cohort.left_out:
         out.print(f"left out: {person.name}, {person.status}: {person.why}", markup=False)
     return cohort
+
+
+def _struck(data: Path) -> "dict[str, Struck]":
+    """Return whom the study's register says not to count, and why."""
+    from labcrane.analysis.cohort import Status
+    from labcrane.participants.places import Places
+    from labcrane.participants.register import read
+
+    if not Places(data).register.exists():
+        return {}
+    register = read(Places(data))
+    struck = {
+        stone.participant: (Status.ERASED, f"on {stone.date}: {stone.reason}")
+        for stone in register.tombstones
+    }
+    for name, entry in register.participants.items():
+        if entry.exclusion is not None:
+            why = f"on {entry.exclusion.date}: {entry.exclusion.reason}"
+            struck[name] = (Status.EXCLUDED, why)
+    return struck
+
+
+def _keep_track(data: Path, to: str, folder: Path, cohort: "Cohort") -> None:
+    """Note in the register where data of its participants went, for erasing and relabelling."""
+    from datetime import UTC, datetime
+
+    from labcrane.participants.copies import record_export
+    from labcrane.participants.places import Places
+
+    if not Places(data).register.exists():
+        return  # pilots and simulations only: nobody's data have gone anywhere
+    names = [person.name for person in cohort.included]
+    files = {}
+    for path in (path for path in folder.rglob("*") if path.is_file()):
+        inside = path.relative_to(folder)
+        # A file that is named after somebody holds nobody else; a table may hold everybody.
+        named = [name for name in names if name in str(inside)]
+        files[inside] = named or names
+    record_export(Places(data), to, folder, files, datetime.now(UTC).date())
 
 
 @contextmanager

@@ -53,13 +53,11 @@ def describe_dataset(
 
 def _approvals(contexts: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the approvals that the sessions were recorded under."""
-    found = []
-    for context in contexts:
-        approval = context.get("approval")
-        if isinstance(approval, Mapping):
-            words = [str(approval[key]) for key in ("board", "reference") if key in approval]
-            found.append(", ".join(words))
-    return found
+    return [
+        f"{context['approval_board']}, {context['approval']}"
+        for context in contexts
+        if "approval_board" in context
+    ]
 
 
 def describe_participants(folder: Path, rows: Sequence[Mapping[str, object]]) -> None:

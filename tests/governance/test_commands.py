@@ -62,9 +62,17 @@ def test_from_approval_to_erasure(study: Path, capsys: pytest.CaptureFixture[str
     assert "2 files are equal on both sides" in say(capsys, "transfer", "store")
     assert "P001 is P003 now" in say(capsys, "relabel", "P001", "P003")
     assert "wrong" in say(capsys, "deviations")
+    say(
+        capsys, "export", "data", "--to", "tables", "--out", "data/exports/tables",
+        "--include", "half-finished",
+    )  # fmt: skip
+    exported = "".join(path.read_text() for path in Path("data/exports/tables").rglob("*.csv"))
+    assert "P003" in exported
     said = say(capsys, "erase", "P003", "--reason", "withdrew")
     assert "P003 is erased. labcrane cannot reach backups" in said
     assert f"P003 erased on {TODAY}: withdrew" in say(capsys, "participants")
+    left = b"".join(path.read_bytes() for path in Path("data/exports").rglob("*.csv"))
+    assert b"P003" not in left
     assert not list(study.rglob("*.h5"))
 
 

@@ -4,8 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from labcrane.analysis.cohort import Cohort, find_cohort
+from labcrane.analysis.cohort import Cohort, Status, find_cohort
 from labcrane.console import Command, Order
+from labcrane.participants.places import Places
+from labcrane.participants.register import Tombstone, changed
 from results.recorded import record, study
 
 
@@ -20,8 +22,9 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     record(the_study, folder, "P003", orders={900: [Command(Order.END)]})
     record(the_study, folder, "P001", pilot=True)
     record(the_study, folder, "P005", simulated=True)
-    (folder / "P006").mkdir()
-    (folder / "P006" / "erased.json").write_text("{}")
+    with changed(Places(folder)) as register:  # what erasing P006 has left
+        stone = Tombstone(participant="P006", date="2026-05-01", reason="withdrew")
+        register.tombstones.append(stone)
     (folder / "P007").mkdir()
     (folder / "P007" / "ses-01_run.xdf").write_bytes(b"XDF:")
     return folder
@@ -29,4 +32,5 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def cohort(data: Path) -> Cohort:
-    return find_cohort(data)
+    """Somebody was erased as well, as the register tells."""
+    return find_cohort(data, struck={"P006": (Status.ERASED, "on 2026-05-01: withdrew")})

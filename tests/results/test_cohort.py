@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from labcrane import ProtocolError, RecordingError
-from labcrane.analysis.cohort import Cohort, find_cohort
+from labcrane.analysis.cohort import Cohort, Status, find_cohort
 
 
 def test_only_complete_participants_are_included(cohort: Cohort) -> None:
@@ -41,7 +41,7 @@ def test_what_cannot_be_included_is_refused(data: Path, status: str) -> None:
         find_cohort(data, [status])
     assert str(refusal.value) == (
         f"{status!r} cannot be included; possible: simulated, pilot, half-finished "
-        "(complete participants always are, erased and unreadable ones never)"
+        "(complete participants always are, erased, excluded and unreadable ones never)"
     )
 
 
@@ -50,10 +50,17 @@ def test_a_folder_without_anybody_to_use_says_what_is_in_it(tmp_path: Path) -> N
         find_cohort(tmp_path)
     with pytest.raises(RecordingError, match=r"there is no data folder .*; give the study's"):
         find_cohort(tmp_path / "nowhere")
-    (tmp_path / "P001").mkdir()
-    (tmp_path / "P001" / "erased.json").touch()
+    erased = {"P001": (Status.ERASED, "on 2026-05-01: withdrew")}
     with pytest.raises(RecordingError, match="can be used as asked: 1 erased; include them"):
-        find_cohort(tmp_path)
+        find_cohort(tmp_path, struck=erased)
+
+
+def test_an_excluded_participant_is_listed_with_the_reason_and_not_used(data: Path) -> None:
+    excluded = {"P002": (Status.EXCLUDED, "on 2026-05-02: fell asleep")}
+    found = find_cohort(data, struck=excluded)
+    assert [person.name for person in found.included] == ["P001"]
+    (left_out,) = (person for person in found.left_out if person.name == "P002")
+    assert (left_out.status, left_out.why) == excluded["P002"]
 
 
 def test_a_session_that_is_still_to_come_makes_a_participant_half_finished(tmp_path: Path) -> None:

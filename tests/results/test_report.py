@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from labcrane.analysis.cohort import Cohort, find_cohort
+from labcrane.analysis.cohort import Cohort, Status, find_cohort
 from labcrane.analysis.quality import exclusions, is_result, loop_quality, sync_quality
 from labcrane.analysis.report import write_report
 from labcrane.cli.app import main
@@ -17,7 +17,8 @@ from results.consumers import under
 
 @pytest.fixture(scope="module")
 def folder(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    cohort = find_cohort(data, ["half-finished", "simulated"])
+    struck = {"P006": (Status.ERASED, "on 2026-05-01: withdrew")}
+    cohort = find_cohort(data, ["half-finished", "simulated"], struck=struck)
     out = tmp_path_factory.mktemp("report")
     done: list[int] = []
     page = write_report(cohort, out, progress=lambda number, of: done.append(number))
