@@ -82,12 +82,15 @@ class _Recorded:
 class Recorder:
     """Records what is asked for as soon as it is there. Call ``look`` several times a second."""
 
-    def __init__(self, journal: Path, requests: Sequence[StreamRequest]) -> None:
-        import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
-
+    def __init__(
+        self,
+        journal: Path,
+        requests: Sequence[StreamRequest],
+        resolver: "pylsl.ContinuousResolver | None" = None,
+    ) -> None:
         self._requests = tuple(requests)
         self._writer = XdfWriter(next_part(journal))
-        self._resolver = pylsl.ContinuousResolver(forget_after=FORGET_S)
+        self._resolver = resolver or a_resolver()
         self._streams: dict[tuple[str, str, str], _Recorded] = {}
         self._since: dict[str, float] = {}
         self._fault: str | None = None
@@ -168,6 +171,13 @@ class Recorder:
                     recorded.inlet.note("warning", text=warning)
 
 
+def a_resolver() -> "pylsl.ContinuousResolver":
+    """Return a resolver that begins to look around at once, and goes on."""
+    import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
+
+    return pylsl.ContinuousResolver(forget_after=FORGET_S)
+
+
 def _health(recorded: _Recorded, now: float) -> Health:
     inlet, flow, info = recorded.inlet, recorded.inlet.flow, recorded.inlet.info
     probe = flow.probe
@@ -224,13 +234,16 @@ def _absent(request: StreamRequest) -> Health:
 def main(arguments: Sequence[str]) -> int:
     """Record until told to stop; the process's exit status.
 
-    Without arguments the process loads what it needs and waits for its orders, a line of JSON on
-    the standard input: a spare recorder takes over at once.
+    Without arguments the process loads what it needs, looks around for streams, and waits for its
+    orders, a line of JSON on the standard input: a spare recorder takes over at once.
     """
     from labcrane.streams.recorder_process import await_orders, run  # noqa: PLC0415 - a cycle
 
-    orders = arguments[0] if arguments else await_orders()
-    return run(Orders.of(json.loads(orders))) if orders else 0
+    if arguments:
+        return run(Orders.of(json.loads(arguments[0])))
+    resolver = a_resolver()
+    orders = await_orders()
+    return run(Orders.of(json.loads(orders)), resolver) if orders else 0
 
 
 if __name__ == "__main__":

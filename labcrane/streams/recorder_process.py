@@ -8,23 +8,29 @@ import signal
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from labcrane.streams.network import use_loopback
 from labcrane.streams.outlets import check_clock
 from labcrane.streams.recorder import Orders, Recorder
+
+if TYPE_CHECKING:
+    import pylsl
 
 LOOK_S = 0.25
 STATUS_S = 1.0
 STATUS_FD = 1
 
 
-def run(orders: Orders) -> int:
-    """Record until told to stop, or until whoever started it has died."""
+def run(orders: Orders, resolver: "pylsl.ContinuousResolver | None" = None) -> int:
+    """Record until told to stop, or until whoever started it has died.
+
+    ``resolver`` is one that has looked around already.
+    """
     if orders.local:
         use_loopback()
     check_clock()
-    recorder = Recorder(orders.journal, orders.streams)
+    recorder = Recorder(orders.journal, orders.streams, resolver)
     teller = _Teller()
     with _no_blocking(STATUS_FD):
         try:
@@ -44,9 +50,6 @@ def await_orders() -> str:
 
     Read byte by byte: what a buffer holds back, select does not see afterwards.
     """
-    import pylsl  # noqa: PLC0415 - the slow part of a start is done before the orders come
-
-    pylsl.library_version()
     line = b""
     while (byte := os.read(0, 1)) not in (b"", b"\n"):
         line += byte
