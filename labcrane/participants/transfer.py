@@ -10,6 +10,7 @@ from labcrane.errors import RecordingError
 from labcrane.participants.copies import Reach, edit_file, in_store
 from labcrane.participants.places import Places
 from labcrane.participants.register import Register, changed, read
+from labcrane.recording.hdf5_columns import texts_of
 from labcrane.recording.participant_file import group_name, opened
 from labcrane.recording.parts import journal_path, parts
 
@@ -121,7 +122,7 @@ def _is_finished(file: Path, session: int) -> bool:
         if group_name(session) not in recording:
             return False
         journals = recording[f"{group_name(session)}/journals"]
-        held = zip(journals["name"].asstr()[:], journals["size"][:].astype(int), strict=True)
+        held = zip(texts_of(journals["name"]), journals["size"][:].astype(int), strict=True)
         return dict(held) == sizes
 
 

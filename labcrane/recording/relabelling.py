@@ -14,7 +14,7 @@ import numpy as np
 
 from labcrane.errors import RecordingError
 from labcrane.recording.checks import CHECK_NAME
-from labcrane.recording.hdf5_columns import write_text, write_texts
+from labcrane.recording.hdf5_columns import text_of, texts_of, write_text, write_texts
 from labcrane.recording.journal import START
 from labcrane.recording.xdf import XdfWriter
 from labcrane.recording.xdf_reader import XdfFile, XdfStream, read_xdf
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 
 SAMPLES = 100_000
 """Numbers are written in chunks of so many samples."""
+
+TEXT_KINDS = "OS"
+"""Numpy's kinds of texts: of their own length in older files, of one length in newer ones."""
 
 FORMERLY = "formerly"
 """Under which name the old pseudonym stays in the record."""
@@ -121,11 +124,11 @@ def relabel_participant_file(
             after.attrs[FORMERLY] = _formerly(before, old)
             for session in (node for name, node in after.items() if name.startswith("ses-")):
                 session.attrs[FORMERLY] = _formerly(session, old)
-                context = _recorded(json.loads(session["context"].asstr()[()]), old)
+                context = _recorded(json.loads(text_of(session["context"])), old)
                 del session["context"]
                 write_text(session, "context", json.dumps(context, ensure_ascii=False))
                 journals = session["journals"]
-                for number, name in enumerate(journals["name"].asstr()[:]):
+                for number, name in enumerate(texts_of(journals["name"])):
                     journals["size"][number] = sizes.get(name, journals["size"][number])
     except (OSError, KeyError, ValueError) as error:
         raise RecordingError(f"cannot relabel {source}: {error}; it is as it was") from error
@@ -143,12 +146,12 @@ def _copy_group(before: "h5py.Group", after: "h5py.Group", rename: Rename) -> No
         if isinstance(node, h5py.Group):
             _copy_group(node, after.create_group(name), rename)
             continue
-        if node.dtype.kind != "O":
+        if node.dtype.kind not in TEXT_KINDS:
             before.copy(name, after)
         elif node.shape == ():
-            write_text(after, name, rename(node.asstr()[()]))
+            write_text(after, name, rename(text_of(node)))
         else:
-            write_texts(after, name, [rename(text) for text in node.asstr()[:]])
+            write_texts(after, name, [rename(text) for text in texts_of(node)])
         _copy_attributes(node, after[name], rename)
 
 
