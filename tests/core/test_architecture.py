@@ -62,13 +62,3 @@ def test_files_stay_short() -> None:
     for folder in ("labcrane", "plugins"):
         for module in (ROOT / folder).rglob("*.py"):
             assert len(module.read_text().splitlines()) <= 300, module.relative_to(ROOT)
-
-
-def test_the_project_names_no_place_of_its_making() -> None:
-    tracked = subprocess.run(
-        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False
-    ).stdout.split("\0")
-    for name in filter(None, tracked):
-        path = ROOT / name
-        if path.suffix in {".py", ".md", ".toml", ".yaml", ".sh", ".c"} and path != Path(__file__):
-            assert "../shared" not in path.read_text(), name

@@ -1,5 +1,4 @@
 import threading
-import time
 from pathlib import Path
 
 import numpy as np
@@ -230,17 +229,12 @@ def test_a_file_is_read_while_it_is_written(tmp_path: Path) -> None:
             assert len(read_xdf(path).stream("n").stamps) == k + 1
 
 
-def test_an_hour_of_frames_is_read_in_seconds(tmp_path: Path) -> None:
-    """Not sample by sample: pyxdf needs minutes for an hour at 1 kHz."""
+def test_long_runs_of_equal_frames_read_as_pyxdf_reads_them(tmp_path: Path) -> None:
+    # They are viewed in one piece, not read sample by sample; what that saves is in
+    # benchmarks/recording.py.
     path = write(tmp_path / "x.xdf", 24_000)
-    began = time.perf_counter()
     ours = read_xdf(path).stream("labcrane.frames")
-    took = time.perf_counter() - began
-    began = time.perf_counter()
-    theirs = load(path)["labcrane.frames"]
-    theirs_took = time.perf_counter() - began
-    np.testing.assert_array_equal(ours.data, theirs["time_series"])
-    assert took < theirs_took / 2
+    np.testing.assert_array_equal(ours.data, load(path)["labcrane.frames"]["time_series"])
 
 
 def test_an_unknown_stream_is_named_with_those_there_are(tmp_path: Path) -> None:
