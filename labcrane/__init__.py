@@ -18,7 +18,7 @@ from labcrane.recording.stream_header import Channel, StreamHeader
 from labcrane.recording.xdf import XdfWriter
 from labcrane.records import Event, Frame, Judgement, Phase, Planned, Run, Trial, Value
 from labcrane.roles import Controller, Dynamics, Exporter, InputDevice, Task
-from labcrane.signals import FloatArray, Layout, Signal
+from labcrane.signals import FloatArray, Layout, Signal, signals_of
 
 __version__ = "0.1.0"
 
@@ -66,4 +66,5 @@ __all__ = [
     "offer",
     "open_recording",
     "reach",
+    "signals_of",
 ]

@@ -1,6 +1,6 @@
 """What entered a recorded session from outside, tick by tick."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from labcrane.console import Command, Order
 from labcrane.recording.recording import SessionRecord
 from labcrane.records import Event, Frame
 from labcrane.roles import InputDevice
-from labcrane.signals import FloatArray, Signal
+from labcrane.signals import FloatArray, Signal, signals_of
 
 
 class RecordOver(Exception):  # noqa: N818 - ends a loop, and is no error
@@ -74,18 +74,3 @@ class Script:
 
     def report(self, event: Event) -> None:
         """Nobody is told; the sinks see every event."""
-
-
-def signals_of(names: Sequence[str], units: Mapping[str, str]) -> tuple[Signal, ...]:
-    """Return signals with these columns, in the same order."""
-    signals: list[Signal] = []
-    for column in names:
-        name, _, component = column.rpartition(".")
-        if name and signals and signals[-1].name == name:
-            last = signals.pop()
-            signals.append(Signal(name, last.unit, (*last.components, component)))
-        elif name:
-            signals.append(Signal(name, units[column], (component,)))
-        else:
-            signals.append(Signal(column, units[column]))
-    return tuple(signals)

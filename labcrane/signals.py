@@ -1,5 +1,6 @@
 """Named quantities, and where they sit in an array."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -96,3 +97,21 @@ class Layout:
 
     def _known(self) -> str:
         return ", ".join(signal.name for signal in self.signals) or "nothing"
+
+
+def signals_of(names: Sequence[str], units: Mapping[str, str]) -> tuple[Signal, ...]:
+    """Return signals with these columns, in the same order: what a recording was laid out by.
+
+    Neighbours that differ in their last word only are the components of one vector.
+    """
+    signals: list[Signal] = []
+    for column in names:
+        name, _, component = column.rpartition(".")
+        if name and signals and signals[-1].name == name:
+            last = signals.pop()
+            signals.append(Signal(name, last.unit, (*last.components, component)))
+        elif name:
+            signals.append(Signal(name, units[column], (component,)))
+        else:
+            signals.append(Signal(column, units[column]))
+    return tuple(signals)

@@ -1,6 +1,6 @@
 """The axes of a recorded session, played again."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +14,10 @@ from labcrane import (
     RecordingError,
     Run,
     Settings,
-    Signal,
     Tick,
     Value,
     open_recording,
+    signals_of,
 )
 
 
@@ -45,7 +45,7 @@ class RecordedInput(InputDevice):
         except RecordingError as error:
             raise ProtocolError(str(error)) from error
         recorded = record.streams["input"]
-        self.signals = _signals(tuple(map(str, recorded.data)), recorded.units)
+        self.signals = signals_of(tuple(map(str, recorded.data)), recorded.units)
         self._axes: FloatArray = recorded.data.to_numpy(np.float64)
         self._rate_hz = float(record.attrs["rate_hz"])
         self._at_rest = np.zeros(self._axes.shape[1])
@@ -66,18 +66,3 @@ class RecordedInput(InputDevice):
 
     def facts(self) -> Mapping[str, Value]:
         return {"file": str(self._settings.file), "session": self._settings.session}
-
-
-def _signals(columns: Sequence[str], units: Mapping[str, str]) -> tuple[Signal, ...]:
-    """Return signals with these columns, in the same order."""
-    signals: list[Signal] = []
-    for column in columns:
-        name, _, component = column.rpartition(".")
-        if name and signals and signals[-1].name == name:
-            last = signals.pop()
-            signals.append(Signal(name, last.unit, (*last.components, component)))
-        elif name:
-            signals.append(Signal(name, units[column], (component,)))
-        else:
-            signals.append(Signal(column, units[column]))
-    return tuple(signals)

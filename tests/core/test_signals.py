@@ -1,0 +1,35 @@
+"""Named quantities, and where they sit in an array."""
+
+import pytest
+
+from labcrane import Layout, ProtocolError, Signal, signals_of
+
+SIGNALS = (
+    Signal("left", "1", ("x", "trigger")),
+    Signal("joint.angle", "rad", ("slew", "wrist")),
+    Signal("joint.velocity", "rad/s", ("slew", "wrist")),
+    Signal("mode", "1"),
+)
+
+
+def test_signals_come_back_from_the_columns_of_a_recording() -> None:
+    layout = Layout("the machine", SIGNALS)
+    units = dict(zip(layout.columns, layout.units, strict=True))
+    assert signals_of(layout.columns, units) == SIGNALS
+
+
+def test_a_signal_is_found_where_its_columns_are() -> None:
+    layout = Layout("the machine", SIGNALS)
+    assert layout.columns[layout.find("joint.velocity")] == (
+        "joint.velocity.slew",
+        "joint.velocity.wrist",
+    )
+    assert layout.index("mode") == layout.size - 1
+
+
+def test_what_is_not_there_is_told_with_what_is() -> None:
+    layout = Layout("the machine", SIGNALS)
+    with pytest.raises(ProtocolError, match=r"has no 'tip'; it has left, joint\.angle"):
+        layout.find("tip")
+    with pytest.raises(ProtocolError, match=r"has no 'left\.y'; it has left\.x, left\.tri"):
+        layout.index("left.y")
