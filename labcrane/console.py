@@ -19,6 +19,10 @@ class Order(StrEnum):
     NOTE = "note"  # put words into the record
     OVERRIDE = "override"  # let the running trial go on past its automatic ends
     COMPLETION = "completion"  # set the completion flag of the running trial: 1 or 0
+    HINT = "hint"  # show words to the operator
+    ANSWER = "answer"  # to a question, as JSON: questionnaire, item, value
+    SUBMIT = "submit"  # hand in the questionnaire that is asked
+    DENIED = "denied"  # said by a page: somebody without the right asked for something
     LOST = "lost"  # said by the launcher, not by people: something outside the session failed
     BACK = "back"  # and works again
 
@@ -29,6 +33,12 @@ class Command:
 
     order: Order
     text: str = ""
+    by: str = ""  # which page; empty for the terminal
+
+
+def by_whom(command: Command) -> str:
+    """Return who gave an order: a page by its name, or the terminal."""
+    return command.by or "terminal"
 
 
 class Console(Protocol):
