@@ -1,6 +1,7 @@
 """What the people in the room say to a session, and what it tells them."""
 
 import queue
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
@@ -54,11 +55,12 @@ class Console(Protocol):
 
 
 class QueueConsole:
-    """Carries orders and events between threads."""
+    """Carries orders and events between threads; listeners must not wait."""
 
     def __init__(self) -> None:
         self._orders: queue.SimpleQueue[Command] = queue.SimpleQueue()
         self.events: queue.SimpleQueue[Event | None] = queue.SimpleQueue()
+        self.listeners: list[Callable[[Event], None]] = []
 
     def give(self, command: Command) -> None:
         """Give an order; the session takes it up at its next tick."""
@@ -74,3 +76,5 @@ class QueueConsole:
 
     def report(self, event: Event) -> None:
         self.events.put(event)
+        for listen in self.listeners:
+            listen(event)

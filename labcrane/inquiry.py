@@ -53,9 +53,8 @@ class Inquiry:
 
     def begin(self) -> Said:
         """Return the event with which it begins."""
-        kept = sorted(self._answers)
-        title = self._questionnaire.title
-        return START, {**self._about, "title": title, "kept": json.dumps(kept)}
+        kept = json.dumps(self._answers, ensure_ascii=False)
+        return START, {**self._about, "title": self._questionnaire.title, "kept": kept}
 
     def take(self, text: str, by: str) -> Said:
         """Take an answer, as JSON of questionnaire, item and value; return what is to be said."""

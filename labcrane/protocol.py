@@ -18,6 +18,7 @@ from pydantic import (
 from labcrane.design.words import Criterion, Design
 from labcrane.evaluation import IndicatorSettings, StopRule
 from labcrane.offers import Settings
+from labcrane.page_settings import PageSettings
 from labcrane.stream_needs import StreamNeed, TimeLimits
 from labcrane.yaml_file import Place, YamlFile
 
@@ -190,6 +191,9 @@ class Protocol(Section):
 
     stop_rules: tuple[StopRule, ...] = ()
     """Scores above which the session pauses and the examiner decides."""
+
+    page: PageSettings = PageSettings()
+    """Where the supervisor's and the participant's page are served."""
 
     streams: dict[str, StreamNeed] = Field(default_factory=dict)
     """Streams of others to be recorded, by the study's names for them."""
