@@ -3,6 +3,7 @@
 import json
 import math
 import random
+import re
 from collections.abc import Iterator, Mapping
 
 from labcrane.questions import AnswerError, Item
@@ -64,7 +65,7 @@ class Inquiry:
             item, value = self._find(given)
             answer = item.check(value)
         except (AnswerError, json.JSONDecodeError) as error:
-            return REFUSED, {**data, "given": text, "why": str(error)}
+            return REFUSED, {**data, "given": text, "item": _item_of(text), "why": str(error)}
         self._answers[item.name] = answer
         return ANSWER, {**data, "item": item.name, "value": answer}
 
@@ -77,7 +78,7 @@ class Inquiry:
         ]
         if open_items:
             why = f"{', '.join(open_items)} have no answer; answer or decline them"
-            return REFUSED, {**self._about, "by": by, "given": "", "why": why}
+            return REFUSED, {**self._about, "by": by, "given": "", "item": "", "why": why}
         self.over = True
         return self._end(handed_in=True)
 
@@ -121,6 +122,12 @@ class Inquiry:
             known = ", ".join(self._items)
             raise AnswerError(f"{name} has no item {given.get('item')!r}; it has {known}")
         return item, given["value"]
+
+
+def _item_of(text: str) -> str:
+    """Return which item an answer that is refused was for; empty when it names none."""
+    found = re.search(r'"item": ?"([a-z][a-z0-9_]*)"', text)
+    return found[1] if found else ""
 
 
 def _any(item: Item, dice: random.Random) -> Value:

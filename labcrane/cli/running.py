@@ -132,7 +132,8 @@ def _launch(order: "VisitOrder", *, page: bool) -> None:
     ask_for_consent(visit)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
-    with Terminal(console, out, _counted(plan), keys=not visit.simulated) as terminal:
+    keys, asked = not visit.simulated, visit.study.questionnaires
+    with Terminal(console, out, _counted(plan), keys=keys, questionnaires=asked) as terminal:
         launcher = Launcher(order, console, terminal.say)
         with pages(visit, launcher, console, terminal.say) if page else nullcontext():
             outcome = launcher.run()

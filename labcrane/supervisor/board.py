@@ -47,6 +47,7 @@ class Board:
         self.form_version = 0
         self.answers: dict[str, Value] = {}
         self.refusal = ""
+        self.refused_item = ""
         self.streams: Mapping[str, Any] = {}
         self.sync_report: list[str] = []
         self.last_trial: Mapping[str, Value] = {}
@@ -112,7 +113,7 @@ class Board:
                 self.answers[str(data["item"])] = data["value"]
                 self.refusal = ""
             case "refused":
-                self.refusal = str(data["why"])
+                self.refusal, self.refused_item = str(data["why"]), str(data["item"])
             case "end":
                 self.form = None
                 self.form_version += 1

@@ -1,7 +1,7 @@
 """A questionnaire on a page: every answer is sent the moment it is given."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 from labcrane.console import Order
@@ -88,7 +88,7 @@ class Form:
             self._refreshers.append(lambda: status.set_text(self._status(item)))
 
     def _choices(
-        self, name: str, item: Item, values: "dict[float | str, str] | dict[str, str]"
+        self, name: str, item: Item, values: "Mapping[float, str] | Mapping[str, str]"
     ) -> None:
         from nicegui import ui  # noqa: PLC0415
 
@@ -123,7 +123,8 @@ class Form:
 
         held = self._desk.board.answers.get(item.name)
         hint = "" if item.kind == "text" else item.takes
-        field = ui.input(hint, value="" if held is None else f"{held}").classes("w-full")
+        shown = "" if held is None else f"{held:g}" if isinstance(held, float) else str(held)
+        field = ui.input(hint, value=shown).classes("w-full")
         field.props(f'outlined for="{item.name}-field"')
 
         def save() -> None:
@@ -139,7 +140,10 @@ class Form:
         self._desk.give(self._page, Order.ANSWER, json.dumps(given, ensure_ascii=False))
 
     def _status(self, item: Item) -> str:
-        answers = self._desk.board.answers
+        board = self._desk.board
+        answers = board.answers
+        if board.refusal and board.refused_item == item.name:
+            return f"not taken: {board.refusal}"
         if item.name not in answers:
             return OPEN
         return DECLINED if answers[item.name] is None else SAVED

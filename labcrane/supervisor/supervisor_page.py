@@ -103,7 +103,8 @@ def _orders(desk: Desk) -> None:
         ui.button("End session", on_click=sure.open).props('no-caps color=red-10 id="order-end"')
     with ui.row().classes("gap-3 items-center w-full"):
         for order, label in ((Order.NOTE, "Note"), (Order.HINT, "Hint to the operator")):
-            _words(desk, order, label)
+            with ui.row().classes("gap-2 items-center no-wrap"):
+                _words(desk, order, label)
 
 
 def _words(desk: Desk, order: Order, label: str) -> None:

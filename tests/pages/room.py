@@ -10,9 +10,10 @@ from pathlib import Path
 
 import psutil
 import pytest
-from faults.sessions import kill_all, labcrane, wait_for
+from faults.sessions import labcrane, wait_for
 from selenium import webdriver
 from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
 
 STUDY = """\
 labcrane: 1
@@ -40,12 +41,14 @@ class Room:
     def __init__(self, protocol: Path, data: Path, *more: str) -> None:
         self.data = data
         self.folder = data / "P001"
+        what = more[0] if more else "run"
         self.launcher = labcrane(
-            more[0] if more else "run", protocol, "--participant", "P001", "--data", data, "--local",
+            what, protocol, "--participant", "P001", "--data", data, "--local",
             env={**os.environ, "PYTHONUNBUFFERED": "1", "COLUMNS": "200"},
         )  # fmt: skip
         self.said: list[str] = []
-        threading.Thread(target=self._read, daemon=True).start()
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
         wait_for(lambda: len(self.links()) == 2 or self.launcher.poll() is not None, 60)
         assert self.launcher.poll() is None, "".join(self.said)
 
@@ -75,7 +78,14 @@ class Room:
 
     def end(self) -> None:
         if self.launcher.poll() is None:
-            kill_all(self.launcher)
+            processes = [psutil.Process(self.launcher.pid)]
+            processes += processes[0].children(recursive=True)
+            for process in processes:
+                process.kill()
+            psutil.wait_procs(processes, timeout=10)
+            self.launcher.wait()
+        self._reader.join()
+        self.launcher.stdout.close()
 
 
 @contextmanager
@@ -119,7 +129,7 @@ def text(browser: webdriver.Chrome, ident: str) -> str:
 
 
 def press(browser: webdriver.Chrome, ident: str) -> None:
-    wait_for(lambda: browser.find_elements(By.ID, ident))
+    wait_for(lambda: any(e.is_displayed() for e in browser.find_elements(By.ID, ident)))
     element = browser.find_element(By.ID, ident)
     browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", element)
     element.click()
@@ -128,5 +138,5 @@ def press(browser: webdriver.Chrome, ident: str) -> None:
 def write(browser: webdriver.Chrome, ident: str, words: str) -> None:
     wait_for(lambda: browser.find_elements(By.ID, ident))
     field = browser.find_element(By.ID, ident)
-    field.clear()
-    field.send_keys(words, "\n")
+    field.send_keys(Keys.CONTROL, "a")
+    field.send_keys(Keys.NULL, words, Keys.ENTER)
