@@ -13,6 +13,9 @@ from labcrane.roles import Questionnaire
 Said = tuple[str, dict[str, Value]]
 """Name and data of an event that follows."""
 
+SIMULATION = "simulation"
+"""Who answers for a simulated participant."""
+
 SCORE = "score."
 """Before a score's name in the data of ``questionnaire.end``."""
 
@@ -80,12 +83,12 @@ class Inquiry:
             why = f"{', '.join(open_items)} have no answer; answer or decline them"
             return REFUSED, {**self._about, "by": by, "given": "", "item": "", "why": why}
         self.over = True
-        return self._end(handed_in=True)
+        return self._end(by, handed_in=True)
 
     def leave(self) -> Said:
         """Return the event with which it ends without having been handed in."""
         self.over = True
-        return self._end(handed_in=False)
+        return self._end("", handed_in=False)
 
     def scores(self) -> dict[str, float]:
         """Return every score; NaN where it needs an answer that is missing."""
@@ -96,16 +99,22 @@ class Inquiry:
         dice = random.Random(seed)  # noqa: S311 - nothing secret
         for item in self._items.values():
             answer = json.dumps({**self._about, "item": item.name, "value": _any(item, dice)})
-            yield self.take(answer, "simulation")
-        yield self.hand_in("simulation")
+            yield self.take(answer, SIMULATION)
+        yield self.hand_in(SIMULATION)
 
-    def _end(self, *, handed_in: bool) -> Said:
+    def _end(self, by: str, *, handed_in: bool) -> Said:
         missing = sum(self._answers.get(name) is None for name in self._items)
         scores: dict[str, Value] = {
             f"{SCORE}{name}": None if math.isnan(value) else value
             for name, value in self.scores().items()
         }
-        return END, {**self._about, "handed_in": handed_in, "missing": missing, **scores}
+        return END, {
+            **self._about,
+            "by": by,
+            "handed_in": handed_in,
+            "missing": missing,
+            **scores,
+        }
 
     def _find(self, given: object) -> tuple[Item, object]:
         name = self._about["questionnaire"]

@@ -3,8 +3,10 @@
 import json
 from pathlib import Path
 
+import pytest
 from rehearsal import SHORT, Rehearsal, a_study, rehearse
 
+from labcrane.cli.app import main
 from labcrane.console import Command, Order
 from labcrane.study import Study
 
@@ -108,6 +110,17 @@ def test_ratings_after_each_trial_name_their_trial(tmp_path: Path) -> None:
     ends = seen.events("questionnaire.end")
     assert [event.data["trial"] for event in ends] == trials == [2, 3]
     assert all(0.0 <= event.data["score.share"] <= 1.0 for event in ends)
+
+
+def test_answers_of_a_simulation_are_replayed(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    study = tmp_path / "study.yaml"
+    study.write_text(f"{HEAD}{RATINGS}")
+    run = ["run", str(study), "--participant", "P001", "--simulate", "--fast"]
+    assert main([*run, "--data", str(tmp_path)]) == 0
+    file = tmp_path / "P001-SIMULATED" / "P001-SIMULATED.h5"
+    assert main(["replay", str(file), "--session", "1"]) == 0, capsys.readouterr().out
 
 
 def test_a_simulated_participant_answers_everything_the_same_way_each_time(tmp_path: Path) -> None:

@@ -40,10 +40,10 @@ class Room:
 
     def __init__(self, protocol: Path, data: Path, *more: str) -> None:
         self.data = data
-        self.folder = data / "P001"
+        self.folder = data / "P001-PILOT"
         what = more[0] if more else "run"
         self.launcher = labcrane(
-            what, protocol, "--participant", "P001", "--data", data, "--local",
+            what, protocol, "--participant", "P001", "--data", data, "--pilot", "--local",
             env={**os.environ, "PYTHONUNBUFFERED": "1", "COLUMNS": "200"},
         )  # fmt: skip
         self.said: list[str] = []

@@ -10,6 +10,7 @@ from pages.room import STUDY, a_browser, a_room, press, text, write
 from selenium.webdriver.common.by import By
 
 from labcrane import open_recording
+from labcrane.cli.app import main
 
 STEPS = """\
       - questionnaire: [demographics, subjective_accuracy]
@@ -129,7 +130,11 @@ def test_a_session_is_led_and_answered_from_a_browser(  # noqa: PLR0915 - one vi
 
 
 def check_record(data: Path) -> None:
-    session = open_recording(data / "P001" / "P001.h5").session(1)
+    file = data / "P001-PILOT" / "P001-PILOT.h5"
+    assert main(["replay", str(file), "--session", "1"]) == 0, (
+        "the orders of pages are replayed too"
+    )
+    session = open_recording(file).session(1)
     table = session.questionnaires
     answers = table[table["kind"] == "answer"].set_index("item")
     assert answers.loc["age", "value"] == 31.0
@@ -164,7 +169,7 @@ def test_no_answer_is_lost_when_the_session_is_killed_in_the_middle(
             shown(browser, "status-age", "saved")
             room.process("session").kill()
             assert room.launcher.wait(60) == 1
-        table = open_recording(data / "P001" / "P001.h5").session(1).questionnaires
+        table = open_recording(data / "P001-PILOT" / "P001-PILOT.h5").session(1).questionnaires
         assert table[["item", "value"]].to_numpy().tolist() == [["age", 44.0]]
         with a_room(protocol, data, "resume") as room:
             wait_for(lambda: room.process("pages"), 60)
@@ -180,6 +185,6 @@ def test_no_answer_is_lost_when_the_session_is_killed_in_the_middle(
             wait_for(lambda: browser.find_elements(By.ID, "rating-3"))
             room.process("session").kill()
             assert room.launcher.wait(60) == 1
-    events = open_recording(data / "P001" / "P001.h5").session(1).events
+    events = open_recording(data / "P001-PILOT" / "P001-PILOT.h5").session(1).events
     [done] = events[events["name"] == "questionnaire.end"]["data"]
     assert (done["questionnaire"], done["missing"]) == ("demographics", 0)

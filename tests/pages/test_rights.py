@@ -100,7 +100,7 @@ def visited(tmp_path_factory: pytest.TempPathFactory):
         silent.close()
         assert ask(room, "POST", "/orders/end", supervisor)[0] == 202
         assert room.launcher.wait(60) == 0, "".join(room.said)
-    session = open_recording(room.folder / "P001.h5").session(1)
+    session = open_recording(room.folder / "P001-PILOT.h5").session(1)
     return answers, opened, session, (quiet, rude, calm)
 
 
@@ -165,7 +165,9 @@ def test_a_port_that_is_taken_says_what_to_do(tmp_path: Path) -> None:
         steps = "      - break: {seconds: 1}\n"
         text = STUDY.format(study="taken", steps=steps) + f"page: {{port: {port}}}\n"
         (tmp_path / "study.yaml").write_text(text)
-        run = labcrane("run", tmp_path / "study.yaml", "--participant", "P001", "--local")
+        run = labcrane(
+            "run", tmp_path / "study.yaml", "--participant", "P001", "--pilot", "--local"
+        )
         said, _ = run.communicate(timeout=60)
     assert run.returncode == 1
     assert f"the page cannot be served on 127.0.0.1:{port}: Address already in use" in said
