@@ -6,6 +6,7 @@ import random
 import re
 from collections.abc import Iterator, Mapping
 
+from labcrane.privacy import personal
 from labcrane.questions import AnswerError, Item
 from labcrane.records import Value
 from labcrane.roles import Questionnaire
@@ -67,6 +68,10 @@ class Inquiry:
             given = json.loads(text)
             item, value = self._find(given)
             answer = item.check(value)
+            if isinstance(answer, str) and (found := personal(answer)):
+                # What names a person must not be in the record, not even as a refused answer.
+                why = f"an answer must not hold {found}; write it without"
+                return REFUSED, {**data, "given": "", "item": item.name, "why": why}
         except (AnswerError, json.JSONDecodeError) as error:
             return REFUSED, {**data, "given": text, "item": _item_of(text), "why": str(error)}
         self._answers[item.name] = answer

@@ -76,7 +76,7 @@ class Script:
             self._order(tick, Command(Order.ANSWER, json.dumps(given), data["by"]))
         elif what == "refused" and data["given"]:
             self._order(tick, Command(Order.ANSWER, data["given"], data["by"]))
-        elif what == "refused" or (what == "end" and data["handed_in"]):
+        elif (what == "refused" and not data["item"]) or (what == "end" and data["handed_in"]):
             self._order(tick, Command(Order.SUBMIT, "", data["by"]))
 
     def _order(self, tick: int, command: Command) -> None:

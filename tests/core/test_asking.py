@@ -74,6 +74,17 @@ def test_an_answer_to_another_questionnaire_or_none_is_refused(tmp_path: Path) -
     assert not seen.events("questionnaire.answer")
 
 
+def test_an_answer_that_names_a_person_is_refused_and_not_written_down(tmp_path: Path) -> None:
+    questions = "[{name: why, text: Why?, kind: text}]"
+    more = f"questionnaires: {{own: {{use: free, title: Own, questions: {questions}}}}}\n"
+    steps = "sessions:\n  - name: only\n    steps:\n      - questionnaire: own\n"
+    study = a_study(tmp_path, HEAD + more + steps)
+    seen = play(study, answer("own", "ask jane.doe@example.org", item="why"))
+    [refused] = seen.events("questionnaire.refused")
+    assert "an answer must not hold" in refused.data["why"]
+    assert not any("jane" in str(event.data) for frame in seen.frames for event in frame.events)
+
+
 def test_a_question_can_be_declined_and_then_has_no_score(tmp_path: Path) -> None:
     seen = play(ratings(tmp_path), answer("subjective_accuracy", None), SUBMIT)
     end = seen.events("questionnaire.end")[0].data
