@@ -1,5 +1,6 @@
 """The page process: a web server, and one pipe to the launcher."""
 
+import os
 import signal
 import threading
 from collections.abc import Callable
@@ -19,6 +20,8 @@ from labcrane.supervisor.live import Live
 from labcrane.supervisor.rights import SCOPE, SUPERVISOR, Gate, Keys
 
 FORBIDDEN = 403
+NICENESS = 15
+"""The loop's process comes first when the computer is busy, whatever browsers ask for."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,8 @@ class Report:
 def serve(order: PageOrder, pipe: Connection) -> None:
     """Serve both pages until the launcher closes the pipe; the process's main function."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the launcher says when it is over
+    if hasattr(os, "nice"):
+        os.nice(NICENESS)
     import uvicorn  # noqa: PLC0415
     from fastapi import FastAPI  # noqa: PLC0415
     from nicegui import ui  # noqa: PLC0415 - loads for a second
