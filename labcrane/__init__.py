@@ -12,12 +12,13 @@ from labcrane.hookspecs import hookimpl
 from labcrane.kinematics import Arm, frames, jacobian
 from labcrane.machine import Body, Joint, Machine
 from labcrane.offers import Offer, Settings, offer
+from labcrane.questions import AnswerError, Answers, Item, Score, numbers
 from labcrane.reach import reach
 from labcrane.recording.recording import SessionRecord, Stream, open_recording
 from labcrane.recording.stream_header import Channel, StreamHeader
 from labcrane.recording.xdf import XdfWriter
 from labcrane.records import Event, Frame, Judgement, Phase, Planned, Run, Trial, Value
-from labcrane.roles import Controller, Dynamics, Exporter, InputDevice, Task
+from labcrane.roles import Controller, Dynamics, Exporter, InputDevice, Questionnaire, Task
 from labcrane.signals import FloatArray, Layout, Signal, signals_of
 
 __version__ = "0.1.0"
@@ -26,6 +27,8 @@ __all__ = [
     "PRESETS",
     "Actuator",
     "ActuatorSettings",
+    "AnswerError",
+    "Answers",
     "Arm",
     "Body",
     "Channel",
@@ -37,6 +40,7 @@ __all__ = [
     "FloatArray",
     "Frame",
     "InputDevice",
+    "Item",
     "Joint",
     "Judgement",
     "LabcraneError",
@@ -48,8 +52,10 @@ __all__ = [
     "Planned",
     "PluginError",
     "ProtocolError",
+    "Questionnaire",
     "RecordingError",
     "Run",
+    "Score",
     "SessionRecord",
     "Settings",
     "Signal",
@@ -63,6 +69,7 @@ __all__ = [
     "frames",
     "hookimpl",
     "jacobian",
+    "numbers",
     "offer",
     "open_recording",
     "reach",

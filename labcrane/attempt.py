@@ -26,6 +26,7 @@ class Attempt:
             "practice": block.practice,
             "counted": trial.planned.counted,
             **({"group": block.group} if block.group else {}),
+            **({"reference": True} if block.reference else {}),
             **trial.planned.condition,
         }
         self.completion: bool | None = None

@@ -1,6 +1,7 @@
 """What the people in the room say to a session, and what it tells them."""
 
 import queue
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
@@ -19,6 +20,10 @@ class Order(StrEnum):
     NOTE = "note"  # put words into the record
     OVERRIDE = "override"  # let the running trial go on past its automatic ends
     COMPLETION = "completion"  # set the completion flag of the running trial: 1 or 0
+    HINT = "hint"  # show words to the operator
+    ANSWER = "answer"  # to a question, as JSON: questionnaire, item, value
+    SUBMIT = "submit"  # hand in the questionnaire that is asked
+    DENIED = "denied"  # said by a page: somebody without the right asked for something
     LOST = "lost"  # said by the launcher, not by people: something outside the session failed
     BACK = "back"  # and works again
 
@@ -29,6 +34,12 @@ class Command:
 
     order: Order
     text: str = ""
+    by: str = ""  # which page; empty for the terminal
+
+
+def by_whom(command: Command) -> str:
+    """Return who gave an order: a page by its name, or the terminal."""
+    return command.by or "terminal"
 
 
 class Console(Protocol):
@@ -44,11 +55,12 @@ class Console(Protocol):
 
 
 class QueueConsole:
-    """Carries orders and events between threads."""
+    """Carries orders and events between threads; listeners must not wait."""
 
     def __init__(self) -> None:
         self._orders: queue.SimpleQueue[Command] = queue.SimpleQueue()
         self.events: queue.SimpleQueue[Event | None] = queue.SimpleQueue()
+        self.listeners: list[Callable[[Event], None]] = []
 
     def give(self, command: Command) -> None:
         """Give an order; the session takes it up at its next tick."""
@@ -64,3 +76,5 @@ class QueueConsole:
 
     def report(self, event: Event) -> None:
         self.events.put(event)
+        for listen in self.listeners:
+            listen(event)

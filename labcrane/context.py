@@ -44,6 +44,7 @@ def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> 
         "scheme": study.scheme,
         "dynamics": study.dynamics,
         **{f"tasks.{name}": choice for name, choice in study.task_choices.items()},
+        **{f"questionnaires.{name}": each for name, each in study.questionnaire_choices.items()},
     }
     return {
         "study": study.protocol.study,
@@ -72,6 +73,8 @@ def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> 
             label: need.model_dump(mode="json", exclude_none=True)
             for label, need in study.protocol.streams.items()
         },
+        "rights": {name: each.rights for name, each in study.questionnaires.items()},
+        "indicator": study.protocol.indicator.model_dump(mode="json"),
         "sync": study.protocol.sync.model_dump(mode="json"),
         "plan": [
             {"block": block.number, "name": block.name, "trials": len(block.trials)}

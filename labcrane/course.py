@@ -4,10 +4,11 @@ The steps are read like a script: every ``yield`` in a generator below is one ti
 the frame that came of it.
 """
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 
+from labcrane.asking import Asking
 from labcrane.attempt import Attempt
-from labcrane.console import Command, Order
+from labcrane.console import Command, Order, by_whom
 from labcrane.plan import PlannedBlock, PlannedStep, SessionPlan, next_attempt
 from labcrane.privacy import personal
 from labcrane.records import Event, Frame, Phase, Trial, Value
@@ -17,7 +18,7 @@ from labcrane.warm_up import WarmUp
 
 Ticks = Generator[None, Frame, None]
 
-EXAMINER, INPUT, DISK = "examiner", "input", "disk"
+EXAMINER, INPUT, DISK, STOP = "examiner", "input", "disk", "stop rule"
 """Who can hold a session, beside lost streams: it goes on when nobody does."""
 
 
@@ -49,6 +50,8 @@ class Course:
         self._notes: list[tuple[str, dict[str, Value]]] = []  # stamped with the tick they fall in
         self._attempt: Attempt | None = None
         self._stage = ""
+        self._step = 0
+        self._asking: Asking | None = None
         self._wishes: set[Order] = set()  # to start, skip or repeat what runs now
         self._reasons_to_end: list[str] = []
         self._warm_up = WarmUp()
@@ -70,6 +73,10 @@ class Course:
                 self._lose(command.text)
             elif command.order is Order.BACK:
                 self._regain(command.text)
+            elif command.order is Order.DENIED:
+                self._note("page.denied", why=command.text, by=by_whom(command))
+            elif self._asking is not None and command.order in {Order.ANSWER, Order.SUBMIT}:
+                self._notes.append(self._asking.heed(command))
             else:
                 self._obey(command)
         self._watch(INPUT, lost_input)
@@ -89,6 +96,7 @@ class Course:
 
     def _session(self) -> Ticks:
         for step in self._plan.steps:
+            self._step = step.number
             self._note("step.start", step=step.number, kind=step.kind)
             if step.block and not self._warm_up.begin(step.block):
                 pass  # practice has been enough; the step is done, also for who goes on later
@@ -99,12 +107,17 @@ class Course:
             elif step.kind == "consent":
                 self._note("consent.asked")  # what was confirmed is in the session's context
                 yield from self._gate("consent")
+            elif step.kind == "questionnaire":
+                for name in step.questionnaires:
+                    yield from self._ask(name, step.answered.get(name, {}))
             else:
                 self._note("instructions.shown", text=step.text)
                 yield from self._gate("instructions")
             self._note("step.end", step=step.number, kind=step.kind)
             if self._reasons_to_end:
                 break
+        if STOP in self._held_by:
+            self._note("participant.dropout", why="ended while a stop rule was met")
         self._note("session.end", reason=", ".join(self._reasons_to_end) or "complete")
 
     def _gate(self, what: str) -> Ticks:
@@ -134,6 +147,8 @@ class Course:
         self._note("block.start", **about, task=block.task, practice=block.practice)
         for trial in block.trials:
             yield from self._trial(block, trial)
+            for name in block.ask if trial.planned.counted else ():
+                yield from self._ask(name, {}, trial)
             if self._reasons_to_end or (block.until and self._warm_up.over):
                 break
         self._note("block.end", **about)
@@ -158,6 +173,23 @@ class Course:
         if attempt.phase is Phase.REPEATED:
             yield from self._trial(block, next_attempt(self._study, self._plan, trial))
 
+    def _ask(self, name: str, answered: Mapping[str, Value], after: Trial | None = None) -> Ticks:
+        if self._reasons_to_end:
+            return
+        asking = self._asking = Asking(self._study, self._plan, name, self._step, answered, after)
+        self._enter("questionnaire")
+        self._notes.extend(asking.begin(simulated=not self._waits))
+        yield
+        while not (asking.over or Order.SKIP in self._wishes or self._reasons_to_end):
+            yield
+        self._asking = None
+        self._notes.extend(asking.end())
+        self._enter("")
+        if self._waits and asking.alarming:
+            self._hold(STOP)
+        while STOP in self._held_by and not self._reasons_to_end:
+            yield
+
     def _wished_end(self) -> Phase | None:
         if self._reasons_to_end:
             return Phase.ENDED
@@ -175,14 +207,16 @@ class Course:
         refused = self._refusal(command)
         # What names a person must not be in the record, not even as a refused note.
         text = "" if personal(command.text) else command.text
-        self._note(f"order.{command.order}", text=text, refused=refused)
+        about: dict[str, Value] = {"refused": refused, "by": by_whom(command)}
+        self._note(f"order.{command.order}", text=text, **about)
         if refused is not None:
             return
         match command.order:
             case Order.PAUSE:
                 self._hold(EXAMINER)
-            case Order.START if EXAMINER in self._held_by:
+            case Order.START if {EXAMINER, STOP} & self._held_by:
                 self._release(EXAMINER)
+                self._release(STOP)
             case Order.START | Order.SKIP | Order.REPEAT:
                 self._wishes.add(command.order)
             case Order.END:
@@ -191,7 +225,7 @@ class Course:
                 self._running().overrule()
             case Order.COMPLETION:
                 self._running().completion = command.text == "1"
-            case Order.NOTE:
+            case Order.NOTE | Order.HINT:
                 pass  # the event is all there is to it
 
     def _refusal(self, command: Command) -> str | None:
@@ -199,18 +233,20 @@ class Course:
         match command.order:
             case Order.REPEAT | Order.OVERRIDE | Order.COMPLETION if self._stage != "trial":
                 return "no trial is running"
-            case Order.SKIP if self._stage not in {"trial", "break"}:
-                return "neither a trial nor a break is running"
-            case Order.START if self._stage != "waiting" and EXAMINER not in self._held_by:
+            case Order.SKIP if self._stage not in {"trial", "break", "questionnaire"}:
+                return "no trial, break or questionnaire is running"
+            case Order.ANSWER | Order.SUBMIT:
+                return "no questionnaire is asked"
+            case Order.START if self._stage != "waiting" and not ({EXAMINER, STOP} & self._held_by):
                 return "nothing waits to start"
             case Order.PAUSE if EXAMINER in self._held_by:
                 return "the session is paused already"
             case Order.COMPLETION if command.text not in {"0", "1"}:
                 return f"completion is 1 or 0, not {command.text!r}"
-            case Order.NOTE if not command.text:
-                return "a note needs words"
-            case Order.NOTE if found := personal(command.text):
-                return f"a note must not hold {found}; write it without"
+            case Order.NOTE | Order.HINT if not command.text:
+                return f"a {command.order} needs words"
+            case Order.NOTE | Order.HINT if found := personal(command.text):
+                return f"a {command.order} must not hold {found}; write it without"
         return None
 
     def _running(self) -> Attempt:
@@ -249,6 +285,8 @@ class Course:
         self._note("pause.start", by=who)
 
     def _release(self, who: str) -> None:
+        if who not in self._held_by:
+            return
         self._held_by.discard(who)
         self._note("pause.end", by=who)
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import pluggy
 
 from labcrane.offers import Offer
-from labcrane.roles import Controller, Dynamics, Exporter, InputDevice, Task
+from labcrane.roles import Controller, Dynamics, Exporter, InputDevice, Questionnaire, Task
 
 PROJECT = "labcrane"
 
@@ -45,4 +45,10 @@ def labcrane_tasks() -> Sequence[Offer[Task]]:
 @hookspec
 def labcrane_exporters() -> Sequence[Offer[Exporter]]:
     """Offer formats into which recordings can be exported."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_questionnaires() -> Sequence[Offer[Questionnaire]]:
+    """Offer questions for the participant."""
     raise NotImplementedError

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from labcrane.admission import gate
 from labcrane.console import Command, Order, QueueConsole
@@ -66,6 +66,7 @@ class Launcher:
         self._recorder: RecorderKeeper | None = None
         self._lost: set[str] = set()
         self.session_pid: int | None = None
+        self.sync_report: SyncReport | None = None
 
     def run(self) -> Outcome:
         """Run the visit to its end and make its participant file.
@@ -92,8 +93,13 @@ class Launcher:
             if self._recorder:
                 self._recorder.stop()
             if parts(visit.journal):
-                report = finish(visit)
+                report = self.sync_report = finish(visit)
         return Outcome(died, report)
+
+    @property
+    def streams_status(self) -> dict[str, Any]:
+        """What the recorder last said of the streams of others; empty without any."""
+        return self._recorder.status if self._recorder else {}
 
     def _gate(self) -> bool:
         """Wait until all required streams flow; whether the session may start."""

@@ -2,14 +2,14 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from labcrane.design.order import RULES, SQUARES, Turn
 from labcrane.design.seeds import derive
 from labcrane.design.slots import group_of, place_of
 from labcrane.design.words import AS_WRITTEN, Criterion
 from labcrane.protocol import Block, Step
-from labcrane.records import Planned, Trial
+from labcrane.records import Planned, Trial, Value
 from labcrane.study import Study
 
 # Seconds an examiner and a participant are likely to spend on a page of text, for plans only.
@@ -38,6 +38,10 @@ class PlannedBlock:
         The participant's between-subject group; "" when the study has none.
     until, last
         When practice is enough, and whether no further round of it is planned.
+    reference
+        Whether its trials give the operator's own reference time.
+    ask
+        Questionnaires after each counted trial.
     """
 
     name: str
@@ -49,6 +53,8 @@ class PlannedBlock:
     group: str = ""
     until: Criterion | None = None
     last: bool = True
+    reference: bool = False
+    ask: tuple[str, ...] = ()
 
     @property
     def expected_s(self) -> float:
@@ -58,13 +64,21 @@ class PlannedBlock:
 
 @dataclass(frozen=True, slots=True)
 class PlannedStep:
-    """One step of a session: a text, a break, or a block. Steps are counted from 1."""
+    """One step of a session: a text, a break, questionnaires or a block, counted from 1.
+
+    Attributes
+    ----------
+    answered
+        What was answered of its questionnaires before the session's process died.
+    """
 
     number: int
     kind: str
     text: str = ""
     seconds: float = 0.0
     block: PlannedBlock | None = None
+    questionnaires: tuple[str, ...] = ()
+    answered: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
 
     @property
     def expected_s(self) -> float:
@@ -128,14 +142,16 @@ class Planner:
         rounds = step.block.until.rounds if step.block.until else 1
         for _ in range(step.block.repeat):
             for number in range(1, rounds + 1):
-                practice = step.kind == "practice"
-                yield self._step(step, self._block(step.block, practice, last=number == rounds))
+                block = self._block(step.block, step.kind, last=number == rounds)
+                yield self._step(step, block)
 
     def _step(self, step: Step, block: PlannedBlock | None) -> PlannedStep:
         self._steps += 1
-        return PlannedStep(self._steps, step.kind, step.text, step.seconds, block)
+        return PlannedStep(
+            self._steps, step.kind, step.text, step.seconds, block, step.questionnaires
+        )
 
-    def _block(self, block: Block, practice: bool, *, last: bool) -> PlannedBlock:  # noqa: FBT001
+    def _block(self, block: Block, kind: str, *, last: bool) -> PlannedBlock:
         self._blocks += 1
         task = self._study.tasks[block.task]
         levels = {}
@@ -151,12 +167,14 @@ class Planner:
             name,
             self._blocks,
             block.task,
-            practice,
+            kind == "practice",
             levels,
             trials,
             self.group,
             until=block.until,
             last=last,
+            reference=kind == "reference",
+            ask=block.ask,
         )
 
     def _shift(self, factor: str) -> int:

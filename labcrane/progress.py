@@ -11,7 +11,7 @@ from labcrane.errors import ProtocolError
 from labcrane.plan import PlannedBlock, PlannedStep, SessionPlan, next_attempt
 from labcrane.recording.journal_reader import SessionLog, read_journal
 from labcrane.recording.parts import parts
-from labcrane.records import Phase, Trial
+from labcrane.records import Phase, Trial, Value
 from labcrane.study import Study
 
 Policy = Literal["continue", "redo_trial", "redo_block"]
@@ -35,6 +35,10 @@ class Progress:
         What was said of the trial that was under way when the process died; None between trials.
     angles
         Last joint angles in rad, shape ``(n_joints,)``; empty when there is no frame.
+    answers
+        What was answered, by step and questionnaire.
+    handed_in
+        Steps and questionnaires that need not be asked again.
     """
 
     complete: bool = False
@@ -43,6 +47,8 @@ class Progress:
     done: set[int] = field(default_factory=set)
     interrupted: Mapping[str, Any] | None = None
     angles: tuple[float, ...] = ()
+    answers: dict[tuple[int, str], dict[str, Value]] = field(default_factory=dict)
+    handed_in: set[tuple[int, str]] = field(default_factory=set)
 
 
 def progress(journal: Path, joints: Sequence[str]) -> Progress:
@@ -72,6 +78,11 @@ def _take(so_far: Progress, name: str, data: Mapping[str, Any]) -> None:
             so_far.complete = data["reason"] == "complete"
         case "step.end" if not so_far.complete:
             so_far.steps.add(data["step"])
+        case "questionnaire.answer":
+            asked = so_far.answers.setdefault((data["step"], data["questionnaire"]), {})
+            asked[data["item"]] = data["value"]
+        case "questionnaire.end":
+            so_far.handed_in.add((data["step"], data["questionnaire"]))
         case "trial.start":
             so_far.attempts[data["trial"]] = data["attempt"]
             so_far.interrupted = data
@@ -101,12 +112,15 @@ def remaining(study: Study, plan: SessionPlan, so_far: Progress, policy: Policy)
             continue
         block = _rest(study, plan, step.block, so_far, policy) if step.block else None
         if step.block is None or (block and block.trials):
-            steps.append(_with(step, block))
+            steps.append(_unasked(replace(step, block=block), so_far))
     return replace(plan, steps=tuple(steps))
 
 
-def _with(step: PlannedStep, block: PlannedBlock | None) -> PlannedStep:
-    return replace(step, block=block)
+def _unasked(step: PlannedStep, so_far: Progress) -> PlannedStep:
+    """Return a step with the questionnaires that are left, and what was answered of them."""
+    left = [name for name in step.questionnaires if (step.number, name) not in so_far.handed_in]
+    answered = {name: so_far.answers.get((step.number, name), {}) for name in left}
+    return replace(step, questionnaires=tuple(left), answered=answered)
 
 
 def _rest(

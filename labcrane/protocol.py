@@ -16,7 +16,9 @@ from pydantic import (
 )
 
 from labcrane.design.words import Criterion, Design
+from labcrane.evaluation import IndicatorSettings, StopRule
 from labcrane.offers import Settings
+from labcrane.page_settings import PageSettings
 from labcrane.stream_needs import StreamNeed, TimeLimits
 from labcrane.yaml_file import Place, YamlFile
 
@@ -90,6 +92,9 @@ class Block(Section):
     name: str | None = None
     """Name of the block in the record; the task's by default."""
 
+    ask: tuple[str, ...] = ()
+    """Questionnaires after each counted trial: ``[subjective_accuracy, situational_awareness]``."""
+
     repeat: PositiveInt = 1
     """How many times the block is run, each time in a new order."""
 
@@ -112,11 +117,14 @@ class Break(Section):
 class Step(Section):
     """One step of a session, with what kind it is and what it needs."""
 
-    kind: Literal["consent", "instructions", "practice", "block", "break"]
+    kind: Literal[
+        "consent", "instructions", "questionnaire", "practice", "reference", "block", "break"
+    ]
     text: str = ""
     file: str = ""
     block: Block | None = None
     seconds: float = 0.0
+    questionnaires: tuple[str, ...] = ()
 
 
 class Session(Section):
@@ -174,6 +182,19 @@ class Protocol(Section):
     tasks: dict[str, Use] = Field(min_length=1)
     """What the operator is asked to do, by name."""
 
+    questionnaires: dict[str, Use] = Field(default_factory=dict)
+    """Questionnaires with settings, by the study's names for them. One without settings is asked
+    by its own name and need not be listed."""
+
+    indicator: IndicatorSettings = IndicatorSettings()
+    """How the performance indicator is worked out."""
+
+    stop_rules: tuple[StopRule, ...] = ()
+    """Scores above which the session pauses and the examiner decides."""
+
+    page: PageSettings = PageSettings()
+    """Where the supervisor's and the participant's page are served."""
+
     streams: dict[str, StreamNeed] = Field(default_factory=dict)
     """Streams of others to be recorded, by the study's names for them."""
 
@@ -224,7 +245,7 @@ def _sessions(source: YamlFile) -> Any:
     return found
 
 
-STEPS = ("consent", "instructions", "practice", "block", "break")
+STEPS = ("consent", "instructions", "questionnaire", "practice", "reference", "block", "break")
 
 
 def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
@@ -247,11 +268,21 @@ def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
     if kind == "consent":
         source.problem(place, "consent is a step by itself: '- consent'")
         return None
+    if kind == "questionnaire":
+        return _questionnaire(source, place, value)
     block = source.check(Block, (*place, kind))
     if block and block.until and kind != "practice":
         source.problem((*place, kind, "until"), "only practice has a criterion; drop until")
         return None
     return {"kind": kind, "block": block} if block else None
+
+
+def _questionnaire(source: YamlFile, place: Place, value: Any) -> dict[str, Any] | None:
+    names = [value] if isinstance(value, str) else value
+    if not (isinstance(names, list) and names and all(isinstance(name, str) for name in names)):
+        source.problem(place, f"questionnaire is a name or a list of names, not {value!r}")
+        return None
+    return {"kind": "questionnaire", "questionnaires": tuple(names)}
 
 
 def _instructions(source: YamlFile, place: Place, value: Any) -> dict[str, Any] | None:

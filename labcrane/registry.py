@@ -12,7 +12,15 @@ from labcrane import hookspecs
 from labcrane.errors import PluginError
 from labcrane.hookspecs import PROJECT
 from labcrane.offers import Offer
-from labcrane.roles import Component, Controller, Dynamics, Exporter, InputDevice, Task
+from labcrane.roles import (
+    Component,
+    Controller,
+    Dynamics,
+    Exporter,
+    InputDevice,
+    Questionnaire,
+    Task,
+)
 
 RoleT = TypeVar("RoleT", bound=Component)
 
@@ -39,6 +47,7 @@ ROLES: Mapping[type[Component], RoleEntry] = {
     Dynamics: RoleEntry("labcrane_dynamics", "dynamics"),
     Task: RoleEntry("labcrane_tasks", "task"),
     Exporter: RoleEntry("labcrane_exporters", "exporter"),
+    Questionnaire: RoleEntry("labcrane_questionnaires", "questionnaire"),
 }
 
 

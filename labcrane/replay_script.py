@@ -1,5 +1,6 @@
 """What entered a recorded session from outside, tick by tick."""
 
+import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from labcrane.clock import Tick
 from labcrane.console import Command, Order
+from labcrane.inquiry import SIMULATION
 from labcrane.recording.recording import SessionRecord
 from labcrane.records import Event, Frame
 from labcrane.roles import InputDevice
@@ -55,13 +57,27 @@ class Script:
         """Note what an event says came from outside."""
         part, _, what = name.rpartition(".")
         if part == "order":
-            self._order(tick, Command(Order(what), data.get("text", "")))
+            self._order(tick, Command(Order(what), data.get("text", ""), data.get("by", "")))
+        elif part == "questionnaire" and data.get("by", SIMULATION) != SIMULATION:
+            self._answer(tick, what, data)
+        elif name == "page.denied":
+            self._order(tick, Command(Order.DENIED, data["why"], data["by"]))
         elif part == "stream" and what in {"lost", "back"}:
             self._order(tick, Command(Order(what), data["what"]))
         elif part == "input" and what in {"lost", "back"}:
             self.input.faults.append((tick, data.get("why")))
         elif part == "disk" and what in {"lost", "back"}:
             self._disk[tick] = data.get("why")
+
+    def _answer(self, tick: int, what: str, data: Mapping[str, Any]) -> None:
+        """Note what was answered or handed in; a simulated participant answers again by itself."""
+        if what == "answer":
+            given = {name: data[name] for name in ("questionnaire", "item", "value")}
+            self._order(tick, Command(Order.ANSWER, json.dumps(given), data["by"]))
+        elif what == "refused" and data["given"]:
+            self._order(tick, Command(Order.ANSWER, data["given"], data["by"]))
+        elif (what == "refused" and not data["item"]) or (what == "end" and data["handed_in"]):
+            self._order(tick, Command(Order.SUBMIT, "", data["by"]))
 
     def _order(self, tick: int, command: Command) -> None:
         self._orders.setdefault(tick, []).append(command)

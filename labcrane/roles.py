@@ -18,6 +18,7 @@ import numpy as np
 from labcrane.analysis.cohort import Participant
 from labcrane.clock import Tick
 from labcrane.machine import Body
+from labcrane.questions import Answers, Item, Score
 from labcrane.records import Frame, Judgement, Planned, Run, Trial, Value
 from labcrane.signals import FloatArray, Signal
 
@@ -145,3 +146,28 @@ class Exporter(Component):
         be hundreds. Every table says the status of each participant; the caller writes down who
         was left out.
         """
+
+
+class Questionnaire(Component):
+    """Questions put to the participant, and what the answers are worth.
+
+    Shown on the participant's page or asked in the terminal; every answer is recorded the moment
+    it is given. It is asked in a session, so it has no tick method.
+    """
+
+    title: str
+    """What people call it, in the language in which it asks."""
+
+    rights: str
+    """Where its words come from, and who may use them."""
+
+    scores: tuple[Score, ...] = ()
+    """What :meth:`score` returns, and in which range."""
+
+    @abstractmethod
+    def items(self) -> Sequence[Item]:
+        """Return the questions, in the order in which they are asked."""
+
+    @abstractmethod
+    def score(self, answers: Answers) -> Mapping[str, float]:
+        """Return every score by its name; NaN for one that needs an answer that is missing."""

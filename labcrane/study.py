@@ -2,8 +2,8 @@
 
 import hashlib
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
@@ -13,7 +13,7 @@ from labcrane.machine_file import find_machine, load_machine
 from labcrane.offers import Offer, Settings
 from labcrane.protocol import DEFAULT_OPERATOR, Protocol, Use, read
 from labcrane.registry import Registry
-from labcrane.roles import Component, Controller, Dynamics, InputDevice, Task
+from labcrane.roles import Component, Controller, Dynamics, InputDevice, Questionnaire, Task
 from labcrane.yaml_file import Place, YamlFile
 
 RoleT = TypeVar("RoleT", bound=Component)
@@ -49,6 +49,8 @@ class Study:
         The components chosen; ``operator`` takes the place of ``input`` in a simulation.
     tasks
         The tasks by the protocol's names for them, built.
+    questionnaires
+        The questionnaires by the study's names for them, built.
     """
 
     path: Path
@@ -62,6 +64,8 @@ class Study:
     dynamics: Choice
     tasks: Mapping[str, Task]
     task_choices: Mapping[str, Choice]
+    questionnaires: Mapping[str, Questionnaire] = field(default_factory=dict)
+    questionnaire_choices: Mapping[str, Choice] = field(default_factory=dict)
 
     @property
     def sha256(self) -> str:
@@ -115,6 +119,63 @@ class StudyReader:
         names = written if isinstance(written, dict) else {}
         chosen = {name: self.choose(Task, ("tasks", name)) for name in names}
         return {name: choice for name, choice in chosen.items() if choice}
+
+    def choose_questionnaires(self, protocol: Protocol) -> dict[str, Choice]:
+        """Return the questionnaires that the protocol asks, noting those that there are not."""
+        chosen = {
+            name: self.choose(Questionnaire, ("questionnaires", name))
+            for name in protocol.questionnaires
+        }
+        for place, name in self._asked(protocol):
+            if name not in chosen:
+                chosen[name] = self._by_its_own_name(place, name)
+        return {name: choice for name, choice in chosen.items() if choice}
+
+    def _asked(self, protocol: Protocol) -> Iterator[tuple[Place, str]]:
+        for number, session in enumerate(protocol.sessions):
+            for at, step in enumerate(session.steps):
+                place: Place = ("sessions", number, "steps", at)
+                for name in (*step.questionnaires, *(step.block.ask if step.block else ())):
+                    yield place, name
+        for number, rule in enumerate(protocol.stop_rules):
+            yield ("stop_rules", number, "questionnaire"), rule.questionnaire
+
+    def _by_its_own_name(self, place: Place, name: str) -> Choice | None:
+        try:
+            offer = self._registry.find(Questionnaire, name)
+        except PluginError as error:
+            self._source.problem(place, str(error))
+            return None
+        settings = self._source.check(offer.settings, place, {})
+        plugin = self._registry.plugins[Questionnaire][name]
+        return Choice(name, plugin, offer, settings) if settings is not None else None
+
+    def build_questionnaires(
+        self, choices: Mapping[str, Choice], machine: Machine
+    ) -> dict[str, Questionnaire]:
+        """Return the built questionnaires, noting those that cannot be asked as written."""
+        built: dict[str, Questionnaire] = {}
+        for name, choice in choices.items():
+            try:
+                questionnaire = choice.build(machine)
+            except ProtocolError as error:
+                self._source.problem(("questionnaires", name), str(error))
+                continue
+            assert isinstance(questionnaire, Questionnaire)  # noqa: S101 - an offer of this role
+            built[name] = questionnaire
+        return built
+
+    def check_stop_rules(self, protocol: Protocol, asked: Mapping[str, Questionnaire]) -> None:
+        """Note stop rules on scores that a questionnaire does not have."""
+        for number, rule in enumerate(protocol.stop_rules):
+            questionnaire = asked.get(rule.questionnaire)
+            scores = [score.name for score in questionnaire.scores] if questionnaire else []
+            if questionnaire and rule.score not in scores:
+                self._source.problem(
+                    ("stop_rules", number, "score"),
+                    f"{rule.questionnaire} has no score {rule.score!r}; "
+                    f"it has {', '.join(scores) or 'none'}",
+                )
 
     def machine(self) -> tuple[Machine, str] | None:
         """Return the machine and its file's text, or note what is wrong."""
@@ -203,13 +264,27 @@ def load(path: Path, registry: Registry) -> Study:
     dynamics = reader.choose(Dynamics, ("dynamics",))
     choices = reader.choose_tasks()
     tasks = reader.build(choices, machine[0]) if machine else {}
+    asked = reader.choose_questionnaires(protocol) if protocol else {}
+    questionnaires = reader.build_questionnaires(asked, machine[0]) if machine else {}
     if protocol is not None:
         reader.check_blocks(protocol, tasks)
+        reader.check_stop_rules(protocol, questionnaires)
         if len(tasks) == len(protocol.tasks):
             reader.check_order(protocol, tasks)
     source.raise_problems()
     if not (protocol and machine and device and operator and scheme and dynamics):
         raise AssertionError("a missing part is a problem, and problems were raised")
     return Study(
-        path, source.text, protocol, *machine, device, operator, scheme, dynamics, tasks, choices
+        path,
+        source.text,
+        protocol,
+        *machine,
+        device,
+        operator,
+        scheme,
+        dynamics,
+        tasks,
+        choices,
+        questionnaires,
+        asked,
     )

@@ -10,6 +10,8 @@ From the bottom up::
     anova, trends, reported    statistics
     quality        how well the loop ran and the clocks agreed
     figures, pages, report     the HTML report
+    indicator, operator_tests  the performance indicator of tests
+    next_practice, workbook    what to practise next; the evaluation workbook
 
 Nothing here is needed while people are recorded. What is heavy is imported when it is used.
 """

@@ -9,7 +9,16 @@ from collections.abc import Sequence
 import typer
 from rich.console import Console
 
-from labcrane.cli import approval, inspect, people, recording, results, running, upkeep
+from labcrane.cli import (
+    approval,
+    inspect,
+    people,
+    recording,
+    results,
+    running,
+    scoring,
+    upkeep,
+)
 from labcrane.errors import LabcraneError, ProtocolError
 
 app = typer.Typer(
@@ -27,6 +36,7 @@ app.command("streams")(recording.streams)
 app.command("record")(recording.record)
 app.command("recover")(recording.recover)
 app.command("resync")(recording.resync)
+app.command("score")(scoring.score)
 app.command("export")(results.export)
 app.command("report")(results.report)
 app.command("replay")(results.replay)

@@ -1,5 +1,6 @@
 """Commands that run a session: demo, run and resume."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -24,6 +25,10 @@ Simulate = Annotated[
     bool, typer.Option("--simulate", help="a simulated operator takes the controls")
 ]
 Pilot = Annotated[bool, typer.Option("--pilot", help="a trial run: its files are stamped PILOT")]
+Page = Annotated[
+    bool | None,
+    typer.Option("--page/--no-page", help="the pages in the browser; on unless --simulate"),
+]
 
 
 def run(
@@ -37,6 +42,7 @@ def run(
     ] = False,
     pilot: Pilot = False,
     local: Local = False,
+    page: Page = None,
 ) -> None:
     """Run a session of a study."""
     if fast and not simulate:
@@ -51,7 +57,7 @@ def run(
     if fast:
         out.print(f"participant file: {_run_fast(order)}", markup=False)
     else:
-        _launch(order)
+        _launch(order, page=not simulate if page is None else page)
 
 
 def resume(
@@ -66,6 +72,7 @@ def resume(
     simulate: Simulate = False,
     pilot: Pilot = False,
     local: Local = False,
+    page: Page = None,
 ) -> None:
     """Go on with a session whose process died."""
     from labcrane.session_process import VisitOrder
@@ -73,7 +80,8 @@ def resume(
     folder = data or protocol.parent / "data"
     if local or simulate:
         stay_on_this_computer()
-    _launch(VisitOrder(protocol, participant, session, folder, simulate, pilot, True, policy))
+    order = VisitOrder(protocol, participant, session, folder, simulate, pilot, True, policy)
+    _launch(order, page=not simulate if page is None else page)
 
 
 def demo(
@@ -112,7 +120,8 @@ def _run_fast(order: "VisitOrder") -> Path:
         return run_session(visit, console)
 
 
-def _launch(order: "VisitOrder") -> None:
+def _launch(order: "VisitOrder", *, page: bool) -> None:
+    from labcrane.cli.pages import pages
     from labcrane.cli.sync import print_report
     from labcrane.cli.terminal import Terminal
     from labcrane.console import QueueConsole
@@ -123,8 +132,11 @@ def _launch(order: "VisitOrder") -> None:
     ask_for_consent(visit)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
-    with Terminal(console, out, _counted(plan), keys=not visit.simulated) as terminal:
-        outcome = Launcher(order, console, terminal.say).run()
+    keys, asked = not visit.simulated, visit.study.questionnaires
+    with Terminal(console, out, _counted(plan), keys=keys, questionnaires=asked) as terminal:
+        launcher = Launcher(order, console, terminal.say)
+        with pages(visit, launcher, console, terminal.say) if page else nullcontext():
+            outcome = launcher.run()
     if outcome.sync_report is not None:
         print_report(outcome.sync_report)
     if visit.folder.participant_file.exists():

@@ -15,8 +15,11 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from labcrane.cli.sheet import Sheet, Sheets, sheet_line
 from labcrane.console import Command, Order, QueueConsole
+from labcrane.questions import AnswerError
 from labcrane.records import Event
+from labcrane.roles import Questionnaire
 
 KEYS: Mapping[str, Order] = {
     " ": Order.START,
@@ -27,12 +30,14 @@ KEYS: Mapping[str, Order] = {
     "n": Order.NOTE,
     "o": Order.OVERRIDE,
     "c": Order.COMPLETION,
+    "h": Order.HINT,
 }
-PEOPLES = tuple(KEYS.values())
+PEOPLES = (*KEYS.values(), Order.ANSWER, Order.SUBMIT)
 """The orders that people give."""
 
 HELP = (
-    "space start/go on · p pause · r repeat · s skip · e end · n note · o override · c completion"
+    "space start/go on · p pause · r repeat · s skip · e end · n note · o override · "
+    "c completion · h hint · q fill in the questionnaire"
 )
 POLL_S = 0.1
 
@@ -51,7 +56,17 @@ class Terminal:
         Whether to listen at all; a simulated session needs nobody.
     """
 
-    def __init__(self, console: QueueConsole, out: Console, total: int, *, keys: bool) -> None:
+    def __init__(
+        self,
+        console: QueueConsole,
+        out: Console,
+        total: int,
+        *,
+        keys: bool,
+        questionnaires: Mapping[str, Questionnaire] | None = None,
+    ) -> None:
+        self._sheets = Sheets(questionnaires or {})
+        self._sheet: Sheet | None = None
         self._console = console
         self._out = out
         self._keys = keys
@@ -94,6 +109,7 @@ class Terminal:
 
     def _print(self) -> None:
         while (event := self._console.events.get()) is not None:
+            self._sheet = self._sheets(event, self._sheet)
             if event.name == "trial.end" and event.data["counted"]:
                 if not event.data["practice"] and event.data["outcome"] != "repeated":
                     self._progress.advance(self._bar)
@@ -131,10 +147,12 @@ class Terminal:
 
     def _key(self, key: str) -> None:
         order = KEYS.get(key)
-        if order is None:
+        if key == "q":
+            self._fill_in()
+        elif order is None:
             self._progress.print(HELP, style="dim")
-        elif order in {Order.NOTE, Order.COMPLETION}:
-            prompt = "note: " if order is Order.NOTE else "completed? 1 or 0: "
+        elif order in {Order.NOTE, Order.HINT, Order.COMPLETION}:
+            prompt = "completed? 1 or 0: " if order is Order.COMPLETION else f"{order.value}: "
             self._console.give(Command(order, self._ask(prompt)))
         else:
             self._console.give(Command(order))
@@ -153,6 +171,31 @@ class Terminal:
                     return ""
                 key = letters.decode(byte)  # nothing while the rest of a letter is to come
         return key
+
+    def _fill_in(self) -> None:
+        """Ask the questions one by one; what is wrong is asked again.
+
+        Each answer is given at once, so nothing waits here that could be lost. An empty line, or
+        the session's end, leaves the rest for later.
+        """
+        sheet = self._sheet
+        if sheet is None:
+            self._progress.print("no questionnaire is asked")
+            return
+        for item in sheet.items():
+            while True:
+                said = self._ask(f"{item.text} ({item.takes}; - declines, empty leaves): ")
+                if not said:
+                    self._progress.print("left; q begins again")
+                    return
+                try:
+                    answer = item.check(sheet.read(item, said))
+                except AnswerError as error:
+                    self._progress.print(str(error), markup=False)
+                    continue
+                self._console.give(Command(Order.ANSWER, sheet.answer(item, answer)))
+                break
+        self._console.give(Command(Order.SUBMIT))
 
     def _ask(self, prompt: str) -> str:
         """Read a line key by key, as the terminal gives single keys now."""
@@ -195,7 +238,7 @@ def _event_line(event: Event) -> str | None:
         case name if name.startswith("order.") and data["refused"]:
             return f"{name.removeprefix('command.')}: {data['refused']}"
         case _:
-            return None
+            return sheet_line(event)
 
 
 @contextmanager

@@ -129,6 +129,19 @@ class SessionRecord:
             return pd.DataFrame({name: _values(dataset) for name, dataset in columns})
 
     @cached_property
+    def questionnaires(self) -> "pd.DataFrame":
+        """One row per answer and per score: questionnaire, kind, item, text, value, time, ...
+
+        ``kind`` is ``answer`` or ``score``. A declined answer has neither text nor value.
+        """
+        import pandas as pd  # noqa: PLC0415
+
+        with opened(self._path) as file:
+            group = file[self._group]  # sessions of older files have none
+            columns = _columns(group["questionnaires"]) if "questionnaires" in group else []
+            return pd.DataFrame({name: _values(dataset) for name, dataset in columns})
+
+    @cached_property
     def protocol(self) -> str:
         """The text of the protocol that was run."""
         return self._text("protocol")

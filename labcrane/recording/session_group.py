@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from labcrane.recording.answers import write_questionnaires
 from labcrane.recording.hdf5_columns import (
     node_names,
     write_attributes,
@@ -34,6 +35,7 @@ def write_session(group: "h5py.Group", log: SessionLog, journals: Sequence[Journ
     _write_frames(group, log)
     _write_events(group.create_group("events"), log)
     _write_trials(group.create_group("trials"), log)
+    write_questionnaires(group.create_group("questionnaires"), log)
 
 
 def attributes(context: Mapping[str, Any]) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from labcrane.records import Frame, Phase, Planned, Run, Trial
 from labcrane.roles import Component, Controller, Dynamics, InputDevice, Task
 from labcrane.signals import FloatArray, Layout, Signal
 from labcrane.testing.exporters import ExporterContract
+from labcrane.testing.questionnaires import QuestionnaireContract
 
 __all__ = [
     "RATE_HZ",
@@ -30,6 +31,7 @@ __all__ = [
     "DynamicsContract",
     "ExporterContract",
     "InputContract",
+    "QuestionnaireContract",
     "TaskContract",
     "a_frame",
     "a_run",

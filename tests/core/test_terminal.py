@@ -103,3 +103,25 @@ def test_an_interrupt_from_the_keyboard_ends_the_session_in_order(folder: Path) 
     session = open_recording(folder / "data" / "P002-PILOT" / "P002-PILOT.h5").session(1)
     assert session.events["name"].tolist()[-1] == "session.end"
     assert session.events["data"].tolist()[-1]["reason"] == "by order"
+
+
+def test_a_questionnaire_is_filled_in_at_the_terminal(tmp_path: Path) -> None:
+    steps = "- questionnaire: [subjective_accuracy, situational_awareness]"
+    study = SHORT.replace("- block: {task: aiming, pairs: 1}", steps)
+    study = study.replace("{use: dual_joystick}", "{use: simulated_operator}")
+    (tmp_path / "study.yaml").write_text(study)
+    command = [sys.executable, "-m", "labcrane", "run", "study.yaml", "--no-page"]
+    user = TerminalUser([*command, "--participant", "P002", "--local", "--pilot"], tmp_path)
+    user.until("questionnaire: Accuracy")
+    user.press("q")
+    user.until("- declines, empty leaves")
+    user.press("11\r")
+    user.until("item 'rating' takes 0 to 10 in steps of 1, not 11.0")
+    user.press("7\r")
+    user.until("questionnaire: Situational awareness")
+    user.press("q-\r")
+    assert user.leave() == 0
+    table = open_recording(tmp_path / "data/P002-PILOT/P002-PILOT.h5").session(1).questionnaires
+    scores = table[table["kind"] == "score"].set_index("questionnaire")["value"]
+    assert scores["subjective_accuracy"] == 0.7
+    assert scores.isna()["situational_awareness"]

@@ -1,0 +1,41 @@
+"""The pages of a run, and their links in the terminal."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from labcrane.console import QueueConsole
+
+if TYPE_CHECKING:
+    from labcrane.launcher import Launcher
+    from labcrane.session import Visit
+
+
+@contextmanager
+def pages(
+    visit: "Visit", launcher: "Launcher", console: QueueConsole, say: Callable[[str], None]
+) -> Iterator[None]:
+    """Serve both pages while a run lasts; their links are printed once."""
+    from labcrane.supervisor.keeper import PageKeeper, free_port
+    from labcrane.supervisor.service import PageOrder
+
+    where = visit.study.protocol.page
+    order = PageOrder(
+        visit.study.path,
+        visit.participant,
+        visit.folder.name,
+        visit.session,
+        f"{visit.study.protocol.study}/{visit.folder.name}/ses-{visit.session:02}",
+        where.host,
+        free_port(where.host, where.port),
+    )
+    keeper = PageKeeper(order, console.give, say, lambda: launcher.streams_status)
+    console.listeners.append(keeper.tell)
+    for page, link in keeper.links().items():
+        say(f"{page} page: {link}")
+    try:
+        yield
+    finally:
+        report = launcher.sync_report
+        rows = [" · ".join(row) for row in report.table()] + report.advice() if report else []
+        keeper.close(rows)

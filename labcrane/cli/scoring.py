@@ -1,0 +1,55 @@
+"""The command that evaluates operators: score."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Table
+
+from labcrane.cli.inspect import out
+from labcrane.errors import ProtocolError
+
+if TYPE_CHECKING:
+    from labcrane.evaluation import IndicatorSettings
+
+
+def score(
+    folder: Annotated[Path, typer.Argument(help="the study's data folder, or a part of it")],
+    into: Annotated[
+        Path | None, typer.Option("--out", help="the workbook; FOLDER/evaluation.xlsx by default")
+    ] = None,
+    settings: Annotated[
+        Path | None,
+        typer.Option(help="YAML with weights, reading, mistakes, capped; as recorded by default"),
+    ] = None,
+) -> None:
+    """Write the evaluation workbook: performance indicator, trend, what to practise next."""
+    from labcrane.analysis.operator_tests import operator_tests
+    from labcrane.analysis.workbook import advice, write_workbook
+
+    if not folder.is_dir():
+        raise ProtocolError(f"there is no folder {folder}; give the study's data folder")
+    tests = operator_tests(folder, _settings(settings) if settings else None)
+    path = into or folder / "evaluation.xlsx"
+    write_workbook(tests, path)
+    table = Table("operator", "session", "trial", "scenario", "raw", "percent")
+    for test in tests:
+        raw, percent = test.indicator.raw, test.indicator.percent
+        where = (test.operator, str(test.session), str(test.trial), test.scenario)
+        table.add_row(*where, f"{raw:.1f}", f"{percent:.1f}")
+    out.print(table)
+    for each in advice(tests):
+        out.print(f"{each.operator}, {each.about}: {each.verdict} ({each.evidence})", markup=False)
+    out.print(f"workbook: {path}", markup=False)
+
+
+def _settings(path: Path) -> "IndicatorSettings":
+    from labcrane.evaluation import IndicatorSettings
+    from labcrane.yaml_file import YamlFile
+
+    source = YamlFile.read(path)
+    checked = source.check(IndicatorSettings)
+    source.raise_problems()
+    if checked is None:
+        raise AssertionError("what is wrong was raised")
+    return checked

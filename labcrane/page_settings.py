@@ -1,0 +1,16 @@
+"""Where pages are served."""
+
+from pydantic import Field
+
+from labcrane.offers import Settings
+
+
+class PageSettings(Settings):
+    """Of the supervisor's and the participant's page."""
+
+    host: str = "127.0.0.1"
+    """Address at which they are served: this computer only by default. An address of the lab's
+    network, ``192.168.1.20``, opens them to its tablets; whoever has no token is refused."""
+
+    port: int = Field(default=0, ge=0, le=65535)
+    """Port; 0 takes a free one."""

@@ -1,0 +1,40 @@
+"""What a page knows, and how it asks: shared by everything that is shown."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from labcrane.console import Command, Order
+from labcrane.plan import SessionPlan
+from labcrane.study import Study
+from labcrane.supervisor.board import Board
+from labcrane.supervisor.live import Live
+from labcrane.supervisor.rights import RIGHTS
+
+
+@dataclass(frozen=True)
+class Desk:
+    """The session as pages see it.
+
+    Attributes
+    ----------
+    send
+        Passes a command on to the launcher.
+    participant
+        Name of the participant's folder: a pseudonym with its stamps.
+    """
+
+    study: Study
+    plan: SessionPlan
+    participant: str
+    board: Board
+    live: Live
+    send: Callable[[Command], None]
+
+    def give(self, page: str, order: Order, text: str = "") -> bool:
+        """Pass on what a page asks; refuse and log what it has no right to. Whether it went."""
+        if order not in RIGHTS[page]:
+            why = f"the {page} page asked for {order.value}: no right to order it"
+            self.send(Command(Order.DENIED, why, page))
+            return False
+        self.send(Command(order, text, page))
+        return True

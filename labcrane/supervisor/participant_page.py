@@ -1,0 +1,14 @@
+"""The participant's page: the questionnaire that is asked, and nothing else."""
+
+from labcrane.supervisor.desk import Desk
+from labcrane.supervisor.form import Form
+from labcrane.supervisor.rights import PARTICIPANT
+
+
+def participant_page(desk: Desk) -> None:
+    """Build the page."""
+    from nicegui import ui  # noqa: PLC0415 - loads for a second
+
+    ui.page_title("labcrane")
+    with ui.column().classes("w-full max-w-4xl mx-auto p-4"):
+        Form(desk, PARTICIPANT).build()

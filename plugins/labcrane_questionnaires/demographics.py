@@ -1,0 +1,48 @@
+"""What a study reports of its participants; nothing that could name one."""
+
+from collections.abc import Mapping, Sequence
+
+from labcrane import Answers, Item, Questionnaire
+from labcrane_questionnaires.settings import RatingSettings
+
+WORDS = {
+    "en": {
+        "title": "About you",
+        "age": "How old are you, in years?",
+        "sex": "Your sex",
+        "handedness": "Which hand do you write with?",
+        "experience": "For how many years have you operated cranes or manipulators?",
+        "gaming": "How many hours a week do you play computer games?",
+    },
+    "de": {
+        "title": "Zu Ihrer Person",
+        "age": "Wie alt sind Sie, in Jahren?",
+        "sex": "Ihr Geschlecht",
+        "handedness": "Mit welcher Hand schreiben Sie?",
+        "experience": "Seit wie vielen Jahren bedienen Sie Kräne oder Manipulatoren?",
+        "gaming": "Wie viele Stunden in der Woche spielen Sie Computerspiele?",
+    },
+}
+
+
+class Demographics(Questionnaire):
+    """Age, sex, handedness, experience; every answer can be declined. It has no score."""
+
+    rights = "labcrane, Apache-2.0"
+
+    def __init__(self, settings: RatingSettings) -> None:
+        self._words = WORDS[settings.language]
+        self.title = self._words["title"]
+
+    def items(self) -> Sequence[Item]:
+        words = self._words
+        return [
+            Item("age", words["age"], "number", 16.0, 99.0, 1.0),
+            Item("sex", words["sex"], "choice", choices=("female", "male", "other")),
+            Item("handedness", words["handedness"], "choice", choices=("left", "right", "both")),
+            Item("experience", words["experience"], "number", 0.0, 70.0, 0.0),
+            Item("gaming", words["gaming"], "number", 0.0, 168.0, 0.0),
+        ]
+
+    def score(self, answers: Answers) -> Mapping[str, float]:
+        return {}

@@ -1,0 +1,165 @@
+"""What a protocol can set about its questionnaires."""
+
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from labcrane import Item, Settings
+
+NAME = r"^[a-z][a-z0-9_]*$"
+
+
+class LanguageSettings(Settings):
+    """Of a questionnaire whose words are fixed."""
+
+    language: Literal["en"] = "en"
+    """The language in which it asks."""
+
+
+class TlxSettings(LanguageSettings):
+    """Of the NASA task load index."""
+
+    weighted: bool = False
+    """Whether the fifteen pairs are asked too, for the weighted score."""
+
+
+class RatingSettings(Settings):
+    """Of what labcrane words itself."""
+
+    language: Literal["en", "de"] = "en"
+    """The language in which it asks."""
+
+
+class LabText(Settings):
+    """A questionnaire's words, which may not be passed on: a file of the lab's."""
+
+    rights: str = Field(min_length=1)
+    """By whose leave the lab uses these words; recorded."""
+
+    title: str = ""
+    """What participants read above the questions; the usual name by default."""
+
+    items: tuple[str, ...] = Field(min_length=1)
+    """The questions, in the order of the publication."""
+
+    left: str = ""
+    """Words at the lowest end of every scale."""
+
+    right: str = ""
+    """Words at the highest end of every scale."""
+
+
+class LabTextSettings(Settings):
+    """Of a questionnaire whose words the lab has to bring."""
+
+    file: Path
+    """YAML file with the words, beside the protocol: rights, items, and perhaps title, left and
+    right."""
+
+    text: LabText
+    """What the file holds; read from it."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, given: Any, info: ValidationInfo) -> Any:
+        if not (isinstance(given, dict) and isinstance(given.get("file"), str)):
+            raise ValueError(  # noqa: TRY004 - pydantic collects these
+                "its words may not be passed on with labcrane; name the lab's own file with "
+                "file: (docs/questionnaires.md says what is in it)"
+            )
+        if "text" in given:
+            return given
+        path = (info.context or {}).get("folder", Path()) / given["file"]
+        try:
+            text = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError, YAMLError) as error:
+            raise ValueError(f"the lab's file {str(path)!r} cannot be read: {error}") from None
+        return {**given, "text": text}
+
+
+class Question(Settings):
+    """One question of a lab's own."""
+
+    name: str = Field(pattern=NAME)
+    """A lower-case word; names the answer in the record."""
+
+    text: str
+    """What is asked."""
+
+    kind: Literal["scale", "number", "choice", "text"] = "scale"
+    """``scale``: steps between two ends; ``number``; ``choice``; ``text``."""
+
+    lowest: float = 0.0
+    """Smallest number that can be answered."""
+
+    highest: float = 10.0
+    """Largest number that can be answered."""
+
+    step: float = Field(default=1.0, ge=0.0)
+    """Steps of a scale or number; 0 allows everything between."""
+
+    left: str = ""
+    """Words at the lowest end of a scale."""
+
+    right: str = ""
+    """Words at the highest end of a scale."""
+
+    choices: tuple[str, ...] = ()
+    """Of a choice."""
+
+    required: bool = True
+    """Whether it has to be answered, or declined, before the questionnaire is handed in."""
+
+    @model_validator(mode="after")
+    def _can_be_answered(self) -> "Question":
+        if self.kind == "choice" and not self.choices:
+            raise ValueError(f"question {self.name!r} is a choice and has no choices")
+        if not self.lowest < self.highest:
+            raise ValueError(
+                f"question {self.name!r} must rise, but goes from {self.lowest:g} to "
+                f"{self.highest:g}"
+            )
+        return self
+
+    def item(self) -> Item:
+        """Return it as the item it is."""
+        return Item(**self.model_dump())
+
+
+class FreeSettings(Settings):
+    """Of a questionnaire of the lab's own."""
+
+    title: str
+    """What participants read above the questions."""
+
+    rights: str = "the lab's own"
+    """Where the words come from."""
+
+    questions: tuple[Question, ...] = Field(min_length=1)
+    """What is asked, in order."""
+
+    sums: dict[str, tuple[str, ...]] = Field(default_factory=dict)
+    """Scores: the names of the questions whose answers are added, by the score's name."""
+
+    @field_validator("questions")
+    @classmethod
+    def _differ(cls, questions: tuple[Question, ...]) -> tuple[Question, ...]:
+        names = [question.name for question in questions]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise ValueError(f"{', '.join(twice)} is the name of two questions")
+        return questions
+
+    @model_validator(mode="after")
+    def _sums_add_numbers(self) -> "FreeSettings":
+        known = {each.name for each in self.questions if each.kind in {"scale", "number"}}
+        for score, names in self.sums.items():
+            if wrong := [name for name in names if name not in known]:
+                raise ValueError(
+                    f"sum {score!r} adds {', '.join(wrong)}; the questions with numbers are "
+                    f"{', '.join(sorted(known)) or 'none'}"
+                )
+        return self

@@ -1,0 +1,263 @@
+"""The performance indicator against its published test vectors, and LibreOffice's totals."""
+
+import csv
+import math
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from labcrane.analysis.indicator import Indicator, Performance, indicate
+from labcrane.analysis.next_practice import familiarity, fatigue, suggest
+from labcrane.analysis.operator_tests import OperatorTest, completion, operator_tests
+from labcrane.analysis.workbook import write_workbook
+from labcrane.cli.app import main
+from labcrane.errors import LabcraneError, RecordingError
+from labcrane.evaluation import IndicatorSettings, Weights
+from labcrane.recording.journal import Column, SessionJournal
+from labcrane.recording.participant_file import consolidate
+from labcrane.records import Event
+
+LITERAL = IndicatorSettings()
+UNCAPPED = IndicatorSettings(capped=False)
+SHARED = IndicatorSettings(reading="shared_overloads")
+
+
+def points(
+    time: float,
+    counts: tuple[int, int, int, int] = (0, 0, 0, 0),
+    ratings: tuple[float, float] = (1.0, 1.0),
+    *,
+    k: bool = True,
+    settings: IndicatorSettings = LITERAL,
+) -> Indicator:
+    return indicate(Performance(60.0 * time, *counts, *ratings, completed=k), 60.0, settings)
+
+
+VECTORS = [
+    (1.00, (0, 0, 0, 0), (1.0, 1.0), True, 120.0, 100.0, 120.0),
+    (0.80, (0, 0, 0, 0), (1.0, 1.0), True, 120.0, 100.0, 125.0),
+    (1.25, (1, 0, 2, 1), (0.7, 0.6), True, 89.0, 74.167, 89.0),
+    (2.00, (4, 4, 4, 4), (0.0, 0.0), True, 10.0, 8.333, 10.0),
+    (1.25, (5, 0, 0, 0), (0.7, 0.6), False, 0.0, 0.0, 0.0),
+    (1.25, (6, 0, 0, 0), (0.5, 0.5), True, 86.0, 71.667, 86.0),
+]
+
+
+@pytest.mark.parametrize(("time", "counts", "ratings", "k", "raw", "percent", "uncapped"), VECTORS)
+def test_the_six_vectors(
+    time: float,
+    counts: tuple[int, int, int, int],
+    ratings: tuple[float, float],
+    *,
+    k: bool,
+    raw: float,
+    percent: float,
+    uncapped: float,
+) -> None:
+    found = points(time, counts, ratings, k=k)
+    assert found.raw == pytest.approx(raw, abs=1e-12)
+    assert round(found.percent, 3) == percent
+    free = points(time, counts, ratings, k=k, settings=UNCAPPED)
+    assert free.raw == pytest.approx(uncapped, abs=1e-12)
+
+
+def test_a_shared_overload_component_makes_a_hundred_points() -> None:
+    assert points(1.0, settings=SHARED).raw == 100.0
+    # max(0, 1 - (3 + 3) / 4) is 0, where two components would keep 5 points each.
+    assert points(1.0, (0, 0, 3, 3), settings=SHARED).raw == 80.0
+    assert points(1.0, (0, 0, 3, 3)).raw == 90.0
+
+
+def test_a_missing_rating_is_not_made_up() -> None:
+    found = points(1.0, ratings=(math.nan, 1.0))
+    assert math.isnan(found.raw)
+    assert found.objective == 100.0
+
+
+@pytest.mark.parametrize(
+    ("weights", "message"),
+    [
+        ({"body": -1.0}, "greater than or equal to 0"),
+        (dict.fromkeys(Weights.model_fields, 0.0), "all weights are 0"),
+    ],
+)
+def test_weights_below_zero_or_all_zero_are_refused(
+    weights: dict[str, float], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        Weights(**weights)
+
+
+@pytest.mark.parametrize(
+    ("test", "message"),
+    [
+        (Performance(0.0, 0, 0, 0, 0, 1.0, 1.0, completed=True), "the test took 0.0 s"),
+        (Performance(9.0, -1, 0, 0, 0, 1.0, 1.0, completed=True), "object counts -1"),
+        (Performance(9.0, 0, 0, 0, 0, 7.0, 1.0, completed=True), "accuracy is 7.0; it must be 0"),
+    ],
+)
+def test_what_cannot_be_is_refused(test: Performance, message: str) -> None:
+    with pytest.raises(LabcraneError, match=message):
+        indicate(test, 60.0, LITERAL)
+
+
+@pytest.mark.parametrize(
+    ("flag", "worst", "overruled", "outcome", "k"),
+    [
+        (math.nan, 4, False, "success", True),
+        (math.nan, 5, False, "success", False),
+        (math.nan, 6, True, "success", True),
+        (math.nan, 0, False, "timeout", False),
+        (1.0, 5, False, "failure", True),
+        (0.0, 0, False, "success", False),
+    ],
+)
+def test_five_mistakes_end_a_test_unless_the_supervisor_says_otherwise(
+    flag: float, worst: int, outcome: str, *, overruled: bool, k: bool
+) -> None:
+    row = {"completion": flag, "outcome": outcome}
+    assert completion(row, worst, LITERAL, overruled=overruled)[0] is k
+
+
+ROW = {
+    "block": 1, "block_name": "doors", "practice": False, "counted": True, "attempt": 1,
+    "outcome": "success", "completion": None,
+}  # fmt: skip
+
+
+def record(
+    folder: Path, operator: str, rows: list[dict], *, session: int = 1, ratings: bool = True
+) -> None:
+    """Record trials as a scenario task would, ratings after each, as a session writes them."""
+    home = folder / operator
+    home.mkdir(parents=True, exist_ok=True)
+    path = home / f"ses-{session:02}_run.xdf"
+    about = {"participant": operator, "study": "rescue", "indicator": LITERAL.model_dump()}
+    with SessionJournal(path, [Column("loop", "tick", "1")], 240.0) as journal:
+        journal.write_event(Event("session.start", 1.0, about), 0)
+        for at, row in enumerate(rows, start=1):
+            data = {**ROW, "trial": at, "ended": 10.0 * at, **row}
+            rating = data.pop("ratings", (0.7, 0.6))
+            journal.write_event(Event("trial.end", 10.0 * at, data), at)
+            names = ("subjective_accuracy", "situational_awareness")
+            for name, share in zip(names, rating, strict=True):
+                done = {"questionnaire": name, "step": at, "score.share": share, "missing": 0}
+                if ratings:
+                    journal.write_event(Event("questionnaire.end", 10.0 * at + 1, done), at)
+    consolidate(home / f"{operator}.h5", [path])
+
+
+def trial(time: float, counts: tuple[int, int, int, int] = (0, 0, 0, 0), **more: object) -> dict:
+    names = ("n_object", "n_body", "n_overload_max", "n_overload_min")
+    return {"time": time, **dict(zip(names, counts, strict=True)), **more}
+
+
+def the_vectors() -> list[dict]:
+    reference = trial(60.0, reference=True)
+    tests = [
+        trial(60.0 * time, counts, ratings=ratings, completion=int(k))
+        for time, counts, ratings, k, *_ in VECTORS
+    ]
+    return [reference, *tests]
+
+
+def test_the_vectors_come_out_of_recordings_too(tmp_path: Path) -> None:
+    record(tmp_path, "R001", the_vectors())
+    tests = operator_tests(tmp_path)
+    assert [test.indicator.raw for test in tests] == pytest.approx([v[4] for v in VECTORS])
+    assert {test.reference_s for test in tests} == {60.0}
+    assert {test.scenario for test in tests} == {"doors"}
+
+
+def test_every_operator_needs_a_reference_stage(tmp_path: Path) -> None:
+    record(tmp_path, "R001", [trial(60.0, reference=True, outcome="timeout"), trial(70.0)])
+    with pytest.raises(RecordingError, match="R001 has no reference stage that was completed"):
+        operator_tests(tmp_path)
+
+
+def test_a_folder_without_tests_says_what_a_test_is(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="no trial with the columns time, n_object, n_body"):
+        operator_tests(tmp_path)
+
+
+def converted(book: Path, sheet: int) -> list[list[str]]:
+    """Let LibreOffice open the workbook, work it out, and write one sheet as text."""
+    office = shutil.which("soffice")
+    if office is None:
+        pytest.skip("LibreOffice is not installed")
+    how = f"csv:Text - txt - csv (StarCalc):44,34,76,1,,0,false,true,false,false,false,{sheet}"
+    home = f"-env:UserInstallation=file://{book.parent}/office"
+    subprocess.run(
+        [office, home, "--headless", "--convert-to", how, "--outdir", str(book.parent), str(book)],
+        check=True,
+        capture_output=True,
+        timeout=120,
+    )
+    [text] = book.parent.glob(f"{book.stem}-*.csv")
+    rows = list(csv.reader(text.read_text().splitlines()))
+    text.unlink()
+    return rows
+
+
+def test_libreoffice_opens_the_workbook_and_its_totals_are_ours(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    record(tmp_path, "R001", the_vectors())
+    record(tmp_path, "R002", [trial(50.0, reference=True), trial(80.0, (2, 0, 1, 0))])
+    record(tmp_path, "R002", [trial(64.0, (1, 0, 0, 0))], session=2)
+    assert main(["score", str(tmp_path)]) == 0
+    book = tmp_path / "evaluation.xlsx"
+    head, *rows = converted(book, 2)
+    tests = operator_tests(tmp_path)
+    assert len(rows) == len(tests) == 8
+    for test, row in zip(tests, rows, strict=True):
+        cells = dict(zip(head, row, strict=True))
+        for name in ("raw", "percent"):
+            assert float(cells[name]) == pytest.approx(getattr(test.indicator, name), abs=1e-3)
+        assert float(cells["objective"]) == pytest.approx(test.indicator.objective, abs=1e-3)
+    head, *rows = converted(book, 1)
+    assert [row[0] for row in rows] == ["R001", "R002"]
+    mean = sum(test.indicator.percent for test in tests[6:]) / 2
+    assert float(rows[1][3]) == pytest.approx(mean, abs=1e-3)
+    # Lost to objects: 10 and 5 points; to time: 20 (1 - 50/80) = 7.5 and 4.4.
+    assert rows[1][4].startswith("practise objects")
+
+
+def test_a_missing_rating_leaves_no_total_in_the_workbook(tmp_path: Path) -> None:
+    record(tmp_path, "R001", [trial(60.0, reference=True), trial(60.0)], ratings=False)
+    [test] = operator_tests(tmp_path)
+    write_workbook([test], tmp_path / "book.xlsx")
+    head, row = converted(tmp_path / "book.xlsx", 2)
+    assert dict(zip(head, row, strict=True))["raw"] == "#VALUE!"
+
+
+def runs(percents: list[tuple[float, int]]) -> list[OperatorTest]:
+    """Return tests of one operator with times in s and collisions with objects."""
+    tests = []
+    for number, (time, hits) in enumerate(percents, start=1):
+        done = Performance(time, hits, 0, 0, 0, 0.5, 0.5, completed=True)
+        made = indicate(done, 60.0, LITERAL)
+        tests.append(OperatorTest("R001", 1, number, "doors", done, 60.0, "", made, LITERAL))
+    return tests
+
+
+def test_the_component_that_loses_most_is_practised_next() -> None:
+    said = suggest(runs([(60.0, 3), (70.0, 4)]))
+    assert said.verdict == "practise objects: keep clear of what is in the scene"
+    assert said.evidence.startswith("mean loss in points over 2 tests: object 17.5")
+
+
+def test_steady_times_below_the_first_show_familiarity() -> None:
+    assert familiarity(runs([(90, 0), (70, 0), (62, 0), (61, 0), (60, 0)])).verdict == "familiar"
+    said = familiarity(runs([(90, 0), (80, 0), (70, 0), (60, 0)]))
+    assert said.verdict == "still learning"
+    assert familiarity(runs([(60, 0)] * 3)).verdict == "too few runs to say"
+
+
+def test_runs_that_worsen_again_suggest_another_scenario() -> None:
+    tired = runs([(60, 2), (60, 0), (60, 0), (60, 0), (60, 2), (60, 2), (60, 3)])
+    assert fatigue(tired).verdict == "fatigue: give another scenario"
+    assert "best mean of 3 runs 91.7 %, last 81.9 %" in fatigue(tired).evidence
+    assert fatigue(runs([(60, 2), (60, 1), (60, 0), (60, 0)])).verdict == "none"

@@ -1,0 +1,142 @@
+"""A run in real time with its pages, and a browser."""
+
+import os
+import re
+import shutil
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+import pytest
+from faults.sessions import labcrane, wait_for
+from selenium import webdriver
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+
+STUDY = """\
+labcrane: 1
+study: {study}
+title: Pages
+rate_hz: 240
+machine: ch8
+input: {{use: simulated_operator}}
+scheme:
+  use: joint_velocity
+  map: {{slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}}
+dynamics: {{use: kinematic_crane}}
+tasks:
+  aiming: {{use: aiming, distances: [6], movements: 2, limit_s: 60}}
+sessions:
+  - name: only
+    steps:
+{steps}
+"""
+
+
+class Room:
+    """A launcher with its pages; says what it has printed."""
+
+    def __init__(self, protocol: Path, data: Path, *more: str) -> None:
+        self.data = data
+        self.folder = data / "P001-PILOT"
+        what = more[0] if more else "run"
+        self.launcher = labcrane(
+            what, protocol, "--participant", "P001", "--data", data, "--pilot", "--local",
+            env={**os.environ, "PYTHONUNBUFFERED": "1", "COLUMNS": "200"},
+        )  # fmt: skip
+        self.said: list[str] = []
+        self._reader = threading.Thread(target=self._read)
+        self._reader.start()
+        wait_for(lambda: len(self.links()) == 2 or self.launcher.poll() is not None, 60)
+        assert self.launcher.poll() is None, "".join(self.said)
+
+    def _read(self) -> None:
+        for line in self.launcher.stdout:
+            self.said.append(line)
+
+    def links(self) -> dict[str, str]:
+        found = re.findall(r"(\w+) page: (http://\S+)", "".join(self.said))
+        return dict(found)
+
+    def process(self, word: str) -> psutil.Process | None:
+        """Return the session's or the pages' process, by what it has open."""
+        for child in psutil.Process(self.launcher.pid).children():
+            if "spawn_main" not in " ".join(child.cmdline()):
+                continue
+            serves = any(
+                c.status == "LISTEN" and c.laddr.port == self.port for c in child.net_connections()
+            )
+            if serves == (word == "pages"):
+                return child
+        return None
+
+    @property
+    def port(self) -> int:
+        return int(re.search(r":(\d+)/", self.links()["supervisor"])[1])
+
+    def end(self) -> None:
+        if self.launcher.poll() is None:
+            processes = [psutil.Process(self.launcher.pid)]
+            processes += processes[0].children(recursive=True)
+            for process in processes:
+                process.kill()
+            psutil.wait_procs(processes, timeout=10)
+            self.launcher.wait()
+        self._reader.join()
+        self.launcher.stdout.close()
+
+
+@contextmanager
+def a_room(protocol: Path, data: Path, *more: str) -> Iterator[Room]:
+    room = Room(protocol, data, *more)
+    try:
+        yield room
+    finally:
+        room.end()
+
+
+@contextmanager
+def a_browser(profile: Path) -> Iterator[webdriver.Chrome]:
+    """Start Debian's Chromium without a screen, and without any network but this computer."""
+    chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
+    if not (chromium and driver):
+        if os.environ.get("CI"):
+            pytest.fail("CI needs chromium and chromium-driver")
+        pytest.skip("chromium or chromedriver is not installed")
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    for argument in (
+        "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--window-size=1280,800",
+        f"--user-data-dir={profile}", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+        "--disable-background-networking", "--disable-component-update", "--disable-sync",
+        "--no-first-run", "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
+    ):  # fmt: skip
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"performance": "ALL"})
+    browser = webdriver.Chrome(options, webdriver.ChromeService(driver))
+    try:
+        yield browser
+    finally:
+        browser.quit()
+
+
+def text(browser: webdriver.Chrome, ident: str) -> str:
+    """Return what an element shows; empty while the page has none such."""
+    found = browser.find_elements(By.ID, ident)
+    return found[0].text if found else ""
+
+
+def press(browser: webdriver.Chrome, ident: str) -> None:
+    wait_for(lambda: any(e.is_displayed() for e in browser.find_elements(By.ID, ident)))
+    element = browser.find_element(By.ID, ident)
+    browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", element)
+    element.click()
+
+
+def write(browser: webdriver.Chrome, ident: str, words: str) -> None:
+    wait_for(lambda: browser.find_elements(By.ID, ident))
+    field = browser.find_element(By.ID, ident)
+    field.send_keys(Keys.CONTROL, "a")
+    field.send_keys(Keys.NULL, words, Keys.ENTER)

@@ -1,0 +1,190 @@
+"""Both pages in a real browser: orders, answers, reloads, and processes that are killed."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+from faults.sessions import unique, wait_for
+from pages.room import STUDY, a_browser, a_room, press, text, write
+from selenium.webdriver.common.by import By
+
+from labcrane import open_recording
+from labcrane.cli.app import main
+
+STEPS = """\
+      - questionnaire: [demographics, subjective_accuracy]
+      - block: {task: aiming, pairs: 1}
+"""
+SCREENS = os.environ.get("LABCRANE_SCREENS")
+"""Folder for screenshots, for people to look at."""
+
+
+@pytest.fixture(scope="module")
+def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("pages") / "study.yaml"
+    path.write_text(STUDY.format(study=unique("pages"), steps=STEPS))
+    return path
+
+
+def photograph(browser, name: str) -> None:
+    if SCREENS:
+        for width, height in ((1280, 800), (768, 1024)):
+            browser.set_window_size(width, height)
+            browser.save_screenshot(f"{SCREENS}/{name}-{width}.png")
+        browser.set_window_size(1280, 800)
+
+
+def shown(browser, ident: str, words: str) -> None:
+    wait_for(lambda: words in text(browser, ident), 30)
+
+
+def addresses(browser) -> set[str]:
+    """Return the hosts of everything that the browser has asked for."""
+    found = set()
+    for entry in browser.get_log("performance"):
+        message = json.loads(entry["message"])["message"]
+        if message["method"] in {"Network.requestWillBeSent", "Network.webSocketCreated"}:
+            params = message["params"]
+            url = params.get("url") or params["request"]["url"]
+            if not url.startswith(("data:", "blob:", "chrome:")):
+                found.add(url.split("/")[2].partition(":")[0])
+    return found
+
+
+def test_a_session_is_led_and_answered_from_a_browser(  # noqa: PLR0915 - one visit, in order
+    protocol: Path, tmp_path: Path
+) -> None:
+    data = tmp_path / "data"
+    with a_room(protocol, data) as room, a_browser(tmp_path / "profile") as browser:
+        wait_for(lambda: room.process("pages"), 60)
+        links = room.links()
+        browser.get(links["supervisor"])
+        assert "token" not in browser.current_url
+        shown(browser, "stage", "questionnaire: About you")
+        supervisor = browser.current_window_handle
+        browser.switch_to.new_window("tab")
+        participant = browser.current_window_handle
+        browser.get(links["participant"])
+
+        # A wrong answer, a right one, and a reload in the middle.
+        write(browser, "age-field", "7")
+        shown(browser, "refusal", "item 'age' takes 16 to 99 in steps of 1, not 7.0")
+        assert text(browser, "status-age").startswith("not taken")
+        write(browser, "age-field", "31")
+        shown(browser, "status-age", "saved")
+        press(browser, "sex-female")
+        shown(browser, "status-sex", "saved")
+        photograph(browser, "participant")
+        browser.refresh()
+        shown(browser, "status-sex", "saved")
+        assert browser.find_element(By.ID, "age-field").get_property("value") == "31"
+        assert browser.find_element(By.ID, "sex-female").get_attribute("aria-pressed") == "true"
+
+        # The pages' process is killed: it comes back, and so does every answer.
+        room.process("pages").kill()
+        wait_for(lambda: "the page died and is started again" in "".join(room.said), 30)
+        wait_for(lambda: room.process("pages"), 60)
+        browser.refresh()
+        shown(browser, "status-age", "saved")
+        shown(browser, "status-sex", "saved")
+        press(browser, "submit")
+        shown(browser, "refusal", "handedness, experience, gaming have no answer")
+        press(browser, "handedness-left")
+        write(browser, "experience-field", "2.5")
+        write(browser, "gaming-field", "0")
+        shown(browser, "status-gaming", "saved")
+        press(browser, "submit")
+        press(browser, "rating-8")
+        shown(browser, "status-rating", "saved")
+        press(browser, "submit")
+        shown(browser, "wait", "Please wait")
+
+        browser.switch_to.window(supervisor)
+        browser.refresh()
+        shown(browser, "stage", "waits to start: aiming")
+        press(browser, "order-start")
+        shown(browser, "stage", "trial")
+        press(browser, "order-pause")
+        shown(browser, "stage", "HELD by examiner")
+        photograph(browser, "supervisor")
+        write(browser, "note-field", "coughs")
+        shown(browser, "events", '"text": "coughs"')
+        write(browser, "hint-field", "slower")
+        shown(browser, "events", '"text": "slower"')
+        press(browser, "order-start")
+        press(browser, "order-override")
+        shown(browser, "events", "order.override")
+        press(browser, "order-completion1")
+        shown(browser, "events", "order.completion")
+        press(browser, "order-repeat")
+        shown(browser, "facts", "attempt 2")
+        press(browser, "order-skip")
+        shown(browser, "events", "order.skip")
+        press(browser, "order-end")
+        press(browser, "order-end-sure")
+        browser.switch_to.window(participant)
+        assert room.launcher.wait(60) == 0, "".join(room.said)
+        assert addresses(browser) == {"127.0.0.1"}
+    check_record(data)
+
+
+def check_record(data: Path) -> None:
+    file = data / "P001-PILOT" / "P001-PILOT.h5"
+    assert main(["replay", str(file), "--session", "1"]) == 0, (
+        "the orders of pages are replayed too"
+    )
+    session = open_recording(file).session(1)
+    table = session.questionnaires
+    answers = table[table["kind"] == "answer"].set_index("item")
+    assert answers.loc["age", "value"] == 31.0
+    assert answers.loc["sex", "text"] == "female"
+    assert answers.loc["experience", "value"] == 2.5
+    scores = table[table["kind"] == "score"]
+    assert scores[["questionnaire", "item", "value"]].to_numpy().tolist() == [
+        ["subjective_accuracy", "share", 0.8]
+    ]
+    orders = session.events[session.events["name"].str.startswith("order.")]
+    given = {
+        name.removeprefix("order."): d
+        for name, d in zip(orders["name"], orders["data"], strict=True)
+    }
+    assert set(given) == {
+        "start", "pause", "note", "hint", "override", "completion", "repeat", "skip", "end",
+    }  # fmt: skip
+    ends = session.events[session.events["name"] == "trial.end"]["data"]
+    assert [data["outcome"] for data in ends][:2] == ["repeated", "skipped"]
+    assert all(d["by"] == "supervisor" and d["refused"] is None for d in given.values())
+
+
+def test_no_answer_is_lost_when_the_session_is_killed_in_the_middle(
+    protocol: Path, tmp_path: Path
+) -> None:
+    data = tmp_path / "data"
+    with a_browser(tmp_path / "profile") as browser:
+        with a_room(protocol, data) as room:
+            wait_for(lambda: room.process("pages"), 60)
+            browser.get(room.links()["participant"])
+            write(browser, "age-field", "44")
+            shown(browser, "status-age", "saved")
+            room.process("session").kill()
+            assert room.launcher.wait(60) == 1
+        table = open_recording(data / "P001-PILOT" / "P001-PILOT.h5").session(1).questionnaires
+        assert table[["item", "value"]].to_numpy().tolist() == [["age", 44.0]]
+        with a_room(protocol, data, "resume") as room:
+            wait_for(lambda: room.process("pages"), 60)
+            browser.get(room.links()["participant"])
+            shown(browser, "status-age", "saved")
+            assert browser.find_element(By.ID, "age-field").get_property("value") == "44"
+            for item in ("sex-male", "handedness-right"):
+                press(browser, item)
+            write(browser, "experience-field", "0")
+            write(browser, "gaming-field", "1")
+            shown(browser, "status-gaming", "saved")
+            press(browser, "submit")
+            wait_for(lambda: browser.find_elements(By.ID, "rating-3"))
+            room.process("session").kill()
+            assert room.launcher.wait(60) == 1
+    events = open_recording(data / "P001-PILOT" / "P001-PILOT.h5").session(1).events
+    [done] = events[events["name"] == "questionnaire.end"]["data"]
+    assert (done["questionnaire"], done["missing"]) == ("demographics", 0)

@@ -1,0 +1,210 @@
+"""Scores against published definitions, worked by hand; items, languages and rights."""
+
+import math
+from pathlib import Path
+
+import pytest
+from rehearsal import SHORT, a_study
+
+from labcrane import AnswerError, Item, ProtocolError, Questionnaire
+from labcrane.testing import QuestionnaireContract
+from labcrane_questionnaires.demographics import Demographics
+from labcrane_questionnaires.free import Free
+from labcrane_questionnaires.rating import Rating
+from labcrane_questionnaires.sart import Sart
+from labcrane_questionnaires.settings import (
+    FreeSettings,
+    LabText,
+    RatingSettings,
+    TlxSettings,
+)
+from labcrane_questionnaires.slots import SLOTS
+from labcrane_questionnaires.ssq import Ssq
+from labcrane_questionnaires.sus import NAMES, Sus
+from labcrane_questionnaires.tlx import PAIRS, SCALES, NasaTlx
+
+
+def a_lab_text(items: int) -> LabText:
+    return LabText(rights="a licence", items=tuple(f"words {n}" for n in range(items)))
+
+
+BUILT = {
+    "nasa_tlx": NasaTlx(TlxSettings()),
+    "tlx weighted": NasaTlx(TlxSettings(weighted=True)),
+    "sus": Sus(),
+    "ssq": Ssq(a_lab_text(16)),
+    "sart": Sart(a_lab_text(10)),
+    "subjective_accuracy": Rating("subjective_accuracy", RatingSettings()),
+    "situational_awareness": Rating("situational_awareness", RatingSettings(language="de")),
+    "demographics": Demographics(RatingSettings()),
+    "free": Free(
+        FreeSettings.model_validate(
+            {
+                "title": "Comfort",
+                "questions": [
+                    {"name": "heat", "text": "Too hot?"},
+                    {"name": "why", "text": "Why?", "kind": "text"},
+                ],
+                "sums": {"discomfort": ["heat"]},
+            }
+        )
+    ),
+    **{name: SLOTS[name](a_lab_text(1)) for name in ("borg_cr10", "borg_rpe", "kss")},
+}
+
+
+class TestBundled(QuestionnaireContract):
+    @pytest.fixture(params=BUILT)
+    def questionnaire(self, request: pytest.FixtureRequest) -> Questionnaire:
+        return BUILT[request.param]
+
+
+RATINGS = dict(zip(SCALES, (70.0, 30.0, 55.0, 20.0, 65.0, 40.0), strict=True))
+
+
+def test_raw_tlx_is_the_mean_of_the_six() -> None:
+    assert BUILT["nasa_tlx"].score(RATINGS) == {"raw": pytest.approx(280.0 / 6.0)}
+
+
+def test_weighted_tlx_is_the_tally_weighted_sum_over_fifteen() -> None:
+    # Mental wins all its five pairs, effort four, temporal three, frustration two, physical one.
+    rank = ("mental", "effort", "temporal", "frustration", "physical", "performance")
+    chosen = {f"{a}_or_{b}": min(a, b, key=rank.index) for a, b in PAIRS}
+    by_hand = (5 * 70 + 4 * 65 + 3 * 55 + 2 * 40 + 1 * 30 + 0 * 20) / 15
+    scores = BUILT["tlx weighted"].score({**RATINGS, **chosen})
+    assert scores["weighted"] == pytest.approx(by_hand)
+    assert len(PAIRS) == 15
+
+
+def test_performance_runs_from_good_to_poor_and_is_not_turned_round() -> None:
+    item = next(i for i in BUILT["nasa_tlx"].items() if i.name == "performance")
+    assert (item.left, item.right) == ("Good", "Poor")
+    assert BUILT["nasa_tlx"].score({**RATINGS, "performance": 80.0})["raw"] == pytest.approx(
+        340 / 6
+    )
+
+
+@pytest.mark.parametrize(
+    ("answers", "total"),
+    [
+        ([3] * 10, 50.0),
+        ([5, 1] * 5, 100.0),
+        ([1, 5] * 5, 0.0),
+        ([4, 2, 5, 1, 4, 3, 5, 2, 4, 2], 80.0),  # (3+4+3+4+3) + (3+4+2+3+3) = 32
+    ],
+)
+def test_sus_turns_even_statements_round(answers: list[int], total: float) -> None:
+    given = dict(zip(NAMES, map(float, answers), strict=True))
+    assert BUILT["sus"].score(given) == {"total": total}
+
+
+def symptoms(*numbers: int, of: float = 3.0) -> dict[str, float]:
+    return {f"symptom_{n}": of if n in numbers else 0.0 for n in range(1, 17)}
+
+
+def test_ssq_at_its_worst_is_what_kennedys_weights_allow() -> None:
+    scores = BUILT["ssq"].score(symptoms(*range(1, 17)))
+    assert {name: round(value, 2) for name, value in scores.items()} == {
+        "nausea": 200.34,
+        "oculomotor": 159.18,
+        "disorientation": 292.32,
+        "total": 235.62,
+    }
+
+
+def test_ssq_counts_item_8_in_nausea_and_in_disorientation() -> None:
+    scores = BUILT["ssq"].score(symptoms(8, of=1.0))
+    assert scores == {
+        "nausea": 9.54,
+        "oculomotor": 0.0,
+        "disorientation": 13.92,
+        "total": pytest.approx(2 * 3.74),
+    }
+
+
+def test_sart_is_understanding_less_the_surplus_of_demand() -> None:
+    names = [item.name for item in BUILT["sart"].items()]
+    answers = dict(zip(names, map(float, (5, 6, 4, 5, 6, 4, 3, 5, 6, 4)), strict=True))
+    assert BUILT["sart"].score(answers)["total"] == 15 - (15 - 18)
+    worst, best = ([7.0] * 3 + [1.0] * 7), ([1.0] * 3 + [7.0] * 7)
+    assert BUILT["sart"].score(dict(zip(names, worst, strict=True)))["total"] == -14
+    assert BUILT["sart"].score(dict(zip(names, best, strict=True)))["total"] == 46
+
+
+def test_a_missing_answer_leaves_only_the_scores_that_do_not_need_it() -> None:
+    scores = BUILT["ssq"].score({**symptoms(3), "symptom_16": None})  # item 16 is of nausea only
+    assert math.isnan(scores["nausea"])
+    assert math.isnan(scores["total"])
+    assert scores["oculomotor"] == pytest.approx(3 * 7.58)
+    assert scores["disorientation"] == 0.0
+
+
+@pytest.mark.parametrize("answer", [103.0, -5.0, 52.0, float("nan"), "70", True])
+def test_an_answer_off_the_scale_is_refused_with_what_is_possible(answer: object) -> None:
+    item = BUILT["nasa_tlx"].items()[0]
+    with pytest.raises(AnswerError, match=r"item 'mental' takes 0 to 100 in steps of 5, not "):
+        item.check(answer)
+
+
+def test_a_choice_takes_its_choices_only() -> None:
+    item = Item("hand", "Which?", "choice", choices=("left", "right"))
+    assert item.check("left") == "left"
+    assert item.check(None) is None
+    with pytest.raises(AnswerError, match="item 'hand' takes one of left, right, not 'up'"):
+        item.check("up")
+
+
+def a_protocol(steps: str, more: str = "") -> str:
+    head = SHORT.partition("sessions:")[0]
+    return f"{head}{more}sessions:\n  - name: only\n    steps:\n{steps}"
+
+
+def refusal(folder: Path, steps: str, more: str = "") -> str:
+    with pytest.raises(ProtocolError) as caught:
+        a_study(folder, a_protocol(steps, more))
+    return str(caught.value)
+
+
+def test_an_unknown_questionnaire_gets_its_line_and_a_suggestion(tmp_path: Path) -> None:
+    said = refusal(tmp_path, "      - questionnaire: nasa_tlxx\n")
+    assert (
+        "study.yaml:16: questionnaire 'nasa_tlxx' is not installed; did you mean 'nasa_tlx'?"
+        in said
+    )
+
+
+def test_text_that_may_not_be_shipped_is_asked_of_the_lab(tmp_path: Path) -> None:
+    assert "name the lab's own file with file:" in refusal(tmp_path, "      - questionnaire: ssq\n")
+    more = "questionnaires: {ssq: {use: ssq, file: ssq.yaml}}\n"
+    step = "      - questionnaire: ssq\n"
+    assert "ssq.yaml' cannot be read" in refusal(tmp_path, step, more)
+    (tmp_path / "ssq.yaml").write_text("rights: bought\nitems: [one, two]\n")
+    said = refusal(tmp_path, step, more)
+    assert "Simulator sickness questionnaire has 16 items, and the lab's file has 2" in said
+    (tmp_path / "ssq.yaml").write_text(f"rights: bought\nitems: {[f'w{n}' for n in range(16)]}\n")
+    study = a_study(tmp_path, a_protocol(step, more))
+    assert study.questionnaires["ssq"].items()[15].text == "w15"
+    assert study.questionnaires["ssq"].rights == "bought"
+
+
+def test_a_stop_rule_needs_a_score_that_there_is(tmp_path: Path) -> None:
+    more = "stop_rules: [{questionnaire: sus, score: sum, above: 3}]\n"
+    said = refusal(tmp_path, "      - questionnaire: sus\n", more)
+    assert "sus has no score 'sum'; it has total" in said
+
+
+@pytest.mark.parametrize(
+    ("weights", "message"),
+    [
+        ("{object: -1}", "indicator.weights.object is -1; it must be greater than or equal to 0"),
+        (
+            "{duration: 0, object: 0, body: 0, overload_max: 0, overload_min: 0, accuracy: 0, "
+            "awareness: 0}",
+            "indicator.weights: all weights are 0; at least one must be above 0",
+        ),
+        ("{objects: 1}", "'objects' is not a key of indicator.weights; did you mean 'object'?"),
+    ],
+)
+def test_weights_that_mean_nothing_are_refused(tmp_path: Path, weights: str, message: str) -> None:
+    step = "      - questionnaire: sus\n"
+    assert message in refusal(tmp_path, step, f"indicator: {{weights: {weights}}}\n")
