@@ -16,8 +16,9 @@ from labcrane.reach import reach
 from labcrane.recording.recording import SessionRecord, Stream, open_recording
 from labcrane.recording.stream_header import Channel, StreamHeader
 from labcrane.recording.xdf import XdfWriter
-from labcrane.records import Event, Frame, Judgement, Phase, Planned, Run, Trial, Value
-from labcrane.roles import Controller, Dynamics, Exporter, InputDevice, Task
+from labcrane.records import Event, Frame, Judgement, Phase, Planned, Run, Situation, Trial, Value
+from labcrane.roles import Controller, Cue, Dynamics, Exporter, Feedback, InputDevice, Task
+from labcrane.shapes import Ball, Beam, Shape, Targets
 from labcrane.signals import FloatArray, Layout, Signal
 
 __version__ = "0.1.0"
@@ -27,13 +28,17 @@ __all__ = [
     "Actuator",
     "ActuatorSettings",
     "Arm",
+    "Ball",
+    "Beam",
     "Body",
     "Channel",
     "Controller",
+    "Cue",
     "DeviceError",
     "Dynamics",
     "Event",
     "Exporter",
+    "Feedback",
     "FloatArray",
     "Frame",
     "InputDevice",
@@ -52,9 +57,12 @@ __all__ = [
     "Run",
     "SessionRecord",
     "Settings",
+    "Shape",
     "Signal",
+    "Situation",
     "Stream",
     "StreamHeader",
+    "Targets",
     "Task",
     "Tick",
     "Trial",

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import pluggy
 
 from labcrane.offers import Offer
-from labcrane.roles import Controller, Dynamics, Exporter, InputDevice, Task
+from labcrane.roles import Controller, Cue, Dynamics, Exporter, Feedback, InputDevice, Task
 
 PROJECT = "labcrane"
 
@@ -45,4 +45,16 @@ def labcrane_tasks() -> Sequence[Offer[Task]]:
 @hookspec
 def labcrane_exporters() -> Sequence[Offer[Exporter]]:
     """Offer formats into which recordings can be exported."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_cues() -> Sequence[Offer[Cue]]:
+    """Offer things to be seen in every view."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_feedback() -> Sequence[Offer[Feedback]]:
+    """Offer views, sounds and other devices that present a session to people."""
     raise NotImplementedError

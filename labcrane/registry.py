@@ -12,7 +12,16 @@ from labcrane import hookspecs
 from labcrane.errors import PluginError
 from labcrane.hookspecs import PROJECT
 from labcrane.offers import Offer
-from labcrane.roles import Component, Controller, Dynamics, Exporter, InputDevice, Task
+from labcrane.roles import (
+    Component,
+    Controller,
+    Cue,
+    Dynamics,
+    Exporter,
+    Feedback,
+    InputDevice,
+    Task,
+)
 
 RoleT = TypeVar("RoleT", bound=Component)
 
@@ -39,6 +48,8 @@ ROLES: Mapping[type[Component], RoleEntry] = {
     Dynamics: RoleEntry("labcrane_dynamics", "dynamics"),
     Task: RoleEntry("labcrane_tasks", "task"),
     Exporter: RoleEntry("labcrane_exporters", "exporter"),
+    Cue: RoleEntry("labcrane_cues", "cue"),
+    Feedback: RoleEntry("labcrane_feedback", "feedback"),
 }
 
 
