@@ -37,7 +37,11 @@ CODES: Mapping[str, int] = {
     "order.note": 65,
     "order.override": 66,
     "order.completion": 67,
+    "order.setting": 80,
+    "feedback.setting": 81,
     "input.lost": 90,
     "input.back": 91,
+    "feedback.ready": 94,
+    "feedback.lost": 95,
 }
 """A number, once given, never changes its meaning."""
