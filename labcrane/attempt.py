@@ -28,6 +28,8 @@ class Attempt:
             **({"group": block.group} if block.group else {}),
             **trial.planned.condition,
         }
+        if block.feedback:
+            self.about["feedback"] = "+".join(block.feedback[trial.number]) or "none"
         self.completion: bool | None = None
         self._trial = trial
         self._task = task

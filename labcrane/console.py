@@ -19,6 +19,9 @@ class Order(StrEnum):
     NOTE = "note"  # put words into the record
     OVERRIDE = "override"  # let the running trial go on past its automatic ends
     COMPLETION = "completion"  # set the completion flag of the running trial: 1 or 0
+    SETTING = "setting"  # change a setting of a cue or sound: tone.far=3
+    FAILED = "failed"  # said by the launcher of a feedback process: tone: why
+    MENDED = "mended"  # and of one that runs again
     LOST = "lost"  # said by the launcher, not by people: something outside the session failed
     BACK = "back"  # and works again
 

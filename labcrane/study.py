@@ -2,8 +2,8 @@
 
 import hashlib
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
 
@@ -13,7 +13,7 @@ from labcrane.machine_file import find_machine, load_machine
 from labcrane.offers import Offer, Settings
 from labcrane.protocol import DEFAULT_OPERATOR, Protocol, Use, read
 from labcrane.registry import Registry
-from labcrane.roles import Component, Controller, Dynamics, InputDevice, Task
+from labcrane.roles import Component, Controller, Cue, Dynamics, Feedback, InputDevice, Task
 from labcrane.yaml_file import Place, YamlFile
 
 RoleT = TypeVar("RoleT", bound=Component)
@@ -49,6 +49,9 @@ class Study:
         The components chosen; ``operator`` takes the place of ``input`` in a simulation.
     tasks
         The tasks by the protocol's names for them, built.
+    cues, sounds, views
+        What presents the session to people, by the protocol's names: cues and sounds are switched
+        on block by block, views are always there.
     """
 
     path: Path
@@ -62,6 +65,9 @@ class Study:
     dynamics: Choice
     tasks: Mapping[str, Task]
     task_choices: Mapping[str, Choice]
+    cues: dict[str, Choice] = field(default_factory=dict)
+    sounds: dict[str, Choice] = field(default_factory=dict)
+    views: dict[str, Choice] = field(default_factory=dict)
 
     @property
     def sha256(self) -> str:
@@ -115,6 +121,45 @@ class StudyReader:
         names = written if isinstance(written, dict) else {}
         chosen = {name: self.choose(Task, ("tasks", name)) for name in names}
         return {name: choice for name, choice in chosen.items() if choice}
+
+    def choose_feedback(self) -> tuple[dict[str, Choice], dict[str, Choice], dict[str, Choice]]:
+        """Return cues, sounds and views by the protocol's names for them."""
+        cues, sounds = {}, {}
+        written = self._at(("feedback",))
+        for name, use in (written if isinstance(written, dict) else {}).items():
+            is_cue = isinstance(use, dict) and use.get("use") in self._registry.offers[Cue]
+            place = ("feedback", name)
+            if is_cue and (choice := self.choose(Cue, place)):
+                cues[name] = choice
+            elif not is_cue and (choice := self.choose(Feedback, place)):
+                sounds[name] = choice
+        written = self._at(("views",))
+        names = written if isinstance(written, dict) else {}
+        views = {name: self.choose(Feedback, ("views", name)) for name in names}
+        for name in set(names) & {*cues, *sounds}:
+            self._source.problem(("views", name), f"{name!r} is the name of a feedback already")
+        return cues, sounds, {name: choice for name, choice in views.items() if choice}
+
+    def check_groups(self, protocol: Protocol) -> None:
+        """Note groups, and blocks, that are given feedback that there is not."""
+        for group, names in protocol.design.groups.items():
+            self._feedback_exists(("design", "groups", group), names, protocol)
+        for number, session in enumerate(protocol.sessions):
+            steps = self._source.data["sessions"][number]["steps"]
+            for at, step in enumerate(session.steps):
+                if step.block is None:
+                    continue
+                place: Place = ("sessions", number, "steps", at, next(iter(steps[at])), "feedback")
+                if step.block.feedback == "group" and not protocol.design.groups:
+                    self._source.problem(place, "feedback is by group, but design has no groups")
+                elif isinstance(step.block.feedback, tuple):
+                    self._feedback_exists(place, step.block.feedback, protocol)
+
+    def _feedback_exists(self, place: Place, names: Sequence[str], protocol: Protocol) -> None:
+        for name in names:
+            if name not in protocol.feedback:
+                known = ", ".join(protocol.feedback) or "none"
+                self._source.problem(place, f"there is no feedback {name!r}; there is {known}")
 
     def machine(self) -> tuple[Machine, str] | None:
         """Return the machine and its file's text, or note what is wrong."""
@@ -203,7 +248,9 @@ def load(path: Path, registry: Registry) -> Study:
     dynamics = reader.choose(Dynamics, ("dynamics",))
     choices = reader.choose_tasks()
     tasks = reader.build(choices, machine[0]) if machine else {}
+    shown = reader.choose_feedback()
     if protocol is not None:
+        reader.check_groups(protocol)
         reader.check_blocks(protocol, tasks)
         if len(tasks) == len(protocol.tasks):
             reader.check_order(protocol, tasks)
@@ -211,5 +258,15 @@ def load(path: Path, registry: Registry) -> Study:
     if not (protocol and machine and device and operator and scheme and dynamics):
         raise AssertionError("a missing part is a problem, and problems were raised")
     return Study(
-        path, source.text, protocol, *machine, device, operator, scheme, dynamics, tasks, choices
+        path,
+        source.text,
+        protocol,
+        *machine,
+        device,
+        operator,
+        scheme,
+        dynamics,
+        tasks,
+        choices,
+        *shown,
     )

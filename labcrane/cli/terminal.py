@@ -27,12 +27,21 @@ KEYS: Mapping[str, Order] = {
     "n": Order.NOTE,
     "o": Order.OVERRIDE,
     "c": Order.COMPLETION,
+    "f": Order.SETTING,
 }
 PEOPLES = tuple(KEYS.values())
 """The orders that people give."""
 
+PROMPTS: Mapping[Order, str] = {
+    Order.NOTE: "note: ",
+    Order.COMPLETION: "completed? 1 or 0: ",
+    Order.SETTING: "setting, such as tone.far=3: ",
+}
+"""What is asked for orders that need words."""
+
 HELP = (
-    "space start/go on · p pause · r repeat · s skip · e end · n note · o override · c completion"
+    "space start/go on · p pause · r repeat · s skip · e end · n note · o override · c completion "
+    "· f feedback setting"
 )
 POLL_S = 0.1
 
@@ -133,9 +142,8 @@ class Terminal:
         order = KEYS.get(key)
         if order is None:
             self._progress.print(HELP, style="dim")
-        elif order in {Order.NOTE, Order.COMPLETION}:
-            prompt = "note: " if order is Order.NOTE else "completed? 1 or 0: "
-            self._console.give(Command(order, self._ask(prompt)))
+        elif order in PROMPTS:
+            self._console.give(Command(order, self._ask(PROMPTS[order])))
         else:
             self._console.give(Command(order))
 
