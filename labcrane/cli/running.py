@@ -24,6 +24,13 @@ Simulate = Annotated[
     bool, typer.Option("--simulate", help="a simulated operator takes the controls")
 ]
 Pilot = Annotated[bool, typer.Option("--pilot", help="a trial run: its files are stamped PILOT")]
+WithFeedback = Annotated[
+    bool | None,
+    typer.Option(
+        "--feedback/--no-feedback",
+        help="start views and sounds; by default when a person operates the machine",
+    ),
+]
 
 
 def run(
@@ -37,6 +44,7 @@ def run(
     ] = False,
     pilot: Pilot = False,
     local: Local = False,
+    feedback: WithFeedback = None,
 ) -> None:
     """Run a session of a study."""
     if fast and not simulate:
@@ -44,7 +52,13 @@ def run(
     from labcrane.session_process import VisitOrder
 
     order = VisitOrder(
-        protocol, participant, session, data or protocol.parent / "data", simulate, pilot
+        protocol,
+        participant,
+        session,
+        data or protocol.parent / "data",
+        simulate,
+        pilot,
+        feedback=not simulate if feedback is None else feedback,
     )
     if local or simulate:
         stay_on_this_computer()
@@ -66,6 +80,7 @@ def resume(
     simulate: Simulate = False,
     pilot: Pilot = False,
     local: Local = False,
+    feedback: WithFeedback = None,
 ) -> None:
     """Go on with a session whose process died."""
     from labcrane.session_process import VisitOrder
@@ -73,7 +88,9 @@ def resume(
     folder = data or protocol.parent / "data"
     if local or simulate:
         stay_on_this_computer()
-    _launch(VisitOrder(protocol, participant, session, folder, simulate, pilot, True, policy))
+    shown = not simulate if feedback is None else feedback
+    order = VisitOrder(protocol, participant, session, folder, simulate, pilot, True, policy, shown)
+    _launch(order)
 
 
 def demo(
