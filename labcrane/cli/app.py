@@ -9,7 +9,16 @@ from collections.abc import Sequence
 import typer
 from rich.console import Console
 
-from labcrane.cli import approval, inspect, people, recording, results, running, upkeep
+from labcrane.cli import (
+    approval,
+    feedback,
+    inspect,
+    people,
+    recording,
+    results,
+    running,
+    upkeep,
+)
 from labcrane.errors import LabcraneError, ProtocolError
 
 app = typer.Typer(
@@ -42,6 +51,10 @@ app.command("deviations")(people.deviations)
 app.command("erase")(upkeep.erase)
 app.command("relabel")(upkeep.relabel)
 app.command("transfer")(upkeep.transfer)
+
+feedback_app = typer.Typer(help="Views and sounds.", no_args_is_help=True)
+feedback_app.command("preview")(feedback.preview)
+app.add_typer(feedback_app, name="feedback")
 
 PRIVATE = 0o077
 """What labcrane writes is about people: nobody but the user may read it."""
