@@ -17,8 +17,18 @@ from labcrane.reach import reach
 from labcrane.recording.recording import SessionRecord, Stream, open_recording
 from labcrane.recording.stream_header import Channel, StreamHeader
 from labcrane.recording.xdf import XdfWriter
-from labcrane.records import Event, Frame, Judgement, Phase, Planned, Run, Trial, Value
-from labcrane.roles import Controller, Dynamics, Exporter, InputDevice, Questionnaire, Task
+from labcrane.records import Event, Frame, Judgement, Phase, Planned, Run, Situation, Trial, Value
+from labcrane.roles import (
+    Controller,
+    Cue,
+    Dynamics,
+    Exporter,
+    Feedback,
+    InputDevice,
+    Questionnaire,
+    Task,
+)
+from labcrane.shapes import Ball, Beam, Shape, Targets
 from labcrane.signals import FloatArray, Layout, Signal, signals_of
 
 __version__ = "0.1.0"
@@ -30,13 +40,17 @@ __all__ = [
     "AnswerError",
     "Answers",
     "Arm",
+    "Ball",
+    "Beam",
     "Body",
     "Channel",
     "Controller",
+    "Cue",
     "DeviceError",
     "Dynamics",
     "Event",
     "Exporter",
+    "Feedback",
     "FloatArray",
     "Frame",
     "InputDevice",
@@ -58,9 +72,12 @@ __all__ = [
     "Score",
     "SessionRecord",
     "Settings",
+    "Shape",
     "Signal",
+    "Situation",
     "Stream",
     "StreamHeader",
+    "Targets",
     "Task",
     "Tick",
     "Trial",

@@ -29,6 +29,8 @@ class Attempt:
             **({"reference": True} if block.reference else {}),
             **trial.planned.condition,
         }
+        if block.feedback:
+            self.about["feedback"] = "+".join(block.feedback[trial.number]) or "none"
         self.completion: bool | None = None
         self._trial = trial
         self._task = task

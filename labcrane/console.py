@@ -24,6 +24,9 @@ class Order(StrEnum):
     ANSWER = "answer"  # to a question, as JSON: questionnaire, item, value
     SUBMIT = "submit"  # hand in the questionnaire that is asked
     DENIED = "denied"  # said by a page: somebody without the right asked for something
+    SETTING = "setting"  # change a setting of a cue or sound: tone.far=3
+    FAILED = "failed"  # said by the launcher of a feedback process: tone: why
+    MENDED = "mended"  # and of one that runs again
     LOST = "lost"  # said by the launcher, not by people: something outside the session failed
     BACK = "back"  # and works again
 

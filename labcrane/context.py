@@ -14,7 +14,16 @@ from labcrane.records import Run
 from labcrane.rig import Rig
 from labcrane.study import Choice, Study
 
-RECORDED_PACKAGES = ("labcrane", "numpy", "pybullet", "pygame", "pylsl", "pydantic")
+RECORDED_PACKAGES = (
+    "labcrane",
+    "numpy",
+    "panda3d",
+    "pybullet",
+    "pydantic",
+    "pygame",
+    "pylsl",
+    "pyo",
+)
 
 
 class Recorded(Protocol):
@@ -45,6 +54,8 @@ def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> 
         "dynamics": study.dynamics,
         **{f"tasks.{name}": choice for name, choice in study.task_choices.items()},
         **{f"questionnaires.{name}": each for name, each in study.questionnaire_choices.items()},
+        **{f"feedback.{name}": choice for name, choice in (study.cues | study.sounds).items()},
+        **{f"views.{name}": choice for name, choice in study.views.items()},
     }
     return {
         "study": study.protocol.study,

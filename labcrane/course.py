@@ -9,6 +9,7 @@ from collections.abc import Generator, Mapping, Sequence
 from labcrane.asking import Asking
 from labcrane.attempt import Attempt
 from labcrane.console import Command, Order, by_whom
+from labcrane.feedback_settings import FeedbackSettings
 from labcrane.plan import PlannedBlock, PlannedStep, SessionPlan, next_attempt
 from labcrane.privacy import personal
 from labcrane.records import Event, Frame, Phase, Trial, Value
@@ -46,6 +47,7 @@ class Course:
         self._waits = waits
         self._rate_hz = study.protocol.rate_hz
         self._on_fault = study.protocol.on_fault
+        self._settings = FeedbackSettings({**study.cues, **study.sounds})
         self._held_by: set[str] = set()
         self._notes: list[tuple[str, dict[str, Value]]] = []  # stamped with the tick they fall in
         self._attempt: Attempt | None = None
@@ -73,6 +75,8 @@ class Course:
                 self._lose(command.text)
             elif command.order is Order.BACK:
                 self._regain(command.text)
+            elif command.order in (Order.FAILED, Order.MENDED):
+                self._feedback(command)
             elif command.order is Order.DENIED:
                 self._note("page.denied", why=command.text, by=by_whom(command))
             elif self._asking is not None and command.order in {Order.ANSWER, Order.SUBMIT}:
@@ -225,6 +229,8 @@ class Course:
                 self._running().overrule()
             case Order.COMPLETION:
                 self._running().completion = command.text == "1"
+            case Order.SETTING:
+                self._note("feedback.setting", **self._settings.change(command.text))
             case Order.NOTE | Order.HINT:
                 pass  # the event is all there is to it
 
@@ -247,6 +253,8 @@ class Course:
                 return f"a {command.order} needs words"
             case Order.NOTE | Order.HINT if found := personal(command.text):
                 return f"a {command.order} must not hold {found}; write it without"
+            case Order.SETTING:
+                return self._settings.refusal(command.text)
         return None
 
     def _running(self) -> Attempt:
@@ -277,6 +285,19 @@ class Course:
         self._note("stream.back", what=what)
         if what in self._held_by:
             self._release(what)
+
+    def _feedback(self, command: Command) -> None:
+        """Note that a feedback process failed or runs again; hold if the protocol says so."""
+        name, _, why = command.text.partition(": ")
+        who = f"feedback {name}"
+        if command.order is Order.FAILED:
+            self._note("feedback.lost", what=name, why=why)
+            if self._on_fault.feedback_lost == "pause" and who not in self._held_by:
+                self._hold(who)
+            return
+        self._note("feedback.ready", what=name, facts=why)
+        if who in self._held_by:
+            self._release(who)
 
     # What is written down
 

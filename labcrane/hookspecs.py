@@ -10,7 +10,16 @@ from collections.abc import Sequence
 import pluggy
 
 from labcrane.offers import Offer
-from labcrane.roles import Controller, Dynamics, Exporter, InputDevice, Questionnaire, Task
+from labcrane.roles import (
+    Controller,
+    Cue,
+    Dynamics,
+    Exporter,
+    Feedback,
+    InputDevice,
+    Questionnaire,
+    Task,
+)
 
 PROJECT = "labcrane"
 
@@ -51,4 +60,16 @@ def labcrane_exporters() -> Sequence[Offer[Exporter]]:
 @hookspec
 def labcrane_questionnaires() -> Sequence[Offer[Questionnaire]]:
     """Offer questions for the participant."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_cues() -> Sequence[Offer[Cue]]:
+    """Offer things to be seen in every view."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_feedback() -> Sequence[Offer[Feedback]]:
+    """Offer views, sounds and other devices that present a session to people."""
     raise NotImplementedError

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from labcrane.admission import gate
 from labcrane.console import Command, Order, QueueConsole
+from labcrane.feedback_crew import FeedbackCrew, log_requests
 from labcrane.recorder_keeper import RecorderKeeper
 from labcrane.recording.parts import parts
 from labcrane.session import Visit, finish
@@ -64,6 +65,7 @@ class Launcher:
         self._console = console
         self._say = say
         self._recorder: RecorderKeeper | None = None
+        self._crew: FeedbackCrew | None = None
         self._lost: set[str] = set()
         self.session_pid: int | None = None
         self.sync_report: SyncReport | None = None
@@ -80,16 +82,22 @@ class Launcher:
         gate(visit)
         if not visit.resumed:
             visit.folder.claim(visit.session)
-        needs = visit.study.protocol.streams
-        if needs:
-            requests = [
-                need.request(label, required=not visit.simulated) for label, need in needs.items()
-            ]
+        requests = [
+            need.request(label, required=not visit.simulated)
+            for label, need in visit.study.protocol.streams.items()
+        ]
+        if self._order.feedback:
+            requests += log_requests(visit)
+        if requests:
             self._recorder = RecorderKeeper(visit.streams_journal, requests)
         report = None
         try:
+            if self._order.feedback:
+                self._crew = FeedbackCrew(visit)
             died = self._run() if self._gate() else None
         finally:
+            if self._crew:
+                self._crew.stop()
             if self._recorder:
                 self._recorder.stop()
             if parts(visit.journal):
@@ -102,7 +110,9 @@ class Launcher:
         return self._recorder.status if self._recorder else {}
 
     def _gate(self) -> bool:
-        """Wait until all required streams flow; whether the session may start."""
+        """Wait until feedback is ready and all required streams flow; whether to start."""
+        if self._crew and not self._crew.wait(self._say, self._told_to_end):
+            return False
         recorder = self._recorder
         told: list[str] = []
         while recorder is not None and not recorder.ready:
@@ -110,10 +120,13 @@ class Launcher:
             if recorder.status and recorder.complaints() != told:
                 told = recorder.complaints()
                 self._say("waiting for streams:\n" + "\n".join(f"  {line}" for line in told))
-            if any(command.order is Order.END for command in self._console.commands()):
+            if self._told_to_end():
                 return False
             time.sleep(LOOK_S)
         return True
+
+    def _told_to_end(self) -> bool:
+        return any(command.order is Order.END for command in self._console.commands())
 
     def _run(self) -> int | None:
         context = multiprocessing.get_context("spawn")
@@ -148,6 +161,9 @@ class Launcher:
                 process.join()
                 return process.exitcode
             self._watch_streams(pipe)
+            if self._crew:
+                for news in self._crew.watch(self._say):
+                    self._send(pipe, news)
 
     def _pass_events(self, pipe: Connection) -> Ended | None:
         try:

@@ -1,9 +1,10 @@
 """What a session of one participant consists of, before anything is opened."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from labcrane.design.fading import faded
 from labcrane.design.order import RULES, SQUARES, Turn
 from labcrane.design.seeds import derive
 from labcrane.design.slots import group_of, place_of
@@ -42,6 +43,8 @@ class PlannedBlock:
         Whether its trials give the operator's own reference time.
     ask
         Questionnaires after each counted trial.
+    feedback
+        What is switched on in each trial, by the trial's number; empty in a study without.
     """
 
     name: str
@@ -55,6 +58,7 @@ class PlannedBlock:
     last: bool = True
     reference: bool = False
     ask: tuple[str, ...] = ()
+    feedback: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def expected_s(self) -> float:
@@ -175,6 +179,7 @@ class Planner:
             last=last,
             reference=kind == "reference",
             ask=block.ask,
+            feedback=self._feedback(block, trials),
         )
 
     def _shift(self, factor: str) -> int:
@@ -193,6 +198,28 @@ class Planner:
         }
         rows = len(SQUARES[orders[squares[0]].rule](len(factors[squares[0]])))
         return squares.index(factor) * (self._place // rows)
+
+    def _feedback(self, block: Block, trials: Sequence[Trial]) -> dict[int, tuple[str, ...]]:
+        """Return what is on in each trial; an uncounted one is like the counted one after it."""
+        protocol, chosen = self._study.protocol, block.feedback
+        if not protocol.feedback:
+            return {}
+        if chosen == "group":
+            names = protocol.design.groups[self.group]
+        elif chosen == "all":
+            names = tuple(protocol.feedback)
+        else:
+            names = () if chosen == "none" else chosen
+        on = iter(faded(sum(trial.planned.counted for trial in trials), block.fading))
+        shown: dict[int, tuple[str, ...]] = {}
+        waiting: list[int] = []
+        for trial in trials:
+            waiting.append(trial.number)
+            if trial.planned.counted:
+                now = names if next(on) else ()
+                shown.update(dict.fromkeys(waiting, now))
+                waiting.clear()
+        return shown | dict.fromkeys(waiting, names)
 
     def _trial(self, planned: Planned) -> Trial:
         self._trials += 1

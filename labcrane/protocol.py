@@ -3,7 +3,7 @@
 import re
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     ConfigDict,
@@ -74,6 +74,10 @@ class OnFault(Section):
     """A required stream falls silent, or its recorder fails: pause until it is back, or go on and
     mark it in the record."""
 
+    feedback_lost: Literal["restart", "continue", "pause"] = "restart"
+    """A view or sound fails: start it again, go on without it, or pause until it is back. One that
+    cannot be started in the first place stops the session, unless it is to go on without."""
+
     session_died: Literal["continue", "redo_trial", "redo_block"] = "redo_trial"
     """The session's process died: where ``labcrane resume`` goes on."""
 
@@ -94,6 +98,13 @@ class Block(Section):
 
     ask: tuple[str, ...] = ()
     """Questionnaires after each counted trial: ``[subjective_accuracy, situational_awareness]``."""
+    feedback: Literal["all", "none", "group"] | tuple[str, ...] = "all"
+    """Which feedback is switched on during its trials: ``all``, ``none``, what the participant's
+    ``group`` is given, or a list of names."""
+
+    fading: tuple[Annotated[float, Field(ge=0.0, le=1.0)], ...] = (1.0,)
+    """Share of the trials with feedback, part by part: ``[1, 0.5, 0]`` is all of the first third,
+    every second trial of the second, none of the last."""
 
     repeat: PositiveInt = 1
     """How many times the block is run, each time in a new order."""
@@ -194,6 +205,11 @@ class Protocol(Section):
 
     page: PageSettings = PageSettings()
     """Where the supervisor's and the participant's page are served."""
+    feedback: dict[str, Use] = Field(default_factory=dict)
+    """What can be switched on during trials, by name: cues for every view, and sounds."""
+
+    views: dict[str, Use] = Field(default_factory=dict)
+    """Windows and other displays that are always there, by name."""
 
     streams: dict[str, StreamNeed] = Field(default_factory=dict)
     """Streams of others to be recorded, by the study's names for them."""

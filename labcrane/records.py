@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from labcrane.clock import Tick
-from labcrane.machine import Machine
+from labcrane.machine import Body, Machine
+from labcrane.shapes import Shape
 from labcrane.signals import FloatArray, Layout
 
 Value = float | int | str | bool | None
@@ -134,6 +135,8 @@ class Run:
     steer
         The axes, shape ``(n_axes,)``, with which a practised hand asks this controller for a tip
         velocity in m/s, shape ``(3,)``, in a state, shape ``(n_state,)``. For simulated operators.
+    bodies
+        What the machine looks like, for whoever draws it.
     """
 
     rate_hz: float
@@ -144,6 +147,7 @@ class Run:
     state: Layout
     task: Layout
     steer: Callable[[FloatArray, FloatArray], FloatArray]
+    bodies: tuple[Body, ...] = ()
 
 
 @dataclass(slots=True)
@@ -170,6 +174,8 @@ class Frame:
         Whether the command was held at rest.
     events
         What happened, in order.
+    shapes
+        What the active cues drew of it; filled in for whoever presents the frame, and nowhere else.
     """
 
     tick: Tick
@@ -182,3 +188,36 @@ class Frame:
     trial: int = 0
     paused: bool = False
     events: tuple[Event, ...] = ()
+    shapes: tuple[Shape, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Situation:
+    """What a session is about now, for whoever presents it.
+
+    Attributes
+    ----------
+    step, kind
+        Number and kind of the step, 0 before the first.
+    block, block_name, practice
+        The block under way.
+    trial, trials
+        Number of the trial, 0 between trials, and how many the session has.
+    active
+        Names of the cues and sounds that are switched on; empty between trials.
+    settings
+        Settings that the examiner changed, by name of the cue or sound.
+    counts
+        How often each event has happened.
+    """
+
+    step: int = 0
+    kind: str = ""
+    block: int = 0
+    block_name: str = ""
+    practice: bool = False
+    trial: int = 0
+    trials: int = 0
+    active: tuple[str, ...] = ()
+    settings: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+    counts: Mapping[str, int] = field(default_factory=dict)

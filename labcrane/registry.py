@@ -15,8 +15,10 @@ from labcrane.offers import Offer
 from labcrane.roles import (
     Component,
     Controller,
+    Cue,
     Dynamics,
     Exporter,
+    Feedback,
     InputDevice,
     Questionnaire,
     Task,
@@ -48,6 +50,8 @@ ROLES: Mapping[type[Component], RoleEntry] = {
     Task: RoleEntry("labcrane_tasks", "task"),
     Exporter: RoleEntry("labcrane_exporters", "exporter"),
     Questionnaire: RoleEntry("labcrane_questionnaires", "questionnaire"),
+    Cue: RoleEntry("labcrane_cues", "cue"),
+    Feedback: RoleEntry("labcrane_feedback", "feedback"),
 }
 
 

@@ -64,6 +64,10 @@ class Script:
             self._order(tick, Command(Order.DENIED, data["why"], data["by"]))
         elif part == "stream" and what in {"lost", "back"}:
             self._order(tick, Command(Order(what), data["what"]))
+        elif part == "feedback" and what == "lost":
+            self._order(tick, Command(Order.FAILED, f"{data['what']}: {data['why']}"))
+        elif part == "feedback" and what == "ready":
+            self._order(tick, Command(Order.MENDED, f"{data['what']}: {data['facts']}"))
         elif part == "input" and what in {"lost", "back"}:
             self.input.faults.append((tick, data.get("why")))
         elif part == "disk" and what in {"lost", "back"}:

@@ -54,10 +54,9 @@ def build(study: Study, *, simulated: bool) -> Rig:
     return Rig(device, controller, dynamics, study.tasks)
 
 
-@contextmanager
-def opened(rig: Rig, study: Study, participant_seed: int) -> Iterator[Run]:
-    """Open every component, hardware last, and close them all however that ends."""
-    run = Run(
+def describe(rig: Rig, study: Study, participant_seed: int) -> Run:
+    """Return the run of a rig, which need not be open: signals are known before."""
+    return Run(
         rate_hz=study.protocol.rate_hz,
         machine=study.machine,
         participant_seed=participant_seed,
@@ -66,7 +65,14 @@ def opened(rig: Rig, study: Study, participant_seed: int) -> Iterator[Run]:
         state=Layout("the machine", rig.dynamics.signals),
         task=Layout("the tasks", _task_signals(rig.tasks)),
         steer=rig.controller.steer,
+        bodies=tuple(rig.dynamics.bodies()),
     )
+
+
+@contextmanager
+def opened(rig: Rig, study: Study, participant_seed: int) -> Iterator[Run]:
+    """Open every component, hardware last, and close them all however that ends."""
+    run = describe(rig, study, participant_seed)
     with ExitStack() as closing:
         for component in (rig.dynamics, *rig.tasks.values(), rig.controller, rig.input):
             closing.callback(component.close)

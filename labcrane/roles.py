@@ -1,6 +1,7 @@
 """The roles a plugin can fill, in the order data flows through them.
 
-    InputDevice -> Controller -> Dynamics -> Task
+    InputDevice -> Controller -> Dynamics -> Task        in the session's loop
+    Cue -> Feedback                                      in processes of their own
 
 Each role has exactly one method that runs every tick. The loop calls it directly, never through
 pluggy, so it must return soon and must not block. ``labcrane.testing`` has a contract test for
@@ -19,7 +20,8 @@ from labcrane.analysis.cohort import Participant
 from labcrane.clock import Tick
 from labcrane.machine import Body
 from labcrane.questions import Answers, Item, Score
-from labcrane.records import Frame, Judgement, Planned, Run, Trial, Value
+from labcrane.records import Frame, Judgement, Planned, Run, Situation, Trial, Value
+from labcrane.shapes import Shape
 from labcrane.signals import FloatArray, Signal
 
 
@@ -171,3 +173,58 @@ class Questionnaire(Component):
     @abstractmethod
     def score(self, answers: Answers) -> Mapping[str, float]:
         """Return every score by its name; NaN for one that needs an answer that is missing."""
+
+
+class Cue(Component):
+    """Something the operator sees, drawn into every view and computed again from a recording.
+
+    Its signals are the numbers behind the picture; they are recorded with every frame shown.
+    """
+
+    @abstractmethod
+    def draw(self, frame: Frame) -> Sequence[Shape]:
+        """Return what is to be seen; the same frame always gives the same shapes.
+
+        ``frame.task`` is NaN where the task says nothing, and then there is nothing to draw.
+        """
+
+    def values(self, frame: Frame) -> FloatArray:
+        """Return the numbers behind the picture, shape ``(n_signals,)``, as pure as ``draw``."""
+        return np.empty(0)
+
+
+class Feedback(Component):
+    """What presents the session to people: a view, a sound, a lamp.
+
+    It runs in a process of its own, at its own pace: each time it is ready it is given the newest
+    frame, and those in between are left out. Its signals are recorded with every frame presented.
+    """
+
+    streams: Mapping[str, tuple[Signal, ...]] = {}
+    """Further streams it fills, by name, beside its signals; see ``samples``."""
+
+    def hear(self, situation: Situation) -> None:
+        """Be told what the session is about, before the first frame and whenever it changes."""
+
+    @abstractmethod
+    def present(self, frame: Frame) -> FloatArray:
+        """Show or sound ``frame``; return what was presented, shape ``(n_signals,)``.
+
+        ``frame.shapes`` is what the active cues drew. The moment at which this returns is
+        recorded as the moment of presentation.
+        """
+
+    def rest(self) -> None:
+        """Present nothing: between trials, and where the protocol switches it off."""
+
+    def preview(self, run: Run, frames: Sequence[Frame], path: Path) -> Sequence[Path]:
+        """Write what consecutive frames look or sound like to files, and return their paths.
+
+        ``path`` is where they go, without an ending. Needs neither display nor device, and not to
+        be open. What cannot be written to a file writes none.
+        """
+        return ()
+
+    def samples(self) -> Mapping[str, FloatArray]:
+        """Return a sample for each of ``streams``; asked for after every ``present``."""
+        return {}

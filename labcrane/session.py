@@ -68,6 +68,11 @@ class Visit:
         return DataFolder(self.data, self.participant, self.pilot, self.simulated)
 
     @property
+    def source(self) -> str:
+        """Which session this is, the same whenever it is resumed; its streams are named by it."""
+        return f"{self.study.protocol.study}/{self.folder.name}/ses-{self.session:02}"
+
+    @property
     def journal(self) -> Path:
         """The first part of the session's journal."""
         return journal_path(self.folder.path, self.session, "run")
@@ -136,7 +141,7 @@ def record(visit: Visit, console: Console) -> None:
         try:
             for event in _opening(about, so_far, clock.now()):
                 log.note(event)
-            with _outlets(visit, this_run) as outlets:
+            with _outlets(visit, plan, this_run) as outlets:
                 onlookers = (*outlets, _teller(console))
                 loop.run(the_rig, this_run, course, clock, console, log, onlookers)
         finally:
@@ -172,15 +177,24 @@ def _teller(console: Console) -> Callable[[Frame], None]:
 
 
 @contextmanager
-def _outlets(visit: Visit, this_run: Run) -> Iterator[list[Callable[[Frame], None]]]:
+def _outlets(
+    visit: Visit, plan: SessionPlan, this_run: Run
+) -> Iterator[list[Callable[[Frame], None]]]:
     if visit.fast:  # its stamps are not the computer's time, so nobody could use the streams
         yield []
         return
+    from labcrane.streams.context import ContextOutlet  # noqa: PLC0415
+    from labcrane.streams.frames import FrameOutlet  # noqa: PLC0415
     from labcrane.streams.outlets import Outlets  # noqa: PLC0415 - loads liblsl
 
-    source = f"{visit.study.protocol.study}/{visit.folder.name}/ses-{visit.session:02}"
-    outlets = Outlets(this_run, source)
+    trials = sum(len(block.trials) for block in plan.blocks)
+    outlets = (
+        Outlets(this_run, visit.source),
+        FrameOutlet(this_run, visit.source),
+        ContextOutlet(this_run, visit.source, trials),
+    )
     try:
-        yield [outlets.push]
+        yield [outlet.push for outlet in outlets]
     finally:
-        outlets.close()
+        for outlet in outlets:
+            outlet.close()

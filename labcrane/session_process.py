@@ -22,7 +22,13 @@ from labcrane.study import load
 
 @dataclass(frozen=True, slots=True)
 class VisitOrder:
-    """What a session process is told: a visit by the names of things, so that it can be sent."""
+    """What a session process is told: a visit by the names of things, so that it can be sent.
+
+    Attributes
+    ----------
+    feedback
+        Whether the launcher starts the views and sounds.
+    """
 
     protocol: Path
     participant: str
@@ -32,6 +38,7 @@ class VisitOrder:
     pilot: bool = False
     resumed: bool = False
     policy: Policy | None = None
+    feedback: bool = True
 
     def visit(self) -> Visit:
         """Load the study and return the visit."""

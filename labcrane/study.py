@@ -2,7 +2,7 @@
 
 import hashlib
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
@@ -13,7 +13,16 @@ from labcrane.machine_file import find_machine, load_machine
 from labcrane.offers import Offer, Settings
 from labcrane.protocol import DEFAULT_OPERATOR, Protocol, Use, read
 from labcrane.registry import Registry
-from labcrane.roles import Component, Controller, Dynamics, InputDevice, Questionnaire, Task
+from labcrane.roles import (
+    Component,
+    Controller,
+    Cue,
+    Dynamics,
+    Feedback,
+    InputDevice,
+    Questionnaire,
+    Task,
+)
 from labcrane.yaml_file import Place, YamlFile
 
 RoleT = TypeVar("RoleT", bound=Component)
@@ -51,6 +60,9 @@ class Study:
         The tasks by the protocol's names for them, built.
     questionnaires
         The questionnaires by the study's names for them, built.
+    cues, sounds, views
+        What presents the session to people, by the protocol's names: cues and sounds are switched
+        on block by block, views are always there.
     """
 
     path: Path
@@ -66,6 +78,9 @@ class Study:
     task_choices: Mapping[str, Choice]
     questionnaires: Mapping[str, Questionnaire] = field(default_factory=dict)
     questionnaire_choices: Mapping[str, Choice] = field(default_factory=dict)
+    cues: dict[str, Choice] = field(default_factory=dict)
+    sounds: dict[str, Choice] = field(default_factory=dict)
+    views: dict[str, Choice] = field(default_factory=dict)
 
     @property
     def sha256(self) -> str:
@@ -177,6 +192,45 @@ class StudyReader:
                     f"it has {', '.join(scores) or 'none'}",
                 )
 
+    def choose_feedback(self) -> tuple[dict[str, Choice], dict[str, Choice], dict[str, Choice]]:
+        """Return cues, sounds and views by the protocol's names for them."""
+        cues, sounds = {}, {}
+        written = self._at(("feedback",))
+        for name, use in (written if isinstance(written, dict) else {}).items():
+            is_cue = isinstance(use, dict) and use.get("use") in self._registry.offers[Cue]
+            place = ("feedback", name)
+            if is_cue and (choice := self.choose(Cue, place)):
+                cues[name] = choice
+            elif not is_cue and (choice := self.choose(Feedback, place)):
+                sounds[name] = choice
+        written = self._at(("views",))
+        names = written if isinstance(written, dict) else {}
+        views = {name: self.choose(Feedback, ("views", name)) for name in names}
+        for name in set(names) & {*cues, *sounds}:
+            self._source.problem(("views", name), f"{name!r} is the name of a feedback already")
+        return cues, sounds, {name: choice for name, choice in views.items() if choice}
+
+    def check_groups(self, protocol: Protocol) -> None:
+        """Note groups, and blocks, that are given feedback that there is not."""
+        for group, names in protocol.design.groups.items():
+            self._feedback_exists(("design", "groups", group), names, protocol)
+        for number, session in enumerate(protocol.sessions):
+            steps = self._source.data["sessions"][number]["steps"]
+            for at, step in enumerate(session.steps):
+                if step.block is None:
+                    continue
+                place: Place = ("sessions", number, "steps", at, next(iter(steps[at])), "feedback")
+                if step.block.feedback == "group" and not protocol.design.groups:
+                    self._source.problem(place, "feedback is by group, but design has no groups")
+                elif isinstance(step.block.feedback, tuple):
+                    self._feedback_exists(place, step.block.feedback, protocol)
+
+    def _feedback_exists(self, place: Place, names: Sequence[str], protocol: Protocol) -> None:
+        for name in names:
+            if name not in protocol.feedback:
+                known = ", ".join(protocol.feedback) or "none"
+                self._source.problem(place, f"there is no feedback {name!r}; there is {known}")
+
     def machine(self) -> tuple[Machine, str] | None:
         """Return the machine and its file's text, or note what is wrong."""
         name, folder = self._at(("machine",)), self._source.path.parent
@@ -266,7 +320,9 @@ def load(path: Path, registry: Registry) -> Study:
     tasks = reader.build(choices, machine[0]) if machine else {}
     asked = reader.choose_questionnaires(protocol) if protocol else {}
     questionnaires = reader.build_questionnaires(asked, machine[0]) if machine else {}
+    shown = reader.choose_feedback()
     if protocol is not None:
+        reader.check_groups(protocol)
         reader.check_blocks(protocol, tasks)
         reader.check_stop_rules(protocol, questionnaires)
         if len(tasks) == len(protocol.tasks):
@@ -287,4 +343,5 @@ def load(path: Path, registry: Registry) -> Study:
         choices,
         questionnaires,
         asked,
+        *shown,
     )

@@ -11,6 +11,7 @@ from rich.console import Console
 
 from labcrane.cli import (
     approval,
+    feedback,
     inspect,
     people,
     recording,
@@ -52,6 +53,10 @@ app.command("deviations")(people.deviations)
 app.command("erase")(upkeep.erase)
 app.command("relabel")(upkeep.relabel)
 app.command("transfer")(upkeep.transfer)
+
+feedback_app = typer.Typer(help="Views and sounds.", no_args_is_help=True)
+feedback_app.command("preview")(feedback.preview)
+app.add_typer(feedback_app, name="feedback")
 
 PRIVATE = 0o077
 """What labcrane writes is about people: nobody but the user may read it."""

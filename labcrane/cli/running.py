@@ -29,6 +29,13 @@ Page = Annotated[
     bool | None,
     typer.Option("--page/--no-page", help="the pages in the browser; on unless --simulate"),
 ]
+WithFeedback = Annotated[
+    bool | None,
+    typer.Option(
+        "--feedback/--no-feedback",
+        help="start views and sounds; by default when a person operates the machine",
+    ),
+]
 
 
 def run(
@@ -43,6 +50,7 @@ def run(
     pilot: Pilot = False,
     local: Local = False,
     page: Page = None,
+    feedback: WithFeedback = None,
 ) -> None:
     """Run a session of a study."""
     if fast and not simulate:
@@ -50,7 +58,13 @@ def run(
     from labcrane.session_process import VisitOrder
 
     order = VisitOrder(
-        protocol, participant, session, data or protocol.parent / "data", simulate, pilot
+        protocol,
+        participant,
+        session,
+        data or protocol.parent / "data",
+        simulate,
+        pilot,
+        feedback=not simulate if feedback is None else feedback,
     )
     if local or simulate:
         stay_on_this_computer()
@@ -73,6 +87,7 @@ def resume(
     pilot: Pilot = False,
     local: Local = False,
     page: Page = None,
+    feedback: WithFeedback = None,
 ) -> None:
     """Go on with a session whose process died."""
     from labcrane.session_process import VisitOrder
@@ -80,7 +95,8 @@ def resume(
     folder = data or protocol.parent / "data"
     if local or simulate:
         stay_on_this_computer()
-    order = VisitOrder(protocol, participant, session, folder, simulate, pilot, True, policy)
+    shown = not simulate if feedback is None else feedback
+    order = VisitOrder(protocol, participant, session, folder, simulate, pilot, True, policy, shown)
     _launch(order, page=not simulate if page is None else page)
 
 

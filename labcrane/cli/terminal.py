@@ -31,13 +31,22 @@ KEYS: Mapping[str, Order] = {
     "o": Order.OVERRIDE,
     "c": Order.COMPLETION,
     "h": Order.HINT,
+    "f": Order.SETTING,
 }
 PEOPLES = (*KEYS.values(), Order.ANSWER, Order.SUBMIT)
 """The orders that people give."""
 
+PROMPTS: Mapping[Order, str] = {
+    Order.NOTE: "note: ",
+    Order.HINT: "hint: ",
+    Order.COMPLETION: "completed? 1 or 0: ",
+    Order.SETTING: "setting, such as tone.far=3: ",
+}
+"""What is asked for orders that need words."""
+
 HELP = (
     "space start/go on · p pause · r repeat · s skip · e end · n note · o override · "
-    "c completion · h hint · q fill in the questionnaire"
+    "c completion · h hint · f feedback setting · q fill in the questionnaire"
 )
 POLL_S = 0.1
 
@@ -151,9 +160,8 @@ class Terminal:
             self._fill_in()
         elif order is None:
             self._progress.print(HELP, style="dim")
-        elif order in {Order.NOTE, Order.HINT, Order.COMPLETION}:
-            prompt = "completed? 1 or 0: " if order is Order.COMPLETION else f"{order.value}: "
-            self._console.give(Command(order, self._ask(prompt)))
+        elif order in PROMPTS:
+            self._console.give(Command(order, self._ask(PROMPTS[order])))
         else:
             self._console.give(Command(order))
 

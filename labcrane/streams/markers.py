@@ -45,7 +45,11 @@ CODES: Mapping[str, int] = {
     "stop_rule.met": 84,
     "participant.dropout": 85,
     "page.denied": 86,
+    "order.setting": 87,
+    "feedback.setting": 88,
     "input.lost": 90,
     "input.back": 91,
+    "feedback.ready": 94,
+    "feedback.lost": 95,
 }
 """A number, once given, never changes its meaning."""

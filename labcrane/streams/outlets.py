@@ -6,6 +6,8 @@
 | labcrane.input    | Joystick | double64 | axes and buttons, each tick                    |
 | labcrane.markers  | Markers  | string   | an event as JSON (docs/markers.md)             |
 | labcrane.codes    | Markers  | int32    | the event's code; the table is in the header   |
+| labcrane.frame    | Frame    | double64 | a whole frame, each tick                       |
+| labcrane.context  | Context  | string   | all there is to know, each change and second   |
 
 Every sample carries the time at which it holds on the session's clock, which is liblsl's clock: a
 frame the time its tick was due, an event the time it happened.
@@ -54,23 +56,23 @@ class Outlets:
     def __init__(self, run: Run, source: str, codes: Mapping[str, int] | None = None) -> None:
         check_clock()
         self._codes = dict(CODES) | dict(codes or {})
-        state = _info(
+        state = stream_info(
             STATE, "MoCap", run.state.size, "double64", rate_hz=run.rate_hz, source=source
         )
         _describe_state(state, run.state)
-        axes = _info(
+        axes = stream_info(
             INPUT, "Joystick", run.axes.size, "double64", rate_hz=run.rate_hz, source=source
         )
         _describe_input(axes, run.axes)
-        markers = _info(MARKERS, "Markers", 1, "string", rate_hz=0.0, source=source)
-        _channel(markers, label="event", unit="none", type="JSON")
-        numbers = _info(CODE_STREAM, "Markers", 1, "int32", rate_hz=0.0, source=source)
-        _channel(numbers, label="code", unit="none", type="Code")
+        markers = stream_info(MARKERS, "Markers", 1, "string", rate_hz=0.0, source=source)
+        channel(markers, label="event", unit="none", type="JSON")
+        numbers = stream_info(CODE_STREAM, "Markers", 1, "int32", rate_hz=0.0, source=source)
+        channel(numbers, label="code", unit="none", type="Code")
         _describe_codes(numbers, self._codes)
         import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
 
-        self._state = _Samples(state, run.state.size)
-        self._input = _Samples(axes, run.axes.size)
+        self._state = Samples(state, run.state.size)
+        self._input = Samples(axes, run.axes.size)
         self._markers: pylsl.StreamOutlet | None = pylsl.StreamOutlet(markers)
         self._numbers: pylsl.StreamOutlet | None = pylsl.StreamOutlet(numbers)
 
@@ -93,7 +95,7 @@ class Outlets:
         self._markers = self._numbers = None
 
 
-class _Samples:
+class Samples:
     """An outlet of float64 samples.
 
     liblsl is handed a buffer of our own: half the time of ``push_sample`` with a list, and a third
@@ -149,12 +151,13 @@ def _check_stamp(stamp: float) -> None:
         )
 
 
-def _info(
+def stream_info(
     name: str, kind: str, channels: int, form: str, *, rate_hz: float, source: str
 ) -> "pylsl.StreamInfo":
+    """Return the description of one of our streams, without its channels."""
     import pylsl  # noqa: PLC0415
 
-    info = pylsl.StreamInfo(name, kind, channels, rate_hz, form, f"labcrane/{source}/{name}")
+    info = pylsl.StreamInfo(name, kind, channels, rate_hz, form, source_id(source, name))
     description = info.desc()
     acquisition = description.append_child("acquisition")
     acquisition.append_child_value("manufacturer", "labcrane")
@@ -168,10 +171,16 @@ def _info(
     return info
 
 
-def _channel(info: "pylsl.StreamInfo", **fields: str) -> None:
-    channel = info.desc().child("channels").append_child("channel")
+def channel(info: "pylsl.StreamInfo", **fields: str) -> None:
+    """Describe one more channel of a stream."""
+    entry = info.desc().child("channels").append_child("channel")
     for key, value in fields.items():
-        channel.append_child_value(key, value)
+        entry.append_child_value(key, value)
+
+
+def source_id(source: str, name: str) -> str:
+    """Return the source id of one of a session's own streams."""
+    return f"labcrane/{source}/{name}"
 
 
 def _describe_state(info: "pylsl.StreamInfo", layout: Layout) -> None:
@@ -186,14 +195,14 @@ def _describe_state(info: "pylsl.StreamInfo", layout: Layout) -> None:
                     fields["unit"] = "meters"
             else:
                 fields["type"] = "".join(word.title() for word in signal.name.split("."))
-            _channel(info, **fields)
+            channel(info, **fields)
 
 
 def _describe_input(info: "pylsl.StreamInfo", layout: Layout) -> None:
     for column in layout.columns:
         words = column.replace(".", "_").lower().split("_")
         button = any(word.startswith(BUTTONS) for word in words)
-        _channel(info, label=column, unit="normalized", type="Button" if button else "Axis")
+        channel(info, label=column, unit="normalized", type="Button" if button else "Axis")
 
 
 def _describe_codes(info: "pylsl.StreamInfo", codes: Mapping[str, int]) -> None:

@@ -1,0 +1,85 @@
+"""Frame time of the view beside a bare Panda3D scene of the same triangles, and its delay.
+
+    python -m benchmarks.view
+
+The bare scene is the same stage, its shader and shadows, drawn again without anything having
+changed. The view besides places machine and cues, writes text, and computes areas of interest.
+Rounds alternate, so that a wandering machine moves both figures together. The delay is counted in
+frames: every frame has a colour of its own, and the colour that the window has after each is read.
+"""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from labcrane import Ball, Run, Situation
+from labcrane.machine import Body
+from labcrane.testing import TARGETS, a_run, a_target, ch8
+from labcrane_view.settings import ViewSettings
+from labcrane_view.view import View
+
+ROUNDS, PICTURES = 7, 20
+
+
+def a_scene() -> Run:
+    """Return a crane of boxes and a task with two targets."""
+    machine = ch8()
+    boxes = [
+        Body(joint.name, frame, (joint.a or 0.5, 0.3, 0.3), (-0.5 * joint.a, 0.0, 0.0))
+        for frame, joint in enumerate(machine.joints, start=1)
+    ]
+    return replace(a_run(machine, task=TARGETS), bodies=tuple(boxes))
+
+
+def main() -> None:
+    """Print both figures for either renderer."""
+    run = a_scene()
+    for renderer in ("auto", "software"):
+        view = View(ViewSettings(display="hidden", renderer=renderer), run.machine)
+        view.open(run)
+        view.hear(Situation(block=1, block_name="benchmark", trial=1, trials=1))
+        print(f"{view.facts()['renderer']}, {view.facts()['size']}")
+        shown = [_seconds(view, run, whole=True)]  # warms up
+        shown, bare = [], []
+        for _ in range(ROUNDS):
+            shown.append(_seconds(view, run, whole=True))
+            bare.append(_seconds(view, run, whole=False))
+        ratio = np.median(shown) / np.median(bare)
+        print(f"  view       {1000 * np.median(shown):6.2f} ms a picture")
+        print(f"  bare scene {1000 * np.median(bare):6.2f} ms a picture; ratio {ratio:.2f}")
+        print(f"  delay      {_delay(view, run)} frames")
+        view.close()
+
+
+def _seconds(view: View, run: Run, *, whole: bool) -> float:
+    began = time.perf_counter()
+    for number in range(PICTURES):
+        if whole:
+            view.present(a_target(run, number))
+        else:
+            view.redraw()
+    return (time.perf_counter() - began) / PICTURES
+
+
+def _delay(view: View, run: Run) -> int:
+    """Return the most frames by which the window was behind."""
+    levels, behind = [], []
+    for repeat in (3, 1):  # first what each colour looks like, then whether it is there at once
+        for number in range(16):
+            frame = a_target(run, number)
+            wall = (0.0, 0.0, (number + 5) / 21, 1.0)
+            frame.shapes = (Ball("wall", (-1.0, 1.9, 3.0), 0.9, wall),)
+            for _ in range(repeat):
+                view.present(frame)
+            height, width, _ = view.picture().shape
+            level = int(view.picture()[height // 2, width // 2].sum())
+            if repeat > 1:
+                levels.append(level)
+            else:
+                behind.append(number - int(np.argmin(np.abs(np.array(levels) - level))))
+    return max(behind)
+
+
+if __name__ == "__main__":
+    main()

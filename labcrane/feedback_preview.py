@@ -1,0 +1,124 @@
+"""What a movement looks and sounds like, as files: without session, display or device."""
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from labcrane import rig
+from labcrane.clock import Tick
+from labcrane.console import Command, Order, QueueConsole
+from labcrane.errors import ProtocolError
+from labcrane.feedback_crew import host_orders
+from labcrane.feedback_host import Presenter
+from labcrane.pseudonyms import pseudonyms
+from labcrane.recording.recording import SessionRecord, open_recording
+from labcrane.records import Event, Frame
+from labcrane.registry import discover
+from labcrane.session import Visit
+from labcrane.session import run as run_session
+from labcrane.streams.frames import PHASES
+from labcrane.study import Study
+
+
+def write_preview(
+    study: Study,
+    folder: Path,
+    recording: Path | None = None,
+    session: int = 1,
+    trial: int | None = None,
+) -> list[Path]:
+    """Write what one movement looks and sounds like with everything switched on.
+
+    Parameters
+    ----------
+    recording
+        Participant file with the movement; None simulates one.
+    trial
+        Number of the trial; None is the first counted one.
+
+    Returns
+    -------
+    list of Path
+        The files written: pictures of every view, a sound file of every sound.
+    """
+    run = rig.describe(rig.build(study, simulated=True), study, participant_seed=0)
+    orders = host_orders(study, run, "preview")
+    if not orders:
+        raise ProtocolError(f"{study.path} has neither views nor sounds; add views: or feedback:")
+    folder.mkdir(parents=True, exist_ok=True)
+    if recording is None:
+        with tempfile.TemporaryDirectory(prefix="labcrane-preview-") as place:
+            frames = movement(open_recording(_simulated(study, Path(place))).session(1), trial)
+    else:
+        frames = movement(open_recording(recording).session(session), trial)
+    written: list[Path] = []
+    for order in orders:
+        presenter = Presenter(order, discover())
+        try:
+            for cue in presenter.cues.values():
+                cue.open(run)
+            drawn = [_drawn(presenter, frame) for frame in frames]
+            written += presenter.feedback.preview(run, drawn, folder / order.name)
+        finally:
+            presenter.close()
+    return written
+
+
+def movement(record: SessionRecord, trial: int | None = None) -> list[Frame]:
+    """Return the frames of a recorded trial; of the first counted one when it is not said.
+
+    Raises
+    ------
+    ProtocolError
+        There is no such trial.
+    """
+    parts = {name: stream.data for name, stream in record.streams.items()}
+    loop = parts["loop"]
+    counted = record.trials["trial"]
+    if trial is None and len(counted):
+        trial = int(counted.iloc[0])
+    rows = np.flatnonzero(loop["trial"] == trial)
+    if not len(rows):
+        there = ", ".join(str(int(number)) for number in counted.unique()) or "none"
+        raise ProtocolError(f"there is no trial {trial} in the recording; there is {there}")
+    arrays = [parts[name].to_numpy() for name in ("input", "command", "state", "task")]
+    heads = loop[["tick", "due", "woke", "elapsed", "phase", "paused"]].to_numpy()
+    found = []
+    for row in rows:
+        number, due, woke, elapsed, phase, paused = heads[row].tolist()
+        axes, command, state, task = (array[row] for array in arrays)
+        found.append(
+            Frame(
+                Tick(int(number), due, woke),
+                elapsed,
+                axes,
+                command,
+                state,
+                task,
+                PHASES[int(phase)],
+                int(trial or 0),
+                bool(paused),
+            )
+        )
+    return found
+
+
+def _drawn(presenter: Presenter, frame: Frame) -> Frame:
+    shapes = [shape for cue in presenter.cues.values() for shape in cue.draw(frame)]
+    return replace(frame, shapes=tuple(shapes))
+
+
+class _UntilCounted(QueueConsole):
+    """Ends the session when the first counted trial is over."""
+
+    def report(self, event: Event) -> None:
+        if event.name == "trial.end" and event.data["counted"]:
+            self.give(Command(Order.END))
+
+
+def _simulated(study: Study, folder: Path) -> Path:
+    """Run a session up to its first counted trial; return the participant file."""
+    name = pseudonyms(study.protocol.participants.pattern, 1)[0]
+    return run_session(Visit(study, name, 1, folder, simulated=True, fast=True), _UntilCounted())

@@ -1,0 +1,115 @@
+"""The session's whole context as a string stream: LSL keeps no history, so it is sent again.
+
+A sample of ``labcrane.context`` is a JSON object of two parts: ``scene``, which never changes
+(:func:`labcrane.scene.read_scene`), and ``situation`` (:class:`labcrane.records.Situation`). It is
+sent at every change and once a second: whoever starts late, or again, draws from one sample alone.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING, Any
+
+from labcrane.records import Event, Frame, Run, Situation
+from labcrane.scene import write_scene
+from labcrane.streams.outlets import channel, stream_info
+
+if TYPE_CHECKING:
+    import pylsl
+
+CONTEXT = "labcrane.context"
+
+EVERY_S = 1.0
+
+
+def situation_after(situation: Situation, event: Event) -> Situation:
+    """Return what the session is about once ``event`` has happened."""
+    data: Mapping[str, Any] = event.data
+    counts = {**situation.counts, event.name: situation.counts.get(event.name, 0) + 1}
+    now = replace(situation, counts=counts)
+    match event.name:
+        case "step.start":
+            return replace(now, step=data["step"], kind=data["kind"])
+        case "block.start":
+            return replace(
+                now,
+                block=data["block"],
+                block_name=data["block_name"],
+                practice=data["practice"],
+            )
+        case "trial.start":
+            named = data.get("feedback", "none")
+            active = () if named == "none" else tuple(named.split("+"))
+            return replace(now, trial=data["trial"], active=active)
+        case "trial.end":
+            return replace(now, trial=0, active=())
+        case "feedback.setting":
+            mine = {**situation.settings.get(data["feedback"], {}), data["key"]: data["value"]}
+            return replace(now, settings={**situation.settings, data["feedback"]: mine})
+    return now
+
+
+class ContextOutlet:
+    """Sends the context at every event and once a second."""
+
+    def __init__(self, run: Run, source: str, trials: int) -> None:
+        import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
+
+        info = stream_info(CONTEXT, "Context", 1, "string", rate_hz=0.0, source=source)
+        channel(info, label="context", unit="none", type="JSON")
+        self._outlet: pylsl.StreamOutlet | None = pylsl.StreamOutlet(info)
+        self._scene = write_scene(run)
+        self._situation = Situation(trials=trials)
+        self._due = float("-inf")
+
+    def push(self, frame: Frame) -> None:
+        """Take up what happened in a frame, and send the context if it changed or is due."""
+        for event in frame.events:
+            self._situation = situation_after(self._situation, event)
+        if self._outlet is None or not (frame.events or frame.tick.due >= self._due):
+            return
+        self._due = frame.tick.due + EVERY_S
+        situation = json.dumps(asdict(self._situation))
+        text = f'{{"scene": {self._scene}, "situation": {situation}}}'
+        self._outlet.push_sample([text], frame.tick.due)
+
+    def close(self) -> None:
+        """End the stream."""
+        self._outlet = None
+
+
+class ContextInlet:
+    """Receives the context and knows what it said last.
+
+    Attributes
+    ----------
+    text
+        The newest sample as it came; empty before the first.
+    situation
+        What it says of the session.
+    """
+
+    def __init__(self, info: "pylsl.StreamInfo") -> None:
+        import pylsl  # noqa: PLC0415
+
+        self._inlet = pylsl.StreamInlet(info, max_buflen=60, recover=True, processing_flags=0)
+        self.text = ""
+        self.situation = Situation()
+
+    def changed(self, wait_s: float = 0.0) -> bool:
+        """Take what has come; whether the situation is another one now."""
+        newest = None
+        sample, _ = self._inlet.pull_sample(timeout=wait_s)
+        while sample is not None:
+            newest = sample[0]
+            sample, _ = self._inlet.pull_sample(timeout=0.0)
+        if newest is None:
+            return False
+        self.text = newest
+        before, self.situation = self.situation, situation_of(json.loads(newest)["situation"])
+        return self.situation != before
+
+
+def situation_of(found: Mapping[str, Any]) -> Situation:
+    """Return the situation that JSON holds."""
+    return Situation(**{**found, "active": tuple(found["active"])})

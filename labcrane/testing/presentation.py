@@ -1,0 +1,97 @@
+"""Contracts of what presents a session: cues and feedback."""
+
+import copy
+
+import numpy as np
+
+from labcrane.records import Frame, Run, Situation
+from labcrane.roles import Cue, Feedback
+from labcrane.shapes import Ball, Shape
+from labcrane.signals import Layout, Signal
+from labcrane.testing.roles import a_frame, a_run, ch8, check_signals, crane_at, opened
+
+TARGETS = (
+    Signal("target.position", "m", ("x", "y", "z")),
+    Signal("target.radius", "m"),
+    Signal("other.position", "m", ("x", "y", "z")),
+)
+"""What a task of aiming movements shows."""
+
+
+def a_target(run: Run, number: int = 0) -> Frame:
+    """Return a frame with a target in it; each number has another one."""
+    machine = run.machine
+    turn = 0.02 * number
+    frame = a_frame(run, number, crane_at(machine, [turn, *machine.rest[1:]]))
+    frame.task = np.array([5.5, 1.0 - turn, 0.8, 0.25, 4.5, -1.0, 0.8])
+    return frame
+
+
+class CueContract:
+    """What every cue must do. Provide the fixture ``cue``."""
+
+    def test_cue_draws_the_same_for_the_same_frame(self, cue: Cue) -> None:
+        check_signals(cue)
+        run = a_run(ch8(), task=TARGETS)
+        with opened(cue, run):
+            seen = [a_target(run, number) for number in range(5)]
+            first = [list(cue.draw(frame)) for frame in seen]
+            again = [list(cue.draw(copy.deepcopy(frame))) for frame in reversed(seen)]
+            assert first == again[::-1], "draw must depend on the frame alone"
+
+    def test_cue_draws_shapes_with_names_of_their_own(self, cue: Cue) -> None:
+        run = a_run(ch8(), task=TARGETS)
+        with opened(cue, run):
+            shapes = cue.draw(a_target(run))
+            assert shapes, "with a target there is something to be seen"
+            assert len({shape.name for shape in shapes}) == len(shapes)
+            for shape in shapes:
+                _check_shape(shape)
+
+    def test_cue_has_the_numbers_its_signals_promise(self, cue: Cue) -> None:
+        run = a_run(ch8(), task=TARGETS)
+        with opened(cue, run):
+            values = cue.values(a_target(run))
+            assert values.shape == (Layout("cue", cue.signals).size,)
+            assert np.isfinite(values).all()
+
+    def test_cue_draws_nothing_between_trials(self, cue: Cue) -> None:
+        run = a_run(ch8(), task=TARGETS)
+        with opened(cue, run):
+            assert not cue.draw(a_frame(run))
+
+
+def _check_shape(shape: Shape) -> None:
+    points = [shape.centre] if isinstance(shape, Ball) else [shape.start, shape.end]
+    assert np.isfinite(points).all(), shape
+    assert shape.radius > 0.0, shape
+    assert all(0.0 <= part <= 1.0 for part in shape.colour), shape
+
+
+class FeedbackContract:
+    """What all feedback must do. Provide the fixture ``feedback``."""
+
+    def test_feedback_returns_what_its_signals_promise(self, feedback: Feedback) -> None:
+        check_signals(feedback)
+        run = a_run(ch8(), task=TARGETS)
+        with opened(feedback, run):
+            size = Layout("feedback", feedback.signals).size
+            feedback.hear(Situation(trial=1, trials=1))
+            for number in range(3):
+                values = feedback.present(a_target(run, number))
+                assert values.shape == (size,), f"promised ({size},), got {values.shape}"
+                assert values.dtype == np.float64
+                samples = feedback.samples()
+                assert set(samples) == set(feedback.streams)
+                for name, signals in feedback.streams.items():
+                    assert samples[name].shape == (Layout(name, signals).size,), name
+
+    def test_feedback_rests_between_trials(self, feedback: Feedback) -> None:
+        run = a_run(ch8(), task=TARGETS)
+        with opened(feedback, run):
+            feedback.hear(Situation())
+            feedback.present(a_frame(run))  # a frame without a target
+            feedback.rest()
+
+    def test_feedback_closes_without_having_been_opened(self, feedback: Feedback) -> None:
+        feedback.close()

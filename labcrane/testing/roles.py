@@ -1,0 +1,263 @@
+"""Contracts of the roles in the loop, and stand-ins for what a component needs beside it."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+
+import numpy as np
+
+from labcrane.clock import Tick
+from labcrane.kinematics import Arm
+from labcrane.machine import Machine
+from labcrane.machine_file import load_machine
+from labcrane.records import Frame, Phase, Planned, Run, Trial
+from labcrane.roles import Component, Controller, Dynamics, InputDevice, Task
+from labcrane.signals import FloatArray, Layout, Signal
+
+RATE_HZ = 240.0
+
+
+def ch8() -> Machine:
+    """Return the machine of the crane study."""
+    return load_machine("ch8")
+
+
+def crane_state(machine: Machine) -> Layout:
+    """Return the state that every bundled crane has."""
+    return Layout(
+        "the machine",
+        (
+            Signal("joint.angle", "rad", machine.names),
+            Signal("joint.velocity", "rad/s", machine.names),
+            Signal("tip.position", "m", ("x", "y", "z")),
+            Signal("tip.velocity", "m/s", ("x", "y", "z")),
+        ),
+    )
+
+
+def crane_at(machine: Machine, angles: Sequence[float]) -> FloatArray:
+    """Return a crane's state at rest at ``angles`` in rad, shape ``(14,)`` for four joints."""
+    still = [0.0] * len(angles)
+    return np.array([*angles, *still, *Arm(machine).tip(angles), 0.0, 0.0, 0.0])
+
+
+STICKS = (
+    Signal("left", "1", ("x", "y", "trigger")),
+    Signal("right", "1", ("x", "y", "trigger")),
+)
+"""The axes of a dual joystick, as far as tests need them."""
+
+
+def a_run(
+    machine: Machine,
+    *,
+    axes: Sequence[Signal] = STICKS,
+    command: Sequence[Signal] | None = None,
+    state: Sequence[Signal] | None = None,
+    task: Sequence[Signal] = (),
+    steer: Callable[[FloatArray, FloatArray], FloatArray] | None = None,
+) -> Run:
+    """Return a run beside which one component can be opened."""
+    drive = (Signal("command", "rad/s", machine.names),)
+    layout = Layout("the input", tuple(axes))
+    return Run(
+        rate_hz=RATE_HZ,
+        machine=machine,
+        participant_seed=1,
+        axes=layout,
+        command=Layout("the scheme", tuple(command or drive)),
+        state=Layout("the machine", tuple(state)) if state else crane_state(machine),
+        task=Layout("the task", tuple(task)),
+        steer=steer or (lambda velocity, state: np.zeros(layout.size)),
+    )
+
+
+def a_frame(run: Run, number: int = 0, state: FloatArray | None = None) -> Frame:
+    """Return a frame in which nothing has happened yet."""
+    due = number / run.rate_hz
+    return Frame(
+        tick=Tick(number, due, due),
+        elapsed=due,
+        axes=np.zeros(run.axes.size),
+        command=np.zeros(run.command.size),
+        state=crane_at(run.machine, run.machine.rest) if state is None else state,
+        task=np.full(run.task.size, np.nan),
+        phase=Phase.RUNNING,
+        trial=1,
+    )
+
+
+def a_trial(planned: Planned | None = None, seed: int = 1) -> Trial:
+    """Return a first attempt."""
+    return Trial(1, 1, seed, planned or Planned({}, expected_s=1.0))
+
+
+@contextmanager
+def opened(component: Component, run: Run) -> Iterator[None]:
+    """Open ``component`` and close it again, as a session does."""
+    with closing(component):
+        component.open(run)
+        yield
+
+
+def check_array(component: Component, array: FloatArray) -> None:
+    """Check that a tick method returned what the component's signals promise."""
+    name = type(component).__name__
+    size = Layout(name, component.signals).size
+    assert array.shape == (size,), f"{name}.signals promise shape ({size},), got {array.shape}"
+    assert array.dtype == np.float64, f"{name} must return float64, got {array.dtype}"
+    assert np.isfinite(array).all(), f"{name} returned {array}"
+
+
+def check_signals(component: Component) -> None:
+    """Check that signal names are dotted lower-case words, and that no column occurs twice."""
+    columns = Layout("component", component.signals).columns
+    assert len(set(columns)) == len(columns), f"a column occurs twice: {columns}"
+    for column in columns:
+        assert all(word.isidentifier() and word.islower() for word in column.split(".")), column
+
+
+class InputContract:
+    """What every input device must do. Provide the fixture ``device``."""
+
+    def test_device_reads_what_its_signals_promise(self, device: InputDevice) -> None:
+        check_signals(device)
+        run = a_run(ch8(), axes=device.signals)
+        with opened(device, run):
+            device.begin_trial(a_trial())
+            for number in range(10):
+                frame = a_frame(run, number)
+                axes = device.read(frame.tick, frame)
+                check_array(device, axes)
+                assert np.abs(axes).max(initial=0.0) <= 1.0, f"an axis is outside [-1, 1]: {axes}"
+
+    def test_device_closes_without_having_been_opened(self, device: InputDevice) -> None:
+        device.close()
+
+
+class ControllerContract:
+    """What every controller must do. Provide the fixture ``controller``."""
+
+    def test_controller_commands_what_its_signals_promise(self, controller: Controller) -> None:
+        check_signals(controller)
+        machine = ch8()
+        run = a_run(machine, command=controller.signals)
+        with opened(controller, run):
+            controller.begin_trial(a_trial())
+            state = crane_at(machine, machine.rest)
+            for push in (-1.0, 0.0, 0.3, 1.0):
+                command = controller.command(np.full(run.axes.size, push), state)
+                check_array(controller, command)
+            check_array(controller, controller.rest())
+
+    def test_hands_at_rest_ask_for_no_motion(self, controller: Controller) -> None:
+        machine = ch8()
+        run = a_run(machine, command=controller.signals)
+        drive = run.command.find("command")
+        with opened(controller, run):
+            state = crane_at(machine, machine.rest)
+            command = controller.command(np.zeros(run.axes.size), state)
+            assert not command[drive].any()
+            assert not controller.rest()[drive].any()
+
+    def test_no_command_exceeds_the_joint_speeds(self, controller: Controller) -> None:
+        machine = ch8()
+        run = a_run(machine, command=controller.signals)
+        drive = run.command.find("command")
+        random = np.random.default_rng(1)
+        lowest, highest = np.array(machine.limits).T
+        with opened(controller, run):
+            for _ in range(200):
+                state = crane_at(machine, random.uniform(lowest, highest).tolist())
+                axes = random.uniform(-1, 1, run.axes.size)
+                command = controller.command(axes, state)[drive]
+                assert (np.abs(command) <= np.array(machine.speeds) * (1 + 1e-12)).all()
+
+    def test_steering_stays_within_the_axes(self, controller: Controller) -> None:
+        machine = ch8()
+        run = a_run(machine, command=controller.signals)
+        with opened(controller, run):
+            state = crane_at(machine, machine.rest)
+            for velocity in np.vstack([np.eye(3), -5.0 * np.eye(3)]):
+                axes = controller.steer(velocity, state)
+                assert axes.shape == (run.axes.size,)
+                assert np.abs(axes).max() <= 1.0
+
+
+class DynamicsContract:
+    """What every machine must do. Provide the fixture ``dynamics``."""
+
+    def test_dynamics_returns_what_its_signals_promise(self, dynamics: Dynamics) -> None:
+        check_signals(dynamics)
+        machine = ch8()
+        run = a_run(machine, state=dynamics.signals)
+        with opened(dynamics, run):
+            check_array(dynamics, dynamics.state())
+            check_array(dynamics, dynamics.step(0.5 * np.array(machine.speeds), 1 / RATE_HZ))
+            assert dynamics.bodies()
+
+    def test_reset_forgets_everything(self, dynamics: Dynamics) -> None:
+        machine = ch8()
+        run = a_run(machine, state=dynamics.signals)
+        with opened(dynamics, run):
+            paths = []
+            for _ in range(2):
+                dynamics.reset(machine.rest)
+                push = 0.5 * np.array(machine.speeds)
+                paths.append(np.array([dynamics.step(push, 1 / RATE_HZ).copy() for _ in range(50)]))
+            np.testing.assert_array_equal(paths[0], paths[1])
+
+    def test_a_machine_at_rest_stays(self, dynamics: Dynamics) -> None:
+        machine = ch8()
+        run = a_run(machine, state=dynamics.signals)
+        angle = run.state.find("joint.angle")
+        with opened(dynamics, run):
+            before = dynamics.state()[angle].copy()
+            for _ in range(int(RATE_HZ)):
+                dynamics.step(np.zeros(run.command.size), 1 / RATE_HZ)
+            np.testing.assert_allclose(dynamics.state()[angle], before, atol=np.radians(0.001))
+
+
+class TaskContract:
+    """What every task must do. Provide the fixture ``task``."""
+
+    def test_a_plan_follows_the_order_of_its_levels(self, task: Task) -> None:
+        factors = task.factors()
+        forward = task.plan(factors)
+        backward = task.plan({name: list(levels)[::-1] for name, levels in factors.items()})
+        assert [p.condition for p in forward] == [p.condition for p in task.plan(factors)]
+        assert len(forward) == len(backward)
+        assert any(planned.counted for planned in forward)
+        assert all(planned.expected_s > 0 for planned in forward)
+
+    def test_task_judges_what_its_signals_promise(self, task: Task) -> None:
+        check_signals(task)
+        run = a_run(ch8(), task=task.signals)
+        with opened(task, run):
+            for planned in task.plan(task.factors())[:3]:
+                task.begin_trial(a_trial(planned))
+                judgement = task.judge(a_frame(run))
+                check_array(task, judgement.values)
+                assert judgement.phase is not Phase.IDLE
+
+    def test_an_overruled_trial_has_no_automatic_end(self, task: Task) -> None:
+        run = a_run(ch8(), task=task.signals)
+        with opened(task, run):
+            for planned in task.plan(task.factors())[:2]:
+                task.begin_trial(a_trial(planned))
+                task.overrule()
+                late = a_frame(run, number=int(3600 * RATE_HZ))
+                assert not task.judge(late).phase.over
+
+    def test_results_are_declared(self, task: Task) -> None:
+        run = a_run(ch8(), task=task.signals)
+        declared = {column for signal in task.results for column in signal.columns}
+        with opened(task, run):
+            for planned in task.plan(task.factors())[:3]:
+                task.begin_trial(a_trial(planned))
+                results: Mapping[str, object] = {}
+                for number in range(int(120 * RATE_HZ)):
+                    judgement = task.judge(a_frame(run, number))
+                    if judgement.phase.over:
+                        results = judgement.results
+                        break
+                assert set(results) == declared, "a machine that never moves must end by a limit"

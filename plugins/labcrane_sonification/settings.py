@@ -1,0 +1,65 @@
+"""What a protocol can set of the tone."""
+
+from typing import Literal
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+
+from labcrane import Settings
+
+
+class SonificationSettings(Settings):
+    """How the tone follows the movement, and how it is played.
+
+    The published study names sinusoids with overtones for the distance, not the laws: these are a
+    proposal (logarithmic pitch over two octaves, rising as the tip comes closer).
+    """
+
+    far: PositiveFloat = 4.0
+    """Distance of tip and target, in metres, from which on the tone stays as it is."""
+
+    pitch_hz: tuple[PositiveFloat, PositiveFloat] = (220.0, 880.0)
+    """Fundamental far away and at the target, in hertz; equal steps of distance are equal musical
+    intervals. Exchange the two for the other polarity."""
+
+    overtones: tuple[int, int] = (0, 5)
+    """Overtones above the fundamental far away and at the target, 0 to 15."""
+
+    level: tuple[float, float] = (0.3, 0.3)
+    """Amplitude of the fundamental far away and at the target, 0 to 1."""
+
+    aside: PositiveFloat = 2.0
+    """Distance to the side, in metres, at which the tone comes from one side only."""
+
+    pan: Literal["towards", "away", "none"] = "towards"
+    """Whether the tone comes from where the target is, seen from the tip, or from where it is
+    not."""
+
+    silent_after_s: NonNegativeFloat | None = 0.3
+    """Seconds inside the target after which the tone falls silent; null keeps it sounding."""
+
+    ramp_s: NonNegativeFloat = 0.015
+    """Seconds a change takes: shorter ones click."""
+
+    block: PositiveInt = Field(default=256, ge=16, le=8192)
+    """Samples per block: a change is heard from the next block on."""
+
+    rate_hz: PositiveInt = 48000
+    """Samples per second."""
+
+    driver: Literal["portaudio", "jack"] = "portaudio"
+    """Which sound system plays it."""
+
+    device: int | None = None
+    """Number of the output device, as PortAudio counts; the system's default by default."""
+
+    @model_validator(mode="after")
+    def _levels_and_overtones_are_possible(self) -> "SonificationSettings":
+        if not all(0.0 <= level <= 1.0 for level in self.level):
+            raise ValueError(f"level must be 0 to 1, but is {self.level[0]:g}, {self.level[1]:g}")
+        if not all(0 <= count <= MOST_OVERTONES for count in self.overtones):
+            few, many = self.overtones
+            raise ValueError(f"overtones must be 0 to {MOST_OVERTONES}, but are {few}, {many}")
+        return self
+
+
+MOST_OVERTONES = 15

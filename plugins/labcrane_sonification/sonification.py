@@ -1,0 +1,134 @@
+"""The tone as feedback."""
+
+import math
+import wave
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from labcrane import Feedback, FloatArray, Frame, Run, Signal, Situation, Value
+from labcrane_sonification.settings import SonificationSettings
+from labcrane_sonification.synth import Maker, Synth, offline_server, server
+from labcrane_sonification.tone import Tone, tone
+
+
+class Sonification(Feedback):
+    """Follows the distance of tip and target with a tone.
+
+    Parameters
+    ----------
+    make_server
+        Makes the sound server; offline rendering gives another one.
+    """
+
+    signals = (
+        Signal("tone.pitch", "Hz"),
+        Signal("tone.overtones", "1"),
+        Signal("tone.level", "1"),
+        Signal("tone.pan", "1"),
+        Signal("tone.sample", "1"),  # made by the server when the change was given
+    )
+
+    def __init__(self, settings: SonificationSettings, make_server: Maker = server) -> None:
+        self._settings = settings
+        self._make_server = make_server
+        self._synth: Synth | None = None
+        self._trial = 0
+        self._entered: float | None = None
+
+    @property
+    def synth(self) -> Synth:
+        """What makes the sound, once it is open."""
+        if self._synth is None:
+            raise AssertionError("the tone is opened before it sounds")
+        return self._synth
+
+    def open(self, run: Run) -> None:
+        self._tip = run.state.find("tip.position")
+        self._target = run.task.find("target.position")
+        self._radius = run.task.find("target.radius")
+        self._synth = Synth(self._make_server(self._settings), self._settings)
+
+    def close(self) -> None:
+        if self._synth is not None:
+            self._synth.close()
+            self._synth = None
+
+    def hear(self, situation: Situation) -> None:
+        if situation.trial != self._trial:
+            self._trial, self._entered = situation.trial, None
+
+    def present(self, frame: Frame) -> FloatArray:
+        now = self.tone(frame)
+        if now is None:
+            self.rest()
+            return np.array([math.nan, math.nan, 0.0, math.nan, self._sample()])
+        self.synth.sound(now)
+        return np.array([*now.values, self._sample()])
+
+    def tone(self, frame: Frame) -> Tone | None:
+        """Return the tone for a frame that follows those presented; None without a target."""
+        way = frame.task[self._target] - frame.state[self._tip]
+        distance = float(np.linalg.norm(way))
+        if math.isnan(distance):
+            self._entered = None
+            return None
+        inside = distance <= float(frame.task[self._radius][0])
+        if not inside:
+            self._entered = None
+        elif self._entered is None:
+            self._entered = frame.tick.due
+        inside_s = 0.0 if self._entered is None else frame.tick.due - self._entered
+        if frame.paused:
+            return Tone(self._settings.pitch_hz[0], 0.0, 0.0, 0.0)
+        # A moment before the tip has been inside for long enough it still sounds.
+        return tone(self._settings, distance, float(way[1]), inside_s if inside else 0.0)
+
+    def preview(self, run: Run, frames: Sequence[Frame], path: Path) -> Sequence[Path]:
+        file = path.with_suffix(".wav")
+        offline = Sonification(self._settings, offline_server)
+        offline.open(run)
+        try:
+            write_wav(file, offline.rendered(frames), self._settings.rate_hz)
+        finally:
+            offline.close()
+        return [file]
+
+    def rendered(self, frames: Sequence[Frame]) -> npt.NDArray[np.float32]:
+        """Return the sound of consecutive frames, shape ``(n_samples, 2)``.
+
+        Needs an offline server. Each block sounds like the newest frame at its start.
+        """
+        dues = [frame.tick.due for frame in frames]
+        step = self._settings.block / self._settings.rate_hz
+        blocks = []
+        for time in np.arange(dues[0], dues[-1], step):
+            frame = frames[int(np.searchsorted(dues, time, side="right")) - 1]
+            self.present(frame)
+            blocks.append(self.synth.block())
+        return np.concatenate(blocks)
+
+    def rest(self) -> None:
+        self.synth.silence()
+
+    def facts(self) -> Mapping[str, Value]:
+        return {
+            "driver": self._settings.driver,
+            "rate_hz": self._settings.rate_hz,
+            "block": self._settings.block,
+            "delay": "not measured",
+        }
+
+    def _sample(self) -> float:
+        return float(self.synth.server.getCurrentTimeInSamples())
+
+
+def write_wav(path: Path, sound: npt.NDArray[np.float32], rate_hz: int) -> None:
+    """Write a sound between -1 and 1, shape ``(n_samples, n_channels)``, with 16 bits a sample."""
+    with wave.open(str(path), "wb") as file:
+        file.setnchannels(sound.shape[1])
+        file.setsampwidth(2)
+        file.setframerate(rate_hz)
+        file.writeframes(np.round(32767.0 * sound).astype("<i2").tobytes())

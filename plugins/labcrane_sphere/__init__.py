@@ -1,0 +1,13 @@
+"""The study's visual feedback: a sphere that tells the distance of tip and target."""
+
+from labcrane import Cue, Machine, Offer, hookimpl, offer
+from labcrane_sphere.sphere import Sphere, SphereSettings
+
+
+@hookimpl
+def labcrane_cues() -> list[Offer[Cue]]:
+    def build(settings: SphereSettings, machine: Machine) -> Cue:
+        del machine  # the same for every machine
+        return Sphere(settings)
+
+    return [offer("sphere", SphereSettings, build)]

@@ -1,0 +1,103 @@
+"""Where things are in the picture, in pixels: areas of interest for eye tracking."""
+
+import math
+
+import numpy as np
+
+from labcrane import FloatArray
+
+STRAIGHT = 0.999
+NOWHERE = (math.nan,) * 4
+
+
+class Projection:
+    """A camera's way from metres to pixels, y down from the upper left corner.
+
+    Parameters
+    ----------
+    eye, look
+        In metres, in the base frame, shape ``(3,)``.
+    fov_deg
+        Horizontal field of view, in degrees.
+    left, width, height
+        Of the camera's part of the window, in pixels.
+    """
+
+    def __init__(
+        self,
+        eye: FloatArray,
+        look: FloatArray,
+        fov_deg: float,
+        left: int,
+        width: int,
+        height: int,
+    ) -> None:
+        self._eye = eye
+        self._axes = axes_of(eye, look)
+        self._scale = width / 2.0 / math.tan(math.radians(fov_deg) / 2.0)
+        self._left, self._width, self._height = left, width, height
+
+    def ball(self, centre: FloatArray, radius: float) -> tuple[float, float, float, float]:
+        """Return left, top, right and bottom of a sphere; NaN where it is not to be seen.
+
+        The outline of a sphere in perspective, exactly: the rays that touch it, not its diameter.
+        """
+        x, y, z = (self._axes @ (centre - self._eye)).tolist()
+        if y <= radius:
+            return NOWHERE
+        across, up = _tangents(x, y, radius), _tangents(z, y, radius)
+        middle_x, middle_y = self._left + self._width / 2.0, self._height / 2.0
+        box = (
+            middle_x + self._scale * across[0],
+            middle_y - self._scale * up[1],
+            middle_x + self._scale * across[1],
+            middle_y - self._scale * up[0],
+        )
+        return self._clipped(box)
+
+    def points(self, corners: FloatArray) -> tuple[float, float, float, float]:
+        """Return the box around points, shape ``(n, 3)``; NaN when one is behind the eye."""
+        seen = (corners - self._eye) @ self._axes.T
+        if (seen[:, 1] <= 0.0).any():
+            return NOWHERE
+        x = self._left + self._width / 2.0 + self._scale * seen[:, 0] / seen[:, 1]
+        y = self._height / 2.0 - self._scale * seen[:, 2] / seen[:, 1]
+        return self._clipped((float(x.min()), float(y.min()), float(x.max()), float(y.max())))
+
+    def _clipped(self, box: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+        """Return the part of a box that is in the picture."""
+        left, top, right, bottom = box
+        first, last = float(self._left), float(self._left + self._width)
+        if right < first or left > last or bottom < 0.0 or top > self._height:
+            return NOWHERE
+        return max(left, first), max(top, 0.0), min(right, last), min(bottom, float(self._height))
+
+
+def axes_of(eye: FloatArray, look: FloatArray) -> FloatArray:
+    """Return a camera's axes in the base frame, as rows: right, forward, up."""
+    forward = (look - eye) / np.linalg.norm(look - eye)
+    sky = np.array([0.0, 0.0, 1.0])
+    if abs(forward @ sky) > STRAIGHT:  # straight down: ahead is up in the picture
+        sky = np.array([1.0, 0.0, 0.0])
+    right = np.cross(forward, sky)
+    right = right / np.linalg.norm(right)
+    return np.stack([right, forward, np.cross(right, forward)])
+
+
+def _tangents(aside: float, ahead: float, radius: float) -> tuple[float, float]:
+    """Return the slopes of both rays from the eye that touch a circle."""
+    root = radius * math.sqrt(aside * aside + ahead * ahead - radius * radius)
+    square = ahead * ahead - radius * radius
+    return (aside * ahead - root) / square, (aside * ahead + root) / square
+
+
+def turned(
+    box: tuple[float, float, float, float], size: tuple[int, int], flip: str
+) -> tuple[float, float, float, float]:
+    """Return where a box is once the picture has been turned over."""
+    left, top, right, bottom = box
+    if flip == "horizontal":
+        return size[0] - right, top, size[0] - left, bottom
+    if flip == "vertical":
+        return left, size[1] - bottom, right, size[1] - top
+    return box

@@ -1,0 +1,52 @@
+"""Which monitors there are, and where the desktop puts them."""
+
+import re
+import subprocess
+from dataclasses import dataclass
+
+from labcrane import DeviceError
+
+LINE = re.compile(r"^ *\d+: \+?\*?(\S+) (\d+)/\d+x(\d+)/\d+\+(-?\d+)\+(-?\d+)", re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True)
+class Monitor:
+    """One monitor: its name, its size, and its place on the desktop in pixels."""
+
+    name: str
+    size: tuple[int, int]
+    origin: tuple[int, int]
+
+
+def monitors() -> list[Monitor]:
+    """Return the monitors as xrandr lists them, in its order.
+
+    Raises
+    ------
+    DeviceError
+        There is no xrandr, or it finds no display.
+    """
+    try:
+        done = subprocess.run(
+            ["xrandr", "--listactivemonitors"],  # noqa: S607 - wherever it is installed
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+    except FileNotFoundError:
+        raise DeviceError(
+            "screen needs xrandr to find monitors, which is not installed; install it (Debian: "
+            "x11-xserver-utils) or leave screen out"
+        ) from None
+    except subprocess.CalledProcessError as error:
+        raise DeviceError(f"xrandr lists no monitors: {error.stderr.strip()}") from None
+    return parse(done.stdout)
+
+
+def parse(text: str) -> list[Monitor]:
+    """Return the monitors in what xrandr prints."""
+    found = []
+    for name, *numbers in LINE.findall(text):
+        width, height, left, top = map(int, numbers)
+        found.append(Monitor(name, (width, height), (left, top)))
+    return found

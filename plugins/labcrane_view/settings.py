@@ -1,0 +1,122 @@
+"""What a protocol can set of a view."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, NonNegativeFloat, NonNegativeInt, PositiveFloat
+from pydantic import PositiveInt as Pixels
+
+from labcrane import Settings
+
+Triple = tuple[float, float, float]
+
+
+class CameraSettings(Settings):
+    """Where a camera stands, or what it rides on."""
+
+    name: str = "camera"
+    """Names it in the picture and in the areas of interest."""
+
+    eye: Triple
+    """Where it is, in metres, in the machine's base frame or in that of the joint it rides on."""
+
+    look: Triple
+    """A point in the middle of its picture, in the same frame."""
+
+    fov_deg: float = Field(default=70.0, gt=1.0, lt=170.0)
+    """Horizontal field of view, in degrees."""
+
+    on: str | None = None
+    """Joint behind whose link it rides; it stands in the scene by default."""
+
+
+CAMERAS: Mapping[str, CameraSettings] = {
+    "cab_left": CameraSettings(name="cab_left", eye=(-2.2, 2.2, 3.3), look=(5.2, 0.3, 0.8)),
+    "cab_right": CameraSettings(name="cab_right", eye=(-2.2, -2.2, 3.3), look=(5.2, -0.3, 0.8)),
+    "free": CameraSettings(name="free", eye=(11.0, -9.5, 5.5), look=(3.5, 0.0, 1.2), fov_deg=60),
+    "top": CameraSettings(name="top", eye=(4.5, 0.0, 15.0), look=(4.6, 0.0, 0.0), fov_deg=75),
+}
+"""Cameras that have a name."""
+
+
+def _named(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    if value not in CAMERAS:
+        raise ValueError(f"there is no camera {value!r}; there is {', '.join(CAMERAS)}")
+    return CAMERAS[value]
+
+
+Camera = Annotated[CameraSettings, BeforeValidator(_named)]
+
+
+class PatchSettings(Settings):
+    """A square in a corner for a photodiode: it changes between black and white."""
+
+    on: tuple[str, ...] = ("trial.start", "trial.end", "target.entered")
+    """Events at each of which it changes."""
+
+    corner: Literal["bottom_left", "bottom_right", "top_left", "top_right"] = "bottom_left"
+    """Where it is."""
+
+    size: Pixels = 60
+    """Edge length, in pixels."""
+
+
+class ViewSettings(Settings):
+    """A window, what is seen in it, and from where."""
+
+    camera: Camera = CAMERAS["cab_left"]
+    """``cab_left``, ``cab_right``, ``free``, ``top``, or a camera written out."""
+
+    beside: tuple[Camera, ...] = ()
+    """Further cameras, side by side with the first in the same window."""
+
+    size: tuple[Pixels, Pixels] = (1280, 720)
+    """Width and height, in pixels; a full screen has its own."""
+
+    screen: NonNegativeInt | None = None
+    """Number of the monitor to fill, counted from 0; a window by default."""
+
+    flip: Literal["none", "horizontal", "vertical"] = "none"
+    """Turns the picture over, for a mirror."""
+
+    content: Literal["scene", "feedback"] = "scene"
+    """``feedback`` shows targets and cues on black: for a semi-transparent mirror on a table."""
+
+    hud: tuple[Literal["block", "trial", "distance", "time", "speed", "lateness"], ...] = (
+        "block",
+        "trial",
+        "distance",
+    )
+    """Lines of text in the corner."""
+
+    language: Literal["en", "de", "pl"] = "en"
+    """Of that text."""
+
+    font: str | None = None
+    """Font file for the text; one that comes with the renderer by default."""
+
+    targets: bool = True
+    """Whether targets are drawn."""
+
+    delay_s: NonNegativeFloat = 0.0
+    """How long ago what is shown happened: a teleoperator's delay, in seconds."""
+
+    rate_hz: PositiveFloat | None = None
+    """Most pictures per second; as many as the monitor shows by default."""
+
+    patch: PatchSettings | None = None
+    """Square for a photodiode; none by default."""
+
+    areas: tuple[str, ...] = ("tip", "target", "other", "sphere")
+    """What has a box for eye tracking: the tip, targets, shapes of cues, and bodies by name."""
+
+    shadow: NonNegativeInt = Field(default=2048, le=8192)
+    """Edge of the shadow map in pixels; 0 for no shadows."""
+
+    display: Literal["window", "hidden"] = "window"
+    """``hidden`` draws without any screen: for recordings and tests."""
+
+    renderer: Literal["auto", "software"] = "auto"
+    """``software`` draws without any graphics driver, and without shadows."""

@@ -1,0 +1,145 @@
+"""Opens a window, or a picture without one, with whatever renderer there is."""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from panda3d import core
+
+from labcrane import DeviceError
+from labcrane_view.monitors import Monitor, monitors
+from labcrane_view.settings import ViewSettings
+
+# auto-flip 1: by default Panda3D shows every picture one render_frame late. gl-finish 1: the stamp
+# after a picture is only honest when the driver has drawn it.
+CONFIGURATION = """
+auto-flip 1
+sync-video 1
+gl-finish 1
+gl-version 3 3
+audio-library-name null
+notify-level error
+notify-level-display fatal
+framebuffer-multisample 0
+textures-power-2 none
+"""
+
+
+@dataclass(frozen=True)
+class Window:
+    """Where pictures appear.
+
+    Attributes
+    ----------
+    engine, output
+        Panda3D's engine, and its window or buffer.
+    shaders
+        Whether the renderer runs our shader; the software renderer does not.
+    driver
+        What draws, in its own words.
+    """
+
+    engine: Any
+    output: Any
+    shaders: bool
+    driver: str
+
+    @property
+    def software(self) -> bool:
+        """Whether no graphics card takes part."""
+        return not self.shaders or any(
+            word in self.driver.lower() for word in ("llvmpipe", "softpipe", "swrast")
+        )
+
+    def close(self) -> None:
+        """Close the window."""
+        self.engine.remove_all_windows()
+
+
+def open_window(settings: ViewSettings, title: str) -> Window:
+    """Open what the settings ask for.
+
+    Raises
+    ------
+    DeviceError
+        There is no display, no such monitor, or nothing that can draw.
+    """
+    core.load_prc_file_data("labcrane", CONFIGURATION)
+    hidden = settings.display == "hidden"
+    if not hidden and not os.environ.get("DISPLAY"):
+        raise DeviceError(
+            "there is no display for a window (DISPLAY is not set); start labcrane in a desktop "
+            "session, or write display: hidden to draw without a screen"
+        )
+    monitor = None if hidden or settings.screen is None else _monitor(settings.screen)
+    tried = [("p3headlessgl" if hidden else "pandagl", True)] * (settings.renderer == "auto")
+    for module, shaders in [*tried, ("p3tinydisplay", False)]:
+        engine = core.GraphicsEngine()
+        output = _output(engine, module, settings, title, monitor)
+        if output is None:
+            continue
+        gsg = output.get_gsg()
+        return Window(engine, output, shaders, gsg.driver_renderer or module)
+    raise DeviceError(
+        "nothing can draw here: neither OpenGL nor the software renderer could be opened; check "
+        f"that DISPLAY {os.environ.get('DISPLAY')!r} exists and may be used"
+    )
+
+
+def _output(
+    engine: Any, module: str, settings: ViewSettings, title: str, monitor: Monitor | None
+) -> Any:
+    selection = core.GraphicsPipeSelection.get_global_ptr()
+    hidden = settings.display == "hidden"
+    if module == "p3tinydisplay" and hidden:
+        pipe = selection.make_pipe("TinyOffscreenGraphicsPipe", module)
+    else:
+        pipe = selection.make_module_pipe(module)
+    if pipe is None or not pipe.is_valid():
+        return None
+    width, height = settings.size if monitor is None else monitor.size
+    window = core.WindowProperties(size=(width, height))
+    window.title = title
+    if monitor is not None:
+        window.origin = core.LPoint2i(*monitor.origin)
+        window.undecorated = True
+    form = core.FrameBufferProperties()
+    form.rgb_color = True
+    form.set_rgba_bits(8, 8, 8, 0)
+    form.depth_bits = 24
+    kind = core.GraphicsPipe.BF_refuse_window if hidden else core.GraphicsPipe.BF_require_window
+    output = engine.make_output(
+        pipe, title, 0, form, window, kind | core.GraphicsPipe.BF_fb_props_optional
+    )
+    if output is None:
+        return None
+    engine.open_windows()
+    engine.render_frame()
+    return output if output.is_valid() else None
+
+
+def _monitor(number: int) -> Monitor:
+    found = monitors()
+    if number < len(found):
+        return found[number]
+    known = ", ".join(f"{n} ({m.name}, {m.size[0]}x{m.size[1]})" for n, m in enumerate(found))
+    raise DeviceError(f"there is no screen {number}; there is {known}")
+
+
+def font(path: str | None) -> Any:
+    """Return the font in a file, or the renderer's own.
+
+    Raises
+    ------
+    DeviceError
+        There is no such font.
+    """
+    if path is None:
+        return core.TextNode.get_default_font()
+    if not Path(path).is_file():
+        raise DeviceError(f"there is no font file {path!r}; correct font: or leave it out")
+    loaded = core.FontPool.load_font(core.Filename.from_os_specific(path))
+    if loaded is None or not loaded.is_valid():
+        raise DeviceError(f"{path!r} cannot be read as a font; TrueType and OpenType can")
+    return loaded

@@ -1,0 +1,369 @@
+"""Who is given which feedback, what may be changed of it, and what its processes are told."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rehearsal import SHORT, ScriptedConsole, a_study, rehearse
+
+import labcrane
+from labcrane import (
+    Ball,
+    Beam,
+    DeviceError,
+    Event,
+    Feedback,
+    Layout,
+    ProtocolError,
+    Settings,
+    Signal,
+    Situation,
+    Targets,
+    offer,
+)
+from labcrane.console import Command, Order
+from labcrane.design.fading import faded
+from labcrane.feedback_crew import FeedbackCrew
+from labcrane.feedback_host import HostOrder, Part, Presenter
+from labcrane.feedback_preview import movement, write_preview
+from labcrane.plan import plan_session
+from labcrane.registry import Registry, discover
+from labcrane.scene import read_scene, write_scene
+from labcrane.session import Visit, run
+from labcrane.streams.context import situation_after
+from labcrane.study import Study
+from labcrane.testing import TARGETS, a_run, a_target, ch8
+
+FED = SHORT.replace(
+    "sessions:",
+    """feedback:
+  ball: {use: sphere}
+  tone: {use: sonification, far: 3.0}
+design:
+  groups: {none: [], visual: [ball], auditory: [tone], both: [ball, tone]}
+sessions:""",
+)
+
+
+def blocks(*written: str) -> str:
+    head, _, _ = FED.partition("      - block")
+    return head + "".join(f"      - block: {{task: aiming, {block}}}\n" for block in written)
+
+
+def given(study: Study, slot: int = 1) -> list[list[tuple[str, ...]]]:
+    plan = plan_session(study, f"P{slot:03}", 1, slot)
+    return [
+        [block.feedback[t.number] for t in block.trials if t.planned.counted]
+        for block in plan.blocks
+    ]
+
+
+# Who is given what
+
+
+@pytest.mark.parametrize(
+    ("count", "shares", "expected"),
+    [
+        (4, (1.0,), "1111"),
+        (4, (0.5,), "1010"),
+        (6, (0.3,), "100100"),
+        (12, (1.0, 0.5, 0.0), "111110100000"),
+        (5, (0.0,), "00000"),
+    ],
+)
+def test_feedback_fades_part_by_part(count: int, shares: tuple[float, ...], expected: str) -> None:
+    assert "".join(str(int(on)) for on in faded(count, shares)) == expected
+
+
+def test_a_block_says_what_is_switched_on(tmp_path: Path) -> None:
+    study = a_study(
+        tmp_path,
+        blocks("pairs: 1", "pairs: 1, feedback: none", "pairs: 1, feedback: [tone]"),
+    )
+    both = ("ball", "tone")
+    assert given(study) == [[both] * 2, [()] * 2, [("tone",)] * 2]
+
+
+def test_a_group_is_given_its_feedback(tmp_path: Path) -> None:
+    study = a_study(tmp_path, blocks("pairs: 1, feedback: group"))
+    got = {given(study, slot)[0][0] for slot in range(1, 5)}
+    assert got == {(), ("ball",), ("tone",), ("ball", "tone")}
+
+
+def test_a_fading_block_takes_feedback_away(tmp_path: Path) -> None:
+    study = a_study(tmp_path, blocks("fading: [1, 0.5, 0]", "feedback: none"))
+    trials = given(study)[0]
+    assert trials[0]
+    assert not trials[-1]
+
+
+def test_what_was_switched_on_is_in_the_trial_table(tmp_path: Path) -> None:
+    study = a_study(tmp_path, blocks("pairs: 1", "pairs: 1, feedback: none"))
+    visit = Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=True)
+    session = labcrane.open_recording(run(visit, ScriptedConsole())).session(1)
+    assert session.trials["feedback"].tolist() == ["ball+tone"] * 2 + ["none"] * 2
+    assert session.context["components"]["feedback.tone"]["settings"]["far"] == 3.0
+
+
+@pytest.mark.parametrize(
+    ("written", "complaint"),
+    [
+        (blocks("feedback: [bell]"), "there is no feedback 'bell'; there is ball, tone"),
+        (blocks("fading: [2]"), "must be less than or equal to 1"),
+        (FED.replace("[tone]", "[bell]"), "there is no feedback 'bell'; there is ball, tone"),
+        (FED.replace("sphere", "spere"), "'spere' is not installed"),
+        (FED.replace("far: 3.0", "fat: 3.0"), "did you mean 'far'"),
+        (FED + "views: {ball: {use: view}}\n", "'ball' is the name of a feedback already"),
+        (FED + "views: {v: {use: view, camera: moon}}\n", "there is no camera 'moon'; there is"),
+        (
+            SHORT.replace("pairs: 1", "feedback: group"),
+            "feedback is by group, but design has no groups",
+        ),
+    ],
+)
+def test_a_protocol_that_asks_for_the_impossible_is_refused(
+    written: str, complaint: str, tmp_path: Path
+) -> None:
+    with pytest.raises(ProtocolError, match=complaint):
+        a_study(tmp_path, written)
+
+
+# What the examiner changes
+
+
+def test_a_changed_setting_is_an_event(tmp_path: Path) -> None:
+    study = a_study(tmp_path, FED)
+    seen = rehearse(study, {5: [Command(Order.SETTING, "ball.at=tip")]})
+    (event,) = seen.events("feedback.setting")
+    assert event.data == {"feedback": "ball", "key": "at", "value": "tip"}
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("ball", "a setting is written name.key=value, not 'ball'"),
+        ("bell.far=1", "there is no feedback 'bell'; there is ball, tone"),
+        ("tone.fat=1", "tone has no setting 'fat'; it has far, "),
+        ("tone.far=-1", "tone.far cannot be -1: Input should be greater than 0"),
+        ("tone.far=[1, 2]", "tone.far can be changed to a single value, not '[1, 2]'"),
+    ],
+)
+def test_a_setting_that_cannot_be_is_refused(text: str, why: str, tmp_path: Path) -> None:
+    seen = rehearse(a_study(tmp_path, FED), {5: [Command(Order.SETTING, text)]})
+    (order,) = seen.events("order.setting")
+    assert str(order.data["refused"]).startswith(why)
+    assert not seen.events("feedback.setting")
+
+
+# What happens when a process fails
+
+
+def test_a_failed_process_pauses_the_session_if_the_protocol_says_so(tmp_path: Path) -> None:
+    orders = {
+        50: [Command(Order.FAILED, "tone: it hangs")],
+        90: [Command(Order.MENDED, "tone: driver jack")],
+    }
+    pausing = FED + "on_fault: {feedback_lost: pause}\n"
+    seen = rehearse(a_study(tmp_path, pausing), orders)
+    (lost,) = seen.events("feedback.lost")
+    assert lost.data == {"what": "tone", "why": "it hangs"}
+    (ready,) = seen.events("feedback.ready")
+    assert ready.data == {"what": "tone", "facts": "driver jack"}
+    assert [frame.paused for frame in seen.frames[48:92]].count(True) == 40
+    calm = rehearse(a_study(tmp_path, FED), orders)
+    assert not any(frame.paused for frame in calm.frames)
+
+
+def test_feedback_that_cannot_start_refuses_the_session_or_is_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    viewed = SHORT + "views: {window: {use: view}}\n"
+    for policy in ("restart", "continue"):
+        study = a_study(tmp_path, viewed + f"on_fault: {{feedback_lost: {policy}}}\n")
+        crew = FeedbackCrew(Visit(study, "P001", 1, tmp_path, simulated=True))
+        said: list[str] = []
+        try:
+            if policy == "restart":
+                with pytest.raises(
+                    DeviceError,
+                    match="feedback 'window' cannot be started: there is no display for a window",
+                ):
+                    crew.wait(said.append, lambda: False)
+            else:
+                assert crew.wait(said.append, lambda: False)
+                assert "there is no display" in said[0]
+                assert said[0].endswith("it is left out")
+        finally:
+            crew.stop()
+
+
+# What feedback processes are told
+
+
+def test_a_scene_comes_through_as_it_was() -> None:
+    a = replace(a_run(ch8(), task=TARGETS), bodies=())
+    b = read_scene(write_scene(a))
+    assert (a.machine, a.rate_hz, a.axes, a.command, a.state, a.task, a.bodies) == (
+        *(b.machine, b.rate_hz, b.axes, b.command, b.state, b.task, b.bodies),
+    )
+    with pytest.raises(labcrane.PluginError, match="feedback was asked to steer"):
+        b.steer(np.zeros(3), np.zeros(3))
+
+
+def test_the_situation_follows_from_events() -> None:
+    now = Situation(trials=2)
+    events = [
+        Event("step.start", 1.0, {"step": 1, "kind": "block"}),
+        Event("block.start", 1.0, {"block": 1, "block_name": "a", "practice": False}),
+        Event("trial.start", 1.0, {"trial": 1, "feedback": "ball+tone"}),
+        Event("feedback.setting", 2.0, {"feedback": "ball", "key": "far", "value": 2.0}),
+    ]
+    for event in events:
+        now = situation_after(now, event)
+    assert (now.step, now.block_name, now.trial, now.active) == (1, "a", 1, ("ball", "tone"))
+    assert now.settings == {"ball": {"far": 2.0}}
+    after = situation_after(now, Event("trial.end", 3.0, {}))
+    assert (after.trial, after.active, after.settings) == (0, (), now.settings)
+
+
+def test_targets_are_found_among_a_tasks_signals() -> None:
+    task = Layout("the task", (*TARGETS, Signal("cost", "1")))
+    found = list(Targets(task).find(np.array([1.0, 2.0, 3.0, 0.5, 4.0, 5.0, 6.0, 9.0])))
+    assert [(ball.name, ball.centre, ball.radius) for ball in found] == [
+        ("target", (1.0, 2.0, 3.0), 0.5),
+        ("other", (4.0, 5.0, 6.0), 0.5),
+    ]
+    assert not list(Targets(task).find(np.full(8, np.nan)))
+
+
+class Plain(Settings):
+    """No settings."""
+
+    gain: float = 1.0
+    """Multiplies what is presented."""
+
+
+class Notebook(Feedback):
+    """Writes down what it is given."""
+
+    signals = (Signal("gained", "1"),)
+    rested = 0
+
+    def __init__(self, settings: Plain) -> None:
+        self.gain = settings.gain
+        self.shapes: list[Ball | Beam] = []
+
+    def present(self, frame: labcrane.Frame) -> labcrane.FloatArray:
+        self.shapes = list(frame.shapes)
+        return np.array([self.gain])
+
+    def rest(self) -> None:
+        self.rested += 1
+
+
+def presenter(*, always: bool) -> Presenter:
+    found = discover()
+    book = offer("notebook", Plain, lambda settings, machine: Notebook(settings))
+    registry = Registry({**found.offers, Feedback: {"notebook": book}}, found.plugins, {})
+    order = HostOrder(
+        "book",
+        Part("notebook", {}),
+        a_run(ch8(), task=TARGETS),
+        "test",
+        always=always,
+        cues={"ball": Part("sphere", {"at": "tip"})},
+    )
+    again = HostOrder.from_json(order.as_json())
+    assert json.loads(again.as_json()) == json.loads(order.as_json())
+    made = Presenter(again, registry)
+    made.open()
+    return made
+
+
+def test_a_cue_is_drawn_only_while_it_is_switched_on() -> None:
+    made = presenter(always=True)
+    frame = a_target(a_run(ch8(), task=TARGETS))
+    off = made.present(frame)
+    assert off is not None
+    assert not made.feedback.shapes
+    assert np.isnan(off[1:]).all()
+    made.hear(Situation(trial=1, active=("ball",)))
+    on = made.present(frame)
+    assert [shape.name for shape in made.feedback.shapes] == ["sphere"]
+    assert on is not None
+    assert made.layout.columns[1:] == tuple(
+        f"cue.ball.{name}" for name in ("distance", "radius", "brightness")
+    )
+    assert np.isfinite(on).all()
+
+
+def test_a_sound_rests_once_when_it_is_switched_off() -> None:
+    made = presenter(always=False)
+    frame = a_target(a_run(ch8(), task=TARGETS))
+    assert made.present(frame) is None
+    made.hear(Situation(trial=1, active=("book",)))
+    assert made.present(frame) is not None
+    made.hear(Situation())
+    for _ in range(3):
+        assert made.present(frame) is None
+    assert made.feedback.rested == 1
+
+
+def test_a_changed_setting_takes_effect() -> None:
+    made = presenter(always=True)
+    frame = a_target(a_run(ch8(), task=TARGETS))
+    tip = Situation(trial=1, active=("ball",))
+    made.hear(tip)
+    made.present(frame)
+    np.testing.assert_array_equal(made.feedback.shapes[0].centre, frame.state[8:11])
+    made.hear(replace(tip, settings={"ball": {"at": "target"}, "book": {"gain": 3.0}}))
+    values = made.present(frame)
+    assert values is not None
+    assert values[0] == 3.0
+    np.testing.assert_array_equal(made.feedback.shapes[0].centre, frame.task[:3])
+
+
+# Previews
+
+PREVIEWED = FED.replace("distances: [2]", "distances: [2], limit_s: 1") + (
+    "views: {operator: {use: view, renderer: software, size: [160, 90]}}\n"
+)
+
+
+def test_a_preview_has_pictures_and_sound_of_a_movement(tmp_path: Path) -> None:
+    import wave
+
+    study = a_study(tmp_path, PREVIEWED)
+    files = write_preview(study, tmp_path / "out")
+    pictures = [path for path in files if path.suffix == ".png"]
+    assert len(pictures) == 3  # one each half second of a movement that ends after one
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in pictures)
+    (sound,) = (path for path in files if path.suffix == ".wav")
+    with wave.open(str(sound)) as file:
+        assert file.getframerate() == 48000
+        assert file.getnframes() == pytest.approx(48000, rel=0.02)
+        samples = np.frombuffer(file.readframes(48000), "<i2")
+    assert np.abs(samples).max() > 1000
+
+
+def test_a_preview_shows_a_recorded_trial(tmp_path: Path) -> None:
+    study = a_study(tmp_path, PREVIEWED)
+    visit = Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=True)
+    path = run(visit, ScriptedConsole())
+    assert write_preview(study, tmp_path / "out", path, trial=3)
+    session = labcrane.open_recording(path).session(1)
+    frames = movement(session, 3)
+    rows = session.streams["loop"].data["trial"] == 3
+    np.testing.assert_array_equal(
+        [frame.state for frame in frames], session.streams["state"].data[rows]
+    )
+    with pytest.raises(ProtocolError, match="there is no trial 99 in the recording; there is 2, 3"):
+        movement(session, 99)
+
+
+def test_a_study_without_feedback_has_no_preview(tmp_path: Path) -> None:
+    with pytest.raises(ProtocolError, match="has neither views nor sounds; add views: or feedba"):
+        write_preview(a_study(tmp_path), tmp_path / "out")

@@ -1,0 +1,296 @@
+"""The tone: its laws against closed forms, and the sound itself against a spectrum."""
+
+import math
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from labcrane import Feedback, Frame
+from labcrane.testing import TARGETS, FeedbackContract, a_run, a_target, ch8
+from labcrane_sonification.settings import SonificationSettings
+from labcrane_sonification.sonification import Sonification
+from labcrane_sonification.synth import Synth, offline_server
+from labcrane_sonification.tone import Tone, gains, tone
+
+RATE = 48000
+BLOCKS = (64, 128, 256, 512, 1024)
+RUN = a_run(ch8(), task=TARGETS)
+
+
+class TestSonification(FeedbackContract):
+    """Offered as "sonification"."""
+
+    @pytest.fixture
+    def feedback(self) -> Feedback:
+        return Sonification(SonificationSettings(), offline_server)
+
+
+@contextmanager
+def a_synth(**settings: object) -> Iterator[Synth]:
+    made = SonificationSettings(**settings)
+    synth = Synth(offline_server(made), made)
+    try:
+        yield synth
+    finally:
+        synth.close()
+
+
+def blocks(synth: Synth, seconds: float) -> np.ndarray:
+    count = round(seconds * RATE / synth.server.getBufferSize())
+    return np.concatenate([synth.block() for _ in range(count)])
+
+
+def pitch_of(sound: np.ndarray) -> float:
+    """Return the frequency in Hz of the strongest partial, between the bins of a spectrum."""
+    spectrum = np.abs(np.fft.rfft(sound * np.hanning(len(sound)), 1 << 20))
+    peak = int(spectrum.argmax())
+    a, b, c = np.log(spectrum[peak - 1 : peak + 2])
+    return (peak + 0.5 * (a - c) / (a - 2 * b + c)) * RATE / (1 << 20)
+
+
+def test_pitch_rises_by_equal_intervals_as_the_tip_comes_closer() -> None:
+    settings = SonificationSettings(far=4.0, pitch_hz=(220.0, 880.0))
+    pitches = [tone(settings, distance, 0.0, 0.0).pitch for distance in (9, 4, 3, 2, 1, 0)]
+    np.testing.assert_allclose(pitches, 220 * 2 ** np.array([0, 0, 0.5, 1, 1.5, 2]))
+
+
+def test_exchanged_pitches_are_the_other_polarity() -> None:
+    settings = SonificationSettings(far=4.0, pitch_hz=(880.0, 220.0))
+    assert tone(settings, 4.0, 0.0, 0.0).pitch == 880.0
+    assert tone(settings, 0.0, 0.0, 0.0).pitch == pytest.approx(220.0)
+
+
+def test_overtones_and_level_go_from_far_to_near() -> None:
+    settings = SonificationSettings(far=5.0, overtones=(0, 5), level=(0.1, 0.6))
+    tones = [tone(settings, float(distance), 0.0, 0.0) for distance in range(6)]
+    assert [t.overtones for t in tones] == [5, 4, 3, 2, 1, 0]
+    np.testing.assert_allclose([t.level for t in tones], [0.6, 0.5, 0.4, 0.3, 0.2, 0.1])
+
+
+@pytest.mark.parametrize(("pan", "sign"), [("towards", -1.0), ("away", 1.0), ("none", 0.0)])
+def test_a_target_to_the_left_sounds_from_its_side(pan: str, sign: float) -> None:
+    settings = SonificationSettings(pan=pan, aside=2.0)
+    assert tone(settings, 3.0, 1.0, 0.0).pan == 0.5 * sign
+    assert tone(settings, 3.0, 5.0, 0.0).pan == sign
+
+
+def test_panning_keeps_the_power() -> None:
+    for pan in np.linspace(-1, 1, 9):
+        left, right = gains(pan)
+        assert left**2 + right**2 == pytest.approx(1.0)
+    assert gains(-1.0)[1] == pytest.approx(0.0)
+    assert gains(1.0)[0] == pytest.approx(0.0)
+
+
+def test_it_falls_silent_after_a_while_inside_the_target() -> None:
+    settings = SonificationSettings(silent_after_s=0.3)
+    assert tone(settings, 0.1, 0.0, 0.29).level > 0
+    assert tone(settings, 0.1, 0.0, 0.30).level == 0
+    assert tone(SonificationSettings(silent_after_s=None), 0.1, 0.0, 9.0).level > 0
+
+
+def inside(number: int, *, away: float = 0.1) -> Frame:
+    frame = a_target(RUN, number)
+    frame.task[:3] = frame.state[8:11] + np.array((away, 0.0, 0.0))
+    return frame
+
+
+def test_the_time_inside_counts_from_the_last_entry() -> None:
+    sonification = Sonification(SonificationSettings(silent_after_s=0.3), offline_server)
+    sonification.open(RUN)
+    try:
+        levels = [sonification.present(inside(number))[2] for number in (0, 60, 72, 84)]
+        assert [level > 0 for level in levels] == [True, True, False, False]
+        assert sonification.present(inside(90, away=1.0))[2] > 0
+        assert sonification.present(inside(100))[2] > 0
+    finally:
+        sonification.close()
+
+
+def test_a_paused_session_is_silent() -> None:
+    sonification = Sonification(SonificationSettings(), offline_server)
+    sonification.open(RUN)
+    try:
+        frame = a_target(RUN)
+        assert sonification.present(frame)[2] > 0
+        frame.paused = True
+        assert sonification.present(frame)[2] == 0
+    finally:
+        sonification.close()
+
+
+@pytest.mark.parametrize("block", BLOCKS)
+def test_the_sound_has_the_pitch_of_the_law_within_five_cents(block: int) -> None:
+    settings = SonificationSettings(block=block)
+    with a_synth(block=block) as synth:
+        for distance in (3.5, 1.3, 0.0):
+            wanted = tone(settings, distance, 0.0, 0.0)
+            synth.sound(wanted)
+            blocks(synth, 0.1)
+            heard = pitch_of(blocks(synth, 0.5)[:, 0])
+            assert abs(1200 * math.log2(heard / wanted.pitch)) < 5.0
+
+
+def test_partials_have_the_levels_of_the_law() -> None:
+    with a_synth() as synth:
+        synth.sound(Tone(pitch=480.0, overtones=3.0, level=0.2, pan=-1.0))
+        blocks(synth, 0.1)
+        sound = blocks(synth, 0.8)  # whole periods
+    count = len(sound)
+    spectrum = np.abs(np.fft.rfft(sound[:, 0] * np.hanning(count))) / count * 4
+    peaks = [spectrum[round(480 * n * count / RATE) + np.arange(-3, 4)].max() for n in range(1, 6)]
+    np.testing.assert_allclose(peaks[:4], 0.2 / np.arange(1, 5), rtol=0.03)
+    assert peaks[4] < 1e-4
+    assert np.abs(sound[:, 1]).max() < 1e-4  # panned to the left
+
+
+@pytest.mark.parametrize("block", BLOCKS)
+def test_a_change_is_heard_from_the_next_block_on(block: int) -> None:
+    with a_synth(block=block, ramp_s=0.0) as synth:
+        assert not synth.block().any()
+        synth.sound(Tone(pitch=1000.0, overtones=0.0, level=0.5, pan=0.0))
+        assert np.abs(synth.block()[1:]).max() > 0.1
+
+
+def test_a_ramped_change_does_not_click() -> None:
+    # A click is a jump: a jump of the signal's slope beyond what its partials themselves have.
+    wanted = Tone(pitch=300.0, overtones=0.0, level=0.5, pan=0.0)
+    largest = {}
+    for ramp in (0.0, 0.015):
+        with a_synth(ramp_s=ramp, overtones=(0, 0)) as synth:
+            synth.sound(wanted)
+            before = blocks(synth, 0.2)
+            synth.silence()
+            after = blocks(synth, 0.05)
+        steps = np.abs(np.diff(np.concatenate([before[2000:], after])[:, 0]))
+        largest[ramp] = steps.max() / (2 * math.pi * 300 / RATE * 0.5 * math.sqrt(0.5))
+    assert largest[0.015] < 1.1
+    assert largest[0.0] > 3.0
+
+
+@pytest.mark.parametrize("block", BLOCKS)
+def test_offline_rendering_is_fifty_times_faster_than_real_time(block: int) -> None:
+    settings = SonificationSettings(block=block)
+    with a_synth(block=block) as synth:
+        best = 0.0
+        for _ in range(5):  # other programs may hold the processor for a while
+            began = time.process_time()
+            for number in range(2 * RATE // block):
+                synth.sound(tone(settings, 4.0 - 0.001 * number, 0.1, 0.0))
+                synth.block()
+            best = max(best, 2.0 / (time.process_time() - began))
+    assert best > 50.0
+
+
+def test_impossible_settings_are_refused() -> None:
+    with pytest.raises(ValidationError, match="level must be 0 to 1, but is 0, 2"):
+        SonificationSettings(level=(0.0, 2.0))
+    with pytest.raises(ValidationError, match="overtones must be 0 to 15, but are 0, 99"):
+        SonificationSettings(overtones=(0, 99))
+
+
+NO_DEVICE = """
+from labcrane import DeviceError
+from labcrane_sonification.settings import SonificationSettings
+from labcrane_sonification.synth import server
+try:
+    server(SonificationSettings(driver={driver!r}, device={device!r}))
+except DeviceError as error:
+    print(error)
+"""
+
+
+def refusal(driver: str = "portaudio", device: int | None = None, **env: str) -> str:
+    """Return what is said when a sound server is asked for in a process of its own."""
+    done = subprocess.run(
+        [sys.executable, "-c", NO_DEVICE.format(driver=driver, device=device)],
+        env={**os.environ, "JACK_DEFAULT_SERVER": "nobody", **env},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr  # pyo itself would end with a segmentation fault
+    return done.stdout
+
+
+def test_a_computer_without_sound_is_told_so() -> None:
+    said = refusal()
+    if not said and not os.environ.get("CI"):
+        pytest.skip("this computer has a sound device")
+    assert said.startswith("there is no sound output device; connect one, use driver: jack, or")
+
+
+def null_device(folder: Path) -> str:
+    """Return an ALSA configuration whose only device takes everything and sounds nothing."""
+    config = folder / "asoundrc"
+    config.write_text("pcm.!default { type null }\nctl.!default { type null }\n")
+    return str(config)
+
+
+def test_an_unknown_device_is_refused(tmp_path: Path) -> None:
+    said = refusal(device=99, ALSA_CONFIG_PATH=null_device(tmp_path))
+    assert "there is no sound output device 99; there is " in said
+
+
+def test_a_missing_jack_server_is_told_so() -> None:
+    assert "in blocks of 256 samples; start a JACK server first" in refusal(driver="jack")
+
+
+ATTEMPTS = 3
+"""Other programs on this computer can make a sound server late; a fault of ours is there always."""
+
+
+@contextmanager
+def a_jack_server(folder: Path) -> Iterator[tuple[str, Path]]:
+    """Start a JACK server without hardware, in real time; give its name and its log."""
+    name, log = f"labcrane-{os.getpid()}", folder / "jack.log"
+    driver = ["-d", "dummy", "-r", str(RATE), "-p", "1024"]
+    with log.open("w") as file:
+        server = subprocess.Popen(
+            ["jackd", "-n", name, "--no-realtime", *driver], stdout=file, stderr=file
+        )
+        try:
+            waiting = ["jack_wait", "-s", name, "-w", "-t", "20"]
+            subprocess.run(waiting, capture_output=True, check=True)
+            yield name, log
+        finally:
+            server.terminate()
+            server.wait()
+
+
+def underruns(folder: Path, seconds: float) -> list[str]:
+    """Play a moving tone in real time; return what the server's log says of blocks that it missed.
+
+    What the log says of the stand-in for hardware, which is late by microseconds, is left out.
+    """
+    with a_jack_server(folder) as (name, log):
+        program = Path(__file__).with_name("play_tone.py")
+        done = subprocess.run(
+            [sys.executable, str(program), str(seconds)],
+            env={**os.environ, "JACK_DEFAULT_SERVER": name},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    assert done.returncode == 0, done.stderr
+    played, changes = (float(word) for word in done.stdout.split()[-2:])
+    assert played == pytest.approx(seconds * RATE, rel=0.05)
+    assert changes > 50 * seconds
+    return [line for line in log.read_text().splitlines() if "was not finished" in line]
+
+
+@pytest.mark.skipif(
+    shutil.which("jackd") is None and not os.environ.get("CI"), reason="needs jackd"
+)
+def test_real_time_sound_runs_for_a_minute_without_an_underrun(tmp_path: Path) -> None:
+    seconds = 60.0 if os.environ.get("CI") else 5.0
+    assert any(not underruns(tmp_path, seconds) for _ in range(ATTEMPTS))

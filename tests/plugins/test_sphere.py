@@ -1,0 +1,66 @@
+"""The sphere's laws, against closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as some
+from pydantic import ValidationError
+
+from labcrane import Cue
+from labcrane.testing import TARGETS, CueContract, a_run, a_target, ch8
+from labcrane_sphere.sphere import Sphere, SphereSettings
+
+
+class TestSphere(CueContract):
+    """Offered as "sphere"."""
+
+    @pytest.fixture
+    def cue(self) -> Cue:
+        return Sphere(SphereSettings())
+
+
+def test_size_and_brightness_change_evenly_with_distance() -> None:
+    sphere = Sphere(SphereSettings(far=4.0, smallest=0.1, largest=0.5, darkest=0.2))
+    looks = [sphere.look(distance) for distance in (0.0, 1.0, 2.0, 4.0)]
+    np.testing.assert_allclose(looks, [(0.1, 1.0), (0.2, 0.8), (0.3, 0.6), (0.5, 0.2)])
+
+
+def test_beyond_far_nothing_changes() -> None:
+    sphere = Sphere(SphereSettings(far=4.0))
+    assert sphere.look(4.0) == sphere.look(40.0)
+
+
+def test_the_logarithmic_law_changes_most_near_the_target() -> None:
+    sphere = Sphere(SphereSettings(far=4.0, law="log", smallest=0.2, largest=1.2))
+    radii = [sphere.look(distance)[0] - 0.2 for distance in (0.0, 0.4, 4.0)]
+    np.testing.assert_allclose(radii, [0.0, math.log10(1.9), 1.0])
+
+
+@given(some.floats(0.0, 10.0))
+def test_the_other_polarity_is_the_mirror_image(distance: float) -> None:
+    one = Sphere(SphereSettings())
+    other = Sphere(SphereSettings(polarity="grows", brightness="darkens"))
+    sums = np.add(one.look(distance), other.look(distance))
+    np.testing.assert_allclose(sums, [0.15 + 0.60, 0.25 + 1.0])
+
+
+@pytest.mark.parametrize("at", ["tip", "target"])
+def test_it_is_drawn_where_it_should_be(at: str) -> None:
+    run = a_run(ch8(), task=TARGETS)
+    sphere = Sphere(SphereSettings(at=at))
+    sphere.open(run)
+    frame = a_target(run)
+    place = {"tip": frame.state[run.state.find("tip.position")], "target": frame.task[:3]}[at]
+    (ball,) = sphere.draw(frame)
+    np.testing.assert_array_equal(ball.centre, place)
+    distance, radius, brightness = sphere.values(frame)
+    assert distance == pytest.approx(math.dist(frame.task[:3], frame.state[8:11]))
+    assert ball.radius == radius
+    np.testing.assert_allclose(ball.colour[:3], brightness * np.array((0.15, 0.75, 1.0)))
+
+
+def test_sizes_the_wrong_way_round_are_refused() -> None:
+    with pytest.raises(ValidationError, match="smallest is 2 m and largest 1 m; exchange them"):
+        SphereSettings(smallest=2.0, largest=1.0)
