@@ -11,13 +11,14 @@ from labcrane.errors import DeviceError, LabcraneError, PluginError, ProtocolErr
 from labcrane.hookspecs import hookimpl
 from labcrane.kinematics import Arm, frames, jacobian
 from labcrane.machine import Body, Joint, Machine
-from labcrane.offers import Offer, Settings, offer
+from labcrane.offers import CommandOffer, Offer, Settings, StudyPath, offer
 from labcrane.reach import reach
 from labcrane.recording.recording import SessionRecord, Stream, open_recording
 from labcrane.recording.stream_header import Channel, StreamHeader
 from labcrane.recording.xdf import XdfWriter
 from labcrane.records import Event, Frame, Judgement, Phase, Planned, Run, Trial, Value
 from labcrane.roles import Controller, Dynamics, Exporter, InputDevice, Task
+from labcrane.scene import Placed, Scene, Shape, load_scene, place
 from labcrane.signals import FloatArray, Layout, Signal
 
 __version__ = "0.1.0"
@@ -29,6 +30,7 @@ __all__ = [
     "Arm",
     "Body",
     "Channel",
+    "CommandOffer",
     "Controller",
     "DeviceError",
     "Dynamics",
@@ -45,16 +47,20 @@ __all__ = [
     "Offer",
     "Participant",
     "Phase",
+    "Placed",
     "Planned",
     "PluginError",
     "ProtocolError",
     "RecordingError",
     "Run",
+    "Scene",
     "SessionRecord",
     "Settings",
+    "Shape",
     "Signal",
     "Stream",
     "StreamHeader",
+    "StudyPath",
     "Task",
     "Tick",
     "Trial",
@@ -63,7 +69,9 @@ __all__ = [
     "frames",
     "hookimpl",
     "jacobian",
+    "load_scene",
     "offer",
     "open_recording",
+    "place",
     "reach",
 ]

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import pluggy
 
-from labcrane.offers import Offer
+from labcrane.offers import CommandOffer, Offer
 from labcrane.roles import Controller, Dynamics, Exporter, InputDevice, Task
 
 PROJECT = "labcrane"
@@ -45,4 +45,10 @@ def labcrane_tasks() -> Sequence[Offer[Task]]:
 @hookspec
 def labcrane_exporters() -> Sequence[Offer[Exporter]]:
     """Offer formats into which recordings can be exported."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_commands() -> Sequence[CommandOffer]:
+    """Offer commands of the command line."""
     raise NotImplementedError

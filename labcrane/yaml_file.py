@@ -89,7 +89,7 @@ class YamlFile:
             self.problem(place, f"{_name(place)} must be a mapping of keys, but is {value!r}")
             return None
         try:
-            return model.model_validate(value)
+            return model.model_validate(value, context={"folder": self.path.parent})
         except ValidationError as error:
             for each in error.errors():
                 self.problem((*place, *_inside(value, each)), explain(each, place, model))

@@ -9,7 +9,16 @@ from collections.abc import Sequence
 import typer
 from rich.console import Console
 
-from labcrane.cli import approval, inspect, people, recording, results, running, upkeep
+from labcrane.cli import (
+    approval,
+    extension,
+    inspect,
+    people,
+    recording,
+    results,
+    running,
+    upkeep,
+)
 from labcrane.errors import LabcraneError, ProtocolError
 
 app = typer.Typer(
@@ -51,6 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit status: 2 for what cannot be run as written."""
     before = os.umask(PRIVATE)
     try:
+        extension.extend(app)
         app(args=None if arguments is None else list(arguments))
     except SystemExit as leaving:
         return leaving.code if isinstance(leaving.code, int) else 0
