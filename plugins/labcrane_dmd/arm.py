@@ -101,7 +101,10 @@ class DmdArm(Dynamics):
             drive.speed(signal, angle)
             for drive, signal, angle in zip(self._drives, signals, self._pose, strict=True)
         ]
+        stopped = self._stop_at_ends(speeds)
         angles, moved, loads = world.step(speeds)
+        for joint, push in stopped:
+            loads[joint] = push
         over = [
             0
             if joint == self._press
@@ -139,6 +142,22 @@ class DmdArm(Dynamics):
 
     def close(self) -> None:
         self._disconnect()
+
+    def _stop_at_ends(self, speeds: list[float]) -> list[tuple[int, float]]:
+        """Keep joints within their ranges; return those that are driven against an end, and where.
+
+        A cylinder at its end is held by its own housing, and its valve works against the relief:
+        full load, whatever hangs on the joint. The engine's own limits give way (bullet3 #2944).
+        """
+        found = []
+        for joint, (lowest, highest) in enumerate(self._machine.limits):
+            angle, speed = self._pose[joint], speeds[joint]
+            ahead = angle + speed * self._dt
+            if speed > 0.0 and ahead > highest or speed < 0.0 and ahead < lowest:
+                found.append((joint, 1.0 if speed > 0.0 else -1.0))
+            if not lowest <= ahead <= highest:
+                speeds[joint] = ((highest if ahead > highest else lowest) - angle) / self._dt
+        return found
 
     def _standing(self) -> tuple[Placed, ...]:
         if self._trial is None or not self._scenes:

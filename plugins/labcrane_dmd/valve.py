@@ -62,15 +62,29 @@ class Valve(Controller):
         columns = np.array(self._arm.planar_jacobian(angles)).T
         radius = -columns[1, 0]
         slew = (cos * y - sin * x) * radius / (radius**2 + DAMPING_M**2)
-        damped = columns @ columns.T + DAMPING_M**2 * np.eye(2)
-        pitch = columns.T @ np.linalg.solve(damped, np.array([cos * x + sin * y, z]))
-        speeds = [float(slew), *pitch.tolist()]
+        wanted = np.array([cos * x + sin * y, z])
+        free = np.ones(columns.shape[1])
+        for _ in free:  # each pass leaves out the joints that would be driven against an end
+            weighted = columns * free
+            damped = weighted @ columns.T + DAMPING_M**2 * np.eye(2)
+            pitch = weighted.T @ np.linalg.solve(damped, wanted)
+            blocked = self._blocked(angles, pitch)
+            if not (blocked & (free > 0.0)).any():
+                break
+            free[blocked] = 0.0
+        speeds = [float(slew), *(free * pitch).tolist()]
         shares = [self._share(joint, speed, angles[joint]) for joint, speed in enumerate(speeds)]
         most = max(1.0, *map(abs, shares))
         axes = np.zeros(self._n_axes)
         for (index, sign), share in zip(self._axes, shares, strict=True):
             axes[index] = sign * share / most
         return axes
+
+    def _blocked(self, angles: list[float], pitch: FloatArray) -> np.ndarray:
+        """Return which pitch joints would be driven against the end of their range."""
+        low, high = np.array(self._machine.limits[1:]).T
+        at = np.array(angles[1:])
+        return ((at < low + END_RAD) & (pitch < 0.0)) | ((at > high - END_RAD) & (pitch > 0.0))
 
     def _share(self, joint: int, speed: float, angle: float) -> float:
         """Return the share of full signal for a joint speed; beyond 1 when that is not enough."""
@@ -95,6 +109,10 @@ class Valve(Controller):
 
 STILL = 1e-3
 """Joint speed in rad/s below which a hand does not push through the dead band."""
+
+
+END_RAD = 0.01
+"""A practised hand stops a joint this far from its end."""
 
 
 def _model(settings: ValveSettings) -> Model | None:
