@@ -62,8 +62,8 @@ LIMBS: dict[str, tuple[str | None, float, float, Point]] = {
 x goes from the chest to the feet."""
 
 TRUNK = (
-    Part("head", Shape.SPHERE, (0.20, 0.20, 0.20), (-0.46, 0.0, 0.0), 0.0),
     Part("torso", Shape.BOX, (0.55, 0.36, 0.22), (0.0, 0.0, 0.0), 0.0),
+    Part("head", Shape.SPHERE, (0.20, 0.20, 0.20), (-0.46, 0.0, 0.0), 0.0),
     Part("pelvis", Shape.BOX, (0.22, 0.34, 0.20), (0.40, 0.0, 0.0), 0.0),
 )
 
