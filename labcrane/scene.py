@@ -174,7 +174,9 @@ def load_scene(path: Path) -> Scene:
     """
     source = YamlFile.read(path)
     if not isinstance(source.data, dict):
-        raise ProtocolError(f"{path}: a scene is a mapping of keys, beginning with labcrane_scene: 1")
+        raise ProtocolError(
+            f"{path}: a scene is a mapping of keys, beginning with labcrane_scene: 1"
+        )
     scene = source.check(Scene)
     if scene is not None:
         for name, thing in scene.things.items():

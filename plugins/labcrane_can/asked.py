@@ -149,6 +149,8 @@ def _from_dbc(settings: ValveMap) -> "dict[int, tuple[Message, dict[str, str]]]"
             known = ", ".join(
                 f"{each.name}.{one.name}" for each in messages.values() for one in each.signals
             )
-            raise ProtocolError(f"{settings.map} has no {name!r} for joint {joint!r}; it has {known}")
+            raise ProtocolError(
+                f"{settings.map} has no {name!r} for joint {joint!r}; it has {known}"
+            )
         found.setdefault(message.frame_id, (message, {}))[1][signal] = joint
     return found

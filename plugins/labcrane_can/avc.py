@@ -107,9 +107,7 @@ def encode_flow(kind: int, valve: int, percent: float, node: int) -> tuple[int, 
     whole = max(-FLOW_OFFSET, min(FLOW_OFFSET, round(percent)))
     extend, retract = max(whole, 0), max(-whole, 0)
     state = State.EXTEND if whole > 0 else State.RETRACT if whole < 0 else State.BLOCK
-    data = bytes(
-        [extend + FLOW_OFFSET, retract + FLOW_OFFSET, 0x30 | state, *(NOT_AVAILABLE,) * 5]
-    )
+    data = bytes([extend + FLOW_OFFSET, retract + FLOW_OFFSET, 0x30 | state, *(NOT_AVAILABLE,) * 5])
     return _identifier(kind + valve, node, PRIORITY), data
 
 

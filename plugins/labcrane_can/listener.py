@@ -126,7 +126,7 @@ def open_bus(settings: CanSettings) -> "can.BusABC":
         options |= {"host": host or "127.0.0.1", "port": int(port or 29536)}
     try:
         return can.Bus(interface=interface, channel=channel, bitrate=settings.bitrate, **options)
-    except Exception as error:  # noqa: BLE001 - every backend fails in its own way
+    except Exception as error:
         raise DeviceError(
             f"bus {settings.bus!r} cannot be opened: {error}; plug the adapter in, and check name "
             "and permissions"

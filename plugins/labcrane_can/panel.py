@@ -4,7 +4,17 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labcrane import FloatArray, Frame, InputDevice, Machine, ProtocolError, Run, Signal, Tick, Value
+from labcrane import (
+    FloatArray,
+    Frame,
+    InputDevice,
+    Machine,
+    ProtocolError,
+    Run,
+    Signal,
+    Tick,
+    Value,
+)
 from labcrane_can.asked import PanelCommands
 from labcrane_can.avc import ESTIMATED, FULL, MEASURED, encode_flow
 from labcrane_can.listener import Listener

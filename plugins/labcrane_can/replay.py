@@ -4,11 +4,24 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labcrane import FloatArray, Frame, InputDevice, Machine, ProtocolError, Run, Signal, Tick, Value
+from labcrane import (
+    FloatArray,
+    Frame,
+    InputDevice,
+    Machine,
+    ProtocolError,
+    Run,
+    Signal,
+    Tick,
+    Value,
+)
 from labcrane_can.asked import PanelCommands
 from labcrane_can.avc import FULL
 from labcrane_can.panel import panel_signals
 from labcrane_can.settings import ReplaySettings
+
+MICROSECONDS = 6
+"""Digits of a time that all formats keep; what follows differs between them."""
 
 
 class CanReplay(InputDevice):
@@ -44,7 +57,7 @@ class CanReplay(InputDevice):
         now = tick.number / self._rate_hz
         while self._next < len(self._frames):
             frame = self._frames[self._next]
-            at = frame.timestamp - self._start
+            at = round(frame.timestamp - self._start, MICROSECONDS)
             if at > now:
                 break
             self._commands.take(frame, at)

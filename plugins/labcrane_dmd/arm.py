@@ -153,7 +153,7 @@ class DmdArm(Dynamics):
         for joint, (lowest, highest) in enumerate(self._machine.limits):
             angle, speed = self._pose[joint], speeds[joint]
             ahead = angle + speed * self._dt
-            if speed > 0.0 and ahead > highest or speed < 0.0 and ahead < lowest:
+            if (speed > 0.0 and ahead > highest) or (speed < 0.0 and ahead < lowest):
                 found.append((joint, 1.0 if speed > 0.0 else -1.0))
             if not lowest <= ahead <= highest:
                 speeds[joint] = ((highest if ahead > highest else lowest) - angle) / self._dt

@@ -53,7 +53,7 @@ class SegmentDrive:
         return math.copysign(min(size, FULL), opening)
 
 
-SHUT = 1e-3
+SHUT = 0.25
 """Opening, in steps of 0.4 %, that is none: a lag never quite gets there."""
 
 

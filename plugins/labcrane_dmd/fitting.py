@@ -77,7 +77,9 @@ def _direction(
     signals = [sign * level for level in sorted(settings.levels)]
     _check(recording, signals)
     dead_band = _dead_band(recording, sign, settings)
-    found = Direction(dead_band, 0.0, 0.0, _layers(recording, signals, limits, FIRST_RUN_UP_S, settings))
+    found = Direction(
+        dead_band, 0.0, 0.0, _layers(recording, signals, limits, FIRST_RUN_UP_S, settings)
+    )
     far = [layer.signal for layer in found.layers if layer.whole] or signals[-1:]
     first = [run for signal in far[:WEAKEST] for run in recording.at(signal)]
     dead_time, lag = identify(found, first, settings.between)
@@ -150,9 +152,7 @@ def _layer(
     return Layer(signal, curve.covers, whole, fit(curve, max_degree).coefficients)
 
 
-def curve_at(
-    recording: SegmentRecording, signal: float, run_up_s: float
-) -> SpeedCurve | None:
+def curve_at(recording: SegmentRecording, signal: float, run_up_s: float) -> SpeedCurve | None:
     """Return the speed curve of all runs at a signal together; None when the joint stood still."""
     found = [speed_curve(run, run_up_s) for run in recording.at(signal)]
     curves = [curve for curve in found if curve is not None]

@@ -59,12 +59,20 @@ class Grip:
             self._let_go()
 
     def _take(self, each: Standing, opening: float) -> None:
+        constraint = self._hold_limb(each) if each.placed.kind == "body" else self._hold(each)
+        # What is held is part of the hand: jaws that went on pressing would fight the constraint.
+        self._collide(each, touch=False)
+        self.held = Held(each, constraint, opening, Window(self._ticks))
+        self.force = 0.0
+
+    def _hold(self, each: Standing) -> int:
+        """Fix an object to the hand."""
         client, hand = self._client, self._jaws[1]
         state = pybullet.getLinkState(self._arm, hand, physicsClientId=client)
         place = pybullet.getBasePositionAndOrientation(each.body, physicsClientId=client)
         inverse = pybullet.invertTransform(*state[:2])  # the link's centre of mass, as bullet wants
         offset = pybullet.multiplyTransforms(*inverse, *place)
-        constraint = pybullet.createConstraint(
+        constraint: int = pybullet.createConstraint(
             self._arm,
             hand,
             each.body,
@@ -76,10 +84,33 @@ class Grip:
             parentFrameOrientation=offset[1],
             physicsClientId=client,
         )
-        # What is held is part of the hand: jaws that went on pressing would fight the constraint.
-        self._collide(each, touch=False)
-        self.held = Held(each, constraint, opening, Window(self._ticks))
-        self.force = 0.0
+        return constraint
+
+    def _hold_limb(self, each: Standing) -> int:
+        """Hold a body at one point: a limb turns in the hand that has hold of it."""
+        client, hand = self._client, self._jaws[1]
+        touching = pybullet.getContactPoints(self._arm, each.body, hand, physicsClientId=client)
+        link = touching[0][4] if touching else -1
+        grabbed = pybullet.getLinkState(self._arm, hand, physicsClientId=client)[0]
+        place = (
+            pybullet.getBasePositionAndOrientation(each.body, physicsClientId=client)
+            if link < 0
+            else pybullet.getLinkState(each.body, link, physicsClientId=client)[:2]
+        )
+        inverse = pybullet.invertTransform(*place)
+        point = pybullet.multiplyTransforms(*inverse, grabbed, [0.0, 0.0, 0.0, 1.0])[0]
+        constraint: int = pybullet.createConstraint(
+            self._arm,
+            hand,
+            each.body,
+            link,
+            pybullet.JOINT_POINT2POINT,
+            [0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0],
+            point,
+            physicsClientId=client,
+        )
+        return constraint
 
     def _let_go(self) -> None:
         if self.held is None:

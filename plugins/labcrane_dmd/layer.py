@@ -85,9 +85,7 @@ def _slope(place: int, signals: Sequence[float], speeds: Sequence[float]) -> flo
     return (w_before + w_after) / (w_before / before + w_after / after)
 
 
-def _end_slope(
-    outer: int, inner: int, signals: Sequence[float], speeds: Sequence[float]
-) -> float:
+def _end_slope(outer: int, inner: int, signals: Sequence[float], speeds: Sequence[float]) -> float:
     h_outer = signals[outer + 1] - signals[outer]
     h_inner = signals[inner + 1] - signals[inner]
     d_outer, d_inner = _secant(outer, signals, speeds), _secant(inner, signals, speeds)

@@ -42,7 +42,10 @@ def _degree(x: FloatArray, speed: FloatArray, most: int) -> int:
     errors = []
     for degree in range(1, most + 1):
         missed = [
-            (speed[out] - np.polynomial.polynomial.polyval(x[out], _solve(x[~out], speed[~out], degree)))
+            (
+                speed[out]
+                - np.polynomial.polynomial.polyval(x[out], _solve(x[~out], speed[~out], degree))
+            )
             ** 2
             for out in (folds == fold for fold in range(FOLDS))
             if out.any()

@@ -31,9 +31,7 @@ def identify(
     delays = np.arange(0.0, LONGEST_S + COARSE_S / 2, COARSE_S)
     dead_time, lag = _best(tables, delays, delays)
     near = np.arange(-COARSE_S, COARSE_S + FINE_S / 2, FINE_S)
-    dead_time, lag = _best(
-        tables, np.maximum(dead_time + near, 0.0), np.maximum(lag + near, 0.0)
-    )
+    dead_time, lag = _best(tables, np.maximum(dead_time + near, 0.0), np.maximum(lag + near, 0.0))
     return round(dead_time, 4), round(lag, 4)
 
 
@@ -74,9 +72,7 @@ class _SetOff:
         angle = np.full(len(dead_time), self._rest)
         error = (angle - self._angle[0]) ** 2
         lag = np.maximum(lag, 1e-6)
-        for before, now, seen in zip(
-            self._time[:-1], self._time[1:], self._angle[1:], strict=True
-        ):
+        for before, now, seen in zip(self._time[:-1], self._time[1:], self._angle[1:], strict=True):
             waited = np.maximum(0.5 * (before + now) - dead_time, 0.0)
             angle = angle + (now - before) * self._speed(1.0 - np.exp(-waited / lag), angle)
             error += (angle - seen) ** 2

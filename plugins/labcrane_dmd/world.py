@@ -103,9 +103,7 @@ class World:
             jaws = (joints - 2, joints - 1)
             self.grip = Grip(self.arm, jaws, client, settings.jaws.grip_n, release, ticks)
 
-    def step(
-        self, speeds: Sequence[float]
-    ) -> tuple[list[float], list[float], list[float]]:
+    def step(self, speeds: Sequence[float]) -> tuple[list[float], list[float], list[float]]:
         """Move for a tick at ``speeds`` in rad/s.
 
         Returns

@@ -64,7 +64,8 @@ class Station(InputDevice):
         if age > self._settings.timeout_s:
             self.fault = (
                 f"no command in stream {self._settings.stream!r} for "
-                f"{self._settings.timeout_s:g} s" + (f"; {self._complaint}" if self._complaint else "")
+                f"{self._settings.timeout_s:g} s"
+                + (f"; {self._complaint}" if self._complaint else "")
             )
             out[:] = 0.0
         else:

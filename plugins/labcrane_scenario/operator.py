@@ -4,8 +4,18 @@ import math
 
 import numpy as np
 
-from labcrane import FloatArray, Frame, InputDevice, Machine, Phase, ProtocolError, Run, Signal, Tick
-from labcrane import Trial
+from labcrane import (
+    FloatArray,
+    Frame,
+    InputDevice,
+    Machine,
+    Phase,
+    ProtocolError,
+    Run,
+    Signal,
+    Tick,
+    Trial,
+)
 from labcrane_scenario.settings import OperatorSettings
 
 NEAR = 0.6

@@ -54,7 +54,9 @@ class Scenario(Task):
         Signal("peak_force.object", "N"),
         Signal("peak_force.body", "N"),
         Signal("deformity_found", "s"),  # from the start; NaN when it was not, or there is none
-        Signal("k", "1"),  # completion as far as the run itself can tell; the supervisor's overrides
+        Signal(
+            "k", "1"
+        ),  # completion as far as the run itself can tell; the supervisor's overrides
     )
 
     def __init__(self, settings: ScenarioSettings, machine: Machine) -> None:
@@ -82,7 +84,9 @@ class Scenario(Task):
     def open(self, run: Run) -> None:
         self._run = run
         self._tip = run.state.find("tip.position")
-        self._button = run.axes.index(self._settings.find_axis) if self._settings.find_axis else None
+        self._button = (
+            run.axes.index(self._settings.find_axis) if self._settings.find_axis else None
+        )
 
     def begin_trial(self, trial: Trial) -> None:
         name = str(trial.planned.condition["scene"])

@@ -72,9 +72,7 @@ def test_the_fit_does_not_look_at_validation_signals(model, recordings) -> None:
 
     (arm, *_) = recordings
     spoilt = tuple(
-        replace(run, angle=run.angle[::-1].copy())
-        if abs(run.signal) in PCHIP.validation
-        else run
+        replace(run, angle=run.angle[::-1].copy()) if abs(run.signal) in PCHIP.validation else run
         for run in arm.runs
     )
     assert fit_segment(replace(arm, runs=spoilt), PCHIP) == model["arm"]
