@@ -96,7 +96,8 @@ class Figure(BaseModel):
     """Where the chest is, in the machine's base frame, in metres."""
 
     yaw_deg: float | Extent = 0.0
-    """Turned to the left, in degrees: at 0 the feet point away from the machine. A pair is drawn."""
+    """Turned to the left, in degrees: at 0 the feet point away from the machine. A pair is
+    drawn."""
 
     mass_kg: PositiveFloat = 75.0
     """Mass of the whole, in kilograms."""
@@ -147,7 +148,8 @@ def figure_parts(
     if figure.deformity is not None:
         bent = str(random.choice(figure.deformity.limbs))
         bend = math.radians(random.uniform(*figure.deformity.bend_deg))
-    parts, ends = list(TRUNK), {}
+    parts = list(TRUNK)
+    ends: dict[str, tuple[Point, float]] = {}
     for name, (parent, length, thick, start) in LIMBS.items():
         outward = 1.0 if name.startswith("left") else -1.0
         at, heading = ends[parent] if parent else (start, 0.0)

@@ -1,7 +1,8 @@
 """Find the commands that installed plugins offer."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import EntryPoint, entry_points
+from typing import cast
 
 import pluggy
 
@@ -33,7 +34,8 @@ def plugin_commands(
     found: dict[tuple[str, str], CommandOffer] = {}
     owners: dict[tuple[str, str], str] = {}
     for implementation in manager.hook.labcrane_commands.get_hookimpls():
-        for offer in implementation.function():
+        offers = cast("Sequence[CommandOffer]", implementation.function())
+        for offer in offers:
             if offer.words in found:
                 raise PluginError(
                     f"plugins {owners[offer.words]!r} and {implementation.plugin_name!r} both "

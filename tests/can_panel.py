@@ -5,11 +5,11 @@ Run as: can_panel.py LINK RATE_HZ SECONDS UNPLUG_AT BACK_AT. Prints "open" when 
 """
 
 import math
-import os
 import sys
 import time
+from pathlib import Path
 
-sys.path.insert(0, os.path.dirname(__file__))
+sys.path.insert(0, str(Path(__file__).parent))
 from slcan_adapter import SlcanAdapter
 
 from labcrane_can.avc import encode
@@ -29,7 +29,7 @@ for number in range(round(seconds * rate)):
     if adapter is not None and unplug_at <= at < back_at:
         print("unplugged", time.perf_counter(), flush=True)
         adapter.unplug()
-        os.unlink(link)
+        Path(link).unlink()
         adapter = None
     elif adapter is None and at >= back_at:
         adapter = SlcanAdapter(link)

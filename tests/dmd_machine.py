@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-LEVELS = tuple(range(-240, 250, 10)) + (-250, 250)
+LEVELS = (*range(-240, 250, 10), -250, 250)
 DEAD_BAND, DEAD_TIME, LAG = 22.0, 0.08, 0.12
 LOW, HIGH = 0.0, math.radians(60.0)
 

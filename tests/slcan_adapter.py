@@ -5,6 +5,7 @@ import pty
 import select
 import threading
 import tty
+from pathlib import Path
 
 
 class SlcanAdapter:
@@ -19,8 +20,8 @@ class SlcanAdapter:
         tty.setraw(self._slave)
         self.path = os.ttyname(self._slave)
         if path is not None:  # what a udev rule does: the same name after a re-plug
-            os.path.lexists(path) and os.unlink(path)
-            os.symlink(self.path, path)
+            Path(path).unlink(missing_ok=True)
+            Path(path).symlink_to(self.path)
             self.path = path
         self.opened = False
         self.sent: list[tuple[int, bytes]] = []

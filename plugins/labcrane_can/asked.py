@@ -1,7 +1,7 @@
 """What a panel last asked of each joint."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from labcrane import ProtocolError
 from labcrane_can.avc import FULL, FrameError, State, decode
@@ -112,7 +112,7 @@ class PanelCommands:
         if len(frame.data) < message.length:
             self._refuse(f"{message.name} has {len(frame.data)} bytes instead of {message.length}")
             return
-        values = message.decode(bytes(frame.data), decode_choices=False)
+        values: Any = message.decode(bytes(frame.data), decode_choices=False)
         for signal, joint in joints.items():
             value = float(values[signal]) / self._full * FULL
             if abs(value) > FULL * (1 + 1e-9):
@@ -137,7 +137,7 @@ def _from_dbc(settings: ValveMap) -> "dict[int, tuple[Message, dict[str, str]]]"
     import cantools  # noqa: PLC0415 - loads for a moment
 
     try:
-        described = cantools.database.load_file(settings.map)
+        described: Any = cantools.database.load_file(str(settings.map))
     except (OSError, ValueError, cantools.Error) as error:
         raise ProtocolError(f"map {str(settings.map)!r} is no DBC file: {error}") from error
     messages = {message.name: message for message in described.messages}

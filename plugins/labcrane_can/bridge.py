@@ -40,6 +40,7 @@ class Bridge:
             channel.append_child_value("unit", "0.4 percent")
         self._outlet = pylsl.StreamOutlet(info)
         self._flow: pylsl.StreamInlet | None = None
+        self._resolver = pylsl.ContinuousResolver(prop="name", value=FLOW)
         self._listener = Listener(self._settings, self._commands)
         return self
 
@@ -73,7 +74,7 @@ class Bridge:
         import pylsl  # noqa: PLC0415
 
         if self._flow is None:
-            found = pylsl.resolve_byprop("name", FLOW, minimum=1, timeout=0.0)
+            found = self._resolver.results()
             self._flow = pylsl.StreamInlet(found[0], max_buflen=1) if found else None
             return
         sample, stamp = None, None

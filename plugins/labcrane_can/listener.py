@@ -1,9 +1,10 @@
 """A thread beside the loop that reads a bus, and opens it again when it was unplugged."""
 
+import contextlib
 import threading
 import time
 from collections import deque
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from labcrane import DeviceError
 from labcrane_can.asked import PanelCommands
@@ -100,10 +101,8 @@ class Listener:
     def _shut(self) -> None:
         if self._bus is not None:
             bus, self._bus = self._bus, None
-            try:
+            with contextlib.suppress(Exception):  # what was unplugged cannot be closed in order
                 bus.shutdown()
-            except Exception:  # noqa: BLE001, S110 - what was unplugged cannot be closed in order
-                pass
 
 
 def open_bus(settings: CanSettings) -> "can.BusABC":
@@ -117,7 +116,7 @@ def open_bus(settings: CanSettings) -> "can.BusABC":
     import can  # noqa: PLC0415
 
     interface, _, channel = settings.bus.partition(":")
-    options: dict[str, object] = {}
+    options: dict[str, Any] = {}
     if interface == "slcan":
         options["sleep_after_open"] = 0.0
     if interface == "socketcand":

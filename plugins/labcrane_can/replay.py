@@ -69,7 +69,7 @@ class CanReplay(InputDevice):
             self.fault = (
                 f"the log {self._settings.file} has ended"
                 if ended
-                else f"no valve command for {self._settings.timeout_s:g} s at {now:.3f} s of the log"
+                else f"no valve command for {self._settings.timeout_s:g} s at {now:.3f} s of it"
             )
             out[:] = 0.0
             return out

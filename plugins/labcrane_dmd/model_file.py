@@ -2,6 +2,7 @@
 
 import io
 import math
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
@@ -64,7 +65,7 @@ class DirectionText(Settings):
     @model_validator(mode="after")
     def _layers_rise(self) -> "DirectionText":
         sizes = [abs(layer.signal) for layer in self.layers]
-        if any(after <= before for before, after in zip(sizes, sizes[1:], strict=False)):
+        if any(after <= before for before, after in pairwise(sizes)):
             raise ValueError(f"layers must get stronger, but their signals are {sizes}")
         return self
 

@@ -14,7 +14,7 @@ BLOCK = 3
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """Coefficients of 1, x, x², ..., x going from -1 to 1 over the curve, and the residual's RMS."""
+    """Coefficients of 1, x, x², ..., with x from -1 to 1 over the curve, and the residual's RMS."""
 
     coefficients: tuple[float, ...]
     residual: float

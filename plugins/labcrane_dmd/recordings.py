@@ -104,7 +104,7 @@ def _read(path: Path) -> SegmentRecording:
     if missing := [name for name in COLUMNS if name not in table]:
         raise RecordingError(
             f"{path} has no column {', '.join(map(repr, missing))}; its columns are "
-            f"{', '.join(map(str, table))}, and need to be {', '.join(COLUMNS)}: seconds and degrees"
+            f"{', '.join(map(str, table))}, and need to be {', '.join(COLUMNS)}, in s and degrees"
         )
     try:
         run, time, signal, angle = (table[name].to_numpy(np.float64) for name in COLUMNS)

@@ -70,7 +70,7 @@ class _SetOff:
     def error(self, dead_time: FloatArray, lag: FloatArray) -> FloatArray:
         """Return the sum of squared differences in rad² for each pair of delays."""
         angle = np.full(len(dead_time), self._rest)
-        error = (angle - self._angle[0]) ** 2
+        error: FloatArray = (angle - self._angle[0]) ** 2
         lag = np.maximum(lag, 1e-6)
         for before, now, seen in zip(self._time[:-1], self._time[1:], self._angle[1:], strict=True):
             waited = np.maximum(0.5 * (before + now) - dead_time, 0.0)

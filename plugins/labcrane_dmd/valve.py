@@ -1,6 +1,7 @@
 """The scheme of a control panel: each axis is a valve's signal."""
 
 import numpy as np
+import numpy.typing as npt
 
 from labcrane import Arm, Controller, FloatArray, Layout, Machine, ProtocolError, Run, Signal
 from labcrane_dmd.arm_settings import ValveSettings
@@ -63,7 +64,7 @@ class Valve(Controller):
         radius = -columns[1, 0]
         slew = (cos * y - sin * x) * radius / (radius**2 + DAMPING_M**2)
         wanted = np.array([cos * x + sin * y, z])
-        free = np.ones(columns.shape[1])
+        free, pitch = np.ones(columns.shape[1]), np.zeros(columns.shape[1])
         for _ in free:  # each pass leaves out the joints that would be driven against an end
             weighted = columns * free
             damped = weighted @ columns.T + DAMPING_M**2 * np.eye(2)
@@ -80,11 +81,14 @@ class Valve(Controller):
             axes[index] = sign * share / most
         return axes
 
-    def _blocked(self, angles: list[float], pitch: FloatArray) -> np.ndarray:
+    def _blocked(self, angles: list[float], pitch: FloatArray) -> npt.NDArray[np.bool_]:
         """Return which pitch joints would be driven against the end of their range."""
         low, high = np.array(self._machine.limits[1:]).T
         at = np.array(angles[1:])
-        return ((at < low + END_RAD) & (pitch < 0.0)) | ((at > high - END_RAD) & (pitch > 0.0))
+        against: npt.NDArray[np.bool_] = ((at < low + END_RAD) & (pitch < 0.0)) | (
+            (at > high - END_RAD) & (pitch > 0.0)
+        )
+        return against
 
     def _share(self, joint: int, speed: float, angle: float) -> float:
         """Return the share of full signal for a joint speed; beyond 1 when that is not enough."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from labcrane import Event, FloatArray, Placed, Run
+from labcrane import Event, FloatArray, Placed, Run, Value
 from labcrane_scenario.mistakes import Episode, Mistakes
 from labcrane_scenario.settings import ScenarioSettings
 
@@ -78,7 +78,11 @@ class Observation:
             if each.episode.see(force):
                 kind = each.thing.kind
                 count = self.mistakes.add(kind)
-                about = {"thing": each.thing.name, "part": each.part, "force": force}
+                about: dict[str, Value] = {
+                    "thing": each.thing.name,
+                    "part": each.part,
+                    "force": force,
+                }
                 yield Event(f"contact.{kind}", due, {**about, "count": count})
 
     def _overloads(self, state: FloatArray, due: float) -> Iterator[Event]:
@@ -87,6 +91,6 @@ class Observation:
             if direction and direction != self._over[joint]:
                 kind = "overload_max" if direction > 0 else "overload_min"
                 count = self.mistakes.add(kind)
-                about = {"joint": self._names[joint], "direction": direction}
+                about: dict[str, Value] = {"joint": self._names[joint], "direction": direction}
                 yield Event("overload", due, {**about, "count": count})
             self._over[joint] = direction

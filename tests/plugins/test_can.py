@@ -241,7 +241,12 @@ title: A panel on a pty
 machine: {machine}
 input: {{use: can, bus: 'slcan:{link}', valves: {{base: 1, arm: 2, boom: 3, jaws: 4}}}}
 scheme: {{use: valve}}
-dynamics: {{use: dmd_arm, model: {folder}/arm.dmd.yaml, proportional: [base], jaws: {{}}, scenes: [{scene}]}}
+dynamics:
+  use: dmd_arm
+  model: {folder}/arm.dmd.yaml
+  proportional: [base]
+  jaws: {{}}
+  scenes: [{scene}]
 tasks: {{reach: {{use: scenario, scenes: [{scene}], limit_s: 600}}}}
 sessions: [{{name: only, steps: [{{block: {{task: reach}}}}]}}]
 """
@@ -264,7 +269,8 @@ def panel(tmp_path: Path) -> Iterator[tuple[Path, subprocess.Popen[str]]]:
         text=True,
     )
     try:
-        assert process.stdout and process.stdout.readline() == "ready\n"
+        assert process.stdout
+        assert process.stdout.readline() == "ready\n"
         yield link, process
     finally:
         process.kill()

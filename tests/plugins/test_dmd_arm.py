@@ -233,7 +233,8 @@ GRASP = """\
 labcrane_scene: 1
 title: something to hold
 things:
-  thing: {{shape: box, size: [0.08, 0.1, 0.2], position: [1.35, 0, 0.1001], mass_kg: 3, slip_n: {slip}}}
+  thing:
+    {{shape: box, size: [0.08, 0.1, 0.2], position: [1.35, 0, 0.1001], mass_kg: 3, slip_n: {slip}}}
 goals: [{{position: [0, 0, 0], radius: 1}}]
 """
 
@@ -274,7 +275,7 @@ def test_impossible_scenes_are_refused_in_words(tmp_path: Path) -> None:
     with (
         pytest.raises(
             ProtocolError,
-            match=r"scene.yaml:4: 'block' is 0.080 m deep in the ground; its centre must be 0.100 m",
+            match=r"scene.yaml:4: 'block' is 0.080 m deep in the ground; its centre must be 0.100",
         ),
         standing(deep, tmp_path),
     ):
