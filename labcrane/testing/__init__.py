@@ -9,7 +9,6 @@ The fixture returns a component that is built and not yet open. Each contract op
 stand-ins for the other roles, and runs it.
 """
 
-import inspect
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 
@@ -19,15 +18,16 @@ from labcrane.clock import Tick
 from labcrane.kinematics import Arm
 from labcrane.machine import Machine
 from labcrane.machine_file import load_machine
-from labcrane.offers import CommandOffer
 from labcrane.records import Frame, Phase, Planned, Run, Trial
 from labcrane.roles import Component, Controller, Dynamics, InputDevice, Task
 from labcrane.signals import FloatArray, Layout, Signal
+from labcrane.testing.commands import CommandContract
 from labcrane.testing.exporters import ExporterContract
 
 __all__ = [
     "RATE_HZ",
     "STICKS",
+    "CommandContract",
     "ControllerContract",
     "DynamicsContract",
     "ExporterContract",
@@ -292,25 +292,3 @@ class TaskContract:
                         results = judgement.results
                         break
                 assert set(results) == declared, "a machine that never moves must end by a limit"
-
-
-class CommandContract:
-    """What every command of a plugin must do. Provide the fixture ``command``."""
-
-    def test_words_are_a_group_and_a_name_in_lower_case(self, command: CommandOffer) -> None:
-        assert len(command.words) == 2, command.words
-        assert all(word.isalpha() and word.islower() for word in command.words), command.words
-
-    def test_help_tells_what_it_does_and_what_every_option_means(
-        self, command: CommandOffer
-    ) -> None:
-        import typer  # noqa: PLC0415 - who tests a stick needs no command line
-        from typer.testing import CliRunner  # noqa: PLC0415
-
-        app = typer.Typer()
-        app.command()(command.run)
-        shown = CliRunner().invoke(app, ["--help"], env={"COLUMNS": "200", "NO_COLOR": "1"})
-        assert shown.exit_code == 0, shown.output
-        said = inspect.getdoc(command.run) or ""
-        assert said, f"{command.words} has no docstring, which is its help"
-        assert said.split("\n")[0].rstrip(".")[:40] in shown.output

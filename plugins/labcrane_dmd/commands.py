@@ -20,6 +20,14 @@ ModelPath = Annotated[Path, typer.Argument(metavar="MODEL", help="a model's YAML
 out = Console(soft_wrap=True, highlight=False)
 
 
+def _table(*columns: str, title: str | None = None) -> Table:
+    """Return a table in which nothing is cut off."""
+    made = Table(title=title)
+    for column in columns:
+        made.add_column(column, overflow="fold")
+    return made
+
+
 def fit(
     recordings: RecordingsPath,
     to: Annotated[Path, typer.Option("--out", help="the model's YAML file")],
@@ -39,7 +47,7 @@ def fit(
     settings = FitSettings(between=between, max_degree=max_degree)
     model = fit_model(read_recordings(recordings), settings)
     save(model, to)
-    table = Table("segment", "direction", "dead band", "dead time", "lag", "degrees", "not whole")
+    table = _table("segment", "direction", "dead band", "dead time", "lag", "degrees", "not whole")
     for name, segment in model.items():
         for direction, what in ((segment.extend, "extend"), (segment.retract, "retract")):
             table.add_row(
@@ -93,7 +101,9 @@ def _print(levels: "Sequence[Level]", rule: str) -> None:
     from labcrane_dmd.validation import summary
 
     numbers = ("mean_speed", "mse", "rmse", "mae", "max_abs_error", "residual_variance")
-    table = Table("segment", "signal", *numbers, "mean_error", "%", title=f"between: {rule}, deg/s")
+    table = _table(
+        "segment", "signal", *numbers, "mean_error", "%", title=f"between: {rule}, deg/s"
+    )
     for level in levels:
         row = level.row()
         table.add_row(
@@ -104,7 +114,7 @@ def _print(levels: "Sequence[Level]", rule: str) -> None:
             f"{row['mean_error_percent']:+.2f}",
         )
     out.print(table)
-    means = Table("segment", "mse", "rmse", "mae", "max_abs_error", "residual_variance", "largest")
+    means = _table("segment", "mse", "rmse", "mae", "max_abs_error", "residual_variance", "largest")
     for mean in summary(levels):
         name, *values = mean.values()
         means.add_row(str(name), *(f"{value:.4f}" for value in values))

@@ -19,6 +19,8 @@ from labcrane.plan import plan_session
 from labcrane.registry import discover
 from labcrane.study import load
 from labcrane.testing import InputContract, a_frame, a_run, ch8
+from labcrane.testing.commands import CommandContract
+from labcrane_can import labcrane_commands
 from labcrane_can.asked import PanelCommands
 from labcrane_can.avc import ESTIMATED, FULL, FrameError, State, decode, encode, encode_flow
 from labcrane_can.panel import CanPanel
@@ -38,6 +40,12 @@ class TestCanPanel(InputContract):  # "can"
     @pytest.fixture
     def device(self) -> InputDevice:
         return CanPanel(CanSettings(bus="virtual:contract", valves=VALVES), ch8())
+
+
+class TestCommands(CommandContract):
+    @pytest.fixture(params=labcrane_commands(), ids=lambda offered: " ".join(offered.words))
+    def command(self, request):
+        return request.param
 
 
 class TestCanReplay(InputContract):  # "can_replay"

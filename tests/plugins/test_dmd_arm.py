@@ -14,7 +14,6 @@ from labcrane import Arm, Controller, Dynamics, Planned, ProtocolError, Signal
 from labcrane.machine_file import load_machine
 from labcrane.testing import (
     RATE_HZ,
-    CommandContract,
     ControllerContract,
     DynamicsContract,
     a_run,
@@ -22,6 +21,7 @@ from labcrane.testing import (
     ch8,
     crane_at,
 )
+from labcrane.testing.commands import CommandContract
 from labcrane_dmd import labcrane_commands, labcrane_dynamics
 from labcrane_dmd.arm_settings import ArmSettings, JawsSettings, OverloadSettings, ValveSettings
 from labcrane_dmd.overload import Overload
