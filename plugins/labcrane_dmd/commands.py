@@ -101,9 +101,7 @@ def _print(levels: "Sequence[Level]", rule: str) -> None:
     from labcrane_dmd.validation import summary
 
     numbers = ("mean_speed", "mse", "rmse", "mae", "max_abs_error", "residual_variance")
-    table = _table(
-        "segment", "signal", *numbers, "mean_error", "%", title=f"between: {rule}, deg/s"
-    )
+    table = _table("segment", "signal", *numbers, "mean_error", "%", title=f"{rule}, deg/s")
     for level in levels:
         row = level.row()
         table.add_row(
