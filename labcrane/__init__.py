@@ -11,7 +11,7 @@ from labcrane.errors import DeviceError, LabcraneError, PluginError, ProtocolErr
 from labcrane.hookspecs import hookimpl
 from labcrane.kinematics import Arm, frames, jacobian
 from labcrane.machine import Body, Joint, Machine
-from labcrane.offers import Offer, Settings, offer
+from labcrane.offers import CommandOffer, Offer, Settings, StudyPath, offer
 from labcrane.questions import AnswerError, Answers, Item, Score, numbers
 from labcrane.reach import reach
 from labcrane.recording.recording import SessionRecord, Stream, open_recording
@@ -28,6 +28,7 @@ from labcrane.roles import (
     Questionnaire,
     Task,
 )
+from labcrane.scene import Form, Placed, Scene, load_scene, place
 from labcrane.shapes import Ball, Beam, Shape, Targets
 from labcrane.signals import FloatArray, Layout, Signal, signals_of
 
@@ -44,6 +45,7 @@ __all__ = [
     "Beam",
     "Body",
     "Channel",
+    "CommandOffer",
     "Controller",
     "Cue",
     "DeviceError",
@@ -52,6 +54,7 @@ __all__ = [
     "Exporter",
     "Feedback",
     "FloatArray",
+    "Form",
     "Frame",
     "InputDevice",
     "Item",
@@ -63,12 +66,14 @@ __all__ = [
     "Offer",
     "Participant",
     "Phase",
+    "Placed",
     "Planned",
     "PluginError",
     "ProtocolError",
     "Questionnaire",
     "RecordingError",
     "Run",
+    "Scene",
     "Score",
     "SessionRecord",
     "Settings",
@@ -77,6 +82,7 @@ __all__ = [
     "Situation",
     "Stream",
     "StreamHeader",
+    "StudyPath",
     "Targets",
     "Task",
     "Tick",
@@ -86,9 +92,11 @@ __all__ = [
     "frames",
     "hookimpl",
     "jacobian",
+    "load_scene",
     "numbers",
     "offer",
     "open_recording",
+    "place",
     "reach",
     "signals_of",
 ]

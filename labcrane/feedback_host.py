@@ -20,7 +20,7 @@ from labcrane.errors import LabcraneError
 from labcrane.records import Frame, Run, Situation
 from labcrane.registry import Registry, discover
 from labcrane.roles import Component, Cue, Feedback
-from labcrane.scene import read_scene, write_scene
+from labcrane.run_text import read_run, write_run
 from labcrane.signals import FloatArray, Layout
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ class HostOrder:
         fields = {
             "name": self.name,
             "part": asdict(self.part),
-            "run": write_scene(self.run),
+            "run": write_run(self.run),
             "source": self.source,
             "always": self.always,
             "cues": {name: asdict(part) for name, part in self.cues.items()},
@@ -86,7 +86,7 @@ class HostOrder:
         return cls(
             found["name"],
             Part(**found["part"]),
-            read_scene(found["run"]),
+            read_run(found["run"]),
             found["source"],
             found["always"],
             {name: Part(**part) for name, part in found["cues"].items()},

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import pluggy
 
-from labcrane.offers import Offer
+from labcrane.offers import CommandOffer, Offer
 from labcrane.roles import (
     Controller,
     Cue,
@@ -72,4 +72,10 @@ def labcrane_cues() -> Sequence[Offer[Cue]]:
 @hookspec
 def labcrane_feedback() -> Sequence[Offer[Feedback]]:
     """Offer views, sounds and other devices that present a session to people."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_commands() -> Sequence[CommandOffer]:
+    """Offer commands of the command line."""
     raise NotImplementedError

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from pathlib import Path
+from typing import Annotated, Any, Generic, TypeVar
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationInfo
 
 from labcrane.machine import Machine
 from labcrane.roles import Component
@@ -20,6 +21,15 @@ class Settings(BaseModel):
     model_config = ConfigDict(
         extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False
     )
+
+
+def _beside(path: Path, info: ValidationInfo) -> Path:
+    return info.context["folder"] / path if info.context else path
+
+
+StudyPath = Annotated[Path, AfterValidator(_beside)]
+"""A file of the study in a component's settings: a relative path counts from the folder of the
+protocol that names it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,3 +50,20 @@ def offer(
     libraries inside it: every installed plugin is imported just to list offers.
     """
     return Offer(name, settings, build)
+
+
+@dataclass(frozen=True, slots=True)
+class CommandOffer:
+    """One command of the command line on offer.
+
+    Attributes
+    ----------
+    words
+        What the user types after ``labcrane``, a group and a name: ``("dmd", "fit")``.
+    run
+        A function as typer wants it: its docstring is the help, its parameters are arguments and
+        options. It imports what it needs when it runs, so that ``labcrane --help`` stays instant.
+    """
+
+    words: tuple[str, str]
+    run: Callable[..., None]

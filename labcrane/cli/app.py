@@ -11,6 +11,7 @@ from rich.console import Console
 
 from labcrane.cli import (
     approval,
+    extension,
     feedback,
     inspect,
     people,
@@ -66,6 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit status: 2 for what cannot be run as written."""
     before = os.umask(PRIVATE)
     try:
+        extension.extend(app)
         app(args=None if arguments is None else list(arguments))
     except SystemExit as leaving:
         return leaving.code if isinstance(leaving.code, int) else 0

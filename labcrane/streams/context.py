@@ -1,7 +1,7 @@
 """The session's whole context as a string stream: LSL keeps no history, so it is sent again.
 
 A sample of ``labcrane.context`` is a JSON object of two parts: ``scene``, which never changes
-(:func:`labcrane.scene.read_scene`), and ``situation`` (:class:`labcrane.records.Situation`). It is
+(:func:`labcrane.run_text.read_run`), and ``situation`` (:class:`labcrane.records.Situation`). It is
 sent at every change and once a second: whoever starts late, or again, draws from one sample alone.
 """
 
@@ -11,7 +11,7 @@ from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 from labcrane.records import Event, Frame, Run, Situation
-from labcrane.scene import write_scene
+from labcrane.run_text import write_run
 from labcrane.streams.outlets import channel, stream_info
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class ContextOutlet:
         info = stream_info(CONTEXT, "Context", 1, "string", rate_hz=0.0, source=source)
         channel(info, label="context", unit="none", type="JSON")
         self._outlet: pylsl.StreamOutlet | None = pylsl.StreamOutlet(info)
-        self._scene = write_scene(run)
+        self._scene = write_run(run)
         self._situation = Situation(trials=trials)
         self._due = float("-inf")
 

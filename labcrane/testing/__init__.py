@@ -9,6 +9,7 @@ The fixture returns a component that is built and not yet open. Each contract op
 stand-ins for the other roles, and runs it.
 """
 
+from labcrane.testing.commands import CommandContract
 from labcrane.testing.exporters import ExporterContract
 from labcrane.testing.presentation import TARGETS, CueContract, FeedbackContract, a_target
 from labcrane.testing.questionnaires import QuestionnaireContract
@@ -34,6 +35,7 @@ __all__ = [
     "RATE_HZ",
     "STICKS",
     "TARGETS",
+    "CommandContract",
     "ControllerContract",
     "CueContract",
     "DynamicsContract",

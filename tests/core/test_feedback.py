@@ -30,7 +30,7 @@ from labcrane.feedback_host import HostOrder, Part, Presenter
 from labcrane.feedback_preview import movement, write_preview
 from labcrane.plan import plan_session
 from labcrane.registry import Registry, discover
-from labcrane.scene import read_scene, write_scene
+from labcrane.run_text import read_run, write_run
 from labcrane.session import Visit, run
 from labcrane.streams.context import situation_after
 from labcrane.study import Study
@@ -205,7 +205,7 @@ def test_feedback_that_cannot_start_refuses_the_session_or_is_left_out(
 
 def test_a_scene_comes_through_as_it_was() -> None:
     a = replace(a_run(ch8(), task=TARGETS), bodies=())
-    b = read_scene(write_scene(a))
+    b = read_run(write_run(a))
     assert (a.machine, a.rate_hz, a.axes, a.command, a.state, a.task, a.bodies) == (
         *(b.machine, b.rate_hz, b.axes, b.command, b.state, b.task, b.bodies),
     )

@@ -1,0 +1,26 @@
+"""Control panels on a CAN bus: J1939 auxiliary valve commands, or whatever a DBC file describes."""
+
+from labcrane import CommandOffer, InputDevice, Machine, Offer, hookimpl, offer
+from labcrane_can.settings import CanSettings, ReplaySettings
+
+
+@hookimpl
+def labcrane_inputs() -> list[Offer[InputDevice]]:
+    def panel(settings: CanSettings, machine: Machine) -> InputDevice:
+        from labcrane_can.panel import CanPanel
+
+        return CanPanel(settings, machine)
+
+    def replay(settings: ReplaySettings, machine: Machine) -> InputDevice:
+        from labcrane_can.replay import CanReplay
+
+        return CanReplay(settings, machine)
+
+    return [offer("can", CanSettings, panel), offer("can_replay", ReplaySettings, replay)]
+
+
+@hookimpl
+def labcrane_commands() -> list[CommandOffer]:
+    from labcrane_can import commands
+
+    return [CommandOffer(("gateway", "can"), commands.can)]

@@ -1,0 +1,156 @@
+"""What a panel last asked of each joint."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+from labcrane import ProtocolError
+from labcrane_can.avc import FULL, FrameError, State, decode
+from labcrane_can.settings import ValveMap
+
+if TYPE_CHECKING:
+    from cantools.database import Message
+
+NODE, PRIORITY_SHIFT = 0xFF, 26
+
+
+class CanFrame(Protocol):
+    """As much of python-can's message as is read."""
+
+    arbitration_id: int
+    is_extended_id: bool
+    is_error_frame: bool
+    data: bytearray
+
+
+@dataclass(slots=True)
+class Asked:
+    """A joint's last command: its signal, whether the valve is to float, and when it came."""
+
+    signal: float = 0.0
+    floats: bool = False
+    time: float = -1e9
+
+
+class PanelCommands:
+    """Takes frames, and keeps the last command of every joint.
+
+    Attributes
+    ----------
+    asked
+        By joint, in the order of the settings.
+    refused, why
+        How many frames could not be obeyed, and the last one's reason in words.
+    foreign
+        How many frames were none of ours.
+    """
+
+    def __init__(self, settings: ValveMap) -> None:
+        self.asked = {joint: Asked() for joint in settings.valves}
+        self.refused, self.why, self.foreign = 0, "", 0
+        self._node, self._priority = settings.node, settings.priority
+        self._timeout = settings.timeout_s
+        self._joints: dict[int, str] = {}
+        self._signals: dict[int, tuple[Message, dict[str, str]]] = {}
+        self._full = settings.full
+        if settings.map is None:
+            for joint, valve in settings.valves.items():
+                if int(valve) in self._joints:
+                    raise ProtocolError(
+                        f"joints {self._joints[int(valve)]!r} and {joint!r} have the same valve, "
+                        f"{valve}; give each its own"
+                    )
+                self._joints[int(valve)] = joint
+        else:
+            self._signals = _from_dbc(settings)
+
+    def take(self, frame: CanFrame, time: float) -> None:
+        """Take one frame that came at ``time`` in s."""
+        if frame.is_error_frame:
+            self._refuse("the bus reports an error frame")
+        elif self._signals:
+            self._take_described(frame, time)
+        elif not frame.is_extended_id:
+            self.foreign += 1
+        else:
+            self._take_valve(frame, time)
+
+    def signals(self, now: float) -> tuple[list[float], list[bool], bool]:
+        """Return each joint's signal and float at ``now`` in s, and whether the panel is there."""
+        fresh = [now - asked.time <= self._timeout for asked in self.asked.values()]
+        pairs = list(zip(self.asked.values(), fresh, strict=True))
+        signals = [asked.signal if new else 0.0 for asked, new in pairs]
+        return signals, [asked.floats and new for asked, new in pairs], any(fresh)
+
+    def complaint(self) -> str:
+        """Return what came instead of commands, in words; empty when nothing did."""
+        parts = []
+        if self.refused:
+            parts.append(f"{self.refused} frames were refused, the last because {self.why}")
+        if self.foreign:
+            parts.append(f"{self.foreign} frames were not for these valves")
+        return "; ".join(parts)
+
+    def _take_valve(self, frame: CanFrame, time: float) -> None:
+        try:
+            command = decode(frame.arbitration_id, bytes(frame.data))
+        except FrameError as error:
+            self._refuse(str(error))
+            return
+        if command is None or command.valve not in self._joints or not self._ours(frame):
+            self.foreign += 1
+            return
+        asked = self.asked[self._joints[command.valve]]
+        asked.signal, asked.time = float(command.signal), time
+        asked.floats = command.state is State.FLOAT
+
+    def _take_described(self, frame: CanFrame, time: float) -> None:
+        found = self._signals.get(frame.arbitration_id)
+        if found is None or not self._ours(frame):
+            self.foreign += 1
+            return
+        message, joints = found
+        if len(frame.data) < message.length:
+            self._refuse(f"{message.name} has {len(frame.data)} bytes instead of {message.length}")
+            return
+        values: Any = message.decode(bytes(frame.data), decode_choices=False)
+        for signal, joint in joints.items():
+            value = float(values[signal]) / self._full * FULL
+            if abs(value) > FULL * (1 + 1e-9):
+                self._refuse(f"{message.name}.{signal} is {values[signal]}, beyond {self._full:g}")
+                continue
+            asked = self.asked[joint]
+            asked.signal, asked.floats, asked.time = float(round(value)), False, time
+
+    def _ours(self, frame: CanFrame) -> bool:
+        identifier = frame.arbitration_id
+        priority = (identifier >> PRIORITY_SHIFT) & 7
+        return (self._node is None or identifier & NODE == self._node) and (
+            self._priority is None or priority == self._priority
+        )
+
+    def _refuse(self, why: str) -> None:
+        self.refused += 1
+        self.why = why
+
+
+def _from_dbc(settings: ValveMap) -> "dict[int, tuple[Message, dict[str, str]]]":
+    import cantools  # noqa: PLC0415 - loads for a moment
+
+    try:
+        described: Any = cantools.database.load_file(str(settings.map))
+    except (OSError, ValueError, cantools.Error) as error:
+        raise ProtocolError(f"map {str(settings.map)!r} is no DBC file: {error}") from error
+    messages = {message.name: message for message in described.messages}
+    found: dict[int, tuple[Message, dict[str, str]]] = {}
+    for joint, name in settings.valves.items():
+        message_name, _, signal = str(name).partition(".")
+        message = messages.get(message_name)
+        if message is None or signal not in {each.name for each in message.signals}:
+            known = ", ".join(
+                f"{each.name}.{one.name}" for each in messages.values() for one in each.signals
+            )
+            raise ProtocolError(
+                f"{settings.map} has no {name!r} for joint {joint!r}; it has {known}"
+            )
+        found.setdefault(message.frame_id, (message, {}))[1][signal] = joint
+    return found

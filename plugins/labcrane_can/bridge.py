@@ -1,0 +1,90 @@
+"""From a CAN bus to the open gateway protocol and back (docs/gateway.md)."""
+
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+from labcrane_can.asked import PanelCommands
+from labcrane_can.avc import ESTIMATED, encode_flow
+from labcrane_can.listener import Listener
+from labcrane_can.settings import CanSettings
+
+RATE_HZ = 50.0
+FULL_PERCENT = 0.4
+FLOW = "gateway.flow"
+
+
+class Bridge:
+    """Pushes what the panel asks, and sends the valves' flow back to it.
+
+    While the panel is silent nothing is pushed: the other end shuts the valves by itself.
+    """
+
+    def __init__(self, settings: CanSettings, name: str) -> None:
+        self._settings = settings
+        self._name = name
+        self._commands = PanelCommands(settings)
+
+    def __enter__(self) -> Self:
+        import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
+
+        joints = list(self._settings.valves)
+        info = pylsl.StreamInfo(
+            self._name, "Control", len(joints), 0.0, "float32", f"can/{self._settings.bus}"
+        )
+        channels = info.desc().append_child("channels")
+        for joint in joints:
+            channel = channels.append_child("channel")
+            channel.append_child_value("label", joint)
+            channel.append_child_value("unit", "0.4 percent")
+        self._outlet = pylsl.StreamOutlet(info)
+        self._flow: pylsl.StreamInlet | None = None
+        self._resolver = pylsl.ContinuousResolver(prop="name", value=FLOW)
+        self._listener = Listener(self._settings, self._commands)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._listener.close()
+        del self._outlet
+
+    def run(self, seconds: float | None, say: Callable[[str], None]) -> None:
+        """Bridge until ``seconds`` have passed, or for ever."""
+        began, trouble, sent_back = time.perf_counter(), "", 0.0
+        while seconds is None or time.perf_counter() - began < seconds:
+            now = time.perf_counter()
+            signals, _, there = self._commands.signals(now)
+            if there and self._listener.lost is None:
+                self._outlet.push_sample(signals)
+            new = self._listener.lost or ("" if there else "the panel is silent")
+            if new != trouble:
+                say(new or "the panel is there")
+                trouble = new
+            if now - sent_back > 0.1:  # noqa: PLR2004 - ten times a second
+                self._send_back()
+                sent_back = now
+            time.sleep(1.0 / RATE_HZ)
+
+    def _send_back(self) -> None:
+        import pylsl  # noqa: PLC0415
+
+        if self._flow is None:
+            found = self._resolver.results()
+            self._flow = pylsl.StreamInlet(found[0], max_buflen=1) if found else None
+            return
+        sample, stamp = None, None
+        while (next_ := self._flow.pull_sample(timeout=0.0))[1] is not None:
+            sample, stamp = next_
+        if stamp is None or sample is None:
+            return
+        for flow, valve in zip(sample, self._settings.valves.values(), strict=False):
+            if isinstance(valve, int):
+                percent = flow * FULL_PERCENT
+                self._listener.send(
+                    *encode_flow(ESTIMATED, valve, percent, self._settings.own_node)
+                )

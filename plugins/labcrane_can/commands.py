@@ -1,0 +1,37 @@
+"""The command ``labcrane gateway can``: from a panel's bus to the open gateway protocol."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+out = Console(soft_wrap=True, highlight=False)
+
+
+def can(
+    bus: Annotated[str, typer.Option(help="interface:channel, as slcan:/dev/ttyUSB0")],
+    valve: Annotated[
+        list[str],
+        typer.Option(help="joint=number, or joint=Message.Signal with --map; once per joint"),
+    ],
+    map_: Annotated[
+        Path | None, typer.Option("--map", help="DBC file of a panel without valve commands")
+    ] = None,
+    full: Annotated[float, typer.Option(help="value of a DBC signal that is full flow")] = 100.0,
+    bitrate: Annotated[int, typer.Option(help="bits per second")] = 250_000,
+    name: Annotated[str, typer.Option(help="name of the command stream")] = "gateway.command",
+    seconds: Annotated[float | None, typer.Option(help="stop after this time")] = None,
+) -> None:
+    """Bridge a control panel on a CAN bus to the open gateway protocol (docs/gateway.md)."""
+    from labcrane_can.bridge import Bridge
+    from labcrane_can.settings import CanSettings
+
+    pairs = dict(each.split("=", 1) for each in valve if "=" in each)
+    if len(pairs) < len(valve):
+        raise typer.BadParameter("write joint=number: --valve boom=3", param_hint="--valve")
+    valves = {joint: int(what) if what.isdigit() else what for joint, what in pairs.items()}
+    settings = CanSettings(bus=bus, bitrate=bitrate, valves=valves, map=map_, full=full)
+    out.print(f"{bus} -> LSL stream {name!r}: {', '.join(pairs)}; Ctrl-C ends", markup=False)
+    with Bridge(settings, name) as bridge:
+        bridge.run(seconds, lambda text: out.print(text, markup=False))

@@ -1,0 +1,132 @@
+"""A thread beside the loop that reads a bus, and opens it again when it was unplugged."""
+
+import contextlib
+import threading
+import time
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+from labcrane import DeviceError
+from labcrane_can.asked import PanelCommands
+from labcrane_can.settings import CanSettings
+
+if TYPE_CHECKING:
+    import can
+
+WAIT_S = 0.02
+"""How long one look at the bus may take; what waits to be sent waits as long."""
+
+AGAIN_S = 0.2
+"""Time between attempts to open a bus that was lost."""
+
+
+class Listener:
+    """Reads frames into a panel's commands, and sends what is given.
+
+    Attributes
+    ----------
+    lost
+        Why the bus cannot be read, in words; None while it can.
+    """
+
+    def __init__(self, settings: CanSettings, commands: PanelCommands) -> None:
+        self.lost: str | None = None
+        self._settings = settings
+        self._commands = commands
+        self._outgoing: deque[can.Message] = deque(maxlen=64)
+        self._over = threading.Event()
+        self._second, self._count = 0.0, 0
+        self._flooded = False
+        self._bus: can.BusABC | None = open_bus(settings)
+        self._thread = threading.Thread(target=self._work, name="labcrane-can", daemon=True)
+        self._thread.start()
+
+    def send(self, identifier: int, data: bytes) -> None:
+        """Send a frame soon; the oldest are left out when the bus does not take them."""
+        import can  # noqa: PLC0415
+
+        self._outgoing.append(can.Message(arbitration_id=identifier, data=data))
+
+    def close(self) -> None:
+        """Stop reading, and free the bus."""
+        self._over.set()
+        self._thread.join()
+        self._shut()
+
+    def _work(self) -> None:
+        import can  # noqa: PLC0415
+
+        while not self._over.is_set():
+            if self._bus is None:
+                self._reopen()
+                continue
+            try:
+                while self._outgoing:
+                    self._bus.send(self._outgoing.popleft(), timeout=WAIT_S)
+                frame = self._bus.recv(WAIT_S)
+            except (can.CanError, OSError, TypeError, ValueError) as error:
+                # pyserial raises what it likes when its file is closed under it.
+                self._shut()
+                self.lost = f"{self._settings.bus} is gone: {error}"
+                continue
+            now = time.perf_counter()
+            if frame is not None:
+                self._commands.take(frame, now)
+            self._watch_flood(now, came=frame is not None)
+
+    def _watch_flood(self, now: float, *, came: bool) -> None:
+        self._count += came
+        if now - self._second < 1.0:
+            return
+        rate = self._count / (now - self._second) if self._second else 0.0
+        self._second, self._count = now, 0
+        most = self._settings.most_frames_s
+        if rate > most:
+            self.lost = (
+                f"{self._settings.bus} is flooded: {rate:.0f} frames a second, where "
+                f"{most} are the most; find out who sends them"
+            )
+            self._flooded = True
+        elif self._flooded:
+            self.lost, self._flooded = None, False
+
+    def _reopen(self) -> None:
+        try:
+            self._bus = open_bus(self._settings)
+        except DeviceError:
+            self._over.wait(AGAIN_S)
+        else:
+            self.lost = None
+
+    def _shut(self) -> None:
+        if self._bus is not None:
+            bus, self._bus = self._bus, None
+            with contextlib.suppress(Exception):  # what was unplugged cannot be closed in order
+                bus.shutdown()
+
+
+def open_bus(settings: CanSettings) -> "can.BusABC":
+    """Open the bus that the settings name.
+
+    Raises
+    ------
+    DeviceError
+        python-can cannot open it; says why.
+    """
+    import can  # noqa: PLC0415
+
+    interface, _, channel = settings.bus.partition(":")
+    options: dict[str, Any] = {}
+    if interface == "slcan":
+        options["sleep_after_open"] = 0.0
+    if interface == "socketcand":
+        channel, _, where = channel.partition("@")
+        host, _, port = where.partition(":")
+        options |= {"host": host or "127.0.0.1", "port": int(port or 29536)}
+    try:
+        return can.Bus(interface=interface, channel=channel, bitrate=settings.bitrate, **options)
+    except Exception as error:
+        raise DeviceError(
+            f"bus {settings.bus!r} cannot be opened: {error}; plug the adapter in, and check name "
+            "and permissions"
+        ) from error

@@ -1,0 +1,112 @@
+"""A control panel on a CAN bus as an input device."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from labcrane import (
+    FloatArray,
+    Frame,
+    InputDevice,
+    Machine,
+    ProtocolError,
+    Run,
+    Signal,
+    Tick,
+    Value,
+)
+from labcrane_can.asked import PanelCommands
+from labcrane_can.avc import ESTIMATED, FULL, MEASURED, encode_flow
+from labcrane_can.listener import Listener
+from labcrane_can.settings import CanSettings, ValveMap
+
+FEEDBACK_HZ = 10.0
+PERCENT = 100.0
+
+
+def panel_signals(settings: ValveMap, machine: Machine) -> tuple[Signal, ...]:
+    """Return what a panel gives: each joint's signal as a share of full, and whether it floats."""
+    for joint in settings.valves:
+        if joint not in machine.names:
+            raise ProtocolError(
+                f"valves names joint {joint!r}; the machine has {', '.join(machine.names)}"
+            )
+    joints = tuple(settings.valves)
+    return (
+        Signal("valve", "1", joints),
+        Signal("float", "1", joints),
+        Signal("panel.connected", "1"),
+    )
+
+
+class CanPanel(InputDevice):
+    """Reads the newest command of every valve; old ones shut it.
+
+    A thread takes the frames, so that a slow adapter never makes the loop wait.
+    """
+
+    def __init__(self, settings: CanSettings, machine: Machine) -> None:
+        self.signals = panel_signals(settings, machine)
+        self._settings = settings
+        self._machine = machine
+        self._commands = PanelCommands(settings)
+        self._listener: Listener | None = None
+        self._joints = tuple(settings.valves)
+        self._out = np.zeros(2 * len(self._joints) + 1)
+
+    def open(self, run: Run) -> None:
+        names = [signal.name for signal in run.state.signals]
+        self._opening = run.state.find("valve.opening") if "valve.opening" in names else None
+        self._speed = run.state.find("joint.velocity")
+        self._places = [self._machine.names.index(joint) for joint in self._joints]
+        self._every = max(1, round(run.rate_hz / FEEDBACK_HZ))
+        self._listener = Listener(self._settings, self._commands)
+
+    def read(self, tick: Tick, seen: Frame) -> FloatArray:
+        signals, floats, there = self._commands.signals(tick.woke)
+        self.fault = self._trouble(there=there)
+        out, joints = self._out, len(self._joints)
+        if self.fault is not None:
+            out[:] = 0.0
+            return out
+        out[:joints] = [signal / FULL for signal in signals]
+        out[joints:-1] = floats
+        out[-1] = 1.0
+        if self._settings.feedback and tick.number % self._every == 0:
+            self._send_back(seen.state)
+        return out
+
+    def close(self) -> None:
+        if self._listener is not None:
+            self._listener.close()
+            self._listener = None
+
+    def facts(self) -> Mapping[str, Value]:
+        from importlib.metadata import version  # noqa: PLC0415 - only in a session
+
+        return {"bus": self._settings.bus, "python-can": version("python-can")}
+
+    def _trouble(self, *, there: bool) -> str | None:
+        if self._listener is not None and self._listener.lost is not None:
+            return self._listener.lost
+        if there:
+            return None
+        complaint = self._commands.complaint()
+        return f"no valve command for {self._settings.timeout_s:g} s on {self._settings.bus}" + (
+            f"; {complaint}" if complaint else ""
+        )
+
+    def _send_back(self, state: FloatArray) -> None:
+        listener = self._listener
+        if listener is None or self._opening is None:
+            return
+        openings, speeds = state[self._opening].tolist(), state[self._speed].tolist()
+        for joint, place in zip(self._joints, self._places, strict=True):
+            valve = self._settings.valves[joint]
+            if isinstance(valve, str):
+                return  # a DBC map says nothing of what the panel wants to hear
+            node = self._settings.own_node
+            estimated = PERCENT * openings[place] / FULL
+            measured = PERCENT * speeds[place] / self._machine.speeds[place]
+            listener.send(*encode_flow(ESTIMATED, valve, estimated, node))
+            listener.send(*encode_flow(MEASURED, valve, measured, node))

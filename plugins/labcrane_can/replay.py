@@ -1,0 +1,83 @@
+"""A recorded bus as an input device."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from labcrane import (
+    FloatArray,
+    Frame,
+    InputDevice,
+    Machine,
+    ProtocolError,
+    Run,
+    Signal,
+    Tick,
+    Value,
+)
+from labcrane_can.asked import PanelCommands
+from labcrane_can.avc import FULL
+from labcrane_can.panel import panel_signals
+from labcrane_can.settings import ReplaySettings
+
+MICROSECONDS = 6
+"""Digits of a time that all formats keep; what follows differs between them."""
+
+
+class CanReplay(InputDevice):
+    """Gives in each tick the commands that had come by then, counted from the log's first frame.
+
+    Time is that of the log and of the ticks alone, so the same log gives the same commands on every
+    computer. When the log has ended the panel is lost.
+    """
+
+    def __init__(self, settings: ReplaySettings, machine: Machine) -> None:
+        import can  # noqa: PLC0415 - loads for a moment
+
+        self.signals: tuple[Signal, ...] = panel_signals(settings, machine)
+        self._settings = settings
+        try:
+            with can.LogReader(settings.file) as log:
+                self._frames = list(log)
+        except (OSError, ValueError, can.CanError) as error:
+            raise ProtocolError(
+                f"{settings.file} cannot be read as a candump, asc or blf log: {error}"
+            ) from error
+        if not self._frames:
+            raise ProtocolError(f"{settings.file} holds no frames, so there is nothing to replay")
+        self._start = self._frames[0].timestamp
+        self._out = np.zeros(2 * len(settings.valves) + 1)
+
+    def open(self, run: Run) -> None:
+        self._rate_hz = run.rate_hz
+        self._next = 0
+        self._commands = PanelCommands(self._settings)
+
+    def read(self, tick: Tick, seen: Frame) -> FloatArray:
+        now = tick.number / self._rate_hz
+        while self._next < len(self._frames):
+            frame = self._frames[self._next]
+            at = round(frame.timestamp - self._start, MICROSECONDS)
+            if at > now:
+                break
+            self._commands.take(frame, at)
+            self._next += 1
+        signals, floats, there = self._commands.signals(now)
+        out, joints = self._out, len(signals)
+        if not there:
+            ended = self._next == len(self._frames)
+            self.fault = (
+                f"the log {self._settings.file} has ended"
+                if ended
+                else f"no valve command for {self._settings.timeout_s:g} s at {now:.3f} s of it"
+            )
+            out[:] = 0.0
+            return out
+        self.fault = None
+        out[:joints] = [signal / FULL for signal in signals]
+        out[joints:-1] = floats
+        out[-1] = 1.0
+        return out
+
+    def facts(self) -> Mapping[str, Value]:
+        return {"file": str(self._settings.file), "frames": len(self._frames)}

@@ -1,0 +1,81 @@
+"""What a protocol may say about a panel on a CAN bus."""
+
+from typing import Annotated
+
+from pydantic import Field, PositiveFloat, PositiveInt, model_validator
+
+from labcrane import Settings, StudyPath
+
+Node = Annotated[int, Field(ge=0, le=253)]
+"""Source address on the bus; 254 and 255 are no node."""
+
+Valve = Annotated[int, Field(ge=1, le=15)]
+"""Number of an auxiliary valve; 0 is "power beyond" and moves no joint."""
+
+
+class ValveMap(Settings):
+    """Which messages are the commands of which joints."""
+
+    valves: dict[str, Valve | str]
+    """For each joint the number of its auxiliary valve, or with ``map`` the name of message and
+    signal: ``Levers.Boom``."""
+
+    map: StudyPath | None = None
+    """A DBC file, for panels that send no auxiliary valve commands."""
+
+    full: PositiveFloat = 100.0
+    """Value of a DBC signal that is full flow, in the signal's own unit; minus this is full flow
+    the other way."""
+
+    node: Node | None = None
+    """Source address of the panel; any by default."""
+
+    priority: int | None = Field(default=None, ge=0, le=7)
+    """Priority of the panel's messages; any by default. Auxiliary valve commands have 3."""
+
+    timeout_s: PositiveFloat = 0.25
+    """Age, in seconds, at which a valve's last command counts no more and the valve shuts; the
+    panel is lost when that is so of all of them."""
+
+    @model_validator(mode="after")
+    def _names_need_a_map(self) -> "ValveMap":
+        for joint, valve in self.valves.items():
+            if isinstance(valve, str) and self.map is None:
+                raise ValueError(
+                    f"valves has {joint}: {valve!r}, which only a DBC file explains; give map, or "
+                    "the valve's number"
+                )
+            if isinstance(valve, int) and self.map is not None:
+                raise ValueError(
+                    f"valves has {joint}: {valve}, a number, beside a DBC map; write message and "
+                    "signal: Levers.Boom"
+                )
+        return self
+
+
+class CanSettings(ValveMap):
+    """A panel on a live bus."""
+
+    bus: str = Field(pattern=r"^[a-z_]+:.+$")
+    """Interface and channel of python-can: ``slcan:/dev/ttyACM0``, ``socketcan:can0``,
+    ``socketcand:can0@192.168.1.5:29536``, ``pcan:PCAN_USBBUS1``."""
+
+    bitrate: PositiveInt = 250_000
+    """Bits per second; 250 000 is J1939's."""
+
+    feedback: bool = True
+    """Whether estimated and measured flow are sent back to the panel, ten times a second."""
+
+    own_node: Node = 0x80
+    """Our source address in what we send; a valve's is 0x80 and its number."""
+
+    most_frames_s: PositiveInt = 4000
+    """Frames a second beyond which the bus counts as flooded: about twice what 250 kbit/s
+    carry."""
+
+
+class ReplaySettings(ValveMap):
+    """A recorded bus, played again."""
+
+    file: StudyPath
+    """A log of candump, or in Vector's asc or blf format."""

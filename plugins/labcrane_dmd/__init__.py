@@ -1,0 +1,65 @@
+"""Dynamic Model Descriptions: make them from recordings, and operate an arm that moves by one."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from labcrane import (
+    CommandOffer,
+    Controller,
+    Dynamics,
+    Machine,
+    Offer,
+    PluginError,
+    hookimpl,
+    offer,
+)
+from labcrane_dmd.arm_settings import ArmSettings, ValveSettings
+
+if TYPE_CHECKING:
+    from labcrane_dmd.model import Model
+    from labcrane_dmd.settings import Between
+
+
+def load(path: Path | str, between: "Between | None" = None) -> "Model":
+    """Read a model: ``load(path)["boom"].speed(signal, angle)`` in rad and rad/s."""
+    from labcrane_dmd.model_file import load as read
+
+    return read(path, between)
+
+
+@hookimpl
+def labcrane_commands() -> list[CommandOffer]:
+    from labcrane_dmd import commands
+
+    return [
+        CommandOffer(("dmd", "fit"), commands.fit),
+        CommandOffer(("dmd", "validate"), commands.validate),
+        CommandOffer(("dmd", "plot"), commands.plot),
+    ]
+
+
+@hookimpl
+def labcrane_controllers() -> list[Offer[Controller]]:
+    def valve(settings: ValveSettings, machine: Machine) -> Controller:
+        from labcrane_dmd.valve import Valve
+
+        return Valve(settings, machine)
+
+    return [offer("valve", ValveSettings, valve)]
+
+
+@hookimpl
+def labcrane_dynamics() -> list[Offer[Dynamics]]:
+    def arm(settings: ArmSettings, machine: Machine) -> Dynamics:
+        try:
+            from labcrane_dmd.arm import DmdArm
+        except ModuleNotFoundError as error:
+            if error.name != "pybullet":
+                raise
+            raise PluginError(
+                "'dmd_arm' needs PyBullet, which is not installed (its wheels end at Python 3.11); "
+                "install pybullet"
+            ) from error
+        return DmdArm(settings, machine)
+
+    return [offer("dmd_arm", ArmSettings, arm)]

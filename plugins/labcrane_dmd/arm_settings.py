@@ -1,0 +1,82 @@
+"""What a protocol may say about the arm and its valves."""
+
+from typing import Annotated
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat
+
+from labcrane import Settings, StudyPath
+
+AxisName = Annotated[str, Field(pattern=r"^-?[a-z][a-z0-9_.]*$")]
+"""An axis of the input, ``valve.boom``; a leading minus turns it round."""
+
+
+class ValveSettings(Settings):
+    """The operator's axes go to the valves as they are."""
+
+    map: dict[str, AxisName] = Field(default_factory=dict)
+    """Which axis opens which joint's valve; joints that are not named here have the axis
+    ``valve.<joint>``, which is what a control panel gives."""
+
+    model: StudyPath | None = None
+    """The arm's Dynamic Model Description, for simulated operators: a practised hand knows how
+    far to push for a speed. Without one they take speed for proportional to the signal."""
+
+
+class JawsSettings(Settings):
+    """The pair of jaws at the end of the arm."""
+
+    joint: str = "jaws"
+    """The machine's joint whose angle is their opening. It must be the last and have length 0: the
+    arm's tip is the point between the jaws."""
+
+    length_m: PositiveFloat = 0.24
+    """From the hinge to the point between the jaws, in metres."""
+
+    width_m: PositiveFloat = 0.12
+    """Width of a jaw, in metres."""
+
+    thickness_m: PositiveFloat = 0.03
+    """Thickness of a jaw, in metres."""
+
+    grip_n: PositiveFloat = 60.0
+    """A grip forms when both jaws press with more than this, in newtons."""
+
+    release_deg: PositiveFloat = 2.0
+    """A grip is let go when the jaws are opened by this much, in degrees."""
+
+
+class OverloadSettings(Settings):
+    """When a joint counts as overloaded."""
+
+    limit: float = Field(default=0.98, gt=0.0, le=1.0)
+    """Load at which an overload begins, as a fraction of the joint's effort."""
+
+    release: float = Field(default=0.8, gt=0.0, le=1.0)
+    """Load below which it may end."""
+
+    hold_s: NonNegativeFloat = 0.2
+    """How long the load must stay below for it to end, in seconds."""
+
+
+class ArmSettings(Settings):
+    """An arm that moves by a Dynamic Model Description."""
+
+    model: StudyPath
+    """The model's YAML file, made with ``labcrane dmd fit``."""
+
+    proportional: tuple[str, ...] = ()
+    """Joints that the model does not describe and whose speed is proportional to the signal, up
+    to the machine's joint speed. Every joint is either here or in the model."""
+
+    scenes: tuple[StudyPath, ...] = ()
+    """Scene files whose objects, figures and obstacles the arm can touch. The trial's condition
+    ``scene`` says which of them stands there."""
+
+    jaws: JawsSettings | None = None
+    """The jaws, if the arm has any."""
+
+    overload: OverloadSettings = OverloadSettings()
+    """When a joint counts as overloaded."""
+
+    window_s: PositiveFloat = 0.05
+    """Force is the contact impulse over this time divided by it, in seconds."""

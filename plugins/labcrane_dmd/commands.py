@@ -1,0 +1,134 @@
+"""The commands ``labcrane dmd fit``, ``validate`` and ``plot``."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from labcrane_dmd.validation import Level
+
+RecordingsPath = Annotated[
+    Path, typer.Argument(metavar="RECORDINGS", help="a CSV file of a segment, or a folder of them")
+]
+ModelPath = Annotated[Path, typer.Argument(metavar="MODEL", help="a model's YAML file")]
+
+out = Console(soft_wrap=True, highlight=False)
+
+
+def _table(*columns: str, title: str | None = None) -> Table:
+    """Return a table in which nothing is cut off."""
+    made = Table(title=title)
+    for column in columns:
+        made.add_column(column, overflow="fold")
+    return made
+
+
+def fit(
+    recordings: RecordingsPath,
+    to: Annotated[Path, typer.Option("--out", help="the model's YAML file")],
+    between: Annotated[
+        Literal["linear", "pchip"], typer.Option(help="how speeds between layers are found")
+    ] = "linear",
+    max_degree: Annotated[
+        int, typer.Option(help="largest degree of the polynomials", min=1, max=12)
+    ] = 9,
+) -> None:
+    """Make a Dynamic Model Description from recordings of joints."""
+    from labcrane_dmd.fitting import fit_model
+    from labcrane_dmd.model_file import save
+    from labcrane_dmd.recordings import read_recordings
+    from labcrane_dmd.settings import FitSettings
+
+    settings = FitSettings(between=between, max_degree=max_degree)
+    model = fit_model(read_recordings(recordings), settings)
+    save(model, to)
+    table = _table("segment", "direction", "dead band", "dead time", "lag", "degrees", "not whole")
+    for name, segment in model.items():
+        for direction, what in ((segment.extend, "extend"), (segment.retract, "retract")):
+            table.add_row(
+                name,
+                what,
+                f"{direction.dead_band:.1f}",
+                f"{1000 * direction.dead_time:.0f} ms",
+                f"{1000 * direction.lag:.0f} ms",
+                " ".join(str(max(len(layer.coefficients) - 1, 0)) for layer in direction.layers),
+                " ".join(f"{layer.signal:g}" for layer in direction.layers if not layer.whole),
+            )
+    out.print(table)
+    out.print(f"model: {to}", markup=False)
+
+
+def validate(
+    model: ModelPath,
+    recordings: RecordingsPath,
+    to: Annotated[Path | None, typer.Option("--out", help="folder for tables and figures")] = None,
+    between: Annotated[
+        Literal["linear", "pchip"] | None,
+        typer.Option(help="another rule between layers than the model's own"),
+    ] = None,
+) -> None:
+    """Compare a model with recordings at signals that it was not fitted to.
+
+    Tables and figures for the other rule between layers are saved beside those of the model's own.
+    """
+    from labcrane_dmd.figures import draw_validation
+    from labcrane_dmd.model_file import load
+    from labcrane_dmd.recordings import read_recordings
+    from labcrane_dmd.validation import summary, write_table
+    from labcrane_dmd.validation import validate as compare
+
+    loaded = load(model, between)
+    folder = to or model.with_suffix("").with_name(f"{model.stem}-validation")
+    folder.mkdir(parents=True, exist_ok=True)
+    read = read_recordings(recordings)
+    own = loaded.settings.between
+    for rule in ("linear", "pchip"):
+        levels = compare(loaded.interpolated(rule), read)
+        ending = "" if rule == own else f"_{rule}"
+        write_table((level.row() for level in levels), folder / f"validation{ending}.csv")
+        write_table(summary(levels), folder / f"summary{ending}.csv")
+        draw_validation(levels, rule, folder / f"validation{ending}.png")
+        _print(levels, rule)
+    out.print(f"tables and figures: {folder}", markup=False)
+
+
+def _print(levels: "Sequence[Level]", rule: str) -> None:
+    from labcrane_dmd.validation import summary
+
+    numbers = ("mean_speed", "mse", "rmse", "mae", "max_abs_error", "residual_variance")
+    table = _table("segment", "signal", *numbers, "mean_error", "%", title=f"{rule}, deg/s")
+    for level in levels:
+        row = level.row()
+        table.add_row(
+            level.segment,
+            f"{level.signal:+d}",
+            *(f"{row[name]:.4f}" for name in numbers),
+            f"{row['mean_error']:+.4f}",
+            f"{row['mean_error_percent']:+.2f}",
+        )
+    out.print(table)
+    means = _table("segment", "mse", "rmse", "mae", "max_abs_error", "residual_variance", "largest")
+    for mean in summary(levels):
+        name, *values = mean.values()
+        means.add_row(str(name), *(f"{value:.4f}" for value in values))
+    out.print(means)
+
+
+def plot(
+    model: ModelPath,
+    to: Annotated[
+        Path | None, typer.Option("--out", help="PNG file; the model's name by default")
+    ] = None,
+) -> None:
+    """Draw a model's layers."""
+    from labcrane_dmd.figures import draw_model
+    from labcrane_dmd.model_file import load
+
+    path = to or model.with_suffix(".png")
+    draw_model(load(model), path)
+    out.print(f"figure: {path}", markup=False)

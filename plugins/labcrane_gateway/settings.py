@@ -1,0 +1,18 @@
+"""What a protocol may say about a control station behind the open gateway protocol."""
+
+from pydantic import Field, PositiveFloat
+
+from labcrane import Settings
+
+
+class GatewaySettings(Settings):
+    """Settings of :class:`labcrane_gateway.station.Station`."""
+
+    stream: str = Field(default="gateway.command", min_length=1)
+    """Name of the LSL stream with the commands."""
+
+    flow: str = Field(default="gateway.flow", min_length=1)
+    """Name of the LSL stream in which the valves' flow is told."""
+
+    timeout_s: PositiveFloat = 0.25
+    """Age of the last command, in seconds, at which all valves shut and the station is lost."""

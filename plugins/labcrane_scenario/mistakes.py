@@ -1,0 +1,62 @@
+"""Episodes of contact beyond a limit, and how many there were."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+class Episode:
+    """One force against its limit.
+
+    An episode begins beyond the limit and ends when the force has been below a share of it for a
+    while: a contact that trembles is one mistake.
+
+    Parameters
+    ----------
+    limit
+        In N.
+    release
+        Share of the limit below which the episode may end.
+    hold
+        How many ticks it must stay there.
+    """
+
+    def __init__(self, limit: float, release: float, hold: int) -> None:
+        self._limit = limit
+        self._end = release * limit
+        self._hold = hold
+        self._quiet = 0
+        self.on = False
+        self.peak = 0.0
+
+    def see(self, force: float) -> bool:
+        """Take a tick's force in N; return whether an episode begins with it."""
+        self.peak = max(self.peak, force)
+        if force > self._limit:
+            began, self.on, self._quiet = not self.on, True, 0
+            return began
+        if self.on and force < self._end:
+            self._quiet += 1
+            self.on = self._quiet <= self._hold
+        else:
+            self._quiet = 0
+        return False
+
+
+KINDS = ("object", "body", "overload_max", "overload_min", "drop")
+"""Mistakes of these kinds are counted, each for itself."""
+
+
+@dataclass
+class Mistakes:
+    """How many mistakes of each kind there were."""
+
+    counts: dict[str, int] = field(default_factory=lambda: dict.fromkeys(KINDS, 0))
+
+    def add(self, kind: str) -> int:
+        """Count a mistake; return how many of its kind there are now."""
+        self.counts[kind] += 1
+        return self.counts[kind]
+
+    def results(self) -> Mapping[str, float]:
+        """Return the counts by the names of the trial table."""
+        return {f"mistakes.{kind}": float(count) for kind, count in self.counts.items()}

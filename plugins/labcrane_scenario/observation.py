@@ -1,0 +1,96 @@
+"""What the state says of a scene: forces, overloads, drops, and where everything is."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from labcrane import Event, FloatArray, Placed, Run, Value
+from labcrane_scenario.mistakes import Episode, Mistakes
+from labcrane_scenario.settings import ScenarioSettings
+
+GRAVITY = 9.81
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """One limited part of a thing, and where its force sits in the state."""
+
+    thing: Placed
+    part: str
+    place: int
+    support: int | None
+    episode: Episode
+
+
+class Observation:
+    """Watches one trial's scene, and turns what goes wrong into events.
+
+    An object's limit also holds for what it is set down with: its support beyond its own weight.
+    """
+
+    def __init__(self, settings: ScenarioSettings, run: Run, placed: tuple[Placed, ...]) -> None:
+        hold = round(settings.hold_s * run.rate_hz)
+        self.mistakes = Mistakes()
+        self._watched = []
+        for thing in placed:
+            for part, limit in thing.limits.items():
+                if thing.kind == "obstacle":
+                    continue  # its force is that on what touches it
+                column = f"scene.{thing.name}.force.{part}"
+                support = f"scene.{thing.name}.support" if thing.kind == "object" else None
+                self._watched.append(
+                    Watched(
+                        thing,
+                        part,
+                        run.state.index(column),
+                        run.state.index(support) if support else None,
+                        Episode(limit, settings.release, hold),
+                    )
+                )
+        self._overload = run.state.find("joint.overload")
+        self._names = run.machine.names
+        self._over = [0] * len(self._names)
+        columns = run.state.columns
+        self._drops_at = columns.index("grip.drops") if "grip.drops" in columns else None
+        self._drops = 0.0
+
+    @property
+    def peaks(self) -> Mapping[str, float]:
+        """Largest force so far on objects and on bodies, in N."""
+        found = {"object": 0.0, "body": 0.0}
+        for each in self._watched:
+            kind = each.thing.kind
+            found[kind] = max(found[kind], each.episode.peak)
+        return found
+
+    def see(self, state: FloatArray, due: float) -> Iterator[Event]:
+        """Take a tick; yield what went wrong in it."""
+        yield from self._contacts(state, due)
+        yield from self._overloads(state, due)
+        if self._drops_at is not None and state.item(self._drops_at) > self._drops:
+            self._drops = state.item(self._drops_at)
+            yield Event("drop", due, {"count": self.mistakes.add("drop")})
+
+    def _contacts(self, state: FloatArray, due: float) -> Iterator[Event]:
+        for each in self._watched:
+            force = state.item(each.place)
+            if each.support is not None:
+                force = max(force, state.item(each.support) - each.thing.mass * GRAVITY)
+            if each.episode.see(force):
+                kind = each.thing.kind
+                count = self.mistakes.add(kind)
+                about: dict[str, Value] = {
+                    "thing": each.thing.name,
+                    "part": each.part,
+                    "force": force,
+                }
+                yield Event(f"contact.{kind}", due, {**about, "count": count})
+
+    def _overloads(self, state: FloatArray, due: float) -> Iterator[Event]:
+        for joint, now in enumerate(state[self._overload].tolist()):
+            direction = int(now)
+            if direction and direction != self._over[joint]:
+                kind = "overload_max" if direction > 0 else "overload_min"
+                count = self.mistakes.add(kind)
+                about: dict[str, Value] = {"joint": self._names[joint], "direction": direction}
+                yield Event("overload", due, {**about, "count": count})
+            self._over[joint] = direction

@@ -1,0 +1,91 @@
+"""A simulated operator at a control panel."""
+
+import math
+
+import numpy as np
+
+from labcrane import (
+    FloatArray,
+    Frame,
+    InputDevice,
+    Machine,
+    Phase,
+    ProtocolError,
+    Run,
+    Signal,
+    Tick,
+    Trial,
+)
+from labcrane_scenario.settings import OperatorSettings
+
+NEAR = 0.6
+"""Share of a goal's radius within which the tip is left alone while the jaws move."""
+
+
+class ScenarioOperator(InputDevice):
+    """Hands that take the tip to the task's target, and then open or shut the jaws as it asks.
+
+    They see the frame before, like a person, and know the valves as ``run.steer`` does.
+    """
+
+    def __init__(self, settings: OperatorSettings, machine: Machine) -> None:
+        self.signals = (Signal("valve", "1", machine.names), Signal("panel.connected", "1"))
+        if settings.jaws not in machine.names:
+            raise ProtocolError(
+                f"jaws is {settings.jaws!r}; the machine has {', '.join(machine.names)}"
+            )
+        self._settings = settings
+        self._joint = machine.names.index(settings.jaws)
+        self._limits = machine.limits[self._joint]
+        self._out = np.zeros(len(machine.names) + 1)
+        self._trial = 0
+
+    def open(self, run: Run) -> None:
+        self._run = run
+        self._tip = run.state.find("tip.position")
+        self._angle = run.state.find("joint.angle").start + self._joint
+        names = [signal.name for signal in run.task.signals]
+        self._shown = {"target.position", "target.radius", "target.jaws"} <= set(names)
+        if self._shown:
+            self._target = run.task.find("target.position")
+            self._radius = run.task.index("target.radius")
+            self._jaws = run.task.index("target.jaws")
+        self._wait = 0
+
+    def begin_trial(self, trial: Trial) -> None:
+        self._trial = trial.number
+        self._wait = round(self._settings.reaction_s * self._run.rate_hz)
+
+    def read(self, tick: Tick, seen: Frame) -> FloatArray:
+        out = self._out
+        out[:] = 0.0
+        out[-1] = 1.0
+        going = seen.trial == self._trial and seen.phase is Phase.RUNNING and not seen.paused
+        if not (self._shown and going) or math.isnan(seen.task.item(self._radius)):
+            return out
+        if self._wait > 0:
+            self._wait -= 1
+            return out
+        away = seen.task[self._target] - seen.state[self._tip]
+        distance = float(np.linalg.norm(away))
+        if distance > NEAR * seen.task.item(self._radius):
+            settings = self._settings
+            speed = min(settings.gain_per_s * distance, settings.speed_m_s)
+            out[:] = self._run.steer(away / distance * speed, seen.state)
+            out[-1] = 1.0
+            out[self._joint] = 0.0
+        if distance <= seen.task.item(self._radius):
+            self._move_jaws(seen, out)
+        return out
+
+    def _move_jaws(self, seen: Frame, out: FloatArray) -> None:
+        wanted = seen.task.item(self._jaws)
+        if wanted < 0.0:
+            return
+        lowest, highest = self._limits
+        away = lowest + wanted * (highest - lowest) - seen.state.item(self._angle)
+        if abs(away) > CLOSE_RAD:
+            out[self._joint] = math.copysign(self._settings.signal, away)
+
+
+CLOSE_RAD = 0.02

@@ -1,0 +1,161 @@
+"""The scenario task."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from labcrane import (
+    Event,
+    FloatArray,
+    Frame,
+    Judgement,
+    Machine,
+    Phase,
+    Planned,
+    ProtocolError,
+    Run,
+    Scene,
+    Signal,
+    Task,
+    Trial,
+    Value,
+    load_scene,
+    place,
+)
+from labcrane_scenario.mistakes import KINDS
+from labcrane_scenario.observation import Observation
+from labcrane_scenario.settings import ScenarioSettings
+from labcrane_scenario.way import Way
+
+PRESSED = 0.5  # a button is 0 or 1
+
+
+class Scenario(Task):
+    """One run in a scene is one trial: its goals in their order, and what went wrong on the way.
+
+    ``target`` is the goal of the moment, ``target.jaws`` how far the jaws are to be open for it
+    (-1 when it does not matter), ``goals.reached`` how many are done.
+    """
+
+    signals = (
+        Signal("target.position", "m", ("x", "y", "z")),
+        Signal("target.radius", "m"),
+        Signal("target.jaws", "1"),
+        Signal("goals.reached", "1"),
+        Signal("mistakes", "1", KINDS),
+    )
+
+    results = (
+        Signal("duration", "s"),
+        Signal("goals", "1"),
+        Signal("mistakes", "1", KINDS),
+        Signal("peak_force.object", "N"),
+        Signal("peak_force.body", "N"),
+        Signal("deformity_found", "s"),  # from the start; NaN when it was not, or there is none
+        Signal(
+            "k", "1"
+        ),  # completion as far as the run itself can tell; the supervisor's overrides
+    )
+
+    def __init__(self, settings: ScenarioSettings, machine: Machine) -> None:
+        self._settings = settings
+        self._machine = machine
+        self._scenes = {_name(path): load_scene(path) for path in settings.scenes}
+        if len(self._scenes) < len(settings.scenes):
+            raise ProtocolError(
+                f"two scenes have the same name, of {', '.join(map(_name, settings.scenes))}"
+            )
+        for name, scene in self._scenes.items():
+            if scene.start_deg is not None and len(scene.start_deg) != len(machine.joints):
+                raise ProtocolError(
+                    f"scene {name!r}: start_deg has {len(scene.start_deg)} angles; the machine has "
+                    f"{len(machine.joints)} joints ({', '.join(machine.names)})"
+                )
+        self._values: FloatArray = np.zeros(6 + len(KINDS))
+
+    def factors(self) -> Mapping[str, Sequence[str]]:
+        return {"scenes": tuple(self._scenes)}
+
+    def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[Planned]:
+        return [self._planned(name, self._scenes[name]) for name in levels["scenes"]]
+
+    def open(self, run: Run) -> None:
+        self._run = run
+        self._tip = run.state.find("tip.position")
+        self._button = (
+            run.axes.index(self._settings.find_axis) if self._settings.find_axis else None
+        )
+
+    def begin_trial(self, trial: Trial) -> None:
+        name = str(trial.planned.condition["scene"])
+        scene, settings = self._scenes[name], self._settings
+        placed = place(scene, trial.seed)
+        self._watch = Observation(settings, self._run, placed)
+        self._way = Way(scene, placed, self._run)
+        self._deformed = next((each for each in placed if each.deformed is not None), None)
+        self._limit = settings.limit_s or scene.limit_s
+        self._most: float = settings.mistakes
+        self._found = math.nan
+
+    def overrule(self) -> None:
+        self._limit, self._most = math.inf, math.inf
+
+    def judge(self, frame: Frame) -> Judgement:
+        due, state = frame.tick.due, frame.state
+        events = [*self._watch.see(state, due), *self._findings(frame)]
+        events.extend(self._way.see(state, due))
+        mistakes = self._watch.mistakes
+        kind = next((name for name, count in mistakes.counts.items() if count > self._most), None)
+        phase = Phase.RUNNING
+        if self._way.done:
+            phase = Phase.SUCCESS
+        elif kind is not None:
+            phase = Phase.FAILURE
+            events.append(Event("mistakes.too_many", due, {"kind": kind, "most": self._most}))
+        elif frame.elapsed >= self._limit:
+            phase = Phase.TIMEOUT
+        self._values[:] = (*self._way.target(state), *mistakes.counts.values())
+        results = self._results(frame, phase) if phase.over else {}
+        return Judgement(phase, self._values, tuple(events), results)
+
+    def _planned(self, name: str, scene: Scene) -> Planned:
+        start = None
+        if scene.start_deg is not None:
+            start = tuple(math.radians(angle) for angle in scene.start_deg)
+        limit = self._settings.limit_s or scene.limit_s
+        return Planned({"scene": name}, expected_s=limit / 2, start_pose=start)
+
+    def _findings(self, frame: Frame) -> Iterator[Event]:
+        if self._deformed is None or not math.isnan(self._found):
+            return
+        by = None
+        for event in frame.events:
+            text = str(event.data.get("text", ""))
+            if event.name == "order.note" and text.lower().startswith("found"):
+                by = "supervisor"
+        if self._button is not None and frame.axes.item(self._button) > PRESSED:
+            chest = self._way.position(frame.state, self._deformed.name)
+            if math.dist(frame.state[self._tip].tolist(), chest) <= 1.0 + self._settings.find_m:
+                by = "operator"
+        if by is not None:
+            self._found = frame.elapsed
+            about = {"by": by, "limb": self._deformed.deformed}
+            yield Event("deformity.found", frame.tick.due, about)
+
+    def _results(self, frame: Frame, phase: Phase) -> dict[str, Value]:
+        peaks = self._watch.peaks
+        return {
+            "duration": frame.elapsed,
+            "goals": float(self._way.reached),
+            **self._watch.mistakes.results(),
+            "peak_force.object": peaks["object"],
+            "peak_force.body": peaks["body"],
+            "deformity_found": self._found,
+            "k": float(phase is Phase.SUCCESS),
+        }
+
+
+def _name(path: Path) -> str:
+    return path.name.split(".")[0]

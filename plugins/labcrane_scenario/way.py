@@ -1,0 +1,93 @@
+"""The goals of one run, in their order."""
+
+import math
+from collections.abc import Iterator
+
+from labcrane import Event, FloatArray, Placed, Run, Scene
+
+Point = tuple[float, float, float]
+ANY = -1.0
+"""Opening of the jaws that does not matter."""
+
+OPEN_WITHIN = 0.1
+"""How near the jaws' opening must come to what a goal asks, as a share of their range."""
+
+
+class Way:
+    """Follows which goal is next."""
+
+    def __init__(self, scene: Scene, placed: tuple[Placed, ...], run: Run) -> None:
+        self._goals = scene.goals
+        self._placed = {each.name: each for each in placed}
+        self._positions = {
+            signal.name.split(".")[1]: run.state.find(signal.name)
+            for signal in run.state.signals
+            if signal.name.startswith("scene.") and signal.name.endswith(".position")
+        }
+        self._tip = run.state.find("tip.position")
+        self._jaws = run.state.find("joint.angle").stop - 1
+        self._opening = run.machine.limits[-1]
+        columns = run.state.columns
+        self._grip = columns.index("grip.thing") if "grip.thing" in columns else None
+        self._hold_rate = run.rate_hz
+        self._held = 0
+        self.reached = 0
+
+    @property
+    def done(self) -> bool:
+        """Whether all goals were reached."""
+        return self.reached == len(self._goals)
+
+    def position(self, state: FloatArray, what: str) -> Point:
+        """Return where the tip or a thing is, in m."""
+        if what != "tip" and what not in self._positions:
+            return self._placed[what].position  # an obstacle does not move
+        x, y, z = state[self._tip if what == "tip" else self._positions[what]].tolist()
+        return x, y, z
+
+    def see(self, state: FloatArray, due: float) -> Iterator[Event]:
+        """Take a tick; yield the goal that was reached in it, if one was."""
+        if self.done:
+            return
+        goal = self._goals[self.reached]
+        self._held = self._held + 1 if self._there(state) else 0
+        if self._held > goal.hold_s * self._hold_rate:
+            self.reached, self._held = self.reached + 1, 0
+            yield Event("goal.reached", due, {"goal": self.reached, "what": goal.what})
+
+    def target(self, state: FloatArray) -> tuple[float, float, float, float, float, float]:
+        """Return where the tip should go, the region's radius, the jaws, and the goals reached.
+
+        For a goal that something else must come to, the tip should go there by as much as is
+        still missing.
+        """
+        goal = self._goals[min(self.reached, len(self._goals) - 1)]
+        x, y, z = self._place()
+        if goal.what != "tip":
+            at, tip = self.position(state, goal.what), self.position(state, "tip")
+            x, y, z = x + tip[0] - at[0], y + tip[1] - at[1], z + tip[2] - at[2]
+        jaws = ANY if goal.jaws is None else goal.jaws
+        return x, y, z, goal.radius, jaws, float(self.reached)
+
+    def _there(self, state: FloatArray) -> bool:
+        goal = self._goals[self.reached]
+        if math.dist(self.position(state, goal.what), self._place()) > goal.radius:
+            return False
+        if goal.grip is not None and (self._grip is None or goal.grip != bool(state[self._grip])):
+            return False
+        if goal.jaws is None or goal.grip is True:
+            return True
+        lowest, highest = self._opening
+        share = (state.item(self._jaws) - lowest) / (highest - lowest)
+        return abs(share - goal.jaws) <= OPEN_WITHIN
+
+    def _place(self) -> Point:
+        goal = self._goals[min(self.reached, len(self._goals) - 1)]
+        x, y, z = goal.position
+        if goal.beside is None:
+            return x, y, z
+        # The thing as it was placed: turned with it, and not moving with it afterwards.
+        thing = self._placed[goal.beside]
+        cos, sin = math.cos(thing.yaw), math.sin(thing.yaw)
+        ahead, left, up = thing.position
+        return ahead + cos * x - sin * y, left + sin * x + cos * y, up + z

@@ -1,0 +1,335 @@
+"""A panel on a CAN bus: frames, time-outs, unplugging, replay, and what is no command."""
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import can
+import numpy as np
+import pytest
+from rehearsal import NoLog, ScriptedConsole
+
+from labcrane import InputDevice, ProtocolError, Tick, loop, rig
+from labcrane.clock import SystemClock
+from labcrane.console import Command, Order
+from labcrane.course import Course
+from labcrane.plan import plan_session
+from labcrane.registry import discover
+from labcrane.study import load
+from labcrane.testing import InputContract, a_frame, a_run, ch8
+from labcrane.testing.commands import CommandContract
+from labcrane_can import labcrane_commands
+from labcrane_can.asked import PanelCommands
+from labcrane_can.avc import ESTIMATED, FULL, FrameError, State, decode, encode, encode_flow
+from labcrane_can.panel import CanPanel
+from labcrane_can.replay import CanReplay
+from labcrane_can.settings import CanSettings, ReplaySettings, ValveMap
+
+RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"
+VALVES = {"slew": 1, "shoulder": 2, "elbow": 3, "wrist": 4}
+DBC = RETRIEVAL / "avc.dbc"
+
+
+def message(identifier: int, data: bytes, at: float = 0.0) -> can.Message:
+    return can.Message(timestamp=at, arbitration_id=identifier, data=data)
+
+
+class TestCanPanel(InputContract):  # "can"
+    @pytest.fixture
+    def device(self) -> InputDevice:
+        return CanPanel(CanSettings(bus="virtual:contract", valves=VALVES), ch8())
+
+
+class TestCommands(CommandContract):
+    @pytest.fixture(params=labcrane_commands(), ids=lambda offered: " ".join(offered.words))
+    def command(self, request):
+        return request.param
+
+
+class TestCanReplay(InputContract):  # "can_replay"
+    @pytest.fixture
+    def device(self, tmp_path: Path) -> InputDevice:
+        return CanReplay(ReplaySettings(file=a_log(tmp_path / "a.log"), valves=VALVES), ch8())
+
+
+def a_log(path: Path, seed: int = 2) -> Path:
+    random = np.random.default_rng(seed)
+    with can.Logger(path) as log:
+        for number in range(400):
+            level = int(random.integers(-250, 251))
+            # Times that every format can hold, and that do not fall on ticks.
+            log(message(*encode(1 + number % 4, level, 0x25), at=1000.0 + 0.0101 * number))
+    return path
+
+
+def commands_of(device: InputDevice, ticks: int) -> bytes:
+    run = a_run(ch8(), axes=device.signals)
+    device.open(run)
+    frame = a_frame(run)
+    read = [device.read(Tick(number, 0.0, 0.0), frame).tobytes() for number in range(ticks)]
+    device.close()
+    return b"".join(read)
+
+
+def test_every_signal_survives_the_bus_with_its_sign_from_the_state() -> None:
+    for signal in range(-FULL, FULL + 1):
+        command = decode(*encode(5, signal, 0x25))
+        assert command is not None
+        assert (command.signal, command.valve, command.node, command.priority) == (signal, 5, 37, 3)
+
+
+def test_the_valve_makers_example_is_read() -> None:
+    command = decode(0x0CFE3506, bytes.fromhex("96FF01FFFFFFFFFF"))
+    assert command is not None
+    assert (command.valve, command.signal, command.state) == (5, 150, State.EXTEND)
+
+
+def test_cantools_reads_what_we_send_with_the_dbc_file() -> None:
+    import cantools
+
+    database = cantools.database.load_file(DBC, frame_id_mask=0x83FFFF00)
+    for signal in (-250, -1, 0, 1, 250):
+        identifier, data = encode(3, signal, 0x25)
+        read = database.get_message_by_frame_id(identifier).decode(data, decode_choices=False)
+        assert read["AVC3_PortFlow"] == pytest.approx(0.4 * abs(signal))
+        assert read["AVC3_State"] == (1 if signal > 0 else 2 if signal < 0 else 0)
+    identifier, data = encode_flow(ESTIMATED, 2, -37.4, 0x80)
+    read = database.get_message_by_frame_id(identifier).decode(data, decode_choices=False)
+    assert (read["AVEF2_Extend"], read["AVEF2_Retract"], read["AVEF2_State"]) == (0, 37, 2)
+
+
+@pytest.mark.parametrize(
+    ("data", "why"),
+    [
+        (b"\x10\xff\x01", "valve 1: 3 bytes instead of 8"),
+        (b"\xff\xff\x01" + b"\xff" * 5, "valve 1: the port flow is not available"),
+        (b"\xfe\xff\x01" + b"\xff" * 5, "valve 1: the port flow is in error"),
+        (b"\xfb\xff\x01" + b"\xff" * 5, "valve 1: the port flow is reserved, 251"),
+        (b"\x10\xff\x07" + b"\xff" * 5, "valve 1: the state 7 is reserved"),
+        (b"\x10\xff\x0e" + b"\xff" * 5, "valve 1: the state is error"),
+    ],
+)
+def test_malformed_commands_are_refused_and_told_when_the_panel_is_missed(
+    data: bytes, why: str
+) -> None:
+    with pytest.raises(FrameError, match=why):
+        decode(0x0CFE3125, data)
+    with can.Bus(interface="virtual", channel=f"bad-{data.hex()}") as bus:
+        settings = CanSettings(bus=f"virtual:bad-{data.hex()}", valves=VALVES)
+        device = CanPanel(settings, ch8())
+        run = a_run(ch8(), axes=device.signals)
+        device.open(run)
+        try:
+            bus.send(message(0x0CFE3125, data))
+            bus.send(message(0x18F00425, bytes(8)))
+            wait_for(lambda: device._commands.refused and device._commands.foreign)
+            now = time.perf_counter()
+            axes = device.read(Tick(1, now, now), a_frame(run))
+            assert not axes.any()
+            assert device.fault == (
+                f"no valve command for 0.25 s on {settings.bus}; 1 frames were refused, the last "
+                f"because {why}; 1 frames were not for these valves"
+            )
+        finally:
+            device.close()
+
+
+def wait_for(ready, seconds: float = 5.0) -> None:
+    end = time.perf_counter() + seconds
+    while not ready():
+        assert time.perf_counter() < end, "waited in vain"
+        time.sleep(0.005)
+
+
+def test_float_block_and_old_commands_ask_for_no_flow() -> None:
+    commands = PanelCommands(ValveMap(valves=VALVES))
+    commands.take(message(*encode(1, 120, 0x25)), 0.0)
+    commands.take(message(*encode(2, 0, 0x25, state=State.FLOAT)), 0.2)
+    assert commands.signals(0.25) == ([120.0, 0, 0, 0], [False, True, False, False], True)
+    assert commands.signals(0.26) == ([0.0, 0, 0, 0], [False, True, False, False], True)
+    assert commands.signals(0.46) == ([0.0, 0, 0, 0], [False] * 4, False)
+
+
+def test_another_node_or_priority_is_foreign_when_the_protocol_names_them() -> None:
+    commands = PanelCommands(ValveMap(valves=VALVES, node=0x25, priority=3))
+    commands.take(message(*encode(1, 120, 0x26)), 0.0)
+    commands.take(message(*encode(1, 120, 0x25, priority=6)), 0.0)
+    assert commands.foreign == 2
+    commands.take(message(*encode(1, 120, 0x25)), 0.0)
+    assert commands.signals(0.0)[0][0] == 120.0
+
+
+def test_a_dbc_file_maps_another_panel(tmp_path: Path) -> None:
+    (tmp_path / "panel.dbc").write_text(
+        'VERSION ""\nNS_ :\nBS_:\nBU_: P\n\nBO_ 256 Levers: 4 P\n'
+        ' SG_ Boom : 0|16@1- (0.1,0) [-100|100] "%" P\n'
+        ' SG_ Arm : 16|16@1- (0.1,0) [-100|100] "%" P\n'
+    )
+    settings = ValveMap(
+        valves={"elbow": "Levers.Boom", "shoulder": "Levers.Arm"}, map=tmp_path / "panel.dbc"
+    )
+    commands = PanelCommands(settings)
+    frame = can.Message(
+        arbitration_id=256,
+        is_extended_id=False,
+        data=(500).to_bytes(2, "little") + (-1000).to_bytes(2, "little", signed=True),
+    )
+    commands.take(frame, 0.0)
+    assert commands.signals(0.0)[0] == [125.0, -250.0]
+    with pytest.raises(
+        ProtocolError, match=r"has no 'Levers.Bom' for joint 'elbow'; it has Levers"
+    ):
+        PanelCommands(ValveMap(valves={"elbow": "Levers.Bom"}, map=tmp_path / "panel.dbc"))
+
+
+def test_the_same_log_gives_the_same_commands_bit_for_bit_in_every_format(tmp_path: Path) -> None:
+    first = None
+    for ending in ("log", "asc", "blf"):
+        path = a_log(tmp_path / f"panel.{ending}")
+        settings = ReplaySettings(file=path, valves=VALVES)
+        for _ in range(2):
+            got = commands_of(CanReplay(settings, ch8()), 1200)
+            assert first is None or got == first, ending
+            first = got
+
+
+def test_a_candump_log_of_a_live_bus_replays_what_the_panel_was_heard_to_say(
+    tmp_path: Path,
+) -> None:
+    path = a_log(tmp_path / "live.log")
+    live = PanelCommands(ValveMap(valves=VALVES))
+    frames = list(can.LogReader(path))
+    device = CanReplay(ReplaySettings(file=path, valves=VALVES), ch8())
+    run = a_run(ch8(), axes=device.signals)
+    device.open(run)
+    waiting, start = list(frames), frames[0].timestamp
+    for number in range(900):
+        now = number / run.rate_hz
+        while waiting and round(waiting[0].timestamp - start, 6) <= now:
+            live.take(waiting[0], round(waiting.pop(0).timestamp - start, 6))
+        expected = [signal / FULL for signal in live.signals(now)[0]]
+        assert device.read(Tick(number, 0.0, 0.0), a_frame(run))[:4].tolist() == expected
+
+
+def test_what_is_no_log_is_refused_in_words(tmp_path: Path) -> None:
+    (tmp_path / "empty.log").write_text("")
+    with pytest.raises(ProtocolError, match=r"empty.log holds no frames, so there is nothing"):
+        CanReplay(ReplaySettings(file=tmp_path / "empty.log", valves=VALVES), ch8())
+    with pytest.raises(ProtocolError, match=r"no.asc cannot be read as a candump, asc or blf log"):
+        CanReplay(ReplaySettings(file=tmp_path / "no.asc", valves=VALVES), ch8())
+
+
+def test_a_flooded_bus_holds_the_machine_and_says_so() -> None:
+    settings = CanSettings(bus="virtual:flood", valves=VALVES, most_frames_s=300)
+    device = CanPanel(settings, ch8())
+    run = a_run(ch8(), axes=device.signals)
+    with can.Bus(interface="virtual", channel="flood") as bus:
+        device.open(run)
+        try:
+            end = time.perf_counter() + 4.0
+            while time.perf_counter() < end and "flooded" not in (device.fault or ""):
+                for _ in range(10):
+                    bus.send(message(*encode(1, 100, 0x25)))
+                time.sleep(0.002)
+                now = time.perf_counter()
+                axes = device.read(Tick(1, now, now), a_frame(run))
+            assert "virtual:flood is flooded:" in (device.fault or "")
+            assert "where 300 are the most" in (device.fault or "")
+            assert not axes.any()
+        finally:
+            device.close()
+
+
+PROTOCOL = """\
+labcrane: 1
+study: panel
+title: A panel on a pty
+machine: {machine}
+input: {{use: can, bus: 'slcan:{link}', valves: {{base: 1, arm: 2, boom: 3, jaws: 4}}}}
+scheme: {{use: valve}}
+dynamics:
+  use: dmd_arm
+  model: {folder}/arm.dmd.yaml
+  proportional: [base]
+  jaws: {{}}
+  scenes: [{scene}]
+tasks: {{reach: {{use: scenario, scenes: [{scene}], limit_s: 600}}}}
+sessions: [{{name: only, steps: [{{block: {{task: reach}}}}]}}]
+"""
+
+
+class UntilConsole(ScriptedConsole):
+    """Ends the session after some seconds of ticks."""
+
+    def __init__(self, ticks: int) -> None:
+        super().__init__({ticks: [Command(Order.END)]})
+
+
+@pytest.fixture
+def panel(tmp_path: Path) -> Iterator[tuple[Path, subprocess.Popen[str]]]:
+    link = tmp_path / "ttyPANEL"
+    program = Path(__file__).parents[1] / "can_panel.py"
+    process = subprocess.Popen(
+        [sys.executable, str(program), str(link), "100", "60", "30", "33"],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout
+        assert process.stdout.readline() == "ready\n"
+        yield link, process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def test_a_panel_process_unplugged_in_the_middle_pauses_the_session_and_resumes_it(
+    panel, tmp_path: Path
+) -> None:
+    link, process = panel
+    (tmp_path / "study.yaml").write_text(
+        PROTOCOL.format(
+            link=link,
+            folder=RETRIEVAL,
+            machine="ied_arm.yaml",
+            scene=RETRIEVAL / "scenes" / "touch.yaml",
+        )
+    )
+    (tmp_path / "ied_arm.yaml").write_text((RETRIEVAL / "ied_arm.yaml").read_text())
+    study = load(tmp_path / "study.yaml", discover())
+    plan = plan_session(study, "P001", 1)
+    the_rig = rig.build(study, simulated=False)
+    frames = []
+    with rig.opened(the_rig, study, plan.seed) as run:
+        signal = run.command.find("valve.signal")
+
+        def keep(frame):
+            frames.append(
+                (frame.tick.woke, frame.command[signal].copy(), frame.paused, frame.events)
+            )
+
+        course = Course(study, plan, the_rig, waits=False)
+        loop.run(the_rig, run, course, SystemClock(), UntilConsole(240 * 59), NoLog(), [keep])
+    output, _ = process.communicate(timeout=20)
+    said = dict(line.split(" ", 1) for line in output.splitlines() if " " in line)
+    unplugged, back = float(said["unplugged"]), float(said["back"])
+    events = [(woke, event) for woke, _, _, events in frames for event in events]
+    lost = [(woke, event) for woke, event in events if event.name == "input.lost"]
+    found = [(woke, event) for woke, event in events if event.name == "input.back"]
+    assert lost[-1][0] - unplugged < 0.25
+    assert "is gone" in str(lost[-1][1].data["why"])
+    assert found[-1][0] > back
+    for woke, command, paused, _ in frames:
+        if lost[-1][0] <= woke < found[-1][0]:
+            assert paused
+            assert not command.any()
+    assert found[-1][0] - back < 1.5
+    before = np.array([command for woke, command, _, _ in frames if woke < unplugged])
+    after = np.array([command for woke, command, _, _ in frames if woke > found[-1][0] + 0.1])
+    assert np.abs(before).max() > 190
+    assert np.abs(after).max() > 190
+    sent, heard = map(int, said["sent"].split())
+    assert sent > 5000
+    assert heard > 100  # estimated and measured flow came back to the panel

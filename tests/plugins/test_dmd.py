@@ -1,0 +1,266 @@
+"""Models from recordings: on the shared machine, on another one, and on recordings gone wrong."""
+
+import gzip
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from dmd_machine import LEVELS, record, true_speed
+
+import labcrane_dmd
+from labcrane import ProtocolError, RecordingError
+from labcrane.cli.app import main
+from labcrane_dmd.fitting import fit_model, fit_segment
+from labcrane_dmd.layer import linear, pchip
+from labcrane_dmd.model import Model
+from labcrane_dmd.model_file import save
+from labcrane_dmd.recordings import read_recordings
+from labcrane_dmd.settings import FitSettings
+from labcrane_dmd.validation import validate
+
+FOLDER = Path(__file__).parents[2] / "protocols" / "retrieval" / "hydraulic_arm"
+PCHIP = FitSettings(between="pchip")
+
+
+@pytest.fixture(scope="module")
+def recordings():
+    return read_recordings(FOLDER)
+
+
+@pytest.fixture(scope="module")
+def model(recordings) -> Model:
+    return fit_model(recordings, PCHIP)
+
+
+def recorded_mean(name: str, signal: int, lowest: float, highest: float) -> float:
+    """Return the mean speed over angle in deg/s by a way of its own: crossing times of the ends."""
+    table = pd.read_csv(FOLDER / f"{name}.csv.gz")
+    rows = table[table.run == table[table.signal == signal].run.iloc[0]]
+    rows = rows[rows.signal == signal]
+    smooth = rows.angle_deg.rolling(25, center=True).mean().to_numpy()
+    inside = (smooth >= lowest) & (smooth <= highest)
+    angle, time = smooth[inside], rows.time_s.to_numpy()[inside]
+    # Mean over angle of dθ/dt: crossing times of a grid of angles, each cell by its own duration.
+    edges = np.linspace(angle.min(), angle.max(), 60)
+    order = np.argsort(angle)
+    crossed = np.interp(edges, angle[order], time[order])
+    return float(np.mean(np.diff(edges) / np.diff(crossed)))
+
+
+def test_mean_speeds_at_signals_that_the_fit_never_saw_are_within_the_papers_error(
+    model, recordings
+) -> None:
+    checked = 0
+    for level in validate(model, recordings):
+        if abs(level.signal) < 100:
+            continue
+        row = level.row()
+        theirs = recorded_mean(level.segment, level.signal, row["from_deg"], row["to_deg"])
+        assert row["mean_speed"] == pytest.approx(theirs, rel=0.01)
+        for recorded in (row["mean_speed"], theirs):
+            error = abs(row["model_mean_speed"] - recorded)
+            assert error < 0.1, (level.segment, level.signal)
+            assert error < 0.019 * abs(recorded), (level.segment, level.signal)
+        checked += 1
+    assert checked == 3 * 2 * 4
+
+
+def test_the_fit_does_not_look_at_validation_signals(model, recordings) -> None:
+    from dataclasses import replace
+
+    (arm, *_) = recordings
+    spoilt = tuple(
+        replace(run, angle=run.angle[::-1].copy()) if abs(run.signal) in PCHIP.validation else run
+        for run in arm.runs
+    )
+    assert fit_segment(replace(arm, runs=spoilt), PCHIP) == model["arm"]
+
+
+def test_a_refit_gives_the_same_file_and_the_file_the_same_speeds(
+    model, recordings, tmp_path: Path
+) -> None:
+    save(model, tmp_path / "one.yaml")
+    save(fit_model(recordings, PCHIP), tmp_path / "two.yaml")
+    assert (tmp_path / "one.yaml").read_bytes() == (tmp_path / "two.yaml").read_bytes()
+    read = labcrane_dmd.load(tmp_path / "one.yaml")
+    for name, segment in model.items():
+        for signal in (-250, -60, -20, 0, 33, 140, 250):
+            for angle in np.linspace(*segment.limits, 7).tolist():
+                assert read[name].speed(signal, angle) == pytest.approx(
+                    segment.speed(signal, angle), rel=1e-7, abs=1e-10
+                )
+
+
+def test_the_file_beside_the_protocol_is_the_fit_of_its_recordings(model, tmp_path: Path) -> None:
+    save(model, tmp_path / "arm.yaml")
+    assert (tmp_path / "arm.yaml").read_text() == (FOLDER.parent / "arm.dmd.yaml").read_text()
+
+
+def test_level_zero_and_the_dead_band_stand_still_and_speed_rises_from_its_edge(model) -> None:
+    for segment in model.values():
+        for angle in np.linspace(*segment.limits, 5).tolist():
+            for direction, sign in ((segment.extend, 1), (segment.retract, -1)):
+                assert 10 < direction.dead_band < 30
+                assert segment.speed(sign * direction.dead_band, angle) == 0.0
+                sizes = np.linspace(direction.dead_band, 250, 200)
+                speeds = [sign * segment.speed(sign * size, angle) for size in sizes.tolist()]
+                assert (np.diff(speeds) > 0.0).all()
+            assert segment.speed(0, angle) == 0.0
+
+
+def test_nothing_is_extrapolated_beyond_the_measured_angles(model) -> None:
+    for segment in model.values():
+        for signal in (-250, -40, 40, 250):
+            for end, beyond in zip(segment.limits, (-1.0, 1.0), strict=True):
+                far = segment.speed(signal, end + beyond)
+                assert far == pytest.approx(segment.speed(signal, end), rel=0.02)
+
+
+def test_slow_layers_say_that_they_do_not_cover_the_range_and_go_like_the_next(model) -> None:
+    (slow, *_) = model["arm"].extend.layers
+    assert not slow.whole
+    assert all(layer.whole for layer in model["arm"].extend.layers[1:])
+    beyond = slow.covers[1] + 0.8
+    here, there = (model["arm"].speed(80, angle) for angle in (slow.covers[1], beyond))
+    expected = model["arm"].speed(40, slow.covers[1]) * there / here
+    assert model["arm"].speed(40, beyond) == pytest.approx(expected)
+
+
+def test_between_layers_is_a_line_or_scipys_monotone_cubic() -> None:
+    from scipy.interpolate import PchipInterpolator
+
+    random = np.random.default_rng(3)
+    for _ in range(50):
+        count = random.integers(2, 8)
+        signals = np.cumsum(random.uniform(5, 60, count)).tolist()
+        speeds = random.normal(size=count).cumsum().tolist()
+        theirs = PchipInterpolator(signals, speeds)
+        for at in random.uniform(signals[0], signals[-1], 20).tolist():
+            assert pchip(at, signals, speeds) == pytest.approx(float(theirs(at)), abs=1e-12)
+            assert linear(at, signals, speeds) == pytest.approx(np.interp(at, signals, speeds))
+
+
+def test_a_signal_beyond_full_flow_is_refused(model) -> None:
+    for signal in (251, -300, math.nan):
+        with pytest.raises(ProtocolError, match=r"asked of 'boom'; it is -250 to 250"):
+            model["boom"].speed(signal, 0.0)
+
+
+def test_errors_per_level_keep_their_order(model, recordings) -> None:
+    for between in ("linear", "pchip"):
+        for level in validate(model.interpolated(between), recordings):
+            row = level.row()
+            assert row["mse"] == pytest.approx(row["rmse"] ** 2)
+            assert row["mae"] <= row["rmse"] + 1e-12 <= row["max_abs_error"] + 2e-12
+
+
+def test_another_machines_law_is_found_in_its_recordings(tmp_path: Path) -> None:
+    record(tmp_path / "stick.csv.gz")
+    (stick,) = read_recordings(tmp_path)
+    segment = fit_segment(stick, PCHIP)
+    for signal in LEVELS:
+        if abs(signal) < 100 or signal in (0,):
+            continue
+        angles = np.linspace(math.radians(5), math.radians(55), 40).tolist()
+        model = np.mean([segment.speed(signal, angle) for angle in angles])
+        truth = np.mean([true_speed(signal, angle) for angle in angles])
+        assert abs(model / truth - 1) < 0.01, signal
+    for direction in (segment.extend, segment.retract):
+        assert direction.dead_band == pytest.approx(22.0, abs=3.0)
+        assert direction.dead_time + direction.lag == pytest.approx(0.08 + 0.12, abs=0.04)
+
+
+def spoil(tmp_path: Path, change) -> Path:
+    table = pd.read_csv(FOLDER / "jaws.csv.gz")
+    path = tmp_path / "jaws.csv.gz"
+    change(table).to_csv(path, index=False)
+    return path
+
+
+WRONG = {
+    "gap": (
+        lambda t: t.drop(index=range(3000, 3040)),
+        r"jaws.csv.gz, run \d+: 0.41 s without a sample after [\d.]+ s, where 0.01 s are usual",
+    ),
+    "nan": (
+        lambda t: t.assign(angle_deg=t.angle_deg.where(t.index != 77)),
+        r"has 1 samples that are not numbers, the first in line 79",
+    ),
+    "rad": (
+        lambda t: t.assign(angle_deg=np.radians(t.angle_deg)),
+        r"moves by 1 degrees in all its runs; angle_deg is in degrees, not rad",
+    ),
+    "rad column": (
+        lambda t: t.rename(columns={"angle_deg": "angle_rad"}),
+        r"has no column 'angle_deg'; its columns are run, time_s, signal, angle_rad",
+    ),
+    "milliseconds": (
+        lambda t: t.assign(time_s=1000 * t.time_s),
+        r"samples are 10 s apart; time_s is in seconds",
+    ),
+    "percent": (
+        lambda t: t.assign(signal=t.signal * 0.4),
+        r"signals go to 100; a model needs recordings up to 250",
+    ),
+    "one direction": (
+        lambda t: t[t.groupby("run").signal.transform("min") >= 0],
+        r"jaws.csv.gz has no runs with negative signals; a model needs both directions",
+    ),
+    "backward time": (
+        lambda t: t.assign(time_s=t.time_s.where(t.index != 500, 0.0)),
+        r"time does not go on after [\d.]+ s; it must rise",
+    ),
+    "constant angle": (
+        lambda t: t.assign(
+            angle_deg=t.angle_deg.where(t.groupby("run").signal.transform("max") != 120, 20.0)
+        ),
+        r"the angle does not change at signal 120, though it does at 80",
+    ),
+    "wrong sign": (
+        lambda t: t.assign(signal=-t.signal),
+        r"the angle goes against signal -?250; turn the sensor's sign round",
+    ),
+    "missing level": (
+        lambda t: t[t.groupby("run").signal.transform("max") != 160],
+        r"has no run at signal 160, which the model needs",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_recordings_gone_wrong_are_refused_in_words(case: str, tmp_path: Path) -> None:
+    change, message = WRONG[case]
+    path = spoil(tmp_path, change)
+    with pytest.raises(RecordingError, match=message):
+        fit_model(read_recordings(path), PCHIP)
+
+
+def test_what_is_no_recording_is_refused_in_words(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"holds no recordings; they are files like boom"):
+        read_recordings(tmp_path)
+    with pytest.raises(RecordingError, match=r"does not exist"):
+        read_recordings(tmp_path / "boom.csv")
+    (tmp_path / "boom.csv.gz").write_bytes(gzip.compress(b"\x00\xff\x00")[:-9])
+    with pytest.raises(RecordingError, match=r"boom.csv.gz cannot be read as CSV"):
+        read_recordings(tmp_path)
+
+
+def test_the_commands_leave_model_tables_and_figures(tmp_path: Path, capsys) -> None:
+    arm = str(tmp_path / "arm.yaml")
+    assert main(["dmd", "fit", str(FOLDER), "--out", arm, "--between", "pchip"]) == 0
+    assert main(["dmd", "validate", arm, str(FOLDER), "--out", str(tmp_path / "out")]) == 0
+    assert main(["dmd", "plot", arm, "--out", str(tmp_path / "arm.png")]) == 0
+    table = pd.read_csv(tmp_path / "out" / "validation.csv")
+    named = ["segment", "direction", "signal", "mean_speed", "mse", "rmse", "mae", "max_abs_error"]
+    assert list(table)[:8] == named
+    assert len(table) == 36
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        f"{name}{rule}.{kind}"
+        for rule in ("", "_linear")
+        for name, kind in (("validation", "csv"), ("validation", "png"), ("summary", "csv"))
+    }
+    assert (tmp_path / "arm.png").read_bytes().startswith(b"\x89PNG")
+    assert main(["dmd", "validate", str(tmp_path / "no.yaml"), str(FOLDER)]) == 2
+    assert "cannot be read" in capsys.readouterr().err

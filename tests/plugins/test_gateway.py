@@ -1,0 +1,119 @@
+"""A control station behind the open gateway protocol."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cranes import needs_bullet
+from rehearsal import NoLog, ScriptedConsole
+
+from labcrane import InputDevice, Tick, loop, rig
+from labcrane.clock import SystemClock
+from labcrane.console import Command, Order
+from labcrane.course import Course
+from labcrane.plan import plan_session
+from labcrane.registry import discover
+from labcrane.study import load
+from labcrane.testing import InputContract, a_frame, a_run, ch8
+from labcrane_gateway.settings import GatewaySettings
+from labcrane_gateway.station import Station
+
+TESTS = Path(__file__).parents[1]
+RETRIEVAL = TESTS.parent / "protocols" / "retrieval"
+
+
+class TestStation(InputContract):  # "gateway"
+    @pytest.fixture
+    def device(self) -> InputDevice:
+        return Station(GatewaySettings(stream="nobody.sends"), ch8())
+
+
+STUDY = """\
+labcrane: 1
+study: gateway
+title: A gateway
+machine: ied_arm.yaml
+input: {{use: gateway}}
+scheme: {{use: valve}}
+dynamics:
+  use: dmd_arm
+  model: {0}/arm.dmd.yaml
+  proportional: [base]
+  scenes: [{0}/scenes/touch.yaml]
+tasks: {{reach: {{use: scenario, scenes: [{0}/scenes/touch.yaml]}}}}
+sessions: [{{name: only, steps: [{{block: {{task: reach}}}}]}}]
+"""
+
+
+@needs_bullet
+def test_a_program_written_from_the_documentation_drives_the_arm(tmp_path: Path) -> None:
+    (tmp_path / "study.yaml").write_text(STUDY.format(RETRIEVAL))
+    (tmp_path / "ied_arm.yaml").write_text((RETRIEVAL / "ied_arm.yaml").read_text())
+    study = load(tmp_path / "study.yaml", discover())
+    plan = plan_session(study, "P001", 1)
+    the_rig = rig.build(study, simulated=False)
+    program = subprocess.Popen(
+        [sys.executable, str(TESTS / "gateway_program.py"), "7"], stdout=subprocess.PIPE, text=True
+    )
+    seen = []
+    try:
+        with rig.opened(the_rig, study, plan.seed) as run:
+            arm = run.state.index("joint.angle.arm")
+            signal = run.command.find("valve.signal")
+            course = Course(study, plan, the_rig, waits=False)
+
+            def keep(frame):
+                moved = frame.state[arm], frame.command[signal].tolist()
+                seen.append((frame.tick.woke, frame.paused, *moved, frame.events))
+
+            console = ScriptedConsole({240 * 10: [Command(Order.END)]})
+            loop.run(the_rig, run, course, SystemClock(), console, NoLog(), [keep])
+        output, _ = program.communicate(timeout=10)
+    finally:
+        program.kill()
+        program.communicate()
+    driven = [each for each in seen if each[3] == [0.0, 120.0, 0.0, 0.0]]
+    assert driven[-1][0] - driven[0][0] > 3.0
+    assert driven[-1][2] - driven[0][2] > np.radians(5)  # about 1.7 deg/s
+    assert float(output) == pytest.approx(120.0, abs=0.5)  # it was told of the valve's opening
+    names = [event.name for each in seen for event in each[4]]
+    assert names.index("input.back") < len(names) - 1
+    assert names.count("input.lost") == 2  # before it was there, and after it had gone
+    assert seen[-1][1]
+    assert seen[-1][3] == [0.0] * 4
+
+
+@pytest.mark.parametrize(
+    ("labels", "sample", "complaint"),
+    [
+        (("base",), [0.0], "its channels are base; the machine also needs slew, shoulder, elbow"),
+        (ch8().names, [0.0, 400.0, 0.0, 0.0], "refused, because 400 is not within -250 to 250"),
+        (ch8().names, [0.0, np.nan, 0.0, 0.0], "refused, because nan is not within -250 to 250"),
+    ],
+)
+def test_what_is_wrong_with_a_station_is_told(labels, sample, complaint: str) -> None:
+    import pylsl
+
+    name = f"wrong.{len(labels)}.{sample[-3:][0]}"
+    info = pylsl.StreamInfo(name, "Control", len(labels), 0.0, "float32", name)
+    channels = info.desc().append_child("channels")
+    for label in labels:
+        channels.append_child("channel").append_child_value("label", label)
+    outlet = pylsl.StreamOutlet(info)
+    device = Station(GatewaySettings(stream=name), ch8())
+    run = a_run(ch8(), axes=device.signals)
+    device.open(run)
+    try:
+        end = time.perf_counter() + 8.0
+        while complaint not in (device.fault or "") and time.perf_counter() < end:
+            outlet.push_sample(list(sample))
+            time.sleep(0.02)
+            now = time.perf_counter()
+            axes = device.read(Tick(1, now, now), a_frame(run))
+        assert complaint in (device.fault or "")
+        assert not axes.any()
+    finally:
+        device.close()

@@ -1,0 +1,213 @@
+"""Scenes run and judged: what is counted, what ends a run, and all six with nobody at the panel."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cranes import needs_bullet
+from rehearsal import Rehearsal, rehearse
+
+from labcrane import (
+    InputDevice,
+    Phase,
+    Planned,
+    ProtocolError,
+    Signal,
+    Task,
+    load_scene,
+    place,
+)
+from labcrane.console import Command, Order
+from labcrane.machine_file import load_machine
+from labcrane.registry import discover
+from labcrane.study import load
+from labcrane.testing import (
+    InputContract,
+    TaskContract,
+    a_frame,
+    a_run,
+    a_trial,
+    ch8,
+    crane_state,
+)
+from labcrane_scenario.mistakes import Episode
+from labcrane_scenario.operator import ScenarioOperator
+from labcrane_scenario.scenario import Scenario
+from labcrane_scenario.settings import OperatorSettings, ScenarioSettings
+
+RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"
+SCENES = ("casualty", "touch", "carry", "reach_through", "extract", "reach_over")
+OVERLOAD = Signal("joint.overload", "1", ch8().names)
+FREE = """\
+labcrane_scene: 1
+title: nothing but a goal
+goals: [{position: [30, 0, 0], radius: 0.1}]
+limit_s: 60
+"""
+
+
+class TestScenario(TaskContract):  # "scenario"
+    @pytest.fixture
+    def task(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Task:
+        from labcrane import testing
+
+        state = (*crane_state(ch8()).signals, OVERLOAD)
+        monkeypatch.setattr(
+            testing,
+            "crane_at",
+            lambda machine, angles: np.zeros(sum(len(s.columns) for s in state)),
+        )
+        plain = testing.a_run
+        monkeypatch.setattr(testing, "a_run", lambda m, **k: plain(m, **{"state": state, **k}))
+        (tmp_path / "free.yaml").write_text(FREE)
+        return Scenario(ScenarioSettings(scenes=(tmp_path / "free.yaml",)), ch8())
+
+
+class TestScenarioOperator(InputContract):  # "scenario_operator"
+    @pytest.fixture
+    def device(self) -> InputDevice:
+        return ScenarioOperator(OperatorSettings(jaws="wrist"), ch8())
+
+
+def test_a_force_that_trembles_around_its_limit_is_one_mistake() -> None:
+    episode = Episode(100.0, 0.8, hold=48)
+    began = [episode.see(force) for force in [50, 101, 99, 120, 70, 110] * 50 + [10] * 60 + [101]]
+    assert sum(began) == 2
+    assert episode.peak == 120
+
+
+BLOCK = """\
+labcrane_scene: 1
+title: a block to push
+things:
+  block: {shape: box, size: [0.3, 0.3, 0.2], position: [1.6, 0, 0.1], mass_kg: 20, limit_n: 100}
+goals: [{position: [30, 0, 0], radius: 0.1}]
+limit_s: 60
+"""
+FORCE = "scene.block.force.block"
+
+
+def judged(tmp_path: Path, pushes: list[float], *, overrule: bool = False):
+    """Return the task's judgements of a force on the block, tick by tick."""
+    (tmp_path / "block.yaml").write_text(BLOCK)
+    task = Scenario(ScenarioSettings(scenes=(tmp_path / "block.yaml",), mistakes=4), ch8())
+    state = (
+        *crane_state(ch8()).signals,
+        OVERLOAD,
+        Signal("scene.block.position", "m", ("x", "y", "z")),
+        Signal("scene.block.force", "N", ("block",)),
+        Signal("scene.block.support", "N"),
+        Signal("grip.drops", "1"),
+    )
+    run = a_run(ch8(), state=state, task=task.signals)
+    task.open(run)
+    task.begin_trial(a_trial(Planned({"scene": "block"}, expected_s=1.0)))
+    if overrule:
+        task.overrule()
+    seen = []
+    for number, force in enumerate(pushes):
+        values = np.zeros(run.state.size)
+        values[run.state.index(FORCE)] = force
+        values[run.state.index("scene.block.support")] = 20 * 9.81
+        seen.append(task.judge(a_frame(run, number, values)))
+        if seen[-1].phase.over:
+            break
+    return seen
+
+
+PUSH = [150.0] * 30 + [0.0] * 60
+
+
+def test_five_mistakes_of_a_kind_end_the_run_and_four_do_not(tmp_path: Path) -> None:
+    assert not judged(tmp_path, PUSH * 4)[-1].phase.over
+    seen = judged(tmp_path, PUSH * 6)
+    assert seen[-1].phase is Phase.FAILURE
+    events = [event for judgement in seen for event in judgement.events]
+    assert [event.data["count"] for event in events if event.name == "contact.object"] == [
+        1,
+        2,
+        3,
+        4,
+        5,
+    ]
+    assert events[-1].name == "mistakes.too_many"
+    assert seen[-1].results["k"] == 0.0
+    assert seen[-1].results["mistakes.object"] == 5.0
+    assert seen[-1].results["peak_force.object"] == 150.0
+
+
+def test_an_overridden_run_outlasts_its_mistakes(tmp_path: Path) -> None:
+    seen = judged(tmp_path, PUSH * 8, overrule=True)
+    assert not seen[-1].phase.over
+    assert seen[-1].values[-5] == 8.0
+
+
+def test_the_same_seed_places_everything_the_same_and_another_one_does_not() -> None:
+    scene = load_scene(RETRIEVAL / "scenes" / "casualty.yaml")
+    assert place(scene, 4) == place(scene, 4)
+    found = {place(scene, seed)[0].deformed for seed in range(20)}
+    assert found == {"right_forearm", "left_shank", "right_shank"}
+    yaws = [place(scene, seed)[0].yaw for seed in range(50)]
+    assert math.radians(-4) <= min(yaws) < max(yaws) <= math.radians(4)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("0.1], mass", "0.02], mass"), r"block.yaml:4: 'block' is 0.080 m deep in the ground"),
+        (("shape: box", "shape: bix"), r"block.yaml:4: things.block.shape is 'bix'; it must be"),
+        (("radius: 0.1}", "radius: 0.1, what: blok}"), r"block.yaml:5: there is no 'blok' in this"),
+        (("mass_kg: 20", "mass_kg: -1"), r"things.block.mass_kg is -1; it must be greater than 0"),
+        (
+            ("goals:", "figure: {position: [1, 0, 0.01]}\ngoals:"),
+            r"the figure's chest is 0.01 m high, which is in the ground; 0.11 m or more",
+        ),
+        (
+            ("goals:", "figure: {position: [1, 0, 0.2], limbs_deg: {tail: 3}}\ngoals:"),
+            r"a figure has no 'tail'; it has left_upper_arm",
+        ),
+    ],
+)
+def test_impossible_scenes_are_refused_with_their_line(
+    change: tuple[str, str], message: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "block.yaml"
+    path.write_text(BLOCK.replace(*change))
+    with pytest.raises(ProtocolError, match=message):
+        load_scene(path)
+
+
+def run_scene(name: str, tmp_path: Path, orders=None) -> Rehearsal:
+    text = (RETRIEVAL / "protocol.yaml").read_text()
+    for other in SCENES:
+        if other != name:
+            text = text.replace(f"    - scenes/{other}.yaml\n", "")
+    text = text.replace("scenes/", f"{RETRIEVAL}/scenes/").replace(
+        "arm.dmd.yaml", f"{RETRIEVAL}/arm.dmd.yaml"
+    )
+    text = text.replace("R\\d{3}", "P\\d{3}")
+    for file in ("ied_arm.yaml", "instructions.md"):
+        (tmp_path / file).write_text((RETRIEVAL / file).read_text())
+    (tmp_path / "study.yaml").write_text(text)
+    return rehearse(load(tmp_path / "study.yaml", discover()), orders)
+
+
+@needs_bullet
+@pytest.mark.parametrize("name", SCENES)
+def test_the_simulated_operator_gets_through(name: str, tmp_path: Path) -> None:
+    note = {100: [Command(Order.NOTE, "found: left leg looks bent")]}
+    seen = run_scene(name, tmp_path, note)
+    (row,) = seen.trials()
+    assert row["outcome"] == "success", row
+    assert row["k"] == 1.0
+    scene = load_scene(RETRIEVAL / "scenes" / f"{name}.yaml")
+    assert len(seen.events("goal.reached")) == len(scene.goals) == row["goals"]
+    assert len(seen.events("deformity.found")) == (1 if scene.figure else 0)
+    # Everything a table of the run needs is in the record, per tick.
+    columns = seen.run.state.columns
+    for joint in load_machine("ied_arm.yaml", RETRIEVAL).names:
+        for what in ("angle", "velocity", "load", "overload", "end"):
+            assert f"joint.{what}.{joint}" in columns
+    for each in place(scene, 1):
+        assert (f"scene.{each.name}.support" in columns) == (each.kind != "obstacle")
