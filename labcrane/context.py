@@ -8,11 +8,12 @@ from importlib.util import find_spec
 from typing import Any, Protocol
 
 from labcrane.attempt import trial_units
+from labcrane.choices import Choice
 from labcrane.data_folder import DataFolder
 from labcrane.plan import SessionPlan
 from labcrane.records import Run
 from labcrane.rig import Rig
-from labcrane.study import Choice, Study
+from labcrane.study import Study
 
 RECORDED_PACKAGES = (
     "labcrane",

@@ -10,6 +10,7 @@ from labcrane.asking import Asking
 from labcrane.attempt import Attempt
 from labcrane.console import Command, Order, by_whom
 from labcrane.feedback_settings import FeedbackSettings
+from labcrane.holding import DISK, EXAMINER, INPUT, STOP, Holding
 from labcrane.plan import PlannedBlock, PlannedStep, SessionPlan, next_attempt
 from labcrane.privacy import personal
 from labcrane.records import Event, Frame, Phase, Trial, Value
@@ -19,8 +20,8 @@ from labcrane.warm_up import WarmUp
 
 Ticks = Generator[None, Frame, None]
 
-EXAMINER, INPUT, DISK, STOP = "examiner", "input", "disk", "stop rule"
-"""Who can hold a session, beside lost streams: it goes on when nobody does."""
+FAULTS = frozenset({Order.LOST, Order.BACK, Order.FAILED, Order.MENDED})
+"""What the launcher says, not people."""
 
 
 class Course:
@@ -46,16 +47,14 @@ class Course:
         self._rig = rig
         self._waits = waits
         self._rate_hz = study.protocol.rate_hz
-        self._on_fault = study.protocol.on_fault
         self._settings = FeedbackSettings({**study.cues, **study.sounds})
-        self._held_by: set[str] = set()
         self._notes: list[tuple[str, dict[str, Value]]] = []  # stamped with the tick they fall in
+        self._held = Holding(study.protocol.on_fault, lambda *note: self._notes.append(note))
         self._attempt: Attempt | None = None
         self._stage = ""
         self._step = 0
         self._asking: Asking | None = None
         self._wishes: set[Order] = set()  # to start, skip or repeat what runs now
-        self._reasons_to_end: list[str] = []
         self._warm_up = WarmUp()
         self.over = False
         self._script = self._session()
@@ -64,31 +63,27 @@ class Course:
     @property
     def moving(self) -> bool:
         """Whether the operator's command reaches the machine in this tick."""
-        return self._attempt is not None and not self._held_by
+        return self._attempt is not None and not self._held
 
     def heed(
         self, commands: Sequence[Command], lost_input: str | None, disk_trouble: str | None
     ) -> None:
         """Take up orders, and what has become of the operator's controls and of the disk."""
         for command in commands:
-            if command.order is Order.LOST:
-                self._lose(command.text)
-            elif command.order is Order.BACK:
-                self._regain(command.text)
-            elif command.order in (Order.FAILED, Order.MENDED):
-                self._feedback(command)
+            if command.order in FAULTS:
+                self._held.report(command)
             elif command.order is Order.DENIED:
                 self._note("page.denied", why=command.text, by=by_whom(command))
             elif self._asking is not None and command.order in {Order.ANSWER, Order.SUBMIT}:
                 self._notes.append(self._asking.heed(command))
             else:
                 self._obey(command)
-        self._watch(INPUT, lost_input)
-        self._watch(DISK, disk_trouble)
+        self._held.watch(INPUT, lost_input)
+        self._held.watch(DISK, disk_trouble)
 
     def judge(self, frame: Frame) -> None:
         """Complete ``frame``: trial, phase, the task's values, and everything that happened."""
-        frame.paused = bool(self._held_by)
+        frame.paused = bool(self._held)
         frame.events = self._stamped(frame)
         try:
             self._script.send(frame)
@@ -118,18 +113,18 @@ class Course:
                 self._note("instructions.shown", text=step.text)
                 yield from self._gate("instructions")
             self._note("step.end", step=step.number, kind=step.kind)
-            if self._reasons_to_end:
+            if self._held.ending:
                 break
-        if STOP in self._held_by:
+        if STOP in self._held:
             self._note("participant.dropout", why="ended while a stop rule was met")
-        self._note("session.end", reason=", ".join(self._reasons_to_end) or "complete")
+        self._note("session.end", reason=", ".join(self._held.ending) or "complete")
 
     def _gate(self, what: str) -> Ticks:
         if not self._waits:
             return
         self._enter("waiting")
         self._note("waiting", what=what)
-        while Order.START not in self._wishes and not self._reasons_to_end:
+        while Order.START not in self._wishes and not self._held.ending:
             yield
         self._enter("")
 
@@ -137,7 +132,7 @@ class Course:
         left = round(step.seconds * self._rate_hz)
         self._enter("break")
         self._note("break.start", seconds=step.seconds)
-        while left > 0 and Order.SKIP not in self._wishes and not self._reasons_to_end:
+        while left > 0 and Order.SKIP not in self._wishes and not self._held.ending:
             yield
             left -= 1
         self._note("break.end", left=left / self._rate_hz)
@@ -145,7 +140,7 @@ class Course:
 
     def _block(self, block: PlannedBlock) -> Ticks:
         yield from self._gate(block.name)
-        if self._reasons_to_end:
+        if self._held.ending:
             return
         about: dict[str, Value] = {"block": block.number, "block_name": block.name}
         self._note("block.start", **about, task=block.task, practice=block.practice)
@@ -153,7 +148,7 @@ class Course:
             yield from self._trial(block, trial)
             for name in block.ask if trial.planned.counted else ():
                 yield from self._ask(name, {}, trial)
-            if self._reasons_to_end or (block.until and self._warm_up.over):
+            if self._held.ending or (block.until and self._warm_up.over):
                 break
         self._note("block.end", **about)
         if (verdict := self._warm_up.verdict(block)) is not None:
@@ -178,24 +173,24 @@ class Course:
             yield from self._trial(block, next_attempt(self._study, self._plan, trial))
 
     def _ask(self, name: str, answered: Mapping[str, Value], after: Trial | None = None) -> Ticks:
-        if self._reasons_to_end:
+        if self._held.ending:
             return
         asking = self._asking = Asking(self._study, self._plan, name, self._step, answered, after)
         self._enter("questionnaire")
         self._notes.extend(asking.begin(simulated=not self._waits))
         yield
-        while not (asking.over or Order.SKIP in self._wishes or self._reasons_to_end):
+        while not (asking.over or Order.SKIP in self._wishes or self._held.ending):
             yield
         self._asking = None
         self._notes.extend(asking.end())
         self._enter("")
         if self._waits and asking.alarming:
-            self._hold(STOP)
-        while STOP in self._held_by and not self._reasons_to_end:
+            self._held.hold(STOP)
+        while STOP in self._held and not self._held.ending:
             yield
 
     def _wished_end(self) -> Phase | None:
-        if self._reasons_to_end:
+        if self._held.ending:
             return Phase.ENDED
         if Order.SKIP in self._wishes:
             return Phase.SKIPPED
@@ -217,14 +212,14 @@ class Course:
             return
         match command.order:
             case Order.PAUSE:
-                self._hold(EXAMINER)
-            case Order.START if {EXAMINER, STOP} & self._held_by:
-                self._release(EXAMINER)
-                self._release(STOP)
+                self._held.hold(EXAMINER)
+            case Order.START if EXAMINER in self._held or STOP in self._held:
+                self._held.release(EXAMINER)
+                self._held.release(STOP)
             case Order.START | Order.SKIP | Order.REPEAT:
                 self._wishes.add(command.order)
             case Order.END:
-                self._reasons_to_end.append("by order")
+                self._held.ending.append("by order")
             case Order.OVERRIDE:
                 self._running().overrule()
             case Order.COMPLETION:
@@ -243,9 +238,11 @@ class Course:
                 return "no trial, break or questionnaire is running"
             case Order.ANSWER | Order.SUBMIT:
                 return "no questionnaire is asked"
-            case Order.START if self._stage != "waiting" and not ({EXAMINER, STOP} & self._held_by):
+            case Order.START if self._stage != "waiting" and not (
+                EXAMINER in self._held or STOP in self._held
+            ):
                 return "nothing waits to start"
-            case Order.PAUSE if EXAMINER in self._held_by:
+            case Order.PAUSE if EXAMINER in self._held:
                 return "the session is paused already"
             case Order.COMPLETION if command.text not in {"0", "1"}:
                 return f"completion is 1 or 0, not {command.text!r}"
@@ -262,54 +259,7 @@ class Course:
             raise AssertionError("orders that need a trial are refused without one")
         return self._attempt
 
-    # Faults
-
-    def _watch(self, part: str, trouble: str | None) -> None:
-        """Hold the session while a part is in trouble."""
-        held = part in self._held_by
-        if trouble is not None and not held:
-            self._note(f"{part}.lost", why=trouble)
-            self._hold(part)
-            if part == INPUT and self._on_fault.input_lost == "end":
-                self._reasons_to_end.append("input lost")
-        elif trouble is None and held:
-            self._note(f"{part}.back")
-            self._release(part)
-
-    def _lose(self, what: str) -> None:
-        self._note("stream.lost", what=what)
-        if self._on_fault.stream_lost == "pause":
-            self._hold(what)
-
-    def _regain(self, what: str) -> None:
-        self._note("stream.back", what=what)
-        if what in self._held_by:
-            self._release(what)
-
-    def _feedback(self, command: Command) -> None:
-        """Note that a feedback process failed or runs again; hold if the protocol says so."""
-        name, _, why = command.text.partition(": ")
-        who = f"feedback {name}"
-        if command.order is Order.FAILED:
-            self._note("feedback.lost", what=name, why=why)
-            if self._on_fault.feedback_lost == "pause" and who not in self._held_by:
-                self._hold(who)
-            return
-        self._note("feedback.ready", what=name, facts=why)
-        if who in self._held_by:
-            self._release(who)
-
     # What is written down
-
-    def _hold(self, who: str) -> None:
-        self._held_by.add(who)
-        self._note("pause.start", by=who)
-
-    def _release(self, who: str) -> None:
-        if who not in self._held_by:
-            return
-        self._held_by.discard(who)
-        self._note("pause.end", by=who)
 
     def _note(self, name: str, **data: Value) -> None:
         self._notes.append((name, data))

@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 
 from labcrane import rig
+from labcrane.choices import Choice
 from labcrane.console import Command, Order
 from labcrane.design.seeds import derive
 from labcrane.errors import DeviceError
@@ -13,7 +14,7 @@ from labcrane.records import Run
 from labcrane.session import Visit
 from labcrane.streams.feedback_log import log_source
 from labcrane.streams.request import StreamRequest
-from labcrane.study import Choice, Study
+from labcrane.study import Study
 
 LOOK_S = 0.05
 

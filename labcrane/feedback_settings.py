@@ -7,9 +7,9 @@ from pydantic import ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
+from labcrane.choices import Choice
 from labcrane.offers import Settings
 from labcrane.records import Value
-from labcrane.study import Choice
 
 
 class FeedbackSettings:

@@ -9,8 +9,8 @@ from labcrane.design.order import RULES, SQUARES, Turn
 from labcrane.design.seeds import derive
 from labcrane.design.slots import group_of, place_of
 from labcrane.design.words import AS_WRITTEN, Criterion
-from labcrane.protocol import Block, Step
 from labcrane.records import Planned, Trial, Value
+from labcrane.steps import Block, Step
 from labcrane.study import Study
 
 # Seconds an examiner and a participant are likely to spend on a page of text, for plans only.

@@ -49,7 +49,11 @@ def a_study(path: Path, seconds: float, needs: str = "") -> Path:
 
 
 @pytest.mark.parametrize(
-    "seconds", [60, pytest.param(600, marks=[pytest.mark.soak, pytest.mark.timeout(900)])]
+    "seconds",
+    [
+        pytest.param(60, marks=pytest.mark.long),
+        pytest.param(600, marks=[pytest.mark.soak, pytest.mark.timeout(900)]),
+    ],
 )
 def test_a_laboratory_is_recorded_whole_and_the_loop_does_not_notice(
     tmp_path: Path, seconds: int

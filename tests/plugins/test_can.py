@@ -285,6 +285,7 @@ def panel(tmp_path: Path) -> Iterator[tuple[Path, subprocess.Popen[str]]]:
         process.communicate()
 
 
+@pytest.mark.long
 def test_a_panel_process_unplugged_in_the_middle_pauses_the_session_and_resumes_it(
     panel, tmp_path: Path
 ) -> None:

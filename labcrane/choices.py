@@ -1,0 +1,157 @@
+"""Which components a protocol uses, found among those installed."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TypeVar
+
+from labcrane.errors import PluginError, ProtocolError
+from labcrane.machine import Machine
+from labcrane.machine_file import find_machine, load_machine
+from labcrane.offers import Offer, Settings
+from labcrane.protocol import Protocol, Use
+from labcrane.registry import Registry
+from labcrane.roles import Component, Cue, Feedback, Questionnaire, Task
+from labcrane.yaml_file import Place, YamlFile
+
+RoleT = TypeVar("RoleT", bound=Component)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A component that a protocol names, and its settings."""
+
+    name: str
+    plugin: str
+    offer: Offer[Component]
+    settings: Settings
+
+    def build(self, machine: Machine) -> Component:
+        """Build, but do not open, the component."""
+        return self.offer.build(self.settings, machine)
+
+
+class Chooser:
+    """Finds what a protocol names, and notes every mistake in its file."""
+
+    def __init__(self, source: YamlFile, registry: Registry) -> None:
+        self._source = source
+        self._registry = registry
+
+    def choose(self, role: type[RoleT], place: Place, default: Use | None = None) -> Choice | None:
+        """Return the component that the protocol uses at ``place``, or note why there is none."""
+        written = self._at(place)
+        if written is None and default is not None:
+            use = default
+        elif isinstance(written, dict) and isinstance(written.get("use"), str):
+            use = Use.model_validate(written)
+        else:
+            return None  # noted by the protocol's own check
+        try:
+            offer = self._registry.find(role, use.use)
+        except PluginError as error:
+            self._source.problem((*place, "use"), str(error))
+            return None
+        settings = self._source.check(offer.settings, place, use.settings)
+        plugin = self._registry.plugins[role][use.use]
+        return Choice(use.use, plugin, offer, settings) if settings is not None else None
+
+    def choose_tasks(self) -> dict[str, Choice]:
+        """Return the tasks that can be chosen, by the protocol's names for them."""
+        written = self._at(("tasks",))
+        names = written if isinstance(written, dict) else {}
+        chosen = {name: self.choose(Task, ("tasks", name)) for name in names}
+        return {name: choice for name, choice in chosen.items() if choice}
+
+    def choose_questionnaires(self, protocol: Protocol) -> dict[str, Choice]:
+        """Return the questionnaires that the protocol asks, noting those that there are not."""
+        chosen = {
+            name: self.choose(Questionnaire, ("questionnaires", name))
+            for name in protocol.questionnaires
+        }
+        for place, name in self._asked(protocol):
+            if name not in chosen:
+                chosen[name] = self._by_its_own_name(place, name)
+        return {name: choice for name, choice in chosen.items() if choice}
+
+    def _asked(self, protocol: Protocol) -> Iterator[tuple[Place, str]]:
+        for number, session in enumerate(protocol.sessions):
+            for at, step in enumerate(session.steps):
+                place: Place = ("sessions", number, "steps", at)
+                for name in (*step.questionnaires, *(step.block.ask if step.block else ())):
+                    yield place, name
+        for number, rule in enumerate(protocol.stop_rules):
+            yield ("stop_rules", number, "questionnaire"), rule.questionnaire
+
+    def _by_its_own_name(self, place: Place, name: str) -> Choice | None:
+        try:
+            offer = self._registry.find(Questionnaire, name)
+        except PluginError as error:
+            self._source.problem(place, str(error))
+            return None
+        settings = self._source.check(offer.settings, place, {})
+        plugin = self._registry.plugins[Questionnaire][name]
+        return Choice(name, plugin, offer, settings) if settings is not None else None
+
+    def build_questionnaires(
+        self, choices: Mapping[str, Choice], machine: Machine
+    ) -> dict[str, Questionnaire]:
+        """Return the built questionnaires, noting those that cannot be asked as written."""
+        built: dict[str, Questionnaire] = {}
+        for name, choice in choices.items():
+            try:
+                questionnaire = choice.build(machine)
+            except ProtocolError as error:
+                self._source.problem(("questionnaires", name), str(error))
+                continue
+            assert isinstance(questionnaire, Questionnaire)  # noqa: S101 - an offer of this role
+            built[name] = questionnaire
+        return built
+
+    def choose_feedback(self) -> tuple[dict[str, Choice], dict[str, Choice], dict[str, Choice]]:
+        """Return cues, sounds and views by the protocol's names for them."""
+        cues, sounds = {}, {}
+        written = self._at(("feedback",))
+        for name, use in (written if isinstance(written, dict) else {}).items():
+            is_cue = isinstance(use, dict) and use.get("use") in self._registry.offers[Cue]
+            place = ("feedback", name)
+            if is_cue and (choice := self.choose(Cue, place)):
+                cues[name] = choice
+            elif not is_cue and (choice := self.choose(Feedback, place)):
+                sounds[name] = choice
+        written = self._at(("views",))
+        names = written if isinstance(written, dict) else {}
+        views = {name: self.choose(Feedback, ("views", name)) for name in names}
+        for name in set(names) & {*cues, *sounds}:
+            self._source.problem(("views", name), f"{name!r} is the name of a feedback already")
+        return cues, sounds, {name: choice for name, choice in views.items() if choice}
+
+    def machine(self) -> tuple[Machine, str] | None:
+        """Return the machine and its file's text, or note what is wrong."""
+        name, folder = self._at(("machine",)), self._source.path.parent
+        if not isinstance(name, str):
+            return None
+        try:
+            machine = load_machine(name, folder)
+            return machine, find_machine(name, folder).read_text(encoding="utf-8")
+        except ProtocolError as error:
+            self._source.problem(("machine",), str(error))
+            return None
+
+    def build(self, choices: Mapping[str, Choice], machine: Machine) -> dict[str, Task]:
+        """Return the built tasks, noting those that cannot be done with ``machine``."""
+        tasks: dict[str, Task] = {}
+        for name, choice in choices.items():
+            try:
+                task = choice.build(machine)
+            except ProtocolError as error:
+                self._source.problem(("tasks", name), str(error))
+                continue
+            assert isinstance(task, Task)  # noqa: S101 - an offer of this role
+            tasks[name] = task
+        return tasks
+
+    def _at(self, place: Place) -> object:
+        node = self._source.data
+        for step in place:
+            node = node.get(step) if isinstance(node, dict) else None
+        return node

@@ -1,0 +1,85 @@
+"""What holds a session: the examiner, a part in trouble, a stop rule."""
+
+from collections.abc import Callable
+
+from labcrane.console import Command, Order
+from labcrane.protocol import OnFault
+from labcrane.records import Value
+
+EXAMINER, INPUT, DISK, STOP = "examiner", "input", "disk", "stop rule"
+"""Who can hold a session, beside lost streams and feedback: it goes on when nobody does."""
+
+
+class Holding:
+    """Holds a session while somebody or something has a reason to.
+
+    Parameters
+    ----------
+    on_fault
+        What the protocol wants done about each fault.
+    note
+        Takes an event's name and data; every reason that comes or goes is one.
+
+    Attributes
+    ----------
+    ending
+        Why the session must end, reason by reason; empty while it may go on.
+    """
+
+    def __init__(self, on_fault: OnFault, note: Callable[[str, dict[str, Value]], None]) -> None:
+        self._on_fault = on_fault
+        self._note = note
+        self._by: set[str] = set()
+        self.ending: list[str] = []
+
+    def __contains__(self, who: str) -> bool:
+        return who in self._by
+
+    def __bool__(self) -> bool:
+        return bool(self._by)
+
+    def hold(self, who: str) -> None:
+        """Hold the session for ``who``."""
+        self._by.add(who)
+        self._note("pause.start", {"by": who})
+
+    def release(self, who: str) -> None:
+        """Let the session go on as far as ``who`` is concerned."""
+        if who in self._by:
+            self._by.discard(who)
+            self._note("pause.end", {"by": who})
+
+    def watch(self, part: str, trouble: str | None) -> None:
+        """Hold the session while a part is in trouble; None is none."""
+        held = part in self._by
+        if trouble is not None and not held:
+            self._note(f"{part}.lost", {"why": trouble})
+            self.hold(part)
+            if part == INPUT and self._on_fault.input_lost == "end":
+                self.ending.append("input lost")
+        elif trouble is None and held:
+            self._note(f"{part}.back", {})
+            self.release(part)
+
+    def report(self, command: Command) -> None:
+        """Take up what the launcher says of a stream or a feedback process."""
+        if command.order is Order.LOST:
+            self._note("stream.lost", {"what": command.text})
+            if self._on_fault.stream_lost == "pause":
+                self.hold(command.text)
+        elif command.order is Order.BACK:
+            self._note("stream.back", {"what": command.text})
+            self.release(command.text)
+        else:
+            self._feedback(command)
+
+    def _feedback(self, command: Command) -> None:
+        name, _, why = command.text.partition(": ")
+        who = f"feedback {name}"
+        if command.order is Order.FAILED:
+            self._note("feedback.lost", {"what": name, "why": why})
+            if self._on_fault.feedback_lost == "pause" and who not in self._by:
+                self.hold(who)
+        else:
+            self._note("feedback.ready", {"what": name, "facts": why})
+            self.release(who)
