@@ -218,7 +218,21 @@ class DynamicsContract:
 
 
 class TaskContract:
-    """What every task must do. Provide the fixture ``task``."""
+    """What every task must do. Provide the fixture ``task``.
+
+    Name in ``needs`` what the task asks of the machine's state beside that of every crane; the
+    stand-in has zeros there.
+    """
+
+    needs: Sequence[Signal] = ()
+
+    def _run(self, task: Task) -> Run:
+        state = (*crane_state(ch8()).signals, *self.needs)
+        return a_run(ch8(), state=state, task=task.signals)
+
+    def _frame(self, run: Run, number: int = 0) -> Frame:
+        crane = crane_at(run.machine, run.machine.rest)
+        return a_frame(run, number, np.pad(crane, (0, run.state.size - crane.size)))
 
     def test_a_plan_follows_the_order_of_its_levels(self, task: Task) -> None:
         factors = task.factors()
@@ -231,32 +245,32 @@ class TaskContract:
 
     def test_task_judges_what_its_signals_promise(self, task: Task) -> None:
         check_signals(task)
-        run = a_run(ch8(), task=task.signals)
+        run = self._run(task)
         with opened(task, run):
             for planned in task.plan(task.factors())[:3]:
                 task.begin_trial(a_trial(planned))
-                judgement = task.judge(a_frame(run))
+                judgement = task.judge(self._frame(run))
                 check_array(task, judgement.values)
                 assert judgement.phase is not Phase.IDLE
 
     def test_an_overruled_trial_has_no_automatic_end(self, task: Task) -> None:
-        run = a_run(ch8(), task=task.signals)
+        run = self._run(task)
         with opened(task, run):
             for planned in task.plan(task.factors())[:2]:
                 task.begin_trial(a_trial(planned))
                 task.overrule()
-                late = a_frame(run, number=int(3600 * RATE_HZ))
+                late = self._frame(run, number=int(3600 * RATE_HZ))
                 assert not task.judge(late).phase.over
 
     def test_results_are_declared(self, task: Task) -> None:
-        run = a_run(ch8(), task=task.signals)
+        run = self._run(task)
         declared = {column for signal in task.results for column in signal.columns}
         with opened(task, run):
             for planned in task.plan(task.factors())[:3]:
                 task.begin_trial(a_trial(planned))
                 results: Mapping[str, object] = {}
                 for number in range(int(120 * RATE_HZ)):
-                    judgement = task.judge(a_frame(run, number))
+                    judgement = task.judge(self._frame(run, number))
                     if judgement.phase.over:
                         results = judgement.results
                         break

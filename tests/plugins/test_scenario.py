@@ -48,18 +48,10 @@ limit_s: 60
 
 
 class TestScenario(TaskContract):  # "scenario"
-    @pytest.fixture
-    def task(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Task:
-        from labcrane import testing
+    needs = (OVERLOAD,)
 
-        state = (*crane_state(ch8()).signals, OVERLOAD)
-        monkeypatch.setattr(
-            testing,
-            "crane_at",
-            lambda machine, angles: np.zeros(sum(len(s.columns) for s in state)),
-        )
-        plain = testing.a_run
-        monkeypatch.setattr(testing, "a_run", lambda m, **k: plain(m, **{"state": state, **k}))
+    @pytest.fixture
+    def task(self, tmp_path: Path) -> Task:
         (tmp_path / "free.yaml").write_text(FREE)
         return Scenario(ScenarioSettings(scenes=(tmp_path / "free.yaml",)), ch8())
 
