@@ -92,21 +92,6 @@ class Chooser:
         plugin = self._registry.plugins[Questionnaire][name]
         return Choice(name, plugin, offer, settings) if settings is not None else None
 
-    def build_questionnaires(
-        self, choices: Mapping[str, Choice], machine: Machine
-    ) -> dict[str, Questionnaire]:
-        """Return the built questionnaires, noting those that cannot be asked as written."""
-        built: dict[str, Questionnaire] = {}
-        for name, choice in choices.items():
-            try:
-                questionnaire = choice.build(machine)
-            except ProtocolError as error:
-                self._source.problem(("questionnaires", name), str(error))
-                continue
-            assert isinstance(questionnaire, Questionnaire)  # noqa: S101 - an offer of this role
-            built[name] = questionnaire
-        return built
-
     def choose_feedback(self) -> tuple[dict[str, Choice], dict[str, Choice], dict[str, Choice]]:
         """Return cues, sounds and views by the protocol's names for them."""
         cues, sounds = {}, {}
@@ -137,18 +122,20 @@ class Chooser:
             self._source.problem(("machine",), str(error))
             return None
 
-    def build(self, choices: Mapping[str, Choice], machine: Machine) -> dict[str, Task]:
-        """Return the built tasks, noting those that cannot be done with ``machine``."""
-        tasks: dict[str, Task] = {}
+    def build(
+        self, role: type[RoleT], section: str, choices: Mapping[str, Choice], machine: Machine
+    ) -> dict[str, RoleT]:
+        """Return what a section of the protocol names, built, noting what cannot be as written."""
+        built: dict[str, RoleT] = {}
         for name, choice in choices.items():
             try:
-                task = choice.build(machine)
+                component = choice.build(machine)
             except ProtocolError as error:
-                self._source.problem(("tasks", name), str(error))
+                self._source.problem((section, name), str(error))
                 continue
-            assert isinstance(task, Task)  # noqa: S101 - an offer of this role
-            tasks[name] = task
-        return tasks
+            assert isinstance(component, role)  # noqa: S101 - an offer of this role
+            built[name] = component
+        return built
 
     def _at(self, place: Place) -> object:
         node = self._source.data

@@ -177,9 +177,11 @@ def load(path: Path, registry: Registry) -> Study:
     scheme = chooser.choose(Controller, ("scheme",))
     dynamics = chooser.choose(Dynamics, ("dynamics",))
     choices = chooser.choose_tasks()
-    tasks = chooser.build(choices, machine[0]) if machine else {}
+    tasks = chooser.build(Task, "tasks", choices, machine[0]) if machine else {}
     asked = chooser.choose_questionnaires(protocol) if protocol else {}
-    questionnaires = chooser.build_questionnaires(asked, machine[0]) if machine else {}
+    questionnaires = (
+        chooser.build(Questionnaire, "questionnaires", asked, machine[0]) if machine else {}
+    )
     cues, sounds, views = chooser.choose_feedback()
     if protocol is not None:
         Checker(source, protocol).check(tasks, questionnaires)
