@@ -22,7 +22,9 @@ GOVERNED = SHORT.replace("{use: dual_joystick}", PERSON).replace(
     "distances: [2], movements: 2", "distances: [2], movements: 1"
 )
 GROUPED = GOVERNED.replace(
-    "sessions:", "design:\n  groups: {none: [], visual: [sphere], sound: [tone]}\nsessions:"
+    "sessions:",
+    "feedback: {sphere: {use: sphere}, tone: {use: sonification}}\n"
+    "design:\n  groups: {none: [], visual: [sphere], sound: [tone]}\nsessions:",
 )
 
 

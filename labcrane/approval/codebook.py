@@ -15,8 +15,14 @@ from labcrane.signals import Layout
 from labcrane.study import Study
 
 CORE = "labcrane"
-ABOUT = ("trial", "attempt", "block", "block_name", "practice", "group", "outcome", "completion")
+ABOUT = (
+    "trial", "attempt", "block", "block_name", "practice", "reference", "group", "feedback",
+    "outcome", "completion",
+)  # fmt: skip
 """Columns of the trial table that are labcrane's own, besides those with units."""
+
+FLAGS = ("practice", "reference")
+"""Truth values, recorded as 1 or 0."""
 
 EVENTS = (("time", "s"), ("tick", "1"), ("part", "1"), ("trial", "1"), ("name", ""), ("data", ""))
 
@@ -64,8 +70,8 @@ def codebook(study: Study) -> list[Column]:
 
 def _trials(study: Study) -> list[Column]:
     found: dict[str, Column] = {}
-    about = [name for name in ABOUT if name != "group" or study.protocol.design.groups]
-    units = {**UNITS, "practice": "1"}  # a truth value, recorded as 1 or 0
+    about = [name for name in ABOUT if _has(study, name)]
+    units = {**UNITS, **{name: "1" for name in FLAGS if name in about}}
     for name in (*about, *units):
         found[name] = Column("trials", name, units.get(name, ""), CORE)
     for name, (task, values) in _conditions(study).items():
@@ -78,6 +84,18 @@ def _trials(study: Study) -> list[Column]:
                 source = f"{choice.plugin}: {choice.name}"
                 found[name] = Column("trials", name, signal.unit, source)
     return list(found.values())
+
+
+def _has(study: Study, name: str) -> bool:
+    """Whether sessions of ``study`` have a column that not every study has."""
+    protocol = study.protocol
+    steps = [step for session in protocol.sessions for step in session.steps]
+    given = {
+        "group": bool(protocol.design.groups),
+        "feedback": bool(protocol.feedback),
+        "reference": any(step.kind == "reference" for step in steps),
+    }
+    return given.get(name, True)
 
 
 def _conditions(study: Study) -> dict[str, tuple[str, list[Value]]]:

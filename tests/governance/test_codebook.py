@@ -31,9 +31,10 @@ def ordered(rule: str, text: str = FACTORS) -> str:
 
 
 def test_every_recorded_column_is_in_the_codebook_with_its_unit(tmp_path: Path) -> None:
-    lab = Lab(tmp_path, GROUPED)
+    lab = Lab(tmp_path, GROUPED + "      - reference: {task: aiming, pairs: 1}\n")
     lab.approve()
     session = labcrane.open_recording(lab.run("P001")).session(1)
+    assert {"group", "feedback", "reference"} <= set(session.trials.columns)
     rows = read_lock(lab.protocol).content["codebook"]
     book = {(row["table"], row["name"]): row for row in rows}
     assert len(book) == len(rows)

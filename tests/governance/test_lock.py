@@ -377,5 +377,5 @@ def test_another_group_in_the_protocol_is_drift(tmp_path: Path) -> None:
     lab = Lab(tmp_path, GROUPED)
     lab.approve()
     lab.consent("P001")
-    edit(lab.protocol, "sound: [tone]", "sound: [tone, click]")
-    assert refusal(lab) == ["protocol: design.groups.sound[2] is new: 'click'"]
+    edit(lab.protocol, "sound: [tone]", "sound: [tone, sphere]")
+    assert refusal(lab) == ["protocol: design.groups.sound[2] is new: 'sphere'"]
