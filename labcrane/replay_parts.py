@@ -31,6 +31,8 @@ def restore(
     (folder / "machine.yaml").write_text(described, encoding="utf-8")
     content["machine"] = "machine.yaml"
     _write_instructions(content, record, folder)
+    if protocol is None:
+        _put_in_questionnaires(content, record)
     path = folder / "protocol.yaml"
     path.write_text(json.dumps(content), encoding="utf-8")  # JSON is YAML
     return path
@@ -50,6 +52,14 @@ def _write_instructions(content: Mapping[str, Any], record: SessionRecord, folde
                 path = folder / str(step["instructions"])
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_text(text, encoding="utf-8")
+
+
+def _put_in_questionnaires(content: Mapping[str, Any], record: SessionRecord) -> None:
+    """Let recorded settings stand for those that named a file, which is not there any more."""
+    components = record.context["components"]
+    for name, written in content.get("questionnaires", {}).items():
+        if recorded := components.get(f"questionnaires.{name}"):
+            written.update(recorded["settings"])
 
 
 def differing_parts(record: SessionRecord, study: Study) -> tuple[str, ...]:

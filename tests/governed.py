@@ -68,6 +68,13 @@ class Lab:
         return run(self.visit(participant, fast=True), Willing(orders))
 
 
+def edit(path: Path, old: str, new: str) -> None:
+    """Change what a file says in one place."""
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+
+
 class Willing(ScriptedConsole):
     """Starts whatever waits, and gives the orders of a script."""
 

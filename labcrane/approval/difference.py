@@ -6,6 +6,8 @@ from typing import Any
 
 Tree = Mapping[str, Any]
 
+SETTINGS = "settings: "
+
 
 def differences(before: Tree, now: Tree) -> list[str]:
     """Return one line for everything that is not as it was; nothing when all is.
@@ -29,17 +31,16 @@ def differences(before: Tree, now: Tree) -> list[str]:
 
 
 def _said_once(lines: list[str]) -> list[str]:
-    """Leave out settings that differ because the protocol does: the same change twice."""
-    written = {_tail(line, "protocol") for line in lines if line.startswith("protocol: ")}
-    return [
-        line
-        for line in lines
-        if not (line.startswith("settings: ") and _tail(line, "settings") in written)
-    ]
+    """Leave out settings that differ because the protocol or a file does: the same change twice."""
+    written = {line.partition(": ")[2] for line in lines if not line.startswith(SETTINGS)}
+    return [line for line in lines if not (line.startswith(SETTINGS) and _tails(line) & written)]
 
 
-def _tail(line: str, section: str) -> str:
-    return line.removeprefix(f"{section}: ")
+def _tails(line: str) -> set[str]:
+    """Return a change of a setting with every place from which a file may have named it."""
+    place, space, change = line.removeprefix(SETTINGS).partition(" ")
+    parts = place.split(".")
+    return {".".join(parts[at:]) + space + change for at in range(len(parts))}
 
 
 def _values(where: str, before: Any, now: Any) -> Iterator[str]:

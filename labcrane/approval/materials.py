@@ -1,6 +1,7 @@
 """Everything that a protocol refers to, as plain data that can be compared and hashed."""
 
 import hashlib
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from importlib.metadata import EntryPoint, entry_points, version
 from pathlib import Path
@@ -10,6 +11,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from labcrane.approval.source_tree import hashes
+from labcrane.errors import ProtocolError
 from labcrane.hookspecs import PROJECT
 from labcrane.registry import Registry
 from labcrane.study import Study
@@ -56,10 +58,43 @@ def materials(
 
 
 def settings(study: Study) -> dict[str, Any]:
-    """Return the settings of every component for people, defaults included."""
+    """Return the settings of every component for people, defaults included.
+
+    Raises
+    ------
+    ProtocolError
+        A setting names a file that would not move with the study, and be no part of the lock.
+    """
     choices = {"input": study.input, "scheme": study.scheme, "dynamics": study.dynamics}
-    choices |= {f"tasks.{name}": choice for name, choice in study.task_choices.items()}
-    return {part: choice.settings.model_dump(mode="json") for part, choice in choices.items()}
+    for kind, named in (
+        ("tasks", study.task_choices),
+        ("questionnaires", study.questionnaire_choices),
+        ("feedback", {**study.cues, **study.sounds}),
+        ("views", study.views),
+    ):
+        choices |= {f"{kind}.{name}": choice for name, choice in named.items()}
+    folder = study.path.parent
+    return {
+        part: _portable(choice.settings.model_dump(), folder, part)
+        for part, choice in choices.items()
+    }
+
+
+def _portable(value: object, folder: Path, part: str) -> Any:
+    """Return settings as plain data that are the same on every computer."""
+    if isinstance(value, Mapping):
+        return {str(key): _portable(item, folder, part) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_portable(item, folder, part) for item in value]
+    if not isinstance(value, Path):
+        return value if isinstance(value, bool | int | float | str | None) else str(value)
+    inside, named = (Path(os.path.abspath(path)) for path in (folder, value))  # noqa: PTH100 - links are left as they are
+    if not named.is_relative_to(inside):
+        raise ProtocolError(
+            f"{part} names {value}, which is not in the folder of the protocol, {folder}; put it "
+            "there, so that it moves with the study and is part of the lock"
+        )
+    return named.relative_to(inside).as_posix()
 
 
 def referred(data: object, folder: Path) -> list[Path]:

@@ -7,7 +7,7 @@ from pydantic import Field, ValidationInfo, field_validator, model_validator
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from labcrane import Item, Settings
+from labcrane import Item, Settings, StudyPath
 
 NAME = r"^[a-z][a-z0-9_]*$"
 
@@ -55,7 +55,7 @@ class LabText(Settings):
 class LabTextSettings(Settings):
     """Of a questionnaire whose words the lab has to bring."""
 
-    file: Path
+    file: StudyPath
     """YAML file with the words, beside the protocol: rights, items, and perhaps title, left and
     right."""
 
@@ -70,14 +70,16 @@ class LabTextSettings(Settings):
                 "its words may not be passed on with labcrane; name the lab's own file with "
                 "file: (docs/questionnaires.md says what is in it)"
             )
-        if "text" in given:
-            return given
-        path = (info.context or {}).get("folder", Path()) / given["file"]
-        try:
-            text = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError, YAMLError) as error:
-            raise ValueError(f"the lab's file {str(path)!r} cannot be read: {error}") from None
-        return {**given, "text": text}
+        return given if "text" in given else {**given, "text": _lab_file(given["file"], info)}
+
+
+def _lab_file(name: str, info: ValidationInfo) -> Any:
+    """Return what a YAML file beside the protocol holds."""
+    path = (info.context or {}).get("folder", Path()) / name
+    try:
+        return YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, YAMLError) as error:
+        raise ValueError(f"the lab's file {str(path)!r} cannot be read: {error}") from None
 
 
 class Question(Settings):
@@ -130,7 +132,11 @@ class Question(Settings):
 
 
 class FreeSettings(Settings):
-    """Of a questionnaire of the lab's own."""
+    """Of a questionnaire of the lab's own, written in the protocol or in a file beside it."""
+
+    file: StudyPath | None = None
+    """YAML file beside the protocol with title, questions and whatever else can be set here. What
+    it holds takes its place."""
 
     title: str
     """What participants read above the questions."""
@@ -143,6 +149,21 @@ class FreeSettings(Settings):
 
     sums: dict[str, tuple[str, ...]] = Field(default_factory=dict)
     """Scores: the names of the questions whose answers are added, by the score's name."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, given: Any, info: ValidationInfo) -> Any:
+        if not (isinstance(given, dict) and isinstance(given.get("file"), str)):
+            return given
+        found = _lab_file(given["file"], info)
+        if not isinstance(found, dict):
+            raise ValueError(  # noqa: TRY004 - pydantic collects these
+                f"the lab's file {given['file']!r} holds {found!r}; it must hold keys: title, "
+                "questions"
+            )
+        if twice := sorted({*found} & {*given}):
+            raise ValueError(f"{', '.join(twice)} is said in {given['file']!r} and in the protocol")
+        return {**found, **given, "file": None}
 
     @field_validator("questions")
     @classmethod

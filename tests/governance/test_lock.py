@@ -9,7 +9,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
-from governed import GROUPED, TODAY, Lab
+from governed import GROUPED, TODAY, Lab, edit
 
 from labcrane import ProtocolError
 from labcrane.admission import gate
@@ -21,7 +21,6 @@ from labcrane.approval.source_tree import hashes
 from labcrane.registry import discover
 from labcrane.yaml_file import YamlFile
 
-TARGETS = "targets:\n  - {x: 1.5, y: 2.0}\n  - {x: 1.0, y: 2.5}  # the far one\n"
 MACHINE = (Path(__file__).parents[2] / "labcrane" / "machines" / "ch8.yaml").read_text()
 
 
@@ -51,12 +50,6 @@ def refusal(lab: Lab) -> list[str]:
         assert "labcrane amend" in last
         return [line.strip() for line in lines]
     return []
-
-
-def edit(path: Path, old: str, new: str) -> None:
-    text = path.read_text()
-    assert old in text
-    path.write_text(text.replace(old, new, 1))
 
 
 def test_the_approved_study_may_be_run(lab: Lab) -> None:
@@ -125,15 +118,6 @@ def compared(lab: Lab, data: dict[str, object], change) -> list[str]:
     before = materials(study, discover())
     change()
     return differences(before, materials(study, discover()))
-
-
-def test_one_number_in_a_target_file_is_told(lab: Lab) -> None:
-    targets = lab.folder / "targets.yaml"
-    targets.write_text(TARGETS)
-    told = compared(
-        lab, {"scene": {"targets": "targets.yaml"}}, lambda: edit(targets, "2.5", "2.51")
-    )
-    assert told == ["file targets.yaml: targets[2].y was 2.5, is 2.51"]
 
 
 def test_one_item_of_a_questionnaire_is_told_also_when_another_file_names_it(lab: Lab) -> None:

@@ -1,12 +1,15 @@
 """Scores against published definitions, worked by hand; items, languages and rights."""
 
+import json
 import math
 from pathlib import Path
 
 import pytest
-from rehearsal import SHORT, a_study
+from rehearsal import SHORT, ScriptedConsole, a_study
 
 from labcrane import AnswerError, Item, ProtocolError, Questionnaire
+from labcrane.replay import replay
+from labcrane.session import Visit, run
 from labcrane.testing import QuestionnaireContract
 from labcrane_questionnaires.demographics import Demographics
 from labcrane_questionnaires.free import Free
@@ -208,3 +211,30 @@ def test_a_stop_rule_needs_a_score_that_there_is(tmp_path: Path) -> None:
 def test_weights_that_mean_nothing_are_refused(tmp_path: Path, weights: str, message: str) -> None:
     step = "      - questionnaire: sus\n"
     assert message in refusal(tmp_path, step, f"indicator: {{weights: {weights}}}\n")
+
+
+COMFORT = {"title": "Comfort", "questions": [{"name": "heat", "text": "Too hot?"}]}
+ASK_COMFORT = "      - questionnaire: comfort\n"
+BY_FILE = "questionnaires: {comfort: {use: free, file: comfort.yaml}}\n"
+
+
+def test_the_labs_own_questions_may_stand_in_a_file_of_their_own(tmp_path: Path) -> None:
+    file = tmp_path / "comfort.yaml"
+    file.write_text(json.dumps(COMFORT))
+    study = a_study(tmp_path, a_protocol(ASK_COMFORT, BY_FILE))
+    assert [item.text for item in study.questionnaires["comfort"].items()] == ["Too hot?"]
+    twice = BY_FILE.replace("comfort.yaml", "comfort.yaml, title: Warmth")
+    assert "title is said in 'comfort.yaml' and in" in refusal(tmp_path, ASK_COMFORT, twice)
+    file.write_text("Too hot?")
+    assert "holds 'Too hot?'; it must hold keys" in refusal(tmp_path, ASK_COMFORT, BY_FILE)
+    file.unlink()
+    assert "comfort.yaml' cannot be read" in refusal(tmp_path, ASK_COMFORT, BY_FILE)
+
+
+def test_a_session_is_replayed_without_the_file_of_its_questions(tmp_path: Path) -> None:
+    file = tmp_path / "comfort.yaml"
+    file.write_text(json.dumps(COMFORT))
+    study = a_study(tmp_path, a_protocol(ASK_COMFORT, BY_FILE))
+    path = run(Visit(study, "P001", 1, tmp_path / "data", True, True), ScriptedConsole())
+    file.unlink()
+    assert replay(path, 1).difference is None

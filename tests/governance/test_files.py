@@ -1,0 +1,90 @@
+"""Files that a study names: scenes, machines, models, questionnaires; none may change unseen."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from governed import Lab, edit
+
+from labcrane import ProtocolError
+from labcrane.admission import gate
+from labcrane.approval.lock import lock_path
+
+RESCUE = Path(__file__).parents[2] / "protocols" / "retrieval"
+ASKED = """
+questionnaires:
+  ssq: {use: ssq, file: forms/ssq.yaml}
+  comfort: {use: free, file: forms/comfort.yaml}
+stop_rules: [{questionnaire: ssq, score: total, above: 60}]
+"""
+COMFORT = "title: Comfort\nquestions:\n  - {name: heat, text: Too hot?}\n"
+
+
+@pytest.fixture
+def rescue(tmp_path: Path) -> Lab:
+    """Return the bundled rescue study with questionnaires of the lab's, approved."""
+    folder = tmp_path / "rescue"
+    shutil.copytree(RESCUE, folder, ignore=shutil.ignore_patterns("hydraulic_arm", "data"))
+    text = (folder / "protocol.yaml").read_text()
+    text = text.replace("    steps:\n", "    steps:\n      - questionnaire: [comfort, ssq]\n")
+    (folder / "forms").mkdir()
+    words = json.dumps([f"symptom {number}" for number in range(1, 17)])
+    (folder / "forms" / "ssq.yaml").write_text(f"rights: bought\nitems: {words}\n")
+    (folder / "forms" / "comfort.yaml").write_text(COMFORT)
+    lab = Lab(folder, text + ASKED)
+    lab.approve()
+    lab.consent("R001")
+    return lab
+
+
+DRIFTS = {
+    "scenes/touch.yaml": ("radius: 0.08, jaws", "radius: 0.09, jaws"),  # where the targets are
+    "ied_arm.yaml": ("a: 1.1, offset", "a: 1.15, offset"),
+    "arm.dmd.yaml": ("dead_time_s: 0.112", "dead_time_s: 0.113"),
+    "forms/ssq.yaml": ("symptom 8", "another symptom"),
+    "forms/comfort.yaml": ("Too hot?", "Too cold?"),
+}
+
+
+def test_labcrane_run_refuses_another_number_or_question_in_any_file_and_names_it(
+    rescue: Lab,
+) -> None:
+    """With the command itself, from another folder than the one in which it was approved."""
+    for name, (old, new) in DRIFTS.items():
+        edit(rescue.folder / name, old, new)
+    done = subprocess.run(
+        [sys.executable, "-m", "labcrane", "run", "study.yaml", "--participant", "R001"],
+        cwd=rescue.folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    for said in (
+        "  file scenes/touch.yaml: goals[1].radius was 0.08, is 0.09",
+        "  file forms/ssq.yaml: items[8] was 'symptom 8', is 'another symptom'",
+        "  file forms/comfort.yaml: questions[1].text was 'Too hot?', is 'Too cold?'",
+    ):
+        assert said in done.stderr.splitlines()
+    named = [line.split(":")[0] for line in done.stderr.splitlines() if line.startswith("  ")]
+    assert set(named) == {*(f"  file {name}" for name in DRIFTS), "  the machine"}
+    assert not (rescue.places.root / "R001").exists()
+
+
+def test_each_of_these_files_alone_is_refused(rescue: Lab) -> None:
+    for name, (old, new) in DRIFTS.items():
+        gate(rescue.visit("R001"))
+        edit(rescue.folder / name, old, new)
+        with pytest.raises(ProtocolError, match=f"\n  file {name}: "):
+            gate(rescue.visit("R001"))
+        edit(rescue.folder / name, new, old)
+
+
+def test_a_file_that_would_not_move_with_the_study_is_not_approved(rescue: Lab) -> None:
+    lock_path(rescue.protocol).unlink()
+    (rescue.folder / "forms" / "ssq.yaml").rename(rescue.folder.parent / "ssq.yaml")
+    edit(rescue.protocol, "forms/ssq.yaml", "../ssq.yaml")
+    with pytest.raises(
+        ProtocolError, match=r"questionnaires\.ssq names .*ssq\.yaml, which is not in the folder of"
+    ):
+        rescue.approve()
