@@ -23,6 +23,12 @@ Ticks = Generator[None, Frame, None]
 FAULTS = frozenset({Order.LOST, Order.BACK, Order.FAILED, Order.MENDED})
 """What the launcher says, not people."""
 
+NOT_ASKED = {
+    Order.ANSWER: "no questionnaire is asked",
+    Order.SUBMIT: "no questionnaire is asked",
+    Order.CONSENT: "consent is given before the session begins",
+}
+
 
 class Course:
     """Leads a session through its plan.
@@ -236,8 +242,8 @@ class Course:
                 return "no trial is running"
             case Order.SKIP if self._stage not in {"trial", "break", "questionnaire"}:
                 return "no trial, break or questionnaire is running"
-            case Order.ANSWER | Order.SUBMIT:
-                return "no questionnaire is asked"
+            case Order.ANSWER | Order.SUBMIT | Order.CONSENT:
+                return NOT_ASKED[command.order]
             case Order.START if self._stage != "waiting" and not (
                 EXAMINER in self._held or STOP in self._held
             ):

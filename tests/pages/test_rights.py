@@ -195,17 +195,13 @@ def test_two_hundred_reconnects_and_a_client_that_never_reads_do_not_slow_the_lo
     assert opened == RECONNECTS
     before, during = lateness(session, quiet), lateness(session, rude)
     later = during - before
-    print(f"99th percentile of lateness, ms: quiet {1e3 * np.median(before):.2f}, "
-          f"rude {1e3 * np.median(during):.2f}")  # fmt: skip
-    assert min(later) < LATER_S, f"later each time, by {1e3 * later} ms"
+    assert min(later) < LATER_S, f"ms: quiet {1e3 * before}, later each time by {1e3 * later}"
     assert len(later) == SPELLS
 
 
 def test_what_rude_clients_cost_is_paid_by_the_pages_and_not_by_the_loop(visited) -> None:
     _, _, (_, quiet, rude) = visited
     extra = {word: share(rude, word) - share(quiet, word) for word in ("session", "pages")}
-    print(f"CPU of the session: quiet {share(quiet, 'session'):.1%}, rude {extra['session']:+.1%}; "
-          f"of the pages: {share(quiet, 'pages'):.1%}, {extra['pages']:+.1%}")  # fmt: skip
     assert extra["pages"] > 0.1, "two hundred page loads cannot be that cheap"
     assert extra["session"] < 0.25 * extra["pages"]
 
