@@ -150,6 +150,8 @@ class Course:
             return
         about: dict[str, Value] = {"block": block.number, "block_name": block.name}
         self._note("block.start", **about, task=block.task, practice=block.practice)
+        for owed in block.owed:
+            yield from self._ask(owed.questionnaire, owed.answered, owed.after)
         for trial in block.trials:
             yield from self._trial(block, trial)
             for name in block.ask if trial.planned.counted else ():
