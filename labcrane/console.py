@@ -23,6 +23,7 @@ class Order(StrEnum):
     HINT = "hint"  # show words to the operator
     ANSWER = "answer"  # to a question, as JSON: questionnaire, item, value
     SUBMIT = "submit"  # hand in the questionnaire that is asked
+    CONSENT = "consent"  # to the text of this version, given before the session begins
     DENIED = "denied"  # said by a page: somebody without the right asked for something
     SETTING = "setting"  # change a setting of a cue or sound: tone.far=3
     FAILED = "failed"  # said by the launcher of a feedback process: tone: why

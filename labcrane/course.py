@@ -23,6 +23,12 @@ Ticks = Generator[None, Frame, None]
 FAULTS = frozenset({Order.LOST, Order.BACK, Order.FAILED, Order.MENDED})
 """What the launcher says, not people."""
 
+NOT_ASKED = {
+    Order.ANSWER: "no questionnaire is asked",
+    Order.SUBMIT: "no questionnaire is asked",
+    Order.CONSENT: "consent is given before the session begins",
+}
+
 
 class Course:
     """Leads a session through its plan.
@@ -144,6 +150,8 @@ class Course:
             return
         about: dict[str, Value] = {"block": block.number, "block_name": block.name}
         self._note("block.start", **about, task=block.task, practice=block.practice)
+        for owed in block.owed:
+            yield from self._ask(owed.questionnaire, owed.answered, owed.after)
         for trial in block.trials:
             yield from self._trial(block, trial)
             for name in block.ask if trial.planned.counted else ():
@@ -236,8 +244,8 @@ class Course:
                 return "no trial is running"
             case Order.SKIP if self._stage not in {"trial", "break", "questionnaire"}:
                 return "no trial, break or questionnaire is running"
-            case Order.ANSWER | Order.SUBMIT:
-                return "no questionnaire is asked"
+            case Order.ANSWER | Order.SUBMIT | Order.CONSENT:
+                return NOT_ASKED[command.order]
             case Order.START if self._stage != "waiting" and not (
                 EXAMINER in self._held or STOP in self._held
             ):

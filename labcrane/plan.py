@@ -18,6 +18,23 @@ READING_S = 120.0
 
 
 @dataclass(frozen=True, slots=True)
+class Owed:
+    """A questionnaire after a trial that a process died before or in the middle of.
+
+    Attributes
+    ----------
+    after
+        The trial that is over.
+    answered
+        What was answered before.
+    """
+
+    after: Trial
+    questionnaire: str
+    answered: Mapping[str, Value]
+
+
+@dataclass(frozen=True, slots=True)
 class PlannedBlock:
     """A run of trials under one condition.
 
@@ -45,6 +62,8 @@ class PlannedBlock:
         Questionnaires after each counted trial.
     feedback
         What is switched on in each trial, by the trial's number; empty in a study without.
+    owed
+        What a process that died was still to ask after the last trial.
     """
 
     name: str
@@ -59,6 +78,7 @@ class PlannedBlock:
     reference: bool = False
     ask: tuple[str, ...] = ()
     feedback: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
+    owed: tuple[Owed, ...] = ()
 
     @property
     def expected_s(self) -> float:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from labcrane.errors import ProtocolError
-from labcrane.plan import PlannedBlock, PlannedStep, SessionPlan, next_attempt
+from labcrane.plan import Owed, PlannedBlock, PlannedStep, SessionPlan, next_attempt
 from labcrane.recording.journal_reader import SessionLog, read_journal
 from labcrane.recording.parts import parts
 from labcrane.records import Phase, Trial, Value
@@ -39,6 +39,10 @@ class Progress:
         What was answered, by step and questionnaire.
     handed_in
         Steps and questionnaires that need not be asked again.
+    rated, ratings
+        The same of what is asked after trials, by trial and questionnaire.
+    last
+        Number of the last trial that ended; None before the first.
     """
 
     complete: bool = False
@@ -49,6 +53,9 @@ class Progress:
     angles: tuple[float, ...] = ()
     answers: dict[tuple[int, str], dict[str, Value]] = field(default_factory=dict)
     handed_in: set[tuple[int, str]] = field(default_factory=set)
+    ratings: dict[tuple[int, str], dict[str, Value]] = field(default_factory=dict)
+    rated: set[tuple[int, str]] = field(default_factory=set)
+    last: int | None = None
 
 
 def progress(journal: Path, joints: Sequence[str]) -> Progress:
@@ -78,6 +85,11 @@ def _take(so_far: Progress, name: str, data: Mapping[str, Any]) -> None:
             so_far.complete = data["reason"] == "complete"
         case "step.end" if not so_far.complete:
             so_far.steps.add(data["step"])
+        case "questionnaire.answer" if "trial" in data:
+            rating = so_far.ratings.setdefault((data["trial"], data["questionnaire"]), {})
+            rating[data["item"]] = data["value"]
+        case "questionnaire.end" if "trial" in data:
+            so_far.rated.add((data["trial"], data["questionnaire"]))
         case "questionnaire.answer":
             asked = so_far.answers.setdefault((data["step"], data["questionnaire"]), {})
             asked[data["item"]] = data["value"]
@@ -87,7 +99,7 @@ def _take(so_far: Progress, name: str, data: Mapping[str, Any]) -> None:
             so_far.attempts[data["trial"]] = data["attempt"]
             so_far.interrupted = data
         case "trial.end":
-            so_far.interrupted = None
+            so_far.interrupted, so_far.last = None, data["trial"]
             again = {Phase.REPEATED, Phase.ENDED, Phase.INTERRUPTED}
             if data["outcome"] not in again:
                 so_far.done.add(data["trial"])
@@ -111,7 +123,7 @@ def remaining(study: Study, plan: SessionPlan, so_far: Progress, policy: Policy)
         if step.number in so_far.steps:
             continue
         block = _rest(study, plan, step.block, so_far, policy) if step.block else None
-        if step.block is None or (block and block.trials):
+        if step.block is None or (block and (block.trials or block.owed)):
             steps.append(_unasked(replace(step, block=block), so_far))
     return replace(plan, steps=tuple(steps))
 
@@ -139,7 +151,22 @@ def _rest(
             left.append(trial)
         elif policy != "continue":
             left.append(next_attempt(study, plan, trial, so_far.attempts[trial.number] + 1))
-    return replace(block, trials=tuple(left))
+    return replace(block, trials=tuple(left), owed=_owed(block, so_far))
+
+
+def _owed(block: PlannedBlock, so_far: Progress) -> tuple[Owed, ...]:
+    """Return what was still to be asked after the last trial when the process died."""
+    after = [
+        trial
+        for trial in block.trials
+        if trial.number == so_far.last and trial.number in so_far.done and trial.planned.counted
+    ]
+    return tuple(
+        Owed(trial, name, so_far.ratings.get((trial.number, name), {}))
+        for trial in after
+        for name in block.ask
+        if (trial.number, name) not in so_far.rated
+    )
 
 
 def within_limits(study: Study, angles: Sequence[float]) -> tuple[float, ...]:

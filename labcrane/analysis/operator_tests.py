@@ -7,13 +7,13 @@ in docs/indicator.md.
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.indicator import Indicator, Performance, indicate
 from labcrane.errors import RecordingError
 from labcrane.evaluation import IndicatorSettings
-from labcrane.recording.recording import Recording, SessionRecord, open_recording
+from labcrane.recording.recording import Recording, SessionRecord
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,8 +54,8 @@ class OperatorTest:
     settings: IndicatorSettings
 
 
-def operator_tests(folder: Path, settings: IndicatorSettings | None = None) -> list[OperatorTest]:
-    """Return all tests below ``folder``, by operator, session and time.
+def operator_tests(cohort: Cohort, settings: IndicatorSettings | None = None) -> list[OperatorTest]:
+    """Return all tests of who is included, by operator, session and time.
 
     ``settings`` takes the place of what each session was recorded with.
 
@@ -64,11 +64,11 @@ def operator_tests(folder: Path, settings: IndicatorSettings | None = None) -> l
     RecordingError
         There is no test, or an operator has no reference stage.
     """
-    files = sorted(folder.rglob("*.h5"))
-    tests = [test for file in files for test in _tests(open_recording(file), settings)]
+    people = cohort.included
+    tests = [test for person in people for test in _tests(person.recording, settings)]
     if not tests:
         raise RecordingError(
-            f"no test below {folder}: {len(files)} participant files, and no trial with the "
+            f"no test in {cohort.folder}: {len(people)} participant files, and no trial with the "
             f"columns {', '.join((TIME, *COUNTS.values()))}; a scenario task records them"
         )
     return tests

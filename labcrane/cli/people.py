@@ -1,16 +1,12 @@
 """Commands about participants: the register, consent, deviations."""
 
-import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from labcrane.cli.approval import today
 from labcrane.cli.inspect import ProtocolPath, out, whole_table
-
-if TYPE_CHECKING:
-    from labcrane.session import Visit
 
 Someone = Annotated[str, typer.Argument(metavar="PARTICIPANT", help="pseudonym: P001")]
 Reason = Annotated[str, typer.Option(help="why; no names")]
@@ -122,22 +118,3 @@ def deviations(data: Data = HERE) -> None:
         where = [str(number) if number else "-" for number in (deviation.session, deviation.trial)]
         table.add_row(name, *where, deviation.what, deviation.detail)
     out.print(table if found else "no deviations")
-
-
-def ask_for_consent(visit: "Visit") -> None:
-    """Ask the examiner at the terminal for a consent that is not on record yet."""
-    if visit.pilot or visit.simulated or not sys.stdin.isatty():
-        return
-    from labcrane.approval.decision import verify
-    from labcrane.participants.enrolment import confirm_consent
-    from labcrane.participants.places import Places
-    from labcrane.participants.register import read
-    from labcrane.registry import discover
-
-    lock, places = verify(visit.study, discover(), today()), Places(visit.data)
-    entry = read(places).participants.get(visit.participant)
-    if entry and any(given.version == lock.consent_version for given in entry.consent):
-        return
-    text = (lock.approval["consent"], lock.consent_version)
-    if typer.confirm(f"Has {visit.participant} consented to {text[0]} (version {text[1]})?"):
-        confirm_consent(places, visit.study, visit.participant, text, today())

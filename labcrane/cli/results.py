@@ -42,7 +42,7 @@ def export(
     chosen = _settings(offer.settings, settings or [], to)
     if folder.exists() and any(folder.iterdir()):
         raise ProtocolError(f"{folder} is not empty, and nothing is overwritten; give a new folder")
-    cohort = _cohort(data, include)
+    cohort = cohort_of(data, include)
     _, first = next(cohort.included[0].sessions())
     exporter = offer.build(chosen, machine_of(first))
     folder.mkdir(parents=True, exist_ok=True)
@@ -63,7 +63,7 @@ def report(
     """Write an HTML report of a study: figures, measures, statistics, quality."""
     from labcrane.analysis.report import write_report
 
-    cohort = _cohort(data, include)
+    cohort = cohort_of(data, include)
     with _bar("report", len(cohort.included)) as advance:
         page = write_report(cohort, folder, progress=lambda done, of: advance())
     out.print(f"report: {page}", markup=False)
@@ -113,7 +113,8 @@ def replay(
     )
 
 
-def _cohort(data: Path, include: list[str] | None) -> "Cohort":
+def cohort_of(data: Path, include: list[str] | None) -> "Cohort":
+    """Return who counts in a study's data folder, and print who does not, and why."""
     from labcrane.analysis.cohort import find_cohort
 
     cohort = find_cohort(data, include or (), struck=_struck(data))

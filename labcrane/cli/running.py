@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from labcrane.cli.consent import ask_for_consent, await_consent
 from labcrane.cli.inspect import ProtocolPath, out
 from labcrane.cli.network import Local, stay_on_this_computer
-from labcrane.cli.people import ask_for_consent
 from labcrane.errors import LabcraneError, ProtocolError
 
 if TYPE_CHECKING:
@@ -145,13 +145,15 @@ def _launch(order: "VisitOrder", *, page: bool) -> None:
     from labcrane.plan import plan_session
 
     visit = order.visit()
-    ask_for_consent(visit)
+    ask_for_consent(visit, page=page)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
     keys, asked = not visit.simulated, visit.study.questionnaires
     with Terminal(console, out, _counted(plan), keys=keys, questionnaires=asked) as terminal:
         launcher = Launcher(order, console, terminal.say)
         with pages(visit, launcher, console, terminal.say) if page else nullcontext():
+            if page:
+                await_consent(visit, console, terminal.say)
             outcome = launcher.run()
     if outcome.sync_report is not None:
         print_report(outcome.sync_report)

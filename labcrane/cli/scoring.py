@@ -7,14 +7,16 @@ import typer
 from rich.table import Table
 
 from labcrane.cli.inspect import out
-from labcrane.errors import ProtocolError
+from labcrane.cli.results import cohort_of
 
 if TYPE_CHECKING:
     from labcrane.evaluation import IndicatorSettings
 
+HALF_FINISHED = "half-finished"
+
 
 def score(
-    folder: Annotated[Path, typer.Argument(help="the study's data folder, or a part of it")],
+    folder: Annotated[Path, typer.Argument(help="the study's data folder")],
     into: Annotated[
         Path | None, typer.Option("--out", help="the workbook; FOLDER/evaluation.xlsx by default")
     ] = None,
@@ -22,14 +24,17 @@ def score(
         Path | None,
         typer.Option(help="YAML with weights, reading, mistakes, capped; as recorded by default"),
     ] = None,
+    include: Annotated[
+        list[str] | None, typer.Option(help="use also: simulated, pilot; may be repeated")
+    ] = None,
 ) -> None:
     """Write the evaluation workbook: performance indicator, trend, what to practise next."""
     from labcrane.analysis.operator_tests import operator_tests
     from labcrane.analysis.workbook import advice, write_workbook
 
-    if not folder.is_dir():
-        raise ProtocolError(f"there is no folder {folder}; give the study's data folder")
-    tests = operator_tests(folder, _settings(settings) if settings else None)
+    # Operators are scored while they are still in training.
+    cohort = cohort_of(folder, [HALF_FINISHED, *(include or ())])
+    tests = operator_tests(cohort, _settings(settings) if settings else None)
     path = into or folder / "evaluation.xlsx"
     write_workbook(tests, path)
     table = Table("operator", "session", "trial", "scenario", "raw", "percent")

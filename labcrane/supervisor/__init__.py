@@ -6,6 +6,7 @@ From the bottom up::
     board       what is known of the session, from its events
     live        machine and scenario signals, from LSL
     form        a questionnaire on a page
+    consent     the consent text on a page, before the session
     scene       the machine in three dimensions
     participant_page, supervisor_page
     service     the process: one pipe to the launcher, and the web server

@@ -31,6 +31,8 @@ class Board:
         Grows with every questionnaire.
     streams
         What the recorder says of the streams of others.
+    consent
+        What is asked before the session: file, version and text; nothing when none is.
     sync_report
         Lines of the session's sync report, at its end.
     """
@@ -52,6 +54,7 @@ class Board:
         self.sync_report: list[str] = []
         self.last_trial: Mapping[str, Value] = {}
         self.alarm = ""
+        self.consent: Mapping[str, Value] = {}
 
     def take(self, event: Event) -> None:
         """Take in the next event."""
@@ -62,6 +65,8 @@ class Board:
                 self._form(what, event.data)
             case "trial":
                 self._trial(what, event.data)
+            case "consent":
+                self.consent = event.data if what == "needed" else {}
             case "pause":
                 who = str(event.data["by"])
                 (self.holds.add if what == "start" else self.holds.discard)(who)
@@ -78,6 +83,10 @@ class Board:
 
     def _stage(self, event: Event) -> None:
         match event.name:
+            case "consent.needed":
+                self.stage = "waits for the participant's consent"
+            case "consent.given":
+                self.stage = "starting"
             case "waiting":
                 self.stage = f"waits to start: {event.data['what']}"
             case "trial.start":

@@ -1,27 +1,30 @@
-"""Signals of machine and scenario, from the session's LSL streams."""
+"""Signals of machine, scenario and loop, from the session's LSL stream of whole frames."""
 
+import math
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import Any
 
-from labcrane.streams.outlets import INPUT, STATE
+from labcrane.streams.frames import FRAME
 
 HISTORY_S = 20.0
 CHART_HZ = 20.0
 PAUSE_S = 0.02
+RECENT_S = 1.0
+"""The lateness that is shown is the worst of this time."""
 
 
 class Live:
-    """Keeps the newest sample of every signal, and some seconds of history for charts.
+    """Keeps the newest value of every signal, and some seconds of history for charts.
 
-    A thread pulls; whoever reads gets what there is. Streams are found again when a session is.
+    A thread pulls; whoever reads gets what there is. The stream is found again when a session is.
 
     Attributes
     ----------
     newest
-        The newest value of each signal by its column.
+        The newest value of each column of a frame: ``state.joint.angle.slew``.
     age_s
         How old the newest frame was when it came, in seconds.
     """
@@ -30,37 +33,46 @@ class Live:
         self.newest: dict[str, float] = {}
         self.age_s: float | None = None
         self._source = source
+        self._late: deque[tuple[float, float]] = deque()  # due and lateness of late ticks, in s
         self._history: deque[tuple[float, dict[str, float]]] = deque(
             maxlen=round(HISTORY_S * CHART_HZ)
         )
         threading.Thread(target=self._pull, name="live", daemon=True).start()
 
+    @property
+    def lateness_s(self) -> float | None:
+        """How late the latest tick of the last second was, in seconds; None before the first."""
+        late = [lateness for _, lateness in list(self._late)]
+        return max(late) if late else None
+
     def history(self, signal: str) -> list[tuple[float, float]]:
         """Return times in seconds before now and values of a signal, oldest first."""
         kept = list(self._history)
         end = kept[-1][0] if kept else 0.0
-        return [(round(t - end, 3), values[signal]) for t, values in kept if signal in values]
+        return [
+            (round(t - end, 3), values[signal])
+            for t, values in kept
+            if math.isfinite(values.get(signal, math.nan))
+        ]
 
     def _pull(self) -> None:
         import pylsl  # noqa: PLC0415
 
-        inlets: Mapping[str, tuple[Any, list[str]]] = {}
+        found: tuple[Any, list[str]] | None = None
         while True:
-            missing = [name for name in (STATE, INPUT) if name not in inlets]
-            inlets = {**inlets, **{n: found for n in missing if (found := self._open(n))}}
-            for inlet, columns in inlets.values():
+            found = found or self._open()
+            if found:
+                inlet, columns = found
                 samples, stamps = inlet.pull_chunk(timeout=0.0, max_samples=1024)
                 if stamps:
-                    self.newest.update(zip(columns, samples[-1], strict=True))
+                    self._take(columns, samples)
                     self.age_s = pylsl.local_clock() - stamps[-1]
-                    self._keep(stamps[-1])
             time.sleep(PAUSE_S)
 
-    def _open(self, name: str) -> "tuple[Any, list[str]] | None":
+    def _open(self) -> "tuple[Any, list[str]] | None":
         import pylsl  # noqa: PLC0415
 
-        wanted = f"source_id='labcrane/{self._source}/{name}'"
-        found = pylsl.resolve_bypred(wanted, 1, 0.5)
+        found = pylsl.resolve_bypred(f"source_id='labcrane/{self._source}/{FRAME}'", 1, 0.5)
         if not found:
             return None
         # One second of buffer, and a connection that comes back by itself.
@@ -72,6 +84,12 @@ class Live:
             channel = channel.next_sibling("channel")
         return inlet, columns
 
-    def _keep(self, stamp: float) -> None:
-        if not self._history or stamp - self._history[-1][0] >= 1.0 / CHART_HZ:
-            self._history.append((stamp, dict(self.newest)))
+    def _take(self, columns: Sequence[str], samples: Sequence[Sequence[float]]) -> None:
+        due, woke = columns.index("due"), columns.index("woke")
+        self._late.extend((sample[due], sample[woke] - sample[due]) for sample in samples)
+        newest = dict(zip(columns, samples[-1], strict=True))
+        while self._late[0][0] < newest["due"] - RECENT_S:
+            self._late.popleft()
+        self.newest = newest
+        if not self._history or newest["due"] - self._history[-1][0] >= 1.0 / CHART_HZ:
+            self._history.append((newest["due"], newest))

@@ -1,5 +1,6 @@
-"""The participant's page: the questionnaire that is asked, and nothing else."""
+"""The participant's page: consent, the questionnaire that is asked, and nothing else."""
 
+from labcrane.supervisor.consent import ConsentCard
 from labcrane.supervisor.desk import Desk
 from labcrane.supervisor.form import Form
 from labcrane.supervisor.rights import PARTICIPANT
@@ -11,4 +12,5 @@ def participant_page(desk: Desk) -> None:
 
     ui.page_title("labcrane")
     with ui.column().classes("w-full max-w-4xl mx-auto p-4"):
+        ConsentCard(desk, PARTICIPANT).build()
         Form(desk, PARTICIPANT).build()

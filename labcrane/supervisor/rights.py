@@ -13,7 +13,7 @@ SUPERVISOR, PARTICIPANT = "supervisor", "participant"
 
 RIGHTS: Mapping[str, frozenset[Order]] = {
     SUPERVISOR: frozenset(Order) - {Order.LOST, Order.BACK, Order.DENIED},
-    PARTICIPANT: frozenset({Order.ANSWER, Order.SUBMIT}),
+    PARTICIPANT: frozenset({Order.ANSWER, Order.SUBMIT, Order.CONSENT}),
 }
 """What each page may ask of the session."""
 

@@ -47,7 +47,7 @@ class Scene:
 
     def _update(self) -> None:
         machine, newest = self._desk.study.machine, self._desk.live.newest
-        angles = [newest.get(f"joint.angle.{name}") for name in machine.names]
+        angles = [newest.get(f"state.joint.angle.{name}") for name in machine.names]
         given = [angle for angle in angles if angle is not None]
         if len(given) == len(angles):
             self._place(_points(machine, given))

@@ -1,5 +1,6 @@
 """The page process: a web server, and one pipe to the launcher."""
 
+import mimetypes
 import os
 import signal
 import threading
@@ -9,6 +10,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from labcrane.approval.lock import read_lock
 from labcrane.console import Command, Order
 from labcrane.plan import plan_session
 from labcrane.records import Event
@@ -19,7 +21,7 @@ from labcrane.supervisor.desk import Desk
 from labcrane.supervisor.live import Live
 from labcrane.supervisor.rights import SCOPE, SUPERVISOR, Gate, Keys
 
-FORBIDDEN = 403
+FORBIDDEN, NOT_FOUND = 403, 404
 NICENESS = 15
 """The loop's process comes first when the computer is busy, whatever browsers ask for."""
 
@@ -138,6 +140,15 @@ def _routes(app: Any, desk: Desk) -> None:
     @ui.page("/participant")
     def participant() -> None:
         participant_page(desk)
+
+    @app.get("/consent")  # type: ignore[untyped-decorator]  # app may be any ASGI app
+    def consent() -> Response:
+        """Give the approved consent text, as it is asked for; no other file can be had."""
+        if not desk.board.consent:
+            return Response("no consent is asked for", NOT_FOUND)
+        text = read_lock(desk.study.path).consent
+        kind, _ = mimetypes.guess_type(text.name)
+        return Response(text.read_bytes(), media_type=kind or "application/octet-stream")
 
     @app.post("/orders/{word}")  # type: ignore[untyped-decorator]  # app may be any ASGI app
     async def order(word: str, request: Request) -> Response:

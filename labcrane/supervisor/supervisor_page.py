@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 
 from labcrane.console import Order
 from labcrane.records import Event
+from labcrane.supervisor.consent import ConsentCard
 from labcrane.supervisor.desk import Desk
 from labcrane.supervisor.form import Form
 from labcrane.supervisor.rights import SUPERVISOR
@@ -12,7 +13,7 @@ from labcrane.supervisor.scene import Scene
 
 BUTTONS: Mapping[str, tuple[Order, str, str]] = {
     "Start / go on": (Order.START, "", "green-10"),
-    "Pause": (Order.PAUSE, "", "orange-10"),
+    "Pause": (Order.PAUSE, "", "brown-8"),
     "Repeat trial": (Order.REPEAT, "", "blue-10"),
     "Skip": (Order.SKIP, "", "blue-10"),
     "Override end": (Order.OVERRIDE, "", "blue-10"),
@@ -30,6 +31,7 @@ def supervisor_page(desk: Desk) -> None:
     ui.page_title(f"labcrane: {desk.participant}")
     with ui.column().classes("w-full max-w-7xl mx-auto p-3 gap-3"):
         _status(desk)
+        ConsentCard(desk, SUPERVISOR).build()
         _orders(desk)
         with ui.element("div").classes("grid grid-cols-1 lg:grid-cols-2 gap-3 w-full"):
             with ui.card().classes("w-full"):
@@ -76,6 +78,8 @@ def _facts(desk: Desk) -> list[str]:
     if "worst_lateness" in board.last_trial:
         worst = float(str(board.last_trial["worst_lateness"]))
         found.append(f"worst lateness of last trial {1000 * worst:.1f} ms")
+    if live.lateness_s is not None:
+        found.append(f"loop at most {1000 * live.lateness_s:.1f} ms late")
     if live.age_s is not None:
         found.append(f"newest frame {1000 * live.age_s:.0f} ms old")
     return found
@@ -129,15 +133,15 @@ def _chart(desk: Desk) -> None:
             "animation": False,
             "grid": {"left": 50, "right": 15, "top": 15, "bottom": 30},
             "xAxis": {"type": "value", "min": -20, "max": 0, "name": "s"},
-            "yAxis": {"type": "value", "scale": True},
+            "yAxis": {"type": "value", "scale": True, "axisLine": {"onZero": False}},
             "series": [{"type": "line", "showSymbol": False, "data": []}],
         }
     ).classes("w-full h-60")
 
     def update() -> None:
-        signals = sorted(desk.live.newest)
+        signals = sorted(name for name in desk.live.newest if "." in name)  # of machine and task
         if signals and choice.options != signals:
-            tip = [name for name in signals if name.startswith("tip.position")]
+            tip = [name for name in signals if name.startswith("state.tip.position")]
             choice.set_options(signals, value=choice.value or (tip or signals)[0])
         if choice.value:
             chart.options["series"][0]["data"] = desk.live.history(choice.value)

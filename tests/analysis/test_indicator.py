@@ -2,12 +2,15 @@
 
 import csv
 import math
+import os
 import shutil
 import subprocess
+from datetime import date
 from pathlib import Path
 
 import pytest
 
+from labcrane.analysis.cohort import find_cohort
 from labcrane.analysis.indicator import Indicator, Performance, indicate
 from labcrane.analysis.next_practice import familiarity, fatigue, suggest
 from labcrane.analysis.operator_tests import OperatorTest, completion, operator_tests
@@ -15,6 +18,9 @@ from labcrane.analysis.workbook import write_workbook
 from labcrane.cli.app import main
 from labcrane.errors import LabcraneError, RecordingError
 from labcrane.evaluation import IndicatorSettings, Weights
+from labcrane.participants.enrolment import exclude
+from labcrane.participants.places import Places
+from labcrane.participants.register import Entry, changed
 from labcrane.recording.journal import Column, SessionJournal
 from labcrane.recording.participant_file import consolidate
 from labcrane.records import Event
@@ -134,7 +140,10 @@ def record(
     home = folder / operator
     home.mkdir(parents=True, exist_ok=True)
     path = home / f"ses-{session:02}_run.xdf"
-    about = {"participant": operator, "study": "rescue", "indicator": LITERAL.model_dump()}
+    about = {
+        "participant": operator, "study": "rescue", "indicator": LITERAL.model_dump(),
+        "simulated": operator.endswith("-SIMULATED"),
+    }  # fmt: skip
     with SessionJournal(path, [Column("loop", "tick", "1")], 240.0) as journal:
         journal.write_event(Event("session.start", 1.0, about), 0)
         for at, row in enumerate(rows, start=1):
@@ -147,6 +156,10 @@ def record(
                 if ratings:
                     journal.write_event(Event("questionnaire.end", 10.0 * at + 1, done), at)
     consolidate(home / f"{operator}.h5", [path])
+
+
+def scored(folder: Path) -> list[OperatorTest]:
+    return operator_tests(find_cohort(folder, ["half-finished"]))
 
 
 def trial(time: float, counts: tuple[int, int, int, int] = (0, 0, 0, 0), **more: object) -> dict:
@@ -165,7 +178,7 @@ def the_vectors() -> list[dict]:
 
 def test_the_vectors_come_out_of_recordings_too(tmp_path: Path) -> None:
     record(tmp_path, "R001", the_vectors())
-    tests = operator_tests(tmp_path)
+    tests = scored(tmp_path)
     assert [test.indicator.raw for test in tests] == pytest.approx([v[4] for v in VECTORS])
     assert {test.reference_s for test in tests} == {60.0}
     assert {test.scenario for test in tests} == {"doors"}
@@ -174,18 +187,21 @@ def test_the_vectors_come_out_of_recordings_too(tmp_path: Path) -> None:
 def test_every_operator_needs_a_reference_stage(tmp_path: Path) -> None:
     record(tmp_path, "R001", [trial(60.0, reference=True, outcome="timeout"), trial(70.0)])
     with pytest.raises(RecordingError, match="R001 has no reference stage that was completed"):
-        operator_tests(tmp_path)
+        scored(tmp_path)
 
 
 def test_a_folder_without_tests_says_what_a_test_is(tmp_path: Path) -> None:
+    record(tmp_path, "R001", [trial(60.0, reference=True)])
     with pytest.raises(RecordingError, match="no trial with the columns time, n_object, n_body"):
-        operator_tests(tmp_path)
+        scored(tmp_path)
 
 
 def converted(book: Path, sheet: int) -> list[list[str]]:
     """Let LibreOffice open the workbook, work it out, and write one sheet as text."""
     office = shutil.which("soffice")
     if office is None:
+        if os.environ.get("CI"):
+            pytest.fail("CI needs libreoffice-calc-nogui")
         pytest.skip("LibreOffice is not installed")
     how = f"csv:Text - txt - csv (StarCalc):44,34,76,1,,0,false,true,false,false,false,{sheet}"
     home = f"-env:UserInstallation=file://{book.parent}/office"
@@ -210,7 +226,7 @@ def test_libreoffice_opens_the_workbook_and_its_totals_are_ours(
     assert main(["score", str(tmp_path)]) == 0
     book = tmp_path / "evaluation.xlsx"
     head, *rows = converted(book, 2)
-    tests = operator_tests(tmp_path)
+    tests = scored(tmp_path)
     assert len(rows) == len(tests) == 8
     for test, row in zip(tests, rows, strict=True):
         cells = dict(zip(head, row, strict=True))
@@ -225,9 +241,27 @@ def test_libreoffice_opens_the_workbook_and_its_totals_are_ours(
     assert rows[1][4].startswith("practise objects")
 
 
+def test_who_was_excluded_is_not_scored_and_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    places = Places(tmp_path / "data")
+    with changed(places) as register:
+        for slot, name in enumerate(("R001", "R002"), start=1):
+            register.participants[name] = Entry(slot=slot, seed=1, enrolled="2026-01-01")
+    for name in ("R001", "R002", "R003-SIMULATED"):
+        record(places.root, name, [trial(50.0, reference=True), trial(80.0)])
+    exclude(places, "R002", "was ill", date(2026, 1, 2))
+    assert main(["score", str(places.root)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "left out: R002, excluded: on 2026-01-02: was ill" in said
+    assert "left out: R003-SIMULATED, simulated" in said
+    (_, row) = converted(places.root / "evaluation.xlsx", 2)
+    assert row[0] == "R001"
+
+
 def test_a_missing_rating_leaves_no_total_in_the_workbook(tmp_path: Path) -> None:
     record(tmp_path, "R001", [trial(60.0, reference=True), trial(60.0)], ratings=False)
-    [test] = operator_tests(tmp_path)
+    [test] = scored(tmp_path)
     write_workbook([test], tmp_path / "book.xlsx")
     head, row = converted(tmp_path / "book.xlsx", 2)
     assert dict(zip(head, row, strict=True))["raw"] == "#VALUE!"

@@ -1,5 +1,6 @@
 """Going on after a crash: what is left of a session, by each policy."""
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 from rehearsal import SHORT, ScriptedConsole, a_study
 
 from labcrane import ProtocolError, open_recording
+from labcrane.console import Command, Order
 from labcrane.plan import plan_session
 from labcrane.progress import progress, remaining
 from labcrane.session import Visit, finish, record, run
@@ -117,3 +119,74 @@ def test_a_session_that_is_complete_is_not_gone_on_with(visit: Visit) -> None:
 def test_a_session_that_was_never_begun_is_not_gone_on_with(visit: Visit) -> None:
     with pytest.raises(ProtocolError, match="there is no session to go on with; start one with"):
         run(replace(visit, resumed=True), ScriptedConsole())
+
+
+RATED = SHORT.replace("{use: dual_joystick}", "{use: simulated_operator}").replace(
+    "{task: aiming, pairs: 1}", "{task: aiming, pairs: 1, ask: [tlx, subjective_accuracy]}"
+)
+TLX = "questionnaires: {tlx: {use: nasa_tlx}}\n"
+SIX = ("mental", "physical", "temporal", "performance", "effort", "frustration")
+
+
+class Rater(ScriptedConsole):
+    """Starts what waits and answers what is asked, until so many answers were given; then dies."""
+
+    def __init__(self, dies_after: int | None = None) -> None:
+        super().__init__()
+        self._left = dies_after
+
+    def commands(self):
+        news, self.told = self.told, []
+        return [order for event in news for order in self._orders_after(event)]
+
+    def _orders_after(self, event):
+        if event.name == "waiting":
+            return [Command(Order.START)]
+        if event.name != "questionnaire.start":
+            return []
+        name = event.data["questionnaire"]
+        items = SIX if name == "tlx" else ("rating",)
+        left = [item for item in items if item not in json.loads(event.data["kept"])]
+        if self._left is not None:
+            left = left[: self._left]
+            self._left -= len(left)
+        values = [
+            Command(Order.ANSWER, json.dumps({"questionnaire": name, "item": item, "value": 5}))
+            for item in left
+        ]
+        if self._left == 0:
+            self.report = self.die_after(len(values))
+            return values
+        return [*values, Command(Order.SUBMIT)]
+
+    def die_after(self, answers: int):
+        seen = []
+
+        def report(event) -> None:
+            seen.extend([event] if event.name == "questionnaire.answer" else [])
+            if len(seen) == answers:
+                raise DiesError
+
+        return report
+
+
+# Six answers and one follow each of the two trials.
+@pytest.mark.parametrize("answers", [2, 7, 9, 14])
+def test_the_rating_of_a_trial_that_was_cut_off_is_asked_on(tmp_path: Path, answers: int) -> None:
+    study = a_study(tmp_path, RATED + TLX)
+    visit = Visit(study, "P001", 1, tmp_path / "data", fast=True, pilot=True)
+    with pytest.raises(DiesError):
+        record(visit, Rater(answers))
+    path = run(replace(visit, resumed=True), Rater())
+    session = open_recording(path).session(1)
+    table = session.questionnaires
+    given = table[table["kind"] == "answer"]
+    trials = session.trials["trial"].tolist()
+    assert given.groupby(["trial", "questionnaire"]).size().to_dict() == {
+        (trial, name): count
+        for trial in trials
+        for name, count in (("tlx", 6), ("subjective_accuracy", 1))
+    }
+    scores = table[table["kind"] == "score"]
+    assert scores["value"].tolist() == [5.0, 0.5] * 2
+    assert session.trials["outcome"].tolist() == ["success"] * 2

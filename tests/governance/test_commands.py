@@ -34,7 +34,7 @@ def approve(capsys: pytest.CaptureFixture[str]) -> str:
 
 
 def run_session(said: str) -> subprocess.CompletedProcess[str]:
-    run = ["run", "study.yaml", "--participant", "P001", "--local"]
+    run = ["run", "study.yaml", "--participant", "P001", "--local", "--no-page"]
     return subprocess.run(
         [sys.executable, "-m", "labcrane", *run],
         input=said,

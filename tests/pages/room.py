@@ -4,6 +4,7 @@ import os
 import re
 import shutil
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -38,12 +39,14 @@ sessions:
 class Room:
     """A launcher with its pages; says what it has printed."""
 
-    def __init__(self, protocol: Path, data: Path, *more: str) -> None:
+    def __init__(
+        self, protocol: Path, data: Path, what: str = "run", *, pilot: bool = True
+    ) -> None:
         self.data = data
-        self.folder = data / "P001-PILOT"
-        what = more[0] if more else "run"
+        self.folder = data / ("P001-PILOT" if pilot else "P001")
+        stamp = ["--pilot"] if pilot else []
         self.launcher = labcrane(
-            what, protocol, "--participant", "P001", "--data", data, "--pilot", "--local",
+            what, protocol, "--participant", "P001", "--data", data, *stamp, "--local",
             env={**os.environ, "PYTHONUNBUFFERED": "1", "COLUMNS": "200"},
         )  # fmt: skip
         self.said: list[str] = []
@@ -89,8 +92,8 @@ class Room:
 
 
 @contextmanager
-def a_room(protocol: Path, data: Path, *more: str) -> Iterator[Room]:
-    room = Room(protocol, data, *more)
+def a_room(protocol: Path, data: Path, what: str = "run", *, pilot: bool = True) -> Iterator[Room]:
+    room = Room(protocol, data, what, pilot=pilot)
     try:
         yield room
     finally:
@@ -140,3 +143,23 @@ def write(browser: webdriver.Chrome, ident: str, words: str) -> None:
     field = browser.find_element(By.ID, ident)
     field.send_keys(Keys.CONTROL, "a")
     field.send_keys(Keys.NULL, words, Keys.ENTER)
+
+
+def shown(browser: webdriver.Chrome, ident: str, words: str) -> None:
+    wait_for(lambda: words in text(browser, ident), 30)
+
+
+SCREENS = os.environ.get("LABCRANE_SCREENS")
+"""Folder for pictures of the pages, for people to look at."""
+
+
+def photograph(browser: webdriver.Chrome, name: str) -> None:
+    """Take pictures as a wide screen and a tablet show the page."""
+    if not SCREENS:
+        return
+    for width, height in ((1280, 800), (768, 1024)):
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        time.sleep(0.5)  # for the page to settle; only when pictures are wanted
+        browser.save_screenshot(f"{SCREENS}/{name}-{width}.png")
+    browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})

@@ -1,12 +1,12 @@
 """Both pages in a real browser: orders, answers, reloads, and processes that are killed."""
 
 import json
-import os
 from pathlib import Path
 
 import pytest
 from faults.sessions import unique, wait_for
-from pages.room import STUDY, a_browser, a_room, press, text, write
+from pages.room import STUDY, a_room, photograph, press, shown, text, write
+from selenium import webdriver
 from selenium.webdriver.common.by import By
 
 from labcrane import open_recording
@@ -16,8 +16,6 @@ STEPS = """\
       - questionnaire: [demographics, subjective_accuracy]
       - block: {task: aiming, pairs: 1}
 """
-SCREENS = os.environ.get("LABCRANE_SCREENS")
-"""Folder for screenshots, for people to look at."""
 
 
 @pytest.fixture(scope="module")
@@ -25,18 +23,6 @@ def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("pages") / "study.yaml"
     path.write_text(STUDY.format(study=unique("pages"), steps=STEPS))
     return path
-
-
-def photograph(browser, name: str) -> None:
-    if SCREENS:
-        for width, height in ((1280, 800), (768, 1024)):
-            browser.set_window_size(width, height)
-            browser.save_screenshot(f"{SCREENS}/{name}-{width}.png")
-        browser.set_window_size(1280, 800)
-
-
-def shown(browser, ident: str, words: str) -> None:
-    wait_for(lambda: words in text(browser, ident), 30)
 
 
 def addresses(browser) -> set[str]:
@@ -53,10 +39,10 @@ def addresses(browser) -> set[str]:
 
 
 def test_a_session_is_led_and_answered_from_a_browser(  # noqa: PLR0915 - one visit, in order
-    protocol: Path, tmp_path: Path
+    protocol: Path, tmp_path: Path, browser: webdriver.Chrome
 ) -> None:
     data = tmp_path / "data"
-    with a_room(protocol, data) as room, a_browser(tmp_path / "profile") as browser:
+    with a_room(protocol, data) as room:
         wait_for(lambda: room.process("pages"), 60)
         links = room.links()
         browser.get(links["supervisor"])
@@ -158,33 +144,32 @@ def check_record(data: Path) -> None:
 
 
 def test_no_answer_is_lost_when_the_session_is_killed_in_the_middle(
-    protocol: Path, tmp_path: Path
+    protocol: Path, tmp_path: Path, browser: webdriver.Chrome
 ) -> None:
     data = tmp_path / "data"
-    with a_browser(tmp_path / "profile") as browser:
-        with a_room(protocol, data) as room:
-            wait_for(lambda: room.process("pages"), 60)
-            browser.get(room.links()["participant"])
-            write(browser, "age-field", "44")
-            shown(browser, "status-age", "saved")
-            room.process("session").kill()
-            assert room.launcher.wait(60) == 1
-        table = open_recording(data / "P001-PILOT" / "P001-PILOT.h5").session(1).questionnaires
-        assert table[["item", "value"]].to_numpy().tolist() == [["age", 44.0]]
-        with a_room(protocol, data, "resume") as room:
-            wait_for(lambda: room.process("pages"), 60)
-            browser.get(room.links()["participant"])
-            shown(browser, "status-age", "saved")
-            assert browser.find_element(By.ID, "age-field").get_property("value") == "44"
-            for item in ("sex-male", "handedness-right"):
-                press(browser, item)
-            write(browser, "experience-field", "0")
-            write(browser, "gaming-field", "1")
-            shown(browser, "status-gaming", "saved")
-            press(browser, "submit")
-            wait_for(lambda: browser.find_elements(By.ID, "rating-3"))
-            room.process("session").kill()
-            assert room.launcher.wait(60) == 1
+    with a_room(protocol, data) as room:
+        wait_for(lambda: room.process("pages"), 60)
+        browser.get(room.links()["participant"])
+        write(browser, "age-field", "44")
+        shown(browser, "status-age", "saved")
+        room.process("session").kill()
+        assert room.launcher.wait(60) == 1
+    table = open_recording(data / "P001-PILOT" / "P001-PILOT.h5").session(1).questionnaires
+    assert table[["item", "value"]].to_numpy().tolist() == [["age", 44.0]]
+    with a_room(protocol, data, "resume") as room:
+        wait_for(lambda: room.process("pages"), 60)
+        browser.get(room.links()["participant"])
+        shown(browser, "status-age", "saved")
+        assert browser.find_element(By.ID, "age-field").get_property("value") == "44"
+        for item in ("sex-male", "handedness-right"):
+            press(browser, item)
+        write(browser, "experience-field", "0")
+        write(browser, "gaming-field", "1")
+        shown(browser, "status-gaming", "saved")
+        press(browser, "submit")
+        wait_for(lambda: browser.find_elements(By.ID, "rating-3"))
+        room.process("session").kill()
+        assert room.launcher.wait(60) == 1
     events = open_recording(data / "P001-PILOT" / "P001-PILOT.h5").session(1).events
     [done] = events[events["name"] == "questionnaire.end"]["data"]
     assert (done["questionnaire"], done["missing"]) == ("demographics", 0)

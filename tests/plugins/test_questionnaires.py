@@ -235,6 +235,8 @@ def test_a_session_is_replayed_without_the_file_of_its_questions(tmp_path: Path)
     file = tmp_path / "comfort.yaml"
     file.write_text(json.dumps(COMFORT))
     study = a_study(tmp_path, a_protocol(ASK_COMFORT, BY_FILE))
-    path = run(Visit(study, "P001", 1, tmp_path / "data", True, True), ScriptedConsole())
+    path = run(
+        Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=True), ScriptedConsole()
+    )
     file.unlink()
     assert replay(path, 1).difference is None
