@@ -59,7 +59,8 @@ class FeedbackLog:
         now = time.perf_counter()
         head = (frame.tick.number, frame.tick.due, skipped)
         for stream, array in {"": values, **more}.items():
-            self._samples[stream].push(np.concatenate([head, array]), now)
+            for row in np.atleast_2d(array):
+                self._samples[stream].push(np.concatenate([head, row]), now)
 
     def close(self) -> None:
         """End the streams."""
