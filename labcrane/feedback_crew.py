@@ -2,10 +2,12 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 from labcrane import rig
 from labcrane.choices import Choice
 from labcrane.console import Command, Order
+from labcrane.delay_file import read_delays
 from labcrane.design.seeds import derive
 from labcrane.errors import DeviceError
 from labcrane.feedback_host import HostOrder, Part
@@ -87,7 +89,9 @@ def _orders_of(visit: Visit) -> list[HostOrder]:
         return []
     seed = derive(study.protocol.study, visit.participant)
     run = rig.describe(rig.build(study, simulated=visit.simulated), study, seed)
-    return host_orders(study, run, visit.source)
+    known = read_delays(study.path)
+    orders = host_orders(study, run, visit.source)
+    return [replace(order, measured=known.get(order.name)) for order in orders]
 
 
 def log_requests(visit: Visit) -> list[StreamRequest]:

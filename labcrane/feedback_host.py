@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
 import numpy as np
 
+from labcrane.delay_file import Measured, delay_in_words, measured_of
 from labcrane.errors import LabcraneError
-from labcrane.records import Frame, Run, Situation
+from labcrane.records import Frame, Run, Situation, Value
 from labcrane.registry import Registry, discover
 from labcrane.roles import Component, Cue, Feedback
 from labcrane.run_text import read_run, write_run
@@ -58,6 +59,8 @@ class HostOrder:
         Whose streams it follows (:attr:`labcrane.session.Visit.source`).
     always
         Whether it presents every frame, or only those of trials in which it is switched on.
+    measured
+        What was measured of its delay, if anything was.
     """
 
     name: str
@@ -66,6 +69,7 @@ class HostOrder:
     source: str
     always: bool
     cues: Mapping[str, Part] = field(default_factory=dict)
+    measured: Measured | None = None
 
     def as_json(self) -> str:
         """Return the order as one line."""
@@ -76,6 +80,7 @@ class HostOrder:
             "source": self.source,
             "always": self.always,
             "cues": {name: asdict(part) for name, part in self.cues.items()},
+            "measured": asdict(self.measured) if self.measured else None,
         }
         return json.dumps(fields)
 
@@ -90,6 +95,7 @@ class HostOrder:
             found["source"],
             found["always"],
             {name: Part(**part) for name, part in found["cues"].items()},
+            measured_of(found["measured"]) if found["measured"] else None,
         )
 
 
@@ -116,6 +122,12 @@ class Presenter:
             for signal in cue.signals
         )
         return Layout(self._order.name, (*self.feedback.signals, *cues))
+
+    @property
+    def facts(self) -> dict[str, Value]:
+        """What the record should know of the open component, and of its delay."""
+        facts = dict(self.feedback.facts())
+        return {**facts, "delay": delay_in_words(self._order.measured, facts)}
 
     def open(self) -> None:
         """Open everything; raises what the components raise."""
@@ -196,7 +208,7 @@ class FeedbackProcess:
         try:
             presenter.open()
             log = FeedbackLog(self._order.name, self._order.source, presenter)
-            self._say({"ready": True, "facts": dict(presenter.feedback.facts())})
+            self._say({"ready": True, "facts": presenter.facts})
             if (info := self._found(CONTEXT)) is None:
                 return
             context = ContextInlet(info)

@@ -209,6 +209,11 @@ class Situation:
         Settings that the examiner changed, by name of the cue or sound.
     counts
         How often each event has happened.
+    text
+        What the operator is to read as long as it is there: the instructions of the step, a
+        question; empty for nothing.
+    hint, hint_time
+        The examiner's newest hint, empty before the first, and when it was given.
     """
 
     step: int = 0
@@ -221,3 +226,6 @@ class Situation:
     active: tuple[str, ...] = ()
     settings: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
     counts: Mapping[str, int] = field(default_factory=dict)
+    text: str = ""
+    hint: str = ""
+    hint_time: float = 0.0

@@ -226,5 +226,8 @@ class Feedback(Component):
         return ()
 
     def samples(self) -> Mapping[str, FloatArray]:
-        """Return a sample for each of ``streams``; asked for after every ``present``."""
+        """Return a sample for each of ``streams``; asked for after every ``present``.
+
+        Several samples of one stream are rows, in their order: what changed between two frames.
+        """
         return {}

@@ -43,6 +43,12 @@ def situation_after(situation: Situation, event: Event) -> Situation:
             return replace(now, trial=data["trial"], active=active)
         case "trial.end":
             return replace(now, trial=0, active=())
+        case "instructions.shown":
+            return replace(now, text=data["text"])
+        case "step.end":
+            return replace(now, text="")
+        case "order.hint" if data["refused"] is None:
+            return replace(now, hint=data["text"], hint_time=event.time)
         case "feedback.setting":
             mine = {**situation.settings.get(data["feedback"], {}), data["key"]: data["value"]}
             return replace(now, settings={**situation.settings, data["feedback"]: mine})

@@ -54,12 +54,14 @@ class FeedbackLog:
 
     def push(
         self, frame: Frame, values: FloatArray, skipped: int, more: Mapping[str, FloatArray]
-    ) -> None:
-        """Write down that ``frame`` has been presented, now."""
+    ) -> float:
+        """Write down that ``frame`` has been presented, now; return what time that is."""
         now = time.perf_counter()
         head = (frame.tick.number, frame.tick.due, skipped)
         for stream, array in {"": values, **more}.items():
-            self._samples[stream].push(np.concatenate([head, array]), now)
+            for row in np.atleast_2d(array):
+                self._samples[stream].push(np.concatenate([head, row]), now)
+        return now
 
     def close(self) -> None:
         """End the streams."""

@@ -84,7 +84,8 @@ class FeedbackContract:
                 samples = feedback.samples()
                 assert set(samples) == set(feedback.streams)
                 for name, signals in feedback.streams.items():
-                    assert samples[name].shape == (Layout(name, signals).size,), name
+                    rows = np.atleast_2d(samples[name])
+                    assert rows.shape[1:] == (Layout(name, signals).size,), name
 
     def test_feedback_rests_between_trials(self, feedback: Feedback) -> None:
         run = a_run(ch8(), task=TARGETS)

@@ -1,10 +1,15 @@
 """Where things are in the picture, in pixels: areas of interest for eye tracking."""
 
+import itertools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from labcrane import FloatArray
+from labcrane import Ball, Body, FloatArray, Frame, Run, Shape
+
+TIP = 0.12
+"""Radius in metres of the tip's area of interest."""
 
 STRAIGHT = 0.999
 NOWHERE = (math.nan,) * 4
@@ -101,3 +106,39 @@ def turned(
     if flip == "vertical":
         return left, size[1] - bottom, right, size[1] - top
     return box
+
+
+class Areas:
+    """The boxes of what is named, camera by camera."""
+
+    def __init__(self, names: Sequence[str], run: Run, size: tuple[int, int], flip: str) -> None:
+        self._names, self._size, self._flip = names, size, flip
+        self._tip = run.state.find("tip.position")
+        self._bodies = [body for body in run.bodies if body.name in names]
+
+    def of(
+        self, projection: Projection, frame: Frame, shapes: Sequence[Shape], poses: FloatArray
+    ) -> list[float]:
+        """Return left, top, right and bottom of every area, one after the other."""
+        balls = {shape.name: shape for shape in shapes if isinstance(shape, Ball)}
+        x, y, z = frame.state[self._tip].tolist()
+        balls["tip"] = Ball("tip", (x, y, z), TIP, (0.0, 0.0, 0.0, 0.0))
+        corners = {body.name: corners_of(body, poses[body.frame]) for body in self._bodies}
+        boxes: list[float] = []
+        for name in self._names:
+            if name in balls:
+                ball = balls[name]
+                box = projection.ball(np.array(ball.centre), ball.radius)
+            elif name in corners:
+                box = projection.points(corners[name])
+            else:
+                box = NOWHERE
+            boxes += turned(box, self._size, self._flip)
+        return boxes
+
+
+def corners_of(body: Body, pose: FloatArray) -> FloatArray:
+    """Return the corners of a body's box in the base frame, shape ``(8, 3)``."""
+    signs = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
+    inside = np.array(body.centre) + signs * np.array(body.size)
+    return np.asarray(inside @ pose[:3, :3].T + pose[:3, 3])

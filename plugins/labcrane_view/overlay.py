@@ -10,6 +10,12 @@ from labcrane_view.settings import PatchSettings
 LINE = 0.034
 """Height of a line of text, as a share of the window's height."""
 
+NOTICE = 0.05
+"""Height of a line of what is to be read now, which nobody must miss."""
+
+WIDE = 0.8
+"""Longest line of it, as a share of the window's width."""
+
 
 class Overlay:
     """Flat things in pixels: x to the right, y up, from the lower left corner."""
@@ -42,6 +48,17 @@ class Overlay:
         """Return a new block of text in the upper left corner."""
         return Text(self, self._size, font)
 
+    def notice(self, font: Any) -> "Text":
+        """Return a new block of text in the lower middle, for what is to be read now."""
+        return Text(self, self._size, font, notice=True)
+
+    def picture(self, part: tuple[int, int], texture: Any) -> None:
+        """Fill the window from one x to another with a picture."""
+        maker = core.CardMaker("part")
+        maker.set_frame(*part, 0, self._size[1])
+        card = self.root.attach_new_node(maker.generate())
+        card.set_texture(texture)
+
     def patch(self, settings: PatchSettings) -> Any:
         """Return a new photodiode patch."""
         width, height = self._size
@@ -57,7 +74,9 @@ class Overlay:
 class Text:
     """Lines of text on a dark ground."""
 
-    def __init__(self, overlay: Overlay, size: tuple[int, int], font: Any) -> None:
+    def __init__(
+        self, overlay: Overlay, size: tuple[int, int], font: Any, *, notice: bool = False
+    ) -> None:
         self._node = core.TextNode("text")
         self._node.set_font(font)
         self._node.set_text_color(1.0, 1.0, 1.0, 1.0)
@@ -65,11 +84,16 @@ class Text:
         self._node.set_card_as_margin(0.5, 0.6, 0.35, 0.25)
         self._node.set_bin("fixed")  # the card first, then the text over it
         self._node.set_draw_order(10)
-        line = LINE * size[1]
-        place = overlay.root.attach_new_node(self._node)
-        place.set_transparency(core.TransparencyAttrib.M_alpha)
-        place.set_scale(line)
-        place.set_pos(1.0 * line, 0.0, size[1] - 1.6 * line)
+        line = (NOTICE if notice else LINE) * size[1]
+        self._place = overlay.root.attach_new_node(self._node)
+        self._place.set_transparency(core.TransparencyAttrib.M_alpha)
+        self._place.set_scale(line)
+        self._place.set_pos(1.0 * line, 0.0, size[1] - 1.6 * line)
+        if notice:
+            self._node.set_align(core.TextNode.A_center)
+            self._node.set_wordwrap(WIDE * size[0] / line)
+        self._notice = notice
+        self._size, self._line = size, line
         self._shown = ""
 
     def show(self, lines: Sequence[str]) -> None:
@@ -78,3 +102,6 @@ class Text:
         if text != self._shown:  # laying out text takes longer than drawing it
             self._shown = text
             self._node.set_text(text)
+            if self._notice:  # its last line stands above the lower edge, however many there are
+                rise = self._line * (1.5 - self._node.get_bottom())
+                self._place.set_pos(0.5 * self._size[0], 0.0, rise)

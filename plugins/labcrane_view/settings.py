@@ -3,7 +3,14 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, NonNegativeFloat, NonNegativeInt, PositiveFloat
+from pydantic import (
+    BeforeValidator,
+    Field,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    model_validator,
+)
 from pydantic import PositiveInt as Pixels
 
 from labcrane import Settings
@@ -28,6 +35,26 @@ class CameraSettings(Settings):
 
     on: str | None = None
     """Joint behind whose link it rides; it stands in the scene by default."""
+
+    shows: Literal["colour", "depth"] = "colour"
+    """``depth`` shows how far away what is solid is: white at the near end of ``depth_m``, black at
+    the far end and beyond."""
+
+    depth_m: tuple[PositiveFloat, PositiveFloat] = (0.5, 20.0)
+    """Near and far end of a depth picture, in metres along the line of sight."""
+
+    rate_hz: PositiveFloat | None = None
+    """Pictures per second of the session's time; as many as the window shows by default."""
+
+    delay_s: NonNegativeFloat = 0.0
+    """How long ago what it shows happened, in seconds, beside the window's own delay."""
+
+    @model_validator(mode="after")
+    def _depth_rises(self) -> "CameraSettings":
+        near, far = self.depth_m
+        if not near < far:
+            raise ValueError(f"depth_m is {near:g} to {far:g} m; the second must be farther away")
+        return self
 
 
 CAMERAS: Mapping[str, CameraSettings] = {
@@ -84,12 +111,18 @@ class ViewSettings(Settings):
     content: Literal["scene", "feedback"] = "scene"
     """``feedback`` shows targets and cues on black: for a semi-transparent mirror on a table."""
 
-    hud: tuple[Literal["block", "trial", "distance", "time", "speed", "lateness"], ...] = (
+    hud: tuple[Literal["block", "trial", "distance", "time", "speed", "load", "lateness"], ...] = (
         "block",
         "trial",
         "distance",
     )
-    """Lines of text in the corner."""
+    """Lines of text in the corner; ``load`` is how hard each joint works, if the machine says."""
+
+    notices: bool = True
+    """Whether the operator is shown what is to be read: instructions, questions, hints."""
+
+    hint_s: PositiveFloat = 8.0
+    """How long a hint is shown, in seconds."""
 
     language: Literal["en", "de", "pl"] = "en"
     """Of that text."""
@@ -105,6 +138,10 @@ class ViewSettings(Settings):
 
     rate_hz: PositiveFloat | None = None
     """Most pictures per second; as many as the monitor shows by default."""
+
+    keys: tuple[str, ...] = ()
+    """Keys whose state is sent while the window has the focus, for the input ``keyboard``: letters,
+    digits, ``arrow_left``, ``space``, ``lshift`` ..."""
 
     patch: PatchSettings | None = None
     """Square for a photodiode; none by default."""

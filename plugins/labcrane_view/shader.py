@@ -1,4 +1,4 @@
-"""The shader: sun with a shadow map, sky light, a grain, and haze with distance."""
+"""The shaders: sun with a shadow map, sky light, a grain, haze with distance; and depth."""
 
 VERTEX = """#version 330
 in vec4 p3d_Vertex;
@@ -82,4 +82,23 @@ void main() { gl_Position = p3d_ModelViewProjectionMatrix * p3d_Vertex; }
 
 DEPTH_FRAGMENT = """#version 330
 void main() {}
+"""
+
+FAR_VERTEX = """#version 330
+in vec4 p3d_Vertex;
+uniform mat4 p3d_ModelViewProjectionMatrix;
+out float away;
+void main() {
+  gl_Position = p3d_ModelViewProjectionMatrix * p3d_Vertex;
+  away = gl_Position.w;  // metres along the line of sight
+}
+"""
+
+FAR_FRAGMENT = """#version 330
+in float away;
+uniform vec2 range;
+out vec4 colour;
+void main() {
+  colour = vec4(vec3(clamp((range.y - away) / (range.y - range.x), 0.0, 1.0)), 1.0);
+}
 """

@@ -86,6 +86,15 @@ class Stage:
         if self._shaders:
             self.root.set_shader_input("eye", camera.get_pos(self.root))
 
+    def see_depth(self, eye: Any, near: float, far: float) -> None:
+        """Make a camera see how far away what is solid is, from ``near`` to ``far`` metres."""
+        state = core.NodePath("depth picture")
+        made = core.Shader.make(core.Shader.SL_GLSL, shader.FAR_VERTEX, shader.FAR_FRAGMENT)
+        state.set_shader(made, 100)
+        state.set_shader_input("range", core.LVector2(near, far), 100)
+        eye.set_initial_state(state.get_state())
+        eye.set_camera_mask(SHADOWS)
+
     def _add_machine(self, bodies: Sequence[Body]) -> None:
         last = max((body.frame for body in bodies), default=0)
         for body in bodies:

@@ -1,9 +1,7 @@
 """The view: one window, one or more cameras in it."""
 
-import itertools
 import math
 import time
-from collections import deque
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,15 +11,13 @@ import numpy.typing as npt
 from panda3d import core
 
 from labcrane import (
-    Ball,
     Beam,
-    Body,
+    DeviceError,
     Feedback,
     FloatArray,
     Frame,
     Machine,
     PluginError,
-    ProtocolError,
     Run,
     Shape,
     Signal,
@@ -30,22 +26,19 @@ from labcrane import (
     Value,
     frames,
 )
-from labcrane_view.areas import NOWHERE, Projection, axes_of, turned
-from labcrane_view.hud import hud_lines
+from labcrane_view.areas import Areas
+from labcrane_view.camera import Camera, Delay, Part
+from labcrane_view.hud import Hud, notice
+from labcrane_view.keys import Keys
 from labcrane_view.overlay import Overlay
-from labcrane_view.settings import CameraSettings, ViewSettings
+from labcrane_view.settings import ViewSettings
 from labcrane_view.stage import HAZE, Stage
 from labcrane_view.window import Window, font, open_window
 
 BOX = ("left", "top", "right", "bottom")
-TIP = 0.12
-"""Radius in metres of the tip's area of interest."""
-
-ROUNDING_S = 1e-9
 PREVIEW_S = 0.5
 """Between two pictures of a preview, in seconds."""
 
-NEAR, FAR = 0.15, 170.0
 STEM = (0.75, 0.75, 0.72, 1.0)
 
 
@@ -60,56 +53,68 @@ class View(Feedback):
     )
 
     def __init__(self, settings: ViewSettings, machine: Machine) -> None:
-        self.streams: Mapping[str, tuple[Signal, ...]] = {"areas": ()}
-        self._settings = settings
-        self._machine = machine
-        self._cameras = (settings.camera, *settings.beside)
-        self._window: Window | None = None
-        self._situation = Situation()
-        self._past: deque[Frame] = deque()
-        self._due = 0.0
-        self._areas: list[float] = []
-        for camera in self._cameras:
-            if camera.on is not None and camera.on not in machine.names:
-                raise ProtocolError(
-                    f"camera {camera.name!r} rides on {camera.on!r}, which the machine has not; "
-                    f"it has {', '.join(machine.names)}"
-                )
-
-    def open(self, run: Run) -> None:
-        self._angles = run.state.find("joint.angle")
-        self._tip = run.state.find("tip.position")
-        self._speed = run.state.find("tip.velocity")
-        self._targets = Targets(run.task)
-        self._bodies = [body for body in run.bodies if body.name in self._settings.areas]
-        self.streams = {
+        cameras = (settings.camera, *settings.beside)
+        self.streams: Mapping[str, tuple[Signal, ...]] = {
             "areas": tuple(
                 Signal(f"{camera.name}.{name}".replace(" ", "_"), "px", BOX)
-                for camera in self._cameras
-                for name in self._settings.areas
+                for camera in cameras
+                for name in settings.areas
             )
         }
-        self._open_window(run)
+        self._keys = Keys(settings.keys) if settings.keys else None
+        if self._keys:
+            self.streams = {**self.streams, "keys": (Signal("key", "1", settings.keys),)}
+        self._settings = settings
+        self._machine = machine
+        self._window: Window | None = None
+        self._situation = Situation()
+        self._delay = Delay(settings.delay_s)
+        self._due = 0.0
+        self._samples: dict[str, FloatArray] = {}
+        # Made before there is a window: a camera on a link that does not exist is refused at once.
+        self._cameras = [Camera(camera, machine) for camera in cameras]
 
-    def _open_window(self, run: Run) -> None:
+    def open(self, run: Run) -> None:
         settings = self._settings
+        self._angles = run.state.find("joint.angle")
+        self._targets = Targets(run.task)
         window = self._window = open_window(settings, "labcrane")
+        if not window.shaders:
+            self._check_simple()
         output = window.output
         self._size = (output.get_x_size(), output.get_y_size())
         scenery = settings.content == "scene"
         self.stage = Stage(
             run.bodies, shaders=window.shaders, shadow=settings.shadow, scenery=scenery
         )
+        self._hud = Hud(settings.hud, settings.language, run)
+        self._areas = Areas(settings.areas, run, self._size, settings.flip)
         back = HAZE if scenery else (0.0, 0.0, 0.0)
         target: Any = output
         if settings.flip != "none":
             target = self._turned_over(output)
         target.set_clear_color(core.LColor(*back, 1.0))
-        self._eyes = [self._make_camera(target, at) for at in range(len(self._cameras))]
+        self._pictures = [output] if target is output else [output, target]
         overlay = Overlay(target, self._size, sort=20)
+        for camera, part in zip(self._cameras, _parts(self._size, len(self._cameras)), strict=True):
+            picture = camera.open(window, self.stage, target, part, back)
+            if picture is not None:
+                overlay.picture((part.left, part.left + part.width), picture)
         self._text = overlay.text(font(settings.font)) if settings.hud else None
+        self._notice = overlay.notice(font(settings.font)) if settings.notices else None
         self._patch = overlay.patch(settings.patch) if settings.patch else None
-        self._projections: list[Projection] = []
+        if self._keys:
+            self._keys.open(output)
+
+    def _check_simple(self) -> None:
+        """Refuse what the software renderer would show as a white rectangle, or not at all."""
+        mirrored = "the window is flipped" if self._settings.flip != "none" else None
+        demands = [mirrored, *(camera.demands for camera in self._cameras)]
+        if asked := next(filter(None, demands), None):
+            raise DeviceError(
+                f"{asked}, which the software renderer cannot; use OpenGL (Mesa's drivers will do "
+                "without a graphics card), or leave it out"
+            )
 
     def _turned_over(self, output: Any) -> Any:
         """Return a hidden picture that is copied to the window, turned over, when it is drawn."""
@@ -122,23 +127,6 @@ class View(Feedback):
         overlay.turned_over(picture, self._settings.flip)
         return hidden
 
-    def _make_camera(self, output: Any, at: int) -> Any:
-        count = len(self._cameras)
-        region = output.make_display_region(at / count, (at + 1) / count, 0.0, 1.0)
-        lens = core.PerspectiveLens()
-        width, height = self._part
-        lens.set_aspect_ratio(width / height)
-        lens.set_fov(self._cameras[at].fov_deg)
-        lens.set_near_far(NEAR, FAR)
-        node = self.stage.root.attach_new_node(core.Camera(self._cameras[at].name, lens))
-        region.set_camera(node)
-        region.set_sort(at)
-        return node
-
-    @property
-    def _part(self) -> tuple[int, int]:
-        return self._size[0] // len(self._cameras), self._size[1]
-
     def close(self) -> None:
         if self._window is not None:
             self._window.close()
@@ -148,27 +136,31 @@ class View(Feedback):
         self._situation = situation
 
     def present(self, frame: Frame) -> FloatArray:
-        window = self._window
-        if window is None:
-            raise AssertionError("a view is opened before it presents")
+        window = self._opened()
         if self._settings.rate_hz is not None:
             time.sleep(max(0.0, self._due - time.perf_counter()))
             self._due = time.perf_counter() + 1.0 / self._settings.rate_hz
-        shown = self._delayed(frame)
+        shown = self._delay.of(frame)
         began = time.perf_counter()
-        poses = frames(self._machine, shown.state[self._angles].tolist())
-        shapes = [*self._task_shapes(shown), *shown.shapes]
-        self.stage.place(poses)
-        self.stage.show(shapes)
-        self._projections = [self._aim(at, poses) for at in range(len(self._cameras))]
+        for camera in self._cameras:
+            if camera.apart and (past := camera.take(shown)) is not None:
+                poses, shapes = self._set(past)
+                self._look(camera, past, shapes, poses)
+                camera.draw(window, self._pictures)
+        poses, shapes = self._set(shown)
+        for camera in reversed(self._cameras):  # the shader's eye is the first one's
+            if not camera.apart:
+                self._look(camera, shown, shapes, poses)
         white = self._write(shown)
         window.engine.render_frame()
         flipped = time.perf_counter()
-        self._areas = self._boxes(shown, shapes, poses)
+        self._samples = {"areas": np.concatenate([camera.boxes for camera in self._cameras])}
+        if self._keys:
+            self._samples["keys"] = self._keys.rows()
         return np.array([shown.tick.number, began, flipped, white])
 
     def samples(self) -> Mapping[str, FloatArray]:
-        return {"areas": np.array(self._areas)}
+        return self._samples
 
     def facts(self) -> Mapping[str, Value]:
         window = self._window
@@ -182,15 +174,15 @@ class View(Feedback):
 
     def picture(self) -> npt.NDArray[np.uint8]:
         """Return what the window shows, shape ``(height, width, 3)``, red first, from the top."""
-        if self._window is None:
-            raise AssertionError("a view is opened before it is looked at")
-        found = self._window.output.get_screenshot()
+        found = self._opened().output.get_screenshot()
         width, height = found.get_x_size(), found.get_y_size()
         bytes_ = np.frombuffer(found.get_ram_image_as("RGB"), np.uint8)
         return bytes_.reshape(height, width, 3)[::-1].copy()
 
     def preview(self, run: Run, frames: Sequence[Frame], path: Path) -> Sequence[Path]:
-        settings = self._settings.model_copy(update={"display": "hidden", "rate_hz": None})
+        settings = self._settings.model_copy(
+            update={"display": "hidden", "rate_hz": None, "keys": ()}
+        )
         view = View(settings, self._machine)
         files = []
         try:
@@ -206,8 +198,7 @@ class View(Feedback):
 
     def redraw(self) -> None:
         """Draw the same picture again; what the rest of :meth:`present` costs shows beside it."""
-        if self._window is not None:
-            self._window.engine.render_frame()
+        self._opened().engine.render_frame()
 
     def save(self, path: Path) -> None:
         """Write what the window shows to a PNG file."""
@@ -216,15 +207,25 @@ class View(Feedback):
         ):
             raise PluginError(f"the picture could not be written to {path}")
 
-    def _delayed(self, frame: Frame) -> Frame:
-        if self._settings.delay_s == 0.0:
-            return frame
-        self._past.append(frame)
-        while len(self._past) > 1 and self._past[1].tick.due <= (
-            frame.tick.due - self._settings.delay_s + ROUNDING_S
-        ):
-            self._past.popleft()
-        return self._past[0]
+    def _opened(self) -> Window:
+        if self._window is None:
+            raise AssertionError("a view is opened before it presents")
+        return self._window
+
+    def _look(
+        self, camera: Camera, frame: Frame, shapes: Sequence[Shape], poses: FloatArray
+    ) -> None:
+        """Turn a camera to where it looks now, and find what is where in its picture."""
+        camera.boxes = self._areas.of(camera.aim(poses), frame, shapes, poses)
+        camera.see()
+
+    def _set(self, frame: Frame) -> tuple[FloatArray, list[Shape]]:
+        """Set the stage for a frame; return the machine's frames and the shapes shown."""
+        poses = frames(self._machine, frame.state[self._angles].tolist())
+        shapes = [*self._task_shapes(frame), *frame.shapes]
+        self.stage.place(poses)
+        self.stage.show(shapes)
+        return poses, shapes
 
     def _task_shapes(self, frame: Frame) -> list[Shape]:
         shapes: list[Shape] = []
@@ -238,36 +239,12 @@ class View(Feedback):
                 shapes.append(Beam(f"{target.name} stem", foot, top, 0.03, STEM))
         return shapes
 
-    def _aim(self, at: int, poses: FloatArray) -> Projection:
-        """Turn a camera to where it looks now."""
-        camera, node = self._cameras[at], self._eyes[at]
-        eye, look = (self._in_base(camera, point, poses) for point in (camera.eye, camera.look))
-        right, forward, up = axes_of(eye, look)
-        rows = [*right, 0.0, *forward, 0.0, *up, 0.0, *eye, 1.0]
-        node.set_mat(core.LMatrix4f(*(float(value) for value in rows)))
-        if at == 0:
-            self.stage.look_from(node)
-        width, height = self._part
-        return Projection(eye, look, camera.fov_deg, at * width, width, height)
-
-    def _in_base(
-        self, camera: CameraSettings, point: Sequence[float], poses: FloatArray
-    ) -> FloatArray:
-        if camera.on is None:
-            return np.array(point)
-        pose = poses[1 + self._machine.names.index(camera.on)]
-        return np.asarray(pose[:3, :3] @ np.array(point) + pose[:3, 3])
-
     def _write(self, frame: Frame) -> float:
         """Set text and patch; return 1 when the patch is white, 0 black, NaN without."""
         if self._text is not None:
-            tip, there = frame.state[self._tip], list(self._targets.find(frame.task))
-            away = math.dist(tip, there[0].centre) if there else math.nan
-            speed = float(np.linalg.norm(frame.state[self._speed]))
-            language = self._settings.language
-            self._text.show(
-                hud_lines(self._settings.hud, language, frame, self._situation, away, speed)
-            )
+            self._text.show(self._hud.lines(frame, self._situation))
+        if self._notice is not None:
+            self._notice.show(notice(frame, self._situation, self._settings.hint_s))
         if self._patch is None or self._settings.patch is None:
             return math.nan
         counts = self._situation.counts
@@ -275,26 +252,8 @@ class View(Feedback):
         self._patch.set_color(white, white, white, 1.0)
         return white
 
-    def _boxes(self, frame: Frame, shapes: Sequence[Shape], poses: FloatArray) -> list[float]:
-        balls = {shape.name: shape for shape in shapes if isinstance(shape, Ball)}
-        x, y, z = frame.state[self._tip].tolist()
-        balls["tip"] = Ball("tip", (x, y, z), TIP, STEM)
-        corners = {body.name: self._corners(body, poses) for body in self._bodies}
-        boxes: list[float] = []
-        for projection in self._projections:
-            for name in self._settings.areas:
-                if name in balls:
-                    ball = balls[name]
-                    box = projection.ball(np.array(ball.centre), ball.radius)
-                elif name in corners:
-                    box = projection.points(corners[name])
-                else:
-                    box = NOWHERE
-                boxes += turned(box, self._size, self._settings.flip)
-        return boxes
 
-    def _corners(self, body: Body, poses: FloatArray) -> FloatArray:
-        signs = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
-        pose = poses[body.frame]
-        inside = np.array(body.centre) + signs * np.array(body.size)
-        return np.asarray(inside @ pose[:3, :3].T + pose[:3, 3])
+def _parts(size: tuple[int, int], count: int) -> list[Part]:
+    """Return the parts of a window of ``size`` pixels, side by side."""
+    width = size[0] // count
+    return [Part(at * width, width, size[1]) for at in range(count)]

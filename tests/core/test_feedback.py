@@ -229,6 +229,19 @@ def test_the_situation_follows_from_events() -> None:
     assert (after.trial, after.active, after.settings) == (0, (), now.settings)
 
 
+def test_the_situation_says_what_the_operator_is_to_read() -> None:
+    now = Situation()
+    for event, text, hint in (
+        (Event("instructions.shown", 1.0, {"text": "go"}), "go", ""),
+        (Event("order.hint", 2.0, {"text": "slower", "refused": None, "by": "x"}), "go", "slower"),
+        (Event("order.hint", 3.0, {"text": "", "refused": "words", "by": "x"}), "go", "slower"),
+        (Event("step.end", 4.0, {"step": 1, "kind": "instructions"}), "", "slower"),
+    ):
+        now = situation_after(now, event)
+        assert (now.text, now.hint) == (text, hint)
+    assert now.hint_time == 2.0
+
+
 def test_targets_are_found_among_a_tasks_signals() -> None:
     task = Layout("the task", (*TARGETS, Signal("cost", "1")))
     found = list(Targets(task).find(np.array([1.0, 2.0, 3.0, 0.5, 4.0, 5.0, 6.0, 9.0])))

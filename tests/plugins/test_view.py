@@ -5,80 +5,29 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from windows import (
+    MACHINE,
+    POSE,
+    SIZE,
+    a_frame,
+    a_view,
+    an_x_server,
+    centre_of,
+    magenta,
+    projected,
+    shown,
+)
 
-from labcrane import Ball, DeviceError, Feedback, Frame, ProtocolError, Run, Situation
+from labcrane import Ball, DeviceError, Feedback, ProtocolError, Situation
 from labcrane.kinematics import Arm
-from labcrane.testing import TARGETS, FeedbackContract, a_run, a_target, ch8, crane_at
-from labcrane_bullet.boxes import crane_boxes
+from labcrane.testing import FeedbackContract, crane_at
 from labcrane_view.monitors import parse
 from labcrane_view.settings import CAMERAS, CameraSettings, ViewSettings
 from labcrane_view.view import View
-
-SIZE = (640, 360)
-POSE = (0.35, -0.2, 0.35, 0.75)
-MACHINE = ch8()
-
-
-def a_scene() -> Run:
-    return replace(a_run(MACHINE, task=TARGETS), bodies=crane_boxes(MACHINE))
-
-
-def a_frame(number: int = 0) -> Frame:
-    frame = a_target(a_scene(), number)
-    frame.state = crane_at(MACHINE, POSE)
-    frame.task = np.array([4.5, 0.2, 0.8, 0.25, 6.5, 2.4, 0.8])
-    return frame
-
-
-@contextmanager
-def a_view(**settings: object) -> Iterator[View]:
-    view = View(ViewSettings(**{"display": "hidden", "size": SIZE, "hud": ()} | settings), MACHINE)
-    try:
-        view.open(a_scene())
-        yield view
-    finally:
-        view.close()
-
-
-def shown(frame: Frame, **settings: object) -> np.ndarray:
-    with a_view(**settings) as view:
-        view.present(frame)
-        view.present(frame)  # the first picture is drawn while shadow and textures are made
-        return view.picture().astype(int)
-
-
-def projected(
-    point: tuple[float, float, float], camera: CameraSettings, size: tuple[int, int] = SIZE
-) -> tuple[float, float]:
-    """Return where a pinhole camera sees a point, from angles alone."""
-    offset = np.subtract(point, camera.eye)
-    ahead = np.subtract(camera.look, camera.eye)
-    heading = math.atan2(ahead[1], ahead[0])
-    pitch = math.atan2(ahead[2], math.hypot(ahead[0], ahead[1]))
-    along = offset[0] * math.cos(heading) + offset[1] * math.sin(heading)
-    right = offset[0] * math.sin(heading) - offset[1] * math.cos(heading)
-    depth = along * math.cos(pitch) + offset[2] * math.sin(pitch)
-    up = -along * math.sin(pitch) + offset[2] * math.cos(pitch)
-    focal = size[0] / 2 / math.tan(math.radians(camera.fov_deg / 2))
-    return size[0] / 2 + focal * right / depth, size[1] / 2 - focal * up / depth
-
-
-def centre_of(mask: np.ndarray) -> tuple[float, float]:
-    """Return the middle of the pixels in a mask, in pixels from the upper left corner."""
-    assert mask.any(), "nothing of that colour is in the picture"
-    rows, columns = np.nonzero(mask)
-    return (columns.min() + columns.max() + 1) / 2, (rows.min() + rows.max() + 1) / 2
-
-
-def magenta(picture: np.ndarray) -> np.ndarray:
-    red, green, blue = np.moveaxis(picture, -1, 0)
-    return (red > 120) & (blue > 120) & (green < 90)
 
 
 class TestView(FeedbackContract):
@@ -282,31 +231,9 @@ def test_monitors_are_found_where_the_desktop_puts_them() -> None:
 
 
 @pytest.fixture(scope="module")
-def x_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """An X server of the test's own; its number is chosen by the server."""
-    read, write = os.pipe()
-    arguments = [
-        "Xvfb",
-        "-displayfd",
-        str(write),
-        "-screen",
-        "0",
-        "1000x700x24",
-        "-nolisten",
-        "tcp",
-    ]
-    try:
-        server = subprocess.Popen(arguments, pass_fds=[write], stderr=subprocess.DEVNULL)
-    except FileNotFoundError:
-        if os.environ.get("CI"):
-            raise
-        pytest.skip("needs Xvfb")
-    os.close(write)
-    with os.fdopen(read) as numbers:
-        number = numbers.readline().strip()
-    yield f":{number}"
-    server.terminate()
-    server.wait()
+def x_server() -> Iterator[str]:
+    with an_x_server() as display:
+        yield display
 
 
 def test_a_window_shows_the_newest_frame_and_is_never_late(x_server: str) -> None:

@@ -1,0 +1,15 @@
+"""The keyboard as an input, through the window of a view."""
+
+from labcrane import InputDevice, Machine, Offer, hookimpl, offer
+from labcrane_keyboard.settings import KeyboardSettings
+
+
+@hookimpl
+def labcrane_inputs() -> list[Offer[InputDevice]]:
+    def keyboard(settings: KeyboardSettings, machine: Machine) -> InputDevice:
+        from labcrane_keyboard.keyboard import Keyboard
+
+        del machine  # axes are named by the protocol
+        return Keyboard(settings)
+
+    return [offer("keyboard", KeyboardSettings, keyboard)]

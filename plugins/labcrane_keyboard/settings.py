@@ -1,0 +1,38 @@
+"""What a protocol may say about the keyboard."""
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
+
+from labcrane import Settings
+
+
+class KeyboardSettings(Settings):
+    """Settings of :class:`labcrane_keyboard.keyboard.Keyboard`."""
+
+    view: str
+    """Name of the view whose window has the keyboard's focus; the keys must be among its own."""
+
+    axes: dict[str, tuple[str, str]] = Field(min_length=1)
+    """Two keys for each axis: the one towards -1, and the one towards 1. A scheme maps the axes as
+    ``keyboard.NAME``."""
+
+    ramp_s: NonNegativeFloat = 0.3
+    """Time in which an axis goes from rest to full while its key is held, in seconds; 0 is at
+    once."""
+
+    fall_s: NonNegativeFloat = 0.1
+    """Time in which it goes from full to rest when the key is let go."""
+
+    timeout_s: PositiveFloat = 0.5
+    """Silence of the view, in seconds, after which the keyboard is lost and all axes are at
+    rest."""
+
+    @field_validator("axes")
+    @classmethod
+    def _keys_differ(cls, axes: dict[str, tuple[str, str]]) -> dict[str, tuple[str, str]]:
+        keys = [key for pair in axes.values() for key in pair]
+        if twice := sorted({key for key in keys if keys.count(key) > 1}):
+            raise ValueError(f"a key can move one axis only; {', '.join(twice)} moves more")
+        for name in axes:
+            if not name.isidentifier() or not name.islower():
+                raise ValueError(f"an axis is named by a lower-case word, not {name!r}")
+        return axes

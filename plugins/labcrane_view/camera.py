@@ -1,0 +1,168 @@
+"""One camera of a view: where it stands, what it sees, and when."""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from panda3d import core
+
+from labcrane import FloatArray, Frame, Machine, ProtocolError
+from labcrane_view.areas import Projection, axes_of
+from labcrane_view.settings import CameraSettings
+from labcrane_view.stage import Stage
+from labcrane_view.window import Window
+
+NEAR, FAR = 0.15, 170.0
+ROUNDING_S = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """The camera's part of the window, in pixels: ``left`` counts from the window's left edge."""
+
+    left: int
+    width: int
+    height: int
+
+
+class Delay:
+    """Gives the frame of a while ago.
+
+    Parameters
+    ----------
+    delay_s
+        How long ago, in seconds of the session.
+    """
+
+    def __init__(self, delay_s: float) -> None:
+        self._delay = delay_s
+        self._past: deque[Frame] = deque()
+
+    def of(self, frame: Frame) -> Frame:
+        """Return the newest frame that is old enough, the oldest there is until one is."""
+        if self._delay == 0.0:
+            return frame
+        self._past.append(frame)
+        latest = frame.tick.due - self._delay + ROUNDING_S
+        while len(self._past) > 1 and self._past[1].tick.due <= latest:
+            self._past.popleft()
+        return self._past[0]
+
+
+class Camera:
+    """A camera that looks at the stage from its place in the scene, or from a link.
+
+    One with a frame rate or a delay of its own is drawn into a picture, which stands in the window
+    until the next one is due.
+
+    Attributes
+    ----------
+    boxes
+        The areas of interest in its picture.
+    """
+
+    def __init__(self, settings: CameraSettings, machine: Machine) -> None:
+        if settings.on is not None and settings.on not in machine.names:
+            raise ProtocolError(
+                f"camera {settings.name!r} rides on {settings.on!r}, which the machine has not; "
+                f"it has {', '.join(machine.names)}"
+            )
+        self.settings = settings
+        self._machine = machine
+        self._delay = Delay(settings.delay_s)
+        self._due = -math.inf
+        self.boxes: list[float] = []
+
+    @property
+    def demands(self) -> str | None:
+        """What it does that only OpenGL can, in words; None for nothing."""
+        if self.settings.shows == "depth":
+            return f"camera {self.settings.name!r} shows depth"
+        if self.apart:
+            return f"camera {self.settings.name!r} has a rate or a delay of its own"
+        return None
+
+    @property
+    def apart(self) -> bool:
+        """Whether it has a picture of its own, with a frame of its own."""
+        return self.settings.rate_hz is not None or self.settings.delay_s > 0.0
+
+    def open(
+        self, window: Window, stage: Stage, target: Any, part: Part, back: Sequence[float]
+    ) -> Any:
+        """Make its region in ``target``; return its picture if it has one of its own."""
+        deep = self.settings.shows == "depth"
+        self._stage, self._part = stage, part
+        lens = core.PerspectiveLens()
+        lens.set_aspect_ratio(part.width / part.height)
+        lens.set_fov(self.settings.fov_deg)
+        lens.set_near_far(NEAR, FAR)
+        eye = core.Camera(self.settings.name, lens)
+        self._node = self._stage.root.attach_new_node(eye)
+        picture = None
+        if self.apart:
+            picture = core.Texture(self.settings.name)
+            picture.set_minfilter(core.SamplerState.FT_nearest)
+            picture.set_magfilter(core.SamplerState.FT_nearest)
+            self._buffer = window.output.make_texture_buffer(
+                self.settings.name, part.width, part.height, picture
+            )
+            self._buffer.set_sort(-7)  # after the shadow map, before what shows it
+            self._buffer.set_active(False)
+            region = self._buffer.make_display_region()
+        else:
+            width = target.get_x_size()
+            left, right = part.left / width, (part.left + part.width) / width
+            region = target.make_display_region(left, right, 0.0, 1.0)
+        region.set_clear_color_active(True)
+        region.set_clear_color(core.LColor(*((0.0, 0.0, 0.0) if deep else back), 1.0))
+        region.set_clear_depth_active(True)
+        region.set_camera(self._node)
+        if deep:
+            self._stage.see_depth(eye, *self.settings.depth_m)
+        return picture
+
+    def take(self, frame: Frame) -> Frame | None:
+        """Take a frame; return the one to be drawn now, None while the last picture stands."""
+        past = self._delay.of(frame)
+        now, rate = frame.tick.due, self.settings.rate_hz
+        if now < self._due - ROUNDING_S:
+            return None
+        if rate is not None:  # on a grid: a late picture does not make the following ones late
+            self._due = (math.floor(now * rate + ROUNDING_S) + 1) / rate
+        return past
+
+    def aim(self, poses: FloatArray) -> Projection:
+        """Look from where it is now: ``poses`` as of :func:`labcrane.frames`."""
+        eye, look = (
+            self._in_base(point, poses) for point in (self.settings.eye, self.settings.look)
+        )
+        right, forward, up = axes_of(eye, look)
+        rows = [*right, 0.0, *forward, 0.0, *up, 0.0, *eye, 1.0]
+        self._node.set_mat(core.LMatrix4f(*(float(value) for value in rows)))
+        part = self._part
+        return Projection(eye, look, self.settings.fov_deg, part.left, part.width, part.height)
+
+    def see(self) -> None:
+        """Tell the shader that this is the eye."""
+        self._stage.look_from(self._node)
+
+    def draw(self, window: Window, others: Sequence[Any]) -> None:
+        """Draw its own picture, and nothing into ``others``, the outputs that show pictures."""
+        for other in others:
+            other.set_active(False)
+        self._buffer.set_active(True)
+        self.see()
+        window.engine.render_frame()
+        self._buffer.set_active(False)
+        for other in others:
+            other.set_active(True)
+
+    def _in_base(self, point: Sequence[float], poses: FloatArray) -> FloatArray:
+        if self.settings.on is None:
+            return np.array(point)
+        pose = poses[1 + self._machine.names.index(self.settings.on)]
+        return np.asarray(pose[:3, :3] @ np.array(point) + pose[:3, 3])

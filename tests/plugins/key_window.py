@@ -1,0 +1,27 @@
+"""Opens a view with keys and presents frames until the input ends, as a feedback process does."""
+
+import select
+import sys
+
+from labcrane.feedback_host import HostOrder, Part, Presenter
+from labcrane.registry import discover
+from labcrane.streams.feedback_log import FeedbackLog
+from labcrane.testing import TARGETS, a_run, a_target, ch8
+
+name = sys.argv[1]
+run = a_run(ch8(), task=TARGETS)
+settings = {"size": (400, 300), "keys": ("a", "d", "arrow_up", "arrow_down"), "hud": ()}
+presenter = Presenter(
+    HostOrder(name, Part("view", settings), run, "a/test", always=True), discover()
+)
+presenter.open()
+log = FeedbackLog(name, "a/test", presenter)
+number = 0
+while not select.select([sys.stdin], [], [], 0.01)[0]:
+    number += 1
+    frame = a_target(run, number)
+    log.push(frame, presenter.present(frame), 0, presenter.feedback.samples())
+    if number == 3:
+        sys.stdout.write("ready\n")
+        sys.stdout.flush()
+presenter.close()
