@@ -48,9 +48,9 @@ class Scenario(Task):
     )
 
     results = (
-        Signal("duration", "s"),
+        Signal("time", "s"),
         Signal("goals", "1"),
-        Signal("mistakes", "1", KINDS),
+        *(Signal(f"n_{kind}", "1") for kind in KINDS),
         Signal("peak_force.object", "N"),
         Signal("peak_force.body", "N"),
         Signal("deformity_found", "s"),  # from the start; NaN when it was not, or there is none
@@ -89,7 +89,7 @@ class Scenario(Task):
         )
 
     def begin_trial(self, trial: Trial) -> None:
-        name = str(trial.planned.condition["scene"])
+        name = str(trial.planned.condition["scenario"])
         scene, settings = self._scenes[name], self._settings
         placed = place(scene, trial.seed)
         self._watch = Observation(settings, self._run, placed)
@@ -125,7 +125,7 @@ class Scenario(Task):
         if scene.start_deg is not None:
             start = tuple(math.radians(angle) for angle in scene.start_deg)
         limit = self._settings.limit_s or scene.limit_s
-        return Planned({"scene": name}, expected_s=limit / 2, start_pose=start)
+        return Planned({"scenario": name}, expected_s=limit / 2, start_pose=start)
 
     def _findings(self, frame: Frame) -> Iterator[Event]:
         if self._deformed is None or not math.isnan(self._found):
@@ -147,7 +147,7 @@ class Scenario(Task):
     def _results(self, frame: Frame, phase: Phase) -> dict[str, Value]:
         peaks = self._watch.peaks
         return {
-            "duration": frame.elapsed,
+            "time": frame.elapsed,
             "goals": float(self._way.reached),
             **self._watch.mistakes.results(),
             "peak_force.object": peaks["object"],

@@ -94,7 +94,7 @@ def judged(tmp_path: Path, pushes: list[float], *, overrule: bool = False):
     )
     run = a_run(ch8(), state=state, task=task.signals)
     task.open(run)
-    task.begin_trial(a_trial(Planned({"scene": "block"}, expected_s=1.0)))
+    task.begin_trial(a_trial(Planned({"scenario": "block"}, expected_s=1.0)))
     if overrule:
         task.overrule()
     seen = []
@@ -125,7 +125,7 @@ def test_five_mistakes_of_a_kind_end_the_run_and_four_do_not(tmp_path: Path) -> 
     ]
     assert events[-1].name == "mistakes.too_many"
     assert seen[-1].results["k"] == 0.0
-    assert seen[-1].results["mistakes.object"] == 5.0
+    assert seen[-1].results["n_object"] == 5.0
     assert seen[-1].results["peak_force.object"] == 150.0
 
 
