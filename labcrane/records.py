@@ -209,6 +209,8 @@ class Situation:
         Settings that the examiner changed, by name of the cue or sound.
     counts
         How often each event has happened.
+    scene
+        What stands around the machine, as of :func:`labcrane.read_placed`; empty for nothing.
     """
 
     step: int = 0
@@ -221,3 +223,4 @@ class Situation:
     active: tuple[str, ...] = ()
     settings: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
     counts: Mapping[str, int] = field(default_factory=dict)
+    scene: str = ""

@@ -43,6 +43,8 @@ def situation_after(situation: Situation, event: Event) -> Situation:
             return replace(now, trial=data["trial"], active=active)
         case "trial.end":
             return replace(now, trial=0, active=())
+        case "scene.placed":
+            return replace(now, scene=data["things"])
         case "feedback.setting":
             mine = {**situation.settings.get(data["feedback"], {}), data["key"]: data["value"]}
             return replace(now, settings={**situation.settings, data["feedback"]: mine})

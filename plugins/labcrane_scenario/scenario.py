@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from labcrane import (
+    SCENE_PLACED,
     Event,
     FloatArray,
     Frame,
@@ -23,6 +24,7 @@ from labcrane import (
     Value,
     load_scene,
     place,
+    write_placed,
 )
 from labcrane_scenario.mistakes import KINDS
 from labcrane_scenario.observation import Observation
@@ -98,6 +100,7 @@ class Scenario(Task):
         self._limit = settings.limit_s or scene.limit_s
         self._most: float = settings.mistakes
         self._found = math.nan
+        self._placed = write_placed(placed)
 
     def overrule(self) -> None:
         self._limit, self._most = math.inf, math.inf
@@ -105,6 +108,8 @@ class Scenario(Task):
     def judge(self, frame: Frame) -> Judgement:
         due, state = frame.tick.due, frame.state
         events = [*self._watch.see(state, due), *self._findings(frame)]
+        if frame.elapsed == 0.0:
+            events.insert(0, Event(SCENE_PLACED, due, {"things": self._placed}))
         events.extend(self._way.see(state, due))
         mistakes = self._watch.mistakes
         kind = next((name for name, count in mistakes.counts.items() if count > self._most), None)

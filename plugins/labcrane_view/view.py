@@ -92,14 +92,11 @@ class View(Feedback):
         self._open_window(run)
 
     def _open_window(self, run: Run) -> None:
-        settings = self._settings
+        settings, scenery = self._settings, self._settings.content == "scene"
         window = self._window = open_window(settings, "labcrane")
         output = window.output
         self._size = (output.get_x_size(), output.get_y_size())
-        scenery = settings.content == "scene"
-        self.stage = Stage(
-            run.bodies, shaders=window.shaders, shadow=settings.shadow, scenery=scenery
-        )
+        self.stage = Stage(run, shaders=window.shaders, shadow=settings.shadow, scenery=scenery)
         back = HAZE if scenery else (0.0, 0.0, 0.0)
         target: Any = output
         if settings.flip != "none":
@@ -158,7 +155,7 @@ class View(Feedback):
         began = time.perf_counter()
         poses = frames(self._machine, shown.state[self._angles].tolist())
         shapes = [*self._task_shapes(shown), *shown.shapes]
-        self.stage.place(poses)
+        self.stage.place(poses, self._situation.scene, shown.state)
         self.stage.show(shapes)
         self._projections = [self._aim(at, poses) for at in range(len(self._cameras))]
         white = self._write(shown)
@@ -195,6 +192,7 @@ class View(Feedback):
         files = []
         try:
             view.open(run)
+            view.hear(self._situation)
             view.present(frames[0])
             for number, frame in enumerate(frames[:: round(PREVIEW_S * run.rate_hz)]):
                 view.present(frame)
