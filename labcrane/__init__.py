@@ -28,7 +28,8 @@ from labcrane.roles import (
     Questionnaire,
     Task,
 )
-from labcrane.scene import Form, Placed, Scene, load_scene, place
+from labcrane.scene import Form, Part, Placed, Scene, load_scene, place
+from labcrane.scene_text import SCENE_PLACED, read_placed, write_placed
 from labcrane.shapes import Ball, Beam, Shape, Targets
 from labcrane.signals import FloatArray, Layout, Signal, signals_of
 
@@ -36,6 +37,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "PRESETS",
+    "SCENE_PLACED",
     "Actuator",
     "ActuatorSettings",
     "AnswerError",
@@ -64,6 +66,7 @@ __all__ = [
     "Layout",
     "Machine",
     "Offer",
+    "Part",
     "Participant",
     "Phase",
     "Placed",
@@ -98,5 +101,7 @@ __all__ = [
     "open_recording",
     "place",
     "reach",
+    "read_placed",
     "signals_of",
+    "write_placed",
 ]

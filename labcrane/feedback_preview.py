@@ -14,8 +14,9 @@ from labcrane.feedback_crew import host_orders
 from labcrane.feedback_host import Presenter
 from labcrane.pseudonyms import pseudonyms
 from labcrane.recording.recording import SessionRecord, open_recording
-from labcrane.records import Event, Frame
+from labcrane.records import Event, Frame, Situation
 from labcrane.registry import discover
+from labcrane.scene_text import SCENE_PLACED
 from labcrane.session import Visit
 from labcrane.session import run as run_session
 from labcrane.streams.frames import PHASES
@@ -50,9 +51,11 @@ def write_preview(
     folder.mkdir(parents=True, exist_ok=True)
     if recording is None:
         with tempfile.TemporaryDirectory(prefix="labcrane-preview-") as place:
-            frames = movement(open_recording(_simulated(study, Path(place))).session(1), trial)
+            record = open_recording(_simulated(study, Path(place))).session(1)
+            frames, scene = movement(record, trial), scene_of(record, trial)
     else:
-        frames = movement(open_recording(recording).session(session), trial)
+        record = open_recording(recording).session(session)
+        frames, scene = movement(record, trial), scene_of(record, trial)
     written: list[Path] = []
     for order in orders:
         presenter = Presenter(order, discover())
@@ -60,6 +63,7 @@ def write_preview(
             for cue in presenter.cues.values():
                 cue.open(run)
             drawn = [_drawn(presenter, frame) for frame in frames]
+            presenter.hear(Situation(scene=scene))
             written += presenter.feedback.preview(run, drawn, folder / order.name)
         finally:
             presenter.close()
@@ -103,6 +107,15 @@ def movement(record: SessionRecord, trial: int | None = None) -> list[Frame]:
             )
         )
     return found
+
+
+def scene_of(record: SessionRecord, trial: int | None = None) -> str:
+    """Return what stood around the machine in a recorded trial; empty when nothing did."""
+    if trial is None:
+        trial = int(record.trials["trial"].iloc[0])
+    events = record.events
+    placed = events[(events["name"] == SCENE_PLACED) & (events["trial"] == trial)]
+    return "" if placed.empty else str(placed["data"].iloc[-1]["things"])
 
 
 def _drawn(presenter: Presenter, frame: Frame) -> Frame:

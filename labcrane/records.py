@@ -214,6 +214,8 @@ class Situation:
         question; empty for nothing.
     hint, hint_time
         The examiner's newest hint, empty before the first, and when it was given.
+    scene
+        What stands around the machine, as of :func:`labcrane.read_placed`; empty for nothing.
     """
 
     step: int = 0
@@ -229,3 +231,4 @@ class Situation:
     text: str = ""
     hint: str = ""
     hint_time: float = 0.0
+    scene: str = ""

@@ -49,6 +49,8 @@ def situation_after(situation: Situation, event: Event) -> Situation:
             return replace(now, text="")
         case "order.hint" if data["refused"] is None:
             return replace(now, hint=data["text"], hint_time=event.time)
+        case "scene.placed":
+            return replace(now, scene=data["things"])
         case "feedback.setting":
             mine = {**situation.settings.get(data["feedback"], {}), data["key"]: data["value"]}
             return replace(now, settings={**situation.settings, data["feedback"]: mine})

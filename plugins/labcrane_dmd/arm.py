@@ -19,6 +19,7 @@ from labcrane import (
 )
 from labcrane_dmd.arm_settings import ArmSettings
 from labcrane_dmd.arm_state import ArmState, arm_signals, scene_parts
+from labcrane_dmd.contacts import Window
 from labcrane_dmd.drive import drives
 from labcrane_dmd.looks import boxes
 from labcrane_dmd.model_file import load
@@ -78,7 +79,8 @@ class DmdArm(Dynamics):
 
     def begin_trial(self, trial: Trial) -> None:
         self._trial = trial
-        if self._scenes:
+        # A start pose comes with a reset of its own; until then the arm may stand in the new scene.
+        if self._scenes and trial.planned.start_pose is None:
             self.reset(self._pose)
 
     def state(self) -> FloatArray:
@@ -105,6 +107,7 @@ class DmdArm(Dynamics):
         angles, moved, loads = world.step(speeds)
         for joint, push in stopped:
             loads[joint] = push
+        loads = [window.add(load) for window, load in zip(self._loads, loads, strict=True)]
         over = [
             0
             if joint == self._press
@@ -123,6 +126,9 @@ class DmdArm(Dynamics):
             drive.reset()
         for watch in self._overloads:
             watch.reset()
+        # As forces are: the tick in which a drive sets its joint in motion is no overload.
+        ticks = max(1, round(self._settings.window_s / self._dt))
+        self._loads = [Window(ticks) for _ in angles]
         self._disconnect()
         self._world = World(self._settings, self._machine, self._dt, angles, self._standing())
         self._pose = angles
@@ -162,7 +168,7 @@ class DmdArm(Dynamics):
     def _standing(self) -> tuple[Placed, ...]:
         if self._trial is None or not self._scenes:
             return ()
-        name = self._trial.planned.condition.get("scene")
+        name = self._trial.planned.condition.get("scenario")
         if name not in self._scenes:
             raise ProtocolError(
                 f"the trial is in scene {name!r}; dynamics has {', '.join(self._scenes)}: list the "

@@ -70,7 +70,7 @@ class ArmSettings(Settings):
 
     scenes: tuple[StudyPath, ...] = ()
     """Scene files whose objects, figures and obstacles the arm can touch. The trial's condition
-    ``scene`` says which of them stands there."""
+    ``scenario`` says which of them stands there."""
 
     jaws: JawsSettings | None = None
     """The jaws, if the arm has any."""
@@ -79,4 +79,4 @@ class ArmSettings(Settings):
     """When a joint counts as overloaded."""
 
     window_s: PositiveFloat = 0.05
-    """Force is the contact impulse over this time divided by it, in seconds."""
+    """Force is the contact impulse over this time divided by it, and load its mean, in seconds."""

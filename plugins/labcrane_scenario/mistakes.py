@@ -59,4 +59,4 @@ class Mistakes:
 
     def results(self) -> Mapping[str, float]:
         """Return the counts by the names of the trial table."""
-        return {f"mistakes.{kind}": float(count) for kind, count in self.counts.items()}
+        return {f"n_{kind}": float(count) for kind, count in self.counts.items()}

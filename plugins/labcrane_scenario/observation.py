@@ -18,6 +18,7 @@ class Watched:
     part: str
     place: int
     support: int | None
+    limit: float
     episode: Episode
 
 
@@ -43,6 +44,7 @@ class Observation:
                         part,
                         run.state.index(column),
                         run.state.index(support) if support else None,
+                        limit,
                         Episode(limit, settings.release, hold),
                     )
                 )
@@ -82,6 +84,7 @@ class Observation:
                     "thing": each.thing.name,
                     "part": each.part,
                     "force": force,
+                    "limit": each.limit,
                 }
                 yield Event(f"contact.{kind}", due, {**about, "count": count})
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from labcrane import (
+    SCENE_PLACED,
     Event,
     FloatArray,
     Frame,
@@ -23,6 +24,7 @@ from labcrane import (
     Value,
     load_scene,
     place,
+    write_placed,
 )
 from labcrane_scenario.mistakes import KINDS
 from labcrane_scenario.observation import Observation
@@ -48,9 +50,9 @@ class Scenario(Task):
     )
 
     results = (
-        Signal("duration", "s"),
+        Signal("time", "s"),
         Signal("goals", "1"),
-        Signal("mistakes", "1", KINDS),
+        *(Signal(f"n_{kind}", "1") for kind in KINDS),
         Signal("peak_force.object", "N"),
         Signal("peak_force.body", "N"),
         Signal("deformity_found", "s"),  # from the start; NaN when it was not, or there is none
@@ -89,7 +91,7 @@ class Scenario(Task):
         )
 
     def begin_trial(self, trial: Trial) -> None:
-        name = str(trial.planned.condition["scene"])
+        name = str(trial.planned.condition["scenario"])
         scene, settings = self._scenes[name], self._settings
         placed = place(scene, trial.seed)
         self._watch = Observation(settings, self._run, placed)
@@ -98,6 +100,7 @@ class Scenario(Task):
         self._limit = settings.limit_s or scene.limit_s
         self._most: float = settings.mistakes
         self._found = math.nan
+        self._placed = write_placed(placed)
 
     def overrule(self) -> None:
         self._limit, self._most = math.inf, math.inf
@@ -105,6 +108,8 @@ class Scenario(Task):
     def judge(self, frame: Frame) -> Judgement:
         due, state = frame.tick.due, frame.state
         events = [*self._watch.see(state, due), *self._findings(frame)]
+        if frame.elapsed == 0.0:
+            events.insert(0, Event(SCENE_PLACED, due, {"things": self._placed}))
         events.extend(self._way.see(state, due))
         mistakes = self._watch.mistakes
         kind = next((name for name, count in mistakes.counts.items() if count > self._most), None)
@@ -125,7 +130,7 @@ class Scenario(Task):
         if scene.start_deg is not None:
             start = tuple(math.radians(angle) for angle in scene.start_deg)
         limit = self._settings.limit_s or scene.limit_s
-        return Planned({"scene": name}, expected_s=limit / 2, start_pose=start)
+        return Planned({"scenario": name}, expected_s=limit / 2, start_pose=start)
 
     def _findings(self, frame: Frame) -> Iterator[Event]:
         if self._deformed is None or not math.isnan(self._found):
@@ -147,7 +152,7 @@ class Scenario(Task):
     def _results(self, frame: Frame, phase: Phase) -> dict[str, Value]:
         peaks = self._watch.peaks
         return {
-            "duration": frame.elapsed,
+            "time": frame.elapsed,
             "goals": float(self._way.reached),
             **self._watch.mistakes.results(),
             "peak_force.object": peaks["object"],

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from panda3d import core
 
-from labcrane import Ball, Body, FloatArray, Shape
+from labcrane import Ball, Body, FloatArray, Run, Shape, read_placed
 from labcrane_view import shader
 from labcrane_view.forest import forest
 from labcrane_view.mesh import Mesh, bevelled_box, cone, sphere
+from labcrane_view.things import pieces
 
 HAZE = (0.66, 0.75, 0.82)
 THICKNESS = 0.0125
@@ -41,15 +42,18 @@ class Stage:
         Whether there is anything but targets and cues.
     """
 
-    def __init__(
-        self, bodies: Sequence[Body], *, shaders: bool, shadow: int, scenery: bool
-    ) -> None:
+    def __init__(self, run: Run, *, shaders: bool, shadow: int, scenery: bool) -> None:
         self.root = core.NodePath("stage")
         self._shaders = shaders
         self._ball = sphere()
         self._bar = cone((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0))
         self._parts: list[tuple[int, Any]] = []
         self._shown: dict[str, Any] = {}
+        self._state = run.state
+        self._scene = ""
+        self._things: list[Any] = []
+        self._moving: list[tuple[Any, slice, slice]] = []
+        self._scenery = scenery
         if shaders:
             self._light(shadow)
         else:
@@ -57,12 +61,37 @@ class Stage:
         if scenery:
             for thing in forest():
                 self._add(self.root, thing.name, thing.mesh, thing.colour, thing.grain)
-            self._add_machine(bodies)
+            self._add_machine(run.bodies)
 
-    def place(self, frames: FloatArray) -> None:
-        """Set the machine's bodies: ``frames`` as of :func:`labcrane.frames`."""
+    def place(self, frames: FloatArray, scene: str, state: FloatArray) -> None:
+        """Set the machine's bodies and what stands around.
+
+        ``frames`` as of :func:`labcrane.frames`, ``scene`` as of :func:`labcrane.read_placed`.
+        """
+        if self._scenery and scene != self._scene:
+            self._furnish(scene)
+        for node, position, orientation in self._moving:
+            x, y, z, w = state[orientation].tolist()
+            node.set_pos_quat(core.LPoint3(*state[position].tolist()), core.LQuaternion(w, x, y, z))
         for number, node in self._parts:
             node.set_mat(core.LMatrix4f(*frames[number].T.ravel().tolist()))
+
+    def _furnish(self, scene: str) -> None:
+        """Set up what stands around; what moves is placed by the state from then on."""
+        self._scene = scene
+        for node in self._things:
+            node.remove_node()
+        self._things, self._moving = [], []
+        for thing in read_placed(scene):
+            node = self.root.attach_new_node(thing.name)
+            node.set_pos(*thing.position)
+            node.set_h(math.degrees(thing.yaw))
+            for mesh, colour in pieces(thing):
+                self._add(node, thing.name, mesh, colour, 0.0)
+            self._things.append(node)
+            if f"scene.{thing.name}.position" in (signal.name for signal in self._state.signals):
+                places = (f"scene.{thing.name}.{what}" for what in ("position", "orientation"))
+                self._moving.append((node, *map(self._state.find, places)))
 
     def show(self, shapes: Sequence[Shape]) -> None:
         """Draw ``shapes`` instead of those drawn before."""

@@ -84,9 +84,7 @@ class View(Feedback):
         output = window.output
         self._size = (output.get_x_size(), output.get_y_size())
         scenery = settings.content == "scene"
-        self.stage = Stage(
-            run.bodies, shaders=window.shaders, shadow=settings.shadow, scenery=scenery
-        )
+        self.stage = Stage(run, shaders=window.shaders, shadow=settings.shadow, scenery=scenery)
         self._hud = Hud(settings.hud, settings.language, run)
         self._areas = Areas(settings.areas, run, self._size, settings.flip)
         back = HAZE if scenery else (0.0, 0.0, 0.0)
@@ -187,6 +185,7 @@ class View(Feedback):
         files = []
         try:
             view.open(run)
+            view.hear(self._situation)
             view.present(frames[0])
             for number, frame in enumerate(frames[:: round(PREVIEW_S * run.rate_hz)]):
                 view.present(frame)
@@ -223,7 +222,7 @@ class View(Feedback):
         """Set the stage for a frame; return the machine's frames and the shapes shown."""
         poses = frames(self._machine, frame.state[self._angles].tolist())
         shapes = [*self._task_shapes(frame), *frame.shapes]
-        self.stage.place(poses)
+        self.stage.place(poses, self._situation.scene, frame.state)
         self.stage.show(shapes)
         return poses, shapes
 

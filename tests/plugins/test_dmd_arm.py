@@ -73,7 +73,7 @@ def standing(scene: str | None = None, folder: Path | None = None, **settings) -
     try:
         arm.open(run)
         if scene is not None:
-            arm.begin_trial(a_trial(Planned({"scene": "scene"}, expected_s=1.0)))
+            arm.begin_trial(a_trial(Planned({"scenario": "scene"}, expected_s=1.0)))
         yield arm, run.state
     finally:
         arm.close()

@@ -1,14 +1,13 @@
-"""Scenes run and judged: what is counted, what ends a run, and all six with nobody at the panel."""
+"""Scenes judged: what is counted, what is found, what ends a run."""
 
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
-from cranes import needs_bullet
-from rehearsal import Rehearsal, rehearse
 
 from labcrane import (
+    Event,
     InputDevice,
     Phase,
     Planned,
@@ -18,10 +17,6 @@ from labcrane import (
     load_scene,
     place,
 )
-from labcrane.console import Command, Order
-from labcrane.machine_file import load_machine
-from labcrane.registry import discover
-from labcrane.study import load
 from labcrane.testing import (
     InputContract,
     TaskContract,
@@ -37,7 +32,6 @@ from labcrane_scenario.scenario import Scenario
 from labcrane_scenario.settings import OperatorSettings, ScenarioSettings
 
 RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"
-SCENES = ("casualty", "touch", "carry", "reach_through", "extract", "reach_over")
 OVERLOAD = Signal("joint.overload", "1", ch8().names)
 FREE = """\
 labcrane_scene: 1
@@ -94,7 +88,7 @@ def judged(tmp_path: Path, pushes: list[float], *, overrule: bool = False):
     )
     run = a_run(ch8(), state=state, task=task.signals)
     task.open(run)
-    task.begin_trial(a_trial(Planned({"scene": "block"}, expected_s=1.0)))
+    task.begin_trial(a_trial(Planned({"scenario": "block"}, expected_s=1.0)))
     if overrule:
         task.overrule()
     seen = []
@@ -125,7 +119,7 @@ def test_five_mistakes_of_a_kind_end_the_run_and_four_do_not(tmp_path: Path) -> 
     ]
     assert events[-1].name == "mistakes.too_many"
     assert seen[-1].results["k"] == 0.0
-    assert seen[-1].results["mistakes.object"] == 5.0
+    assert seen[-1].results["n_object"] == 5.0
     assert seen[-1].results["peak_force.object"] == 150.0
 
 
@@ -170,36 +164,52 @@ def test_impossible_scenes_are_refused_with_their_line(
         load_scene(path)
 
 
-def run_scene(name: str, tmp_path: Path, orders=None) -> Rehearsal:
-    text = (RETRIEVAL / "protocol.yaml").read_text()
-    for other in SCENES:
-        if other != name:
-            text = text.replace(f"    - scenes/{other}.yaml\n", "")
-    text = text.replace("scenes/", f"{RETRIEVAL}/scenes/").replace(
-        "arm.dmd.yaml", f"{RETRIEVAL}/arm.dmd.yaml"
+LYING = """\
+labcrane_scene: 1
+title: somebody with a broken leg
+figure:
+  position: [1.6, 0, 0.2]
+  deformity: {limbs: [left_shank]}
+goals: [{position: [30, 0, 0], radius: 0.1}]
+"""
+
+
+@pytest.mark.parametrize(
+    ("tip_x", "button", "notes", "by"),
+    [
+        (1.6, 1.0, {}, "operator"),
+        (8.0, 1.0, {}, None),  # pressed far away, without having seen anything
+        (8.0, 0.0, {3: "found: the left leg"}, "supervisor"),
+        (1.6, 0.0, {3: "the left leg"}, None),
+    ],
+)
+def test_a_deformity_is_found_by_the_operators_button_or_the_supervisors_note(
+    tip_x: float, button: float, notes: dict[int, str], by: str | None, tmp_path: Path
+) -> None:
+    (tmp_path / "lying.yaml").write_text(LYING)
+    settings = ScenarioSettings(scenes=(tmp_path / "lying.yaml",), find_axis="button", limit_s=0.1)
+    task = Scenario(settings, ch8())
+    state = (
+        *crane_state(ch8()).signals,
+        OVERLOAD,
+        Signal("scene.figure.position", "m", ("x", "y", "z")),
     )
-    text = text.replace("R\\d{3}", "P\\d{3}")
-    for file in ("ied_arm.yaml", "instructions.md"):
-        (tmp_path / file).write_text((RETRIEVAL / file).read_text())
-    (tmp_path / "study.yaml").write_text(text)
-    return rehearse(load(tmp_path / "study.yaml", discover()), orders)
-
-
-@needs_bullet
-@pytest.mark.parametrize("name", SCENES)
-def test_the_simulated_operator_gets_through(name: str, tmp_path: Path) -> None:
-    note = {100: [Command(Order.NOTE, "found: left leg looks bent")]}
-    seen = run_scene(name, tmp_path, note)
-    (row,) = seen.trials()
-    assert row["outcome"] == "success", row
-    assert row["k"] == 1.0
-    scene = load_scene(RETRIEVAL / "scenes" / f"{name}.yaml")
-    assert len(seen.events("goal.reached")) == len(scene.goals) == row["goals"]
-    assert len(seen.events("deformity.found")) == (1 if scene.figure else 0)
-    # Everything a table of the run needs is in the record, per tick.
-    columns = seen.run.state.columns
-    for joint in load_machine("ied_arm.yaml", RETRIEVAL).names:
-        for what in ("angle", "velocity", "load", "overload", "end"):
-            assert f"joint.{what}.{joint}" in columns
-    for each in place(scene, 1):
-        assert (f"scene.{each.name}.support" in columns) == (each.kind != "obstacle")
+    run = a_run(ch8(), axes=(Signal("button", "1"),), state=state, task=task.signals)
+    task.open(run)
+    task.begin_trial(a_trial(Planned({"scenario": "lying"}, expected_s=1.0)))
+    events, results = [], {}
+    for number in range(30):
+        values = np.zeros(run.state.size)
+        values[run.state.index("tip.position.x")] = tip_x
+        values[run.state.index("scene.figure.position.x")] = 1.6
+        frame = a_frame(run, number, values)
+        frame.axes = np.array([button])
+        if number in notes:
+            frame.events = (Event("order.note", frame.tick.due, {"text": notes[number]}),)
+        judgement = task.judge(frame)
+        events += [event for event in judgement.events if event.name == "deformity.found"]
+        results = judgement.results or results
+    assert [(event.data["by"], event.data["limb"]) for event in events] == (
+        [(by, "left_shank")] if by else []
+    )
+    assert math.isnan(results["deformity_found"]) == (by is None)

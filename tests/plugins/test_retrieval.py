@@ -1,0 +1,121 @@
+"""The retrieval study by its real command: all six scenarios, their record and their score."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cranes import needs_bullet
+
+import labcrane
+from labcrane.machine_file import load_machine
+from labcrane.recording.recording import SessionRecord
+
+pytestmark = needs_bullet
+
+RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"
+SCENES = {
+    path.stem: labcrane.load_scene(path) for path in sorted((RETRIEVAL / "scenes").glob("*.yaml"))
+}
+JOINTS = load_machine("ied_arm.yaml", RETRIEVAL).names
+
+
+def labcrane_command(*words: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-m", "labcrane", *words], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("data")
+    protocol = str(RETRIEVAL / "protocol.yaml")
+    order = ("--participant", "R001", "--simulate", "--fast", "--data", str(folder))
+    labcrane_command("run", protocol, *order)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def session(data: Path) -> SessionRecord:
+    (file,) = data.rglob("*.h5")
+    return labcrane.open_recording(file).session(1)
+
+
+def test_all_six_scenarios_are_run_through_in_the_reference_and_in_the_block(session) -> None:
+    trials = session.trials
+    assert set(trials["outcome"]) == {"success"}
+    for _, stage in trials.groupby("block"):
+        assert sorted(stage["scenario"]) == sorted(SCENES)
+    assert len(SCENES) == 6
+    assert list(trials["reference"].fillna(0.0)) == [1.0] * 6 + [0.0] * 6
+
+
+def test_every_goal_is_an_event_of_its_trial(session) -> None:
+    reached = session.events[session.events["name"] == "goal.reached"]
+    for _, row in session.trials.iterrows():
+        own = [data["goal"] for data in reached[reached["trial"] == row["trial"]]["data"]]
+        assert own == list(range(1, len(SCENES[row["scenario"]].goals) + 1))
+        assert row["goals"] == len(own)
+
+
+def test_joints_objects_and_bodies_are_recorded_tick_by_tick(session) -> None:
+    rows = len(session.streams["loop"].data)
+    commands, state = (session.streams[name].data for name in ("command", "state"))
+    for joint in JOINTS:
+        columns = [state[f"joint.{what}.{joint}"] for what in ("angle", "velocity", "load")]
+        columns += [state[f"joint.{what}.{joint}"] for what in ("end", "overload")]
+        columns.append(commands[f"valve.signal.{joint}"])
+        assert all(len(column) == rows and np.isfinite(column).all() for column in columns)
+        assert set(state[f"joint.end.{joint}"]) <= {-1.0, 0.0, 1.0}
+    for scene in SCENES.values():
+        for thing in labcrane.place(scene, 1):
+            names = {part.name for part in thing.parts}
+            for part in names if thing.kind != "obstacle" else ():
+                assert f"scene.{thing.name}.force.{part}" in state
+
+
+def test_the_trial_table_agrees_with_the_events_and_the_forces(session) -> None:
+    loop, state, events = (
+        session.streams["loop"].data,
+        session.streams["state"].data,
+        session.events,
+    )
+    force = {
+        "object": [c for c in state if ".force." in c and not c.startswith("scene.figure")],
+        "body": [c for c in state if c.startswith("scene.figure.force.")],
+    }
+    for _, row in session.trials.iterrows():
+        mine = events[events["trial"] == row["trial"]]
+        ticks = (loop["trial"] == row["trial"]).to_numpy()
+        for kind, columns in force.items():
+            assert row[f"n_{kind}"] == (mine["name"] == f"contact.{kind}").sum()
+            pressed = state.loc[ticks, columns].to_numpy().max()
+            assert pressed <= row[f"peak_force.{kind}"] + 1e-9
+        assert row["time"] == pytest.approx((ticks.sum() - 1) / 240)
+        assert row["k"] == 1.0
+
+
+def test_the_study_can_be_scored(data: Path, session, tmp_path: Path) -> None:
+    from openpyxl import load_workbook
+
+    workbook = tmp_path / "evaluation.xlsx"
+    said = labcrane_command("score", str(data), "--out", str(workbook))
+    assert all(name in said for name in SCENES)
+    head, *rows = load_workbook(workbook)["Tests"].iter_rows(values_only=True)
+    tests = [dict(zip(head, row, strict=True)) for row in rows]
+    trials = session.trials
+    reference = trials["reference"] == 1.0
+    assert [test["scenario"] for test in tests] == list(trials["scenario"][~reference])
+    t_ref = trials["time"][reference].mean()
+    for test, seconds in zip(tests, trials["time"][~reference], strict=True):
+        assert test["reference_s"] == pytest.approx(t_ref)
+        assert test["duration_s"] == pytest.approx(seconds)
+        assert test["points duration"] == pytest.approx(20.0 * min(1.0, t_ref / seconds))
+        assert test["points overload_max"] == pytest.approx(20.0 - 5.0 * test["n_overload_max"])
+        assert 0.0 <= test["s_accuracy"] <= 1.0
+        assert test["points accuracy"] == pytest.approx(10.0 * test["s_accuracy"])
+        assert test["points awareness"] == pytest.approx(10.0 * test["s_awareness"])
+        assert test["k"] == 1
