@@ -8,10 +8,11 @@ from labcrane.actuator import PRESETS, Actuator, ActuatorSettings
 from labcrane.analysis.cohort import Participant
 from labcrane.clock import Tick
 from labcrane.errors import DeviceError, LabcraneError, PluginError, ProtocolError, RecordingError
+from labcrane.finding import Finding, Verdict
 from labcrane.hookspecs import hookimpl
 from labcrane.kinematics import Arm, frames, jacobian
 from labcrane.machine import Body, Joint, Machine
-from labcrane.offers import CommandOffer, Offer, Settings, StudyPath, offer
+from labcrane.offers import Ask, CommandOffer, Offer, Settings, StudyPath, offer
 from labcrane.questions import AnswerError, Answers, Item, Score, numbers
 from labcrane.reach import reach
 from labcrane.recording.recording import SessionRecord, Stream, open_recording
@@ -43,6 +44,7 @@ __all__ = [
     "AnswerError",
     "Answers",
     "Arm",
+    "Ask",
     "Ball",
     "Beam",
     "Body",
@@ -55,6 +57,7 @@ __all__ = [
     "Event",
     "Exporter",
     "Feedback",
+    "Finding",
     "FloatArray",
     "Form",
     "Frame",
@@ -91,6 +94,7 @@ __all__ = [
     "Tick",
     "Trial",
     "Value",
+    "Verdict",
     "XdfWriter",
     "frames",
     "hookimpl",

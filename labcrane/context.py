@@ -10,6 +10,7 @@ from typing import Any, Protocol
 from labcrane.attempt import trial_units
 from labcrane.choices import Choice
 from labcrane.data_folder import DataFolder
+from labcrane.doctor.examination import at_start
 from labcrane.plan import SessionPlan
 from labcrane.records import Run
 from labcrane.rig import Rig
@@ -81,6 +82,7 @@ def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> 
         "components": {part: _choice(choice) for part, choice in choices.items()},
         "facts": the_rig.facts(),
         "versions": _versions(),
+        "doctor": at_start(visit.folder.root),
         "streams": {
             label: need.model_dump(mode="json", exclude_none=True)
             for label, need in study.protocol.streams.items()

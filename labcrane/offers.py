@@ -1,12 +1,13 @@
 """How a plugin says what it has: a name, its settings, and how to build it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Generic, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationInfo
 
+from labcrane.finding import Finding
 from labcrane.machine import Machine
 from labcrane.roles import Component
 
@@ -32,24 +33,60 @@ StudyPath = Annotated[Path, AfterValidator(_beside)]
 protocol that names it."""
 
 
+Ask = Callable[[str], None]
+"""Tells the person at the machine what to do next."""
+
+
 @dataclass(frozen=True, slots=True)
 class Offer(Generic[RoleT_co]):
-    """One component on offer. Make it with :func:`offer`."""
+    """One component on offer. Make it with :func:`offer`.
+
+    Attributes
+    ----------
+    name
+        The word a protocol writes after ``use:``.
+    settings
+        Model of the keys beside it.
+    build
+        Makes the component from settings and machine.
+    examine
+        Looks at the hardware it needs; None where it needs none.
+    """
 
     name: str
     settings: type[Settings]
     build: Callable[[Any, Machine], RoleT_co]
+    examine: Callable[[Any, Ask | None], Sequence[Finding]] | None = None
 
 
 def offer(
-    name: str, settings: type[SettingsT], build: Callable[[SettingsT, Machine], RoleT]
+    name: str,
+    settings: type[SettingsT],
+    build: Callable[[SettingsT, Machine], RoleT],
+    examine: Callable[[SettingsT, Ask | None], Sequence[Finding]] | None = None,
 ) -> Offer[RoleT]:
     """Offer what ``build`` makes as ``name``, the word a protocol writes after ``use:``.
 
-    ``build`` is called with validated settings and the machine, once per run. Import heavy
-    libraries inside it: every installed plugin is imported just to list offers.
+    Parameters
+    ----------
+    name
+        One word, in lower case.
+    settings
+        Model of the keys that a protocol may write beside ``use``.
+    build
+        Called with validated settings and the machine, once per run. Import heavy libraries
+        inside it: every installed plugin is imported just to list offers.
+    examine
+        Called by ``labcrane doctor`` with validated settings, in a process of its own, and given
+        30 seconds: says how the hardware is that the component needs. With its second argument it
+        tells the person at the machine what to do; None when nobody is there.
+
+    Returns
+    -------
+    Offer
+        To be returned from a hook.
     """
-    return Offer(name, settings, build)
+    return Offer(name, settings, build, examine)
 
 
 @dataclass(frozen=True, slots=True)

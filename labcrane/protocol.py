@@ -88,6 +88,7 @@ class Protocol(Section):
     """What the study is called."""
 
     participants: Participants = Participants()
+    """Who takes part, and how many."""
 
     rate_hz: PositiveFloat = Field(default=240.0, le=2000.0)
     """Ticks of the loop per second."""
@@ -122,6 +123,7 @@ class Protocol(Section):
 
     page: PageSettings = PageSettings()
     """Where the supervisor's and the participant's page are served."""
+
     feedback: dict[str, Use] = Field(default_factory=dict)
     """What can be switched on during trials, by name: cues for every view, and sounds."""
 
@@ -135,11 +137,13 @@ class Protocol(Section):
     """How right the time stamps must be."""
 
     design: Design = Design()
+    """What is varied between and within participants, and in which order."""
 
     sessions: tuple[Session, ...] = Field(min_length=1)
     """The visits, in order."""
 
     on_fault: OnFault = OnFault()
+    """What happens when something fails."""
 
 
 def read(path: Path) -> tuple[Protocol | None, YamlFile]:

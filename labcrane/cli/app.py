@@ -11,7 +11,7 @@ from rich.console import Console
 
 from labcrane.cli import (
     approval,
-    delay,
+    doctor,
     extension,
     feedback,
     inspect,
@@ -35,7 +35,7 @@ app.command("resume")(running.resume)
 app.command("check")(inspect.check)
 app.command("plan")(inspect.plan)
 app.command("plugins")(inspect.plugins)
-app.command("doctor")(delay.doctor)
+app.command("doctor")(doctor.doctor)
 app.command("streams")(recording.streams)
 app.command("record")(recording.record)
 app.command("recover")(recording.recover)

@@ -1,12 +1,8 @@
 """Measures how long views and sounds take, with a photodiode or a microphone."""
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
-from labcrane.cli.inspect import ProtocolPath, out
-from labcrane.cli.network import Local, stay_on_this_computer
+from labcrane.cli.inspect import out
 from labcrane.errors import ProtocolError
 
 DISPLAY = (
@@ -90,28 +86,3 @@ def _measure(
         f"changes seen at {found.sensor_hz:.0f} Hz; {path}",
         markup=False,
     )
-
-
-def doctor(
-    protocol: ProtocolPath,
-    display: Annotated[bool, typer.Option("--display", help="a view, with a photodiode")] = False,
-    audio: Annotated[bool, typer.Option("--audio", help="a sound, with a microphone")] = False,
-    stream: Annotated[
-        str | None, typer.Option(help="LSL stream of the sensor; without it nothing is measured")
-    ] = None,
-    channel: Annotated[int, typer.Option(help="which channel of it", min=1)] = 1,
-    name: Annotated[
-        str | None, typer.Option(help="which view or sound; the only one by default")
-    ] = None,
-    count: Annotated[int, typer.Option(help="how many changes are presented", min=2)] = 100,
-    local: Local = False,
-) -> None:
-    """Measure how long a view or a sound takes, and keep the result beside the protocol."""
-    if local:
-        stay_on_this_computer()
-    if not (display or audio):
-        raise ProtocolError("say what to measure: --display, --audio, or both without --stream")
-    if display:
-        measure_display(protocol, stream, name, count, channel)
-    if audio:
-        measure_audio(protocol, stream, name, count, channel)

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from labcrane.finding import Finding, Verdict, worst
 from labcrane.recording.foreign_streams import RecordedStream
 from labcrane.streams.quality import Quality
-from labcrane.streams.verdict import Finding, Limits, Verdict, worst
+from labcrane.streams.verdict import Limits
 
 
 @dataclass(frozen=True, slots=True)

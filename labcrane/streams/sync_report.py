@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from labcrane.finding import Finding, Verdict, worst
 from labcrane.signals import FloatArray
 from labcrane.streams.stream_report import StreamReport
-from labcrane.streams.verdict import Finding, Limits, Verdict, worst
+from labcrane.streams.verdict import Limits
 
 COLUMNS = (
     "stream",

@@ -1,17 +1,9 @@
-"""What a study demands of its time stamps, and what is said where they fall short."""
+"""What a study demands of its time stamps."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import NamedTuple
 
-
-class Verdict(StrEnum):
-    """How good a stream is, in words that can be ordered."""
-
-    PASS = "PASS"  # noqa: S105 - no password
-    WARN = "WARN"
-    FAIL = "FAIL"
+from labcrane.finding import Verdict
 
 
 class Limit(NamedTuple):
@@ -73,18 +65,3 @@ class Limits:
     probe_age_s: Limit = PROBE_AGE_S
     missing: Limit = MISSING
     late: Limit = LATE
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """What is not as it should be, and what to do about it."""
-
-    verdict: Verdict
-    text: str
-    advice: str
-
-
-def worst(verdicts: Iterable[Verdict]) -> Verdict:
-    """Return the worst verdict; PASS when there is none."""
-    order = list(Verdict)
-    return max(verdicts, key=order.index, default=Verdict.PASS)

@@ -10,6 +10,7 @@ stand-ins for the other roles, and runs it.
 """
 
 from labcrane.testing.commands import CommandContract
+from labcrane.testing.examinations import ExaminationContract
 from labcrane.testing.exporters import ExporterContract
 from labcrane.testing.presentation import TARGETS, CueContract, FeedbackContract, a_target
 from labcrane.testing.questionnaires import QuestionnaireContract
@@ -39,6 +40,7 @@ __all__ = [
     "ControllerContract",
     "CueContract",
     "DynamicsContract",
+    "ExaminationContract",
     "ExporterContract",
     "FeedbackContract",
     "InputContract",

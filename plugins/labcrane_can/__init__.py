@@ -1,6 +1,8 @@
 """Control panels on a CAN bus: J1939 auxiliary valve commands, or whatever a DBC file describes."""
 
-from labcrane import CommandOffer, InputDevice, Machine, Offer, hookimpl, offer
+from collections.abc import Sequence
+
+from labcrane import Ask, CommandOffer, Finding, InputDevice, Machine, Offer, hookimpl, offer
 from labcrane_can.settings import CanSettings, ReplaySettings
 
 
@@ -16,7 +18,12 @@ def labcrane_inputs() -> list[Offer[InputDevice]]:
 
         return CanReplay(settings, machine)
 
-    return [offer("can", CanSettings, panel), offer("can_replay", ReplaySettings, replay)]
+    def examine(settings: CanSettings, ask: Ask | None) -> Sequence[Finding]:
+        from labcrane_can import examination
+
+        return examination.examine(settings, ask)
+
+    return [offer("can", CanSettings, panel, examine), offer("can_replay", ReplaySettings, replay)]
 
 
 @hookimpl

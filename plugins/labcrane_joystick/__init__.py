@@ -1,15 +1,23 @@
 """Two joysticks, one for each hand."""
 
-from labcrane import InputDevice, Machine, Offer, hookimpl, offer
+from collections.abc import Sequence
+
+from labcrane import Ask, Finding, InputDevice, Machine, Offer, hookimpl, offer
 from labcrane_joystick.settings import JoystickSettings
 
 
 @hookimpl
 def labcrane_inputs() -> list[Offer[InputDevice]]:
-    return [offer("dual_joystick", JoystickSettings, _dual_joystick)]
+    return [offer("dual_joystick", JoystickSettings, _dual_joystick, _examine)]
 
 
 def _dual_joystick(settings: JoystickSettings, machine: Machine) -> InputDevice:
     from labcrane_joystick.dual_joystick import DualJoystick
 
     return DualJoystick(settings)
+
+
+def _examine(settings: JoystickSettings, ask: Ask | None) -> Sequence[Finding]:
+    from labcrane_joystick import examination
+
+    return examination.examine(settings, ask)

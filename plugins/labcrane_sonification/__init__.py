@@ -1,6 +1,8 @@
 """The study's auditory feedback: a tone that tells the distance of tip and target."""
 
-from labcrane import Feedback, Machine, Offer, hookimpl, offer
+from collections.abc import Sequence
+
+from labcrane import Ask, Feedback, Finding, Machine, Offer, hookimpl, offer
 from labcrane_sonification.settings import SonificationSettings
 
 
@@ -12,4 +14,9 @@ def labcrane_feedback() -> list[Offer[Feedback]]:
         del machine  # the same for every machine
         return Sonification(settings)
 
-    return [offer("sonification", SonificationSettings, build)]
+    def examine(settings: SonificationSettings, ask: Ask | None) -> Sequence[Finding]:
+        from labcrane_sonification import examination
+
+        return examination.examine(settings, ask)
+
+    return [offer("sonification", SonificationSettings, build, examine)]

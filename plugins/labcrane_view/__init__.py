@@ -1,6 +1,8 @@
 """The crane in a forest, in 3-D: windows for the operator, the examiner and the mirror."""
 
-from labcrane import Feedback, Machine, Offer, hookimpl, offer
+from collections.abc import Sequence
+
+from labcrane import Ask, Feedback, Finding, Machine, Offer, hookimpl, offer
 from labcrane_view.settings import ViewSettings
 
 
@@ -11,4 +13,9 @@ def labcrane_feedback() -> list[Offer[Feedback]]:
 
         return View(settings, machine)
 
-    return [offer("view", ViewSettings, build)]
+    def examine(settings: ViewSettings, ask: Ask | None) -> Sequence[Finding]:
+        from labcrane_view import examination
+
+        return examination.examine(settings, ask)
+
+    return [offer("view", ViewSettings, build, examine)]

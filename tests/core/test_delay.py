@@ -139,7 +139,7 @@ def test_the_doctor_measures_the_delay_of_a_sensor(
     late = 0.0437
     with a_sensor(kind, name, column, level, late) as sensor:
         options = ["--stream", sensor, "--channel", "2", "--count", "6"]
-        assert main(["doctor", str(protocol), f"--{kind}", *options]) == 0
+        assert main(["doctor", "--protocol", str(protocol), f"--{kind}", *options]) == 0
     said = capsys.readouterr().out
     assert "6 of 6 changes seen at 1000 Hz" in said
     found = read_delays(protocol)[name]
@@ -147,7 +147,7 @@ def test_the_doctor_measures_the_delay_of_a_sensor(
     assert abs(found.delay.mean_s - late) < 0.5e-3
     assert found.delay.sd_s < 0.5e-3
     assert found.kind == kind
-    assert main(["doctor", str(protocol), f"--{kind}"]) == 0
+    assert main(["doctor", "--protocol", str(protocol), f"--{kind}"]) == 0
     again = capsys.readouterr().out
     assert f"{name}: delay 4" in again
     assert "6 changes" in again
@@ -169,7 +169,7 @@ def the_record_says_it(protocol: Path) -> None:
 def test_without_a_sensor_delays_are_not_measured(
     protocol: Path, capsys: pytest.CaptureFixture
 ) -> None:
-    assert main(["doctor", str(protocol), "--display", "--audio"]) == 0
+    assert main(["doctor", "--protocol", str(protocol), "--display", "--audio"]) == 0
     said = capsys.readouterr().out
     assert "view window: delay not measured" in said
     assert "sound tone: delay not measured" in said

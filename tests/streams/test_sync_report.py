@@ -9,13 +9,14 @@ import pytest
 from streams.synthetic import SourceClock, source
 
 from labcrane.errors import RecordingError
+from labcrane.finding import Verdict
 from labcrane.recording.foreign_streams import Note, RecordedStream
 from labcrane.recording.stream_header import Channel, StreamHeader
 from labcrane.streams.quality import Quality
 from labcrane.streams.resync import corrector, resync, treatment_of
 from labcrane.streams.stream_report import judge_stream
 from labcrane.streams.sync_report import COLUMNS, SyncReport, judge_loop, never_came
-from labcrane.streams.verdict import Limit, Limits, Verdict
+from labcrane.streams.verdict import Limit, Limits
 
 EEG = StreamHeader("EEG", "EEG", (Channel("Cz", "microvolts"),), rate_hz=500.0, source_id="amp-1")
 

@@ -1,0 +1,108 @@
+"""Whether the clock can be trusted: how fine it is, what drives it, and whether NTP bends it.
+
+Time stamps are on the monotonic clock. A step of the wall clock does not touch it, but while NTP
+slews, it runs fast or slow by up to 500 ppm, and other computers see that as drift.
+"""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from labcrane.finding import Finding, Verdict
+
+FINE_S = 1e-6
+"""Step of the clock up to which it is fine; a tick at 1 kHz is a thousand of them."""
+
+COARSE_S = 1e-4
+GOOD_SOURCES = ("tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page", "xen")
+SOURCE = Path("/sys/devices/system/clocksource/clocksource0/current_clocksource")
+
+SLEW_PPM = 100.0
+"""Rate of the monotonic clock against the hardware beyond which NTP is still settling."""
+
+STEP_S = 0.005
+"""Change of the wall clock against the monotonic one that is no slew."""
+
+WATCH_S = 1.0
+
+
+class Reading(NamedTuple):
+    """Three clocks read together, in s: the hardware's, the monotonic one and the wall's."""
+
+    raw: float
+    monotonic: float
+    wall: float
+
+
+def read() -> Reading:
+    """Read the clocks; the best of five attempts, so that an interruption does not show."""
+    return min((_read() for _ in range(5)), key=lambda pair: pair[0])[1]
+
+
+def _read() -> tuple[float, Reading]:
+    if not hasattr(time, "CLOCK_MONOTONIC_RAW"):  # Windows slews no monotonic clock
+        now = time.perf_counter()
+        return 0.0, Reading(now, now, time.time())
+    before = time.clock_gettime(time.CLOCK_MONOTONIC)
+    raw = time.clock_gettime(time.CLOCK_MONOTONIC_RAW)
+    wall = time.time()
+    after = time.clock_gettime(time.CLOCK_MONOTONIC)
+    return after - before, Reading(raw, (before + after) / 2.0, wall)
+
+
+def light() -> list[Finding]:
+    """Return what can be seen at once."""
+    return [_resolution(), *_source(SOURCE)]
+
+
+def examine(
+    clocks: Callable[[], Reading] = read, wait: Callable[[float], None] = time.sleep
+) -> list[Finding]:
+    """Return how the clock is, after a look of a second at what NTP does to it."""
+    before = clocks()
+    wait(WATCH_S)
+    return [*light(), *_bent(before, clocks())]
+
+
+def _resolution() -> Finding:
+    steps = []
+    for _ in range(200):
+        began = now = time.perf_counter()
+        while now == began:
+            now = time.perf_counter()
+        steps.append(now - began)
+    step = min(steps)
+    text = f"the clock advances in steps of {1e9 * step:.0f} ns at most"
+    if step <= FINE_S:
+        return Finding(Verdict.PASS, text)
+    verdict = Verdict.WARN if step <= COARSE_S else Verdict.FAIL
+    return Finding(verdict, text, "use another computer or a newer kernel; see the clock source")
+
+
+def _source(path: Path) -> list[Finding]:
+    if not path.is_file():  # no Linux
+        return []
+    name = path.read_text().strip()
+    if name.startswith(GOOD_SOURCES):
+        return [Finding(Verdict.PASS, f"the clock source is {name}")]
+    fix = "look into the kernel's log why it gave up tsc (dmesg | grep -i clocksource)"
+    return [Finding(Verdict.WARN, f"the clock source is {name}, which is slow to read", fix)]
+
+
+def _bent(before: Reading, after: Reading) -> list[Finding]:
+    passed = after.monotonic - before.monotonic
+    ppm = 1e6 * (passed / (after.raw - before.raw) - 1.0)
+    step = (after.wall - before.wall) - passed
+    slew = f"the clock runs {ppm:+.1f} ppm against the hardware"
+    found = []
+    if abs(ppm) <= SLEW_PPM:
+        found.append(Finding(Verdict.PASS, slew))
+    else:
+        fix = "NTP is slewing: wait until it has settled (chronyc tracking, timedatectl)"
+        found.append(Finding(Verdict.WARN, f"{slew}, which others see as drift", fix))
+    if abs(step) > STEP_S:
+        text = f"the wall clock was set by {step:+.3f} s while it was watched"
+        fix = "time stamps are not touched; wait before you compare them with times of day"
+        found.append(Finding(Verdict.WARN, text, fix))
+    return found

@@ -1,0 +1,136 @@
+"""The hardware of components, looked at by the plugins that know it.
+
+Each look is made in a process of its own: a driver that crashes or hangs is a finding.
+"""
+
+import multiprocessing
+import os
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from labcrane.finding import Finding, Verdict
+from labcrane.offers import Settings
+from labcrane.registry import ROLES, Registry, discover
+from labcrane.study import Study
+
+WAIT_S = 30.0
+"""How long a look may take; with a person who moves things, ten times as long."""
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What is to be looked at.
+
+    Attributes
+    ----------
+    area
+        What the researcher calls it: ``view operator``.
+    role
+        The researcher's word for the component's role.
+    name
+        The component's name.
+    settings
+        As the protocol has them.
+    """
+
+    area: str
+    role: str
+    name: str
+    settings: Settings
+
+
+def of_study(study: Study, registry: Registry) -> list[Look]:
+    """Return the looks that a study needs; ``registry`` is the one it was loaded with."""
+    chosen = {
+        f"input {study.input.name}": study.input,
+        **{f"feedback {name}": choice for name, choice in (study.cues | study.sounds).items()},
+        **{f"view {name}": choice for name, choice in study.views.items()},
+    }
+    words = {
+        id(offer): ROLES[role].word
+        for role, offers in registry.offers.items()
+        for offer in offers.values()
+    }
+    return [
+        Look(area, words[id(choice.offer)], choice.name, choice.settings)
+        for area, choice in chosen.items()
+        if choice.offer.examine is not None
+    ]
+
+
+def of_everything(registry: Registry) -> tuple[list[Look], list[str]]:
+    """Return the looks at everything installed, and what needs a protocol to be looked at."""
+    looks, left_out = [], []
+    for role, offers in registry.offers.items():
+        for name, offer in sorted(offers.items()):
+            if offer.examine is None:
+                continue
+            word = ROLES[role].word
+            try:
+                looks.append(Look(f"{word} {name}", word, name, offer.settings()))
+            except ValidationError:
+                left_out.append(f"{word} {name}: give --protocol with a study that uses it")
+    return looks, left_out
+
+
+def examine(look: Look, *, move: bool) -> Sequence[Finding]:
+    """Return what the plugin finds; ``move`` when a person is there to move things."""
+    with tempfile.NamedTemporaryFile(prefix="labcrane-doctor-") as complaints:
+        return _examine(look, move, Path(complaints.name))
+
+
+def _examine(look: Look, move: bool, complaints: Path) -> Sequence[Finding]:  # noqa: FBT001
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe(duplex=False)
+    arguments = (theirs, look, move, str(complaints))
+    process = context.Process(target=_look, args=arguments, name=f"examine {look.name}")
+    process.start()
+    theirs.close()
+    wait_s = WAIT_S * (10.0 if move else 1.0)
+    try:
+        if not ours.poll(wait_s):
+            return [_fault(look, f"did not answer within {wait_s:g} s")]
+        found: Sequence[Finding] = ours.recv()
+    except EOFError:
+        process.join()
+        *_, last = ["", *complaints.read_text(errors="replace").splitlines()]
+        why = f"; the last it said was {last.strip()!r}" if last else ""
+        return [_fault(look, f"ended its process with exit code {process.exitcode}{why}")]
+    else:
+        return found
+    finally:
+        ours.close()
+        process.join(1.0)
+        if process.is_alive():
+            process.kill()
+            process.join()
+
+
+def _fault(look: Look, what: str) -> Finding:
+    fix = "look at its driver, or tell the plugin's author"
+    return Finding(Verdict.FAIL, f"looking at {look.role} {look.name!r} {what}", fix)
+
+
+def _look(pipe: Connection, look: Look, move: bool, complaints: str) -> None:  # noqa: FBT001
+    # Sound libraries fill the terminal with what they did not find; it is kept for a crash.
+    with Path(complaints).open("a") as file:
+        os.dup2(file.fileno(), sys.stderr.fileno())
+    registry = discover()
+    (role,) = (role for role, entry in ROLES.items() if entry.word == look.role)
+    examine = registry.offers[role][look.name].examine
+    assert examine is not None  # noqa: S101 - why it is looked at
+    try:
+        found = list(examine(look.settings, _say if move else None))
+    except Exception as error:  # noqa: BLE001 - a plugin's look can raise anything
+        found = [_fault(look, f"raised {type(error).__name__}: {error}")]
+    pipe.send(found)
+
+
+def _say(text: str) -> None:
+    print(f"  {text}", flush=True)  # noqa: T201 - to the person who moves things

@@ -1,0 +1,165 @@
+"""Whether LSL gets through: a stream that is missing is told apart from one that is blocked.
+
+A stream is announced over UDP, described and sent over TCP, and its clock is asked over UDP
+again; a firewall can stop each alone. The first look is at a stream of our own.
+"""
+
+import os
+import select
+import socket
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree
+
+from labcrane.finding import Finding, Verdict
+from labcrane.streams.discovery import FoundStream, discover
+from labcrane.streams.network import describe
+from labcrane.streams.request import StreamRequest
+
+if TYPE_CHECKING:
+    import pylsl
+
+FIRST_PORT, PORTS = 16571, 34
+"""liblsl's default: 16571 for discovery, and 16572 to 16604 for streams."""
+
+LOOK_S = 2.0
+ANSWER_S = 1.5
+OURS = "labcrane.doctor"
+BYTES = 65536
+OPEN_PORTS = "allow UDP 16571 and TCP and UDP 16572 to 16604, inbound and outbound"
+
+
+def examine(requests: Sequence[StreamRequest] = ()) -> list[Finding]:
+    """Look for a stream of our own, those that a study needs, and trouble with any other."""
+    import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
+
+    source_id = f"{OURS}-{os.getpid()}"
+    outlet = pylsl.StreamOutlet(pylsl.StreamInfo(OURS, "Test", 1, 0.0, "float32", source_id))
+    try:
+        there = discover(LOOK_S)
+    finally:
+        del outlet
+    own = [one for one in there if one.source_id == source_id]
+    others = [one for one in there if one.name != OURS]
+    found = [_self_test(own), *_needs(requests, others)]
+    return [*found, *(finding for one in others for finding in _trouble(one))]
+
+
+def _self_test(own: Sequence[FoundStream]) -> Finding:
+    if not own:
+        fix = f"the firewall of this computer stops it: {OPEN_PORTS}"
+        return Finding(Verdict.FAIL, "a stream of our own is not found (UDP 16571)", fix)
+    if own[0].warnings and (blocked := _blocked(own[0])):
+        fix = f"the firewall of this computer stops it: {OPEN_PORTS}"
+        return Finding(Verdict.FAIL, f"a stream of our own {blocked}", fix)
+    return Finding(Verdict.PASS, f"a stream of our own is found and answers; {describe()}")
+
+
+def _blocked(one: FoundStream) -> str:
+    """Return what of a stream does not get through, in words; empty when all does."""
+    if not one.format:
+        return "is announced but does not send its description: TCP is blocked"
+    return "" if one.offset_s is not None else "does not answer clock probes: UDP is blocked"
+
+
+def _trouble(one: FoundStream) -> Iterator[Finding]:
+    for warning in one.warnings:
+        what, _, fix = warning.partition(": ")
+        yield Finding(Verdict.WARN, f"stream {one.name!r} on {one.host} {what}", fix)
+
+
+def _needs(requests: Sequence[StreamRequest], there: Sequence[FoundStream]) -> Iterator[Finding]:
+    for request in requests:
+        fitting = [one for one in there if request.matches(_info(one))]
+        if not fitting:
+            verdict = Verdict.FAIL if request.required else Verdict.WARN
+            fix = (
+                "start its program; if it runs on another computer, labcrane doctor --peer ADDRESS "
+                "tells whether a firewall is in between"
+            )
+            yield Finding(verdict, f"stream {request} is not announced", fix)
+        for one in fitting:
+            blocked, misfits = _blocked(one), request.misfits(one.channels, one.rate_hz)
+            text = f"stream {request} comes from {one.host}"
+            if blocked:
+                fix = f"a firewall on {one.host} or here stops it: {OPEN_PORTS}"
+                yield Finding(Verdict.FAIL, f"{text}, {blocked}", fix)
+            elif misfits:
+                fix = "correct the program's settings or the protocol"
+                yield Finding(Verdict.FAIL, f"{text}, but it {' and '.join(misfits)}", fix)
+            else:
+                yield Finding(Verdict.PASS, text)
+
+
+def _info(one: FoundStream) -> "pylsl.StreamInfo":
+    import pylsl  # noqa: PLC0415
+
+    return pylsl.StreamInfo(one.name, one.type, one.channels, one.rate_hz, "float32", one.source_id)
+
+
+def ask_peer(host: str, first_port: int = FIRST_PORT, wait_s: float = ANSWER_S) -> list[Finding]:
+    """Ask a computer for its streams as liblsl does, and say what silence means.
+
+    A port on which nobody listens is refused by the other computer; a firewall says nothing.
+    """
+    try:
+        address = socket.gethostbyname(host)
+    except OSError as error:
+        fix = "correct its name, or give its address"
+        return [Finding(Verdict.FAIL, f"{host} has no address: {error}", fix)]
+    answers, refused = _ask(address, range(first_port, first_port + PORTS), wait_s)
+    if answers:
+        return [_reached(host, address, answer) for answer in answers.values()]
+    if refused:
+        fix = "start the program that sends the stream, on that computer"
+        text = f"{host} is there and lets LSL through, and no program sends a stream there"
+        return [Finding(Verdict.FAIL, text, fix)]
+    text = f"{host} does not say a word on UDP {first_port} to {first_port + PORTS - 1}"
+    fix = f"if ping {host} is answered, a firewall stops LSL: {OPEN_PORTS}, there and here"
+    return [Finding(Verdict.FAIL, text, fix)]
+
+
+def _ask(address: str, ports: range, wait_s: float) -> tuple[dict[str, ElementTree.Element], bool]:
+    """Return the streams that answer, by their uid, and whether any port was refused."""
+    answers: dict[str, ElementTree.Element] = {}
+    refused = False
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("", 0))
+        back = receiver.getsockname()[1]
+        query = f"LSL:shortinfo\r\nuid\r\n{back} 1\r\n".encode()
+        senders = [_send(address, port, query) for port in ports]
+        try:
+            waiting = [receiver, *senders]
+            while waiting and (ready := select.select(waiting, [], [], wait_s)[0]):
+                for each in ready:
+                    try:
+                        text = each.recv(BYTES).decode(errors="replace")
+                    except ConnectionRefusedError:
+                        refused = True
+                        waiting.remove(each)
+                        continue
+                    info = ElementTree.fromstring(text.partition("\r\n")[2])  # noqa: S314 - the lab's own network
+                    answers[info.findtext("uid") or text] = info
+        finally:
+            for each in senders:
+                each.close()
+    return answers, refused
+
+
+def _send(address: str, port: int, query: bytes) -> socket.socket:
+    """Send a query from a socket of its own, which hears when the port is refused."""
+    sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sender.connect((address, port))
+    sender.send(query)
+    return sender
+
+
+def _reached(host: str, address: str, info: ElementTree.Element) -> Finding:
+    name, port = info.findtext("name"), int(info.findtext("v4data_port") or 0)
+    try:
+        socket.create_connection((address, port), ANSWER_S).close()
+    except OSError as error:
+        fix = f"a firewall on {host} or here stops it: {OPEN_PORTS}"
+        text = f"stream {name!r} on {host} is announced, but TCP {port} is not open: {error}"
+        return Finding(Verdict.FAIL, text, fix)
+    return Finding(Verdict.PASS, f"stream {name!r} on {host} answers on UDP and on TCP {port}")

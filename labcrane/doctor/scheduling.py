@@ -1,0 +1,76 @@
+"""Whether the operating system lets a loop tick in time."""
+
+import itertools
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from labcrane.clock import SystemClock, ticks
+from labcrane.finding import Finding, Verdict
+from labcrane.streams.verdict import LATE
+
+SECONDS = 2.0
+CPUS = Path("/sys/devices/system/cpu")
+SLOW_GOVERNORS = ("powersave", "conservative", "schedutil", "ondemand")
+FEW_CORES = 2
+"""Loop, views and sound want a core each; below this they take turns."""
+
+
+def light() -> list[Finding]:
+    """Return what can be seen at once: cores, their governor, and real-time priorities."""
+    cores = os.cpu_count() or 1
+    if sys.platform == "linux":
+        cores = len(os.sched_getaffinity(0))
+    text = f"{cores} processor core{'s' if cores > 1 else ''} to run on"
+    found = [Finding(Verdict.PASS, text)]
+    if cores < FEW_CORES:
+        fix = "show views on another computer, or allow more cores (taskset)"
+        found = [Finding(Verdict.WARN, f"{text}: loop, views and sound wait for each other", fix)]
+    return [*found, *governor(CPUS), *_priorities()]
+
+
+def examine(rate_hz: float) -> list[Finding]:
+    """Tick for two seconds as a session does, and say how late that was."""
+    count = round(SECONDS * rate_hz)
+    late = np.array(
+        [tick.woke - tick.due for tick in itertools.islice(ticks(SystemClock(), rate_hz), count)]
+    )
+    share = float(np.mean(late > 1.0 / rate_hz))
+    middle, most, worst = (1e3 * float(np.quantile(late, at)) for at in (0.5, 0.99, 1.0))
+    text = (
+        f"{count} ticks at {rate_hz:g} Hz were late by {middle:.3f} ms (p50), {most:.3f} ms (p99), "
+        f"{worst:.2f} ms (most); {100 * share:.1f} % by more than a period"
+    )
+    verdict = LATE.judge(share)
+    fix = "" if verdict is Verdict.PASS else "close other programs; see the governor; lower rate_hz"
+    return [Finding(verdict, text, fix), *light()]
+
+
+def governor(cpus: Path) -> list[Finding]:
+    """Return whether the processor is allowed its full speed, below ``/sys/devices/system/cpu``."""
+    files = sorted(cpus.glob("cpu[0-9]*/cpufreq/scaling_governor"))
+    names = sorted({path.read_text().strip() for path in files})
+    if not names:
+        return []
+    text = f"the processor's governor is {', '.join(names)}"
+    if set(names) & set(SLOW_GOVERNORS):
+        fix = "sudo cpupower frequency-set --governor performance"
+        return [Finding(Verdict.WARN, f"{text}, which wakes up slowly", fix)]
+    return [Finding(Verdict.PASS, text)]
+
+
+def _priorities() -> list[Finding]:
+    if sys.platform != "linux":
+        return []
+    import resource  # noqa: PLC0415 - not on Windows
+
+    _, most = resource.getrlimit(resource.RLIMIT_RTPRIO)
+    if most != 0 or os.geteuid() == 0:
+        return [Finding(Verdict.PASS, "real-time priorities are allowed")]
+    fix = (
+        "for sound by JACK: add '@audio - rtprio 95' to /etc/security/limits.d/audio.conf, join "
+        "the group audio, log in again"
+    )
+    return [Finding(Verdict.WARN, "real-time priorities are not allowed to this user", fix)]

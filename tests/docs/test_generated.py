@@ -1,0 +1,76 @@
+"""Pages that are read off the program have every key, every component and every signal."""
+
+import importlib.util
+import re
+from types import ModuleType
+
+import pytest
+from docs.page import ROOT
+
+from labcrane.protocol import Protocol
+from labcrane.registry import ROLES, discover
+
+
+@pytest.fixture(scope="module")
+def generate() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("generate", ROOT / "docs" / "generate.py")
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def pages(generate: ModuleType) -> dict[str, str]:
+    return generate.pages()
+
+
+def rows(text: str) -> list[list[str]]:
+    lines = [line for line in text.splitlines() if line.startswith("| `")]
+    return [re.split(r"(?<!\\) \| ", line.strip("| ")) for line in lines]
+
+
+def test_every_key_of_a_protocol_is_described(pages: dict[str, str]) -> None:
+    page = pages["reference/protocol.md"]
+    top, *_ = page.split("\n## ")
+    assert {row[0].strip("`") for row in rows(top)} == set(Protocol.model_fields)
+    assert not [row[0] for row in rows(page) if not row[-1].strip()]
+    assert {"Block", "OnFault", "StreamNeed"} <= set(re.findall(r"^## (\w+)$", page, re.M))
+
+
+def test_every_component_and_every_setting_is_described(pages: dict[str, str]) -> None:
+    registry = discover()
+    for role, entry in ROLES.items():
+        if not registry.offers[role]:
+            continue
+        page = pages[f"reference/{entry.word}.md"]
+        for name, offer in registry.offers[role].items():
+            part = page.split(f"\n## {name}\n")[1].split("\n## ")[0]
+            for key in offer.settings.model_fields:
+                (row,) = [row for row in rows(part) if row[0] == f"`{key}`"][:1]
+                assert len(row) == 4, f"{name}.{key} has no description"
+
+
+def test_the_signals_are_those_that_a_recording_has(pages: dict[str, str]) -> None:
+    assert (
+        "| `joint.angle` | rad | `slew`, `shoulder`, `elbow`, `wrist` |"
+        in (pages["reference/dynamics.md"])
+    )
+    assert (
+        "| `left` | 1 | `x`, `y`, `twist`, `slider`, `trigger`, `connected` |"
+        in (pages["reference/input.md"])
+    )
+
+
+def test_every_decision_is_listed(pages: dict[str, str]) -> None:
+    listed = re.findall(r"\((\d{4}-[\w-]+\.md)\)", pages["decisions/index.md"])
+    assert listed == sorted(path.name for path in (ROOT / "docs" / "decisions").glob("0*.md"))
+
+
+def test_links_within_a_generated_page_lead_to_its_headings(pages: dict[str, str]) -> None:
+    for name, text in pages.items():
+        headings = {
+            heading.lower().replace(" ", "-") for heading in re.findall(r"^## (.+)$", text, re.M)
+        }
+        assert set(re.findall(r"\(#([\w-]+)\)", text)) <= headings, name

@@ -1,0 +1,51 @@
+"""Links of the documentation lead somewhere."""
+
+import re
+from pathlib import Path
+
+import pytest
+from docs.page import ROOT
+
+PAGES = sorted([ROOT / "README.md", ROOT / "plugins" / "README.md", *(ROOT / "docs").rglob("*.md")])
+LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
+MENTION = re.compile(
+    r"`((?:docs|labcrane|plugins|protocols|tests|benchmarks)/[a-z0-9_./*-]+(?:\.[a-z]+|/))`"
+)
+HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
+GENERATED = ("reference/", "decisions/index.md")
+"""What docs/generate.py makes when the site is built; mkdocs checks links to it."""
+
+
+def anchors(page: Path) -> set[str]:
+    """Return what a link can jump to, as Python-Markdown names headings."""
+    text = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
+    words = (re.sub(r"[^\w\s-]", "", heading).strip().lower() for heading in HEADING.findall(text))
+    return {re.sub(r"[-\s]+", "-", word) for word in words}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_to_pages_and_headings_that_exist(page: Path) -> None:
+    for link in LINK.findall(re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)):
+        if link.startswith("https://"):
+            continue  # test_links_to_others_are_listed
+        path, _, anchor = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        if any(part in link for part in GENERATED):
+            continue
+        assert target.exists(), f"{page.relative_to(ROOT)} links {link}"
+        if anchor and target.suffix == ".md":
+            assert anchor in anchors(target), f"{page.relative_to(ROOT)}: no heading {link}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_files_that_are_named_exist(page: Path) -> None:
+    for name in MENTION.findall(page.read_text()):
+        assert list(ROOT.glob(name.rstrip("/"))), f"{page.relative_to(ROOT)} names {name}"
+
+
+def test_links_to_others_are_listed(record_property) -> None:
+    # They are not fetched: a page of somebody else's must not decide whether our tests pass.
+    found = {link for page in PAGES for link in LINK.findall(page.read_text()) if "://" in link}
+    for link in sorted(found):
+        record_property("link", link)
+        assert link.startswith("https://"), link

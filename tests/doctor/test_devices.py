@@ -1,0 +1,169 @@
+"""The looks at CAN, displays and sound, with an adapter on a pty, Xvfb and ALSA's null device."""
+
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from slcan_adapter import SlcanAdapter
+
+from labcrane import Finding, Offer, Settings, Verdict
+from labcrane.testing import ExaminationContract
+from labcrane_can import labcrane_inputs
+from labcrane_can.avc import encode
+from labcrane_can.examination import examine
+from labcrane_can.settings import CanSettings
+from labcrane_sonification import labcrane_feedback as sounds
+from labcrane_view import labcrane_feedback as views
+from labcrane_view.examination import refresh_rates
+from labcrane_view.settings import ViewSettings
+
+VALVES = {"boom": 1, "arm": 2}
+
+
+class TestCan(ExaminationContract):
+    @pytest.fixture
+    def offered(self) -> Offer:
+        return labcrane_inputs()[0]
+
+    @pytest.fixture
+    def settings(self) -> Settings:
+        return CanSettings(bus="virtual:doctor", valves=VALVES)
+
+
+class TestView(ExaminationContract):
+    @pytest.fixture
+    def offered(self) -> Offer:
+        return views()[0]
+
+    @pytest.fixture
+    def settings(self) -> Settings:
+        return ViewSettings(display="hidden", size=(64, 48))
+
+
+class TestSound(ExaminationContract):
+    @pytest.fixture
+    def offered(self) -> Offer:
+        return sounds()[0]
+
+    @pytest.fixture
+    def settings(self) -> Settings:
+        return sounds()[0].settings()
+
+
+def listened(adapter: SlcanAdapter, *frames: tuple[int, bytes]) -> list[Finding]:
+    """Look at a bus on which ``frames`` are sent over and over."""
+    over = threading.Event()
+
+    def send() -> None:
+        while not over.wait(0.02):
+            for frame in frames:
+                adapter.send(*frame)
+
+    sender = threading.Thread(target=send)
+    sender.start()
+    try:
+        return examine(CanSettings(bus=f"slcan:{adapter.path}", valves=VALVES), None)
+    finally:
+        over.set()
+        sender.join()
+        adapter.unplug()
+
+
+def test_a_panel_that_commands_every_valve_passes() -> None:
+    found = listened(SlcanAdapter(), encode(1, 100, 0x25), encode(2, -50, 0x25))
+    assert [finding.verdict for finding in found] == [Verdict.PASS, Verdict.PASS]
+    assert found[0].text.endswith("frames a second from 0x25")
+    assert found[1].text == "the panel commands boom, arm"
+
+
+def test_a_valve_that_nobody_commands_is_named() -> None:
+    traffic, heard, silent = listened(SlcanAdapter(), encode(1, 100, 0x25), encode(7, 0, 0x25))
+    assert traffic.verdict is heard.verdict is Verdict.PASS
+    assert silent.verdict is Verdict.FAIL
+    assert silent.text.startswith("no command for arm within 1 s (")
+    assert "frames were not for these valves" in silent.text
+
+
+def test_a_silent_bus_and_no_adapter_are_told_apart(tmp_path: Path) -> None:
+    silent, *_ = listened(SlcanAdapter())
+    assert silent.text.endswith("is open and silent")
+    assert "switch the panel on" in silent.advice
+    (missing,) = examine(CanSettings(bus=f"slcan:{tmp_path}/none", valves=VALVES), None)
+    assert "cannot be opened" in missing.text
+    assert missing.advice == "plug the adapter in, and check name and permissions"
+
+
+@pytest.fixture(scope="module")
+def x_server() -> Iterator[str]:
+    read, write = os.pipe()
+    arguments = ["Xvfb", "-displayfd", str(write), "-screen", "0", "1000x700x24"]
+    try:
+        server = subprocess.Popen(arguments, pass_fds=[write], stderr=subprocess.DEVNULL)
+    except FileNotFoundError:
+        if os.environ.get("CI"):
+            raise
+        pytest.skip("needs Xvfb")
+    os.close(write)
+    with os.fdopen(read) as numbers:
+        number = numbers.readline().strip()
+    yield f":{number}"
+    server.terminate()
+    server.wait()
+
+
+def in_a_process(plugin: str, **environment: str) -> str:
+    """Return what an examination finds, a line each, in a process of its own."""
+    code = (
+        f"from {plugin} import labcrane_feedback\n"
+        "(offer,) = labcrane_feedback()\n"
+        "for one in offer.examine(offer.settings(), None): print(one.verdict, one.text, one.advice)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_a_display_is_looked_at_with_what_draws(x_server: str) -> None:
+    found = in_a_process("labcrane_view", DISPLAY=x_server)
+    assert "draws a window of 1280 x 720 pixels" in found
+    assert "WARN" in found  # nothing but software draws on it
+    assert "FAIL there is no display" in in_a_process("labcrane_view", DISPLAY="")
+
+
+def test_the_refresh_rate_is_the_one_with_the_star() -> None:
+    # As xrandr 1.5 prints a laptop with a beamer.
+    listed = (
+        "Screen 0: minimum 320 x 200, current 3840 x 1080, maximum 16384 x 16384\n"
+        "eDP-1 connected primary 1920x1080+0+0 (normal left inverted) 344mm x 194mm\n"
+        "   1920x1080     60.05*+  40.04  \n"
+        "   1680x1050     60.05  \n"
+        "HDMI-1 connected 1920x1080+1920+0 (normal left inverted) 1210mm x 680mm\n"
+        "   3840x2160     30.00 +\n"
+        "   1920x1080    120.00    60.00    24.00* \n"
+        "DP-1 disconnected (normal left inverted)\n"
+    )
+    assert refresh_rates(listed) == [("eDP-1", 60.05), ("HDMI-1", 24.0)]
+
+
+def test_a_sound_device_is_named_with_its_block(tmp_path: Path) -> None:
+    config = tmp_path / "asoundrc"
+    config.write_text("pcm.!default { type null }\nctl.!default { type null }\n")
+    found = in_a_process("labcrane_sonification", ALSA_CONFIG_PATH=str(config))
+    assert "takes 48000 Hz in blocks of 256 samples: 5.3 ms each" in found
+
+
+@pytest.mark.skipif(not os.environ.get("CI"), reason="this computer may have a sound device")
+def test_a_computer_without_sound_fails_and_does_not_crash() -> None:
+    assert in_a_process("labcrane_sonification").startswith(
+        "FAIL there is no sound output device connect one"
+    )

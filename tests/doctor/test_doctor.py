@@ -1,0 +1,139 @@
+"""The whole examination: plugins in processes of their own, the command, and the record."""
+
+import json
+import platform
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+from rehearsal import SHORT
+
+import labcrane
+from labcrane.cli.app import main
+from labcrane.doctor import components
+from labcrane.doctor.components import Look, of_everything, of_study
+from labcrane.doctor.diagnosis import Check, diagnosis, keep, latest
+from labcrane.errors import RecordingError
+from labcrane.finding import Finding, Verdict
+from labcrane.registry import discover
+from labcrane.study import load
+
+AIMING = Path(__file__).parents[2] / "protocols" / "aiming" / "protocol.yaml"
+
+LAMP = '''
+import os, sys, time
+from labcrane import Finding, Settings, Verdict, hookimpl, offer
+
+class LampSettings(Settings):
+    does: str = "nothing"
+    """What its examination does."""
+
+def examine(settings, ask):
+    if settings.does == "exits":
+        sys.stderr.write("lamp: burnt out\\n")
+        sys.stderr.flush()
+        os._exit(3)
+    if settings.does == "hangs":
+        time.sleep(60)
+    if settings.does == "raises":
+        raise OSError("no lamp")
+    return [Finding(Verdict.PASS, "the lamp is lit")]
+
+@hookimpl
+def labcrane_feedback():
+    return [offer("lamp", LampSettings, lambda settings, machine: None, examine)]
+'''
+
+
+@pytest.fixture
+def lamp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> type[labcrane.Settings]:
+    """A plugin whose examination does what its settings say."""
+    (tmp_path / "labcrane_doctors_lamp.py").write_text(LAMP)
+    metadata = tmp_path / "labcrane_doctors_lamp-1.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text(
+        "Metadata-Version: 2.1\nName: labcrane-doctors-lamp\nVersion: 1\n"
+    )
+    (metadata / "entry_points.txt").write_text("[labcrane]\ndoctors_lamp = labcrane_doctors_lamp\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    looks, _ = of_everything(discover())
+    (found,) = [look for look in looks if look.name == "lamp"]
+    return type(found.settings)
+
+
+@pytest.mark.parametrize(
+    ("does", "verdict", "text"),
+    [
+        ("nothing", Verdict.PASS, "the lamp is lit"),
+        ("raises", Verdict.FAIL, "looking at feedback 'lamp' raised OSError: no lamp"),
+        (
+            "exits",
+            Verdict.FAIL,
+            "looking at feedback 'lamp' ended its process with exit code 3; "
+            "the last it said was 'lamp: burnt out'",
+        ),
+        ("hangs", Verdict.FAIL, "looking at feedback 'lamp' did not answer within 4 s"),
+    ],
+)
+def test_a_plugins_look_cannot_harm_the_doctor(
+    lamp: type[labcrane.Settings],
+    monkeypatch: pytest.MonkeyPatch,
+    does: str,
+    verdict: Verdict,
+    text: str,
+) -> None:
+    monkeypatch.setattr(components, "WAIT_S", 4.0 if does == "hangs" else 30.0)
+    look = Look("feedback lamp", "feedback", "lamp", lamp.model_validate({"does": does}))
+    (found,) = components.examine(look, move=False)
+    assert (found.verdict, found.text) == (verdict, text)
+
+
+def test_a_study_needs_looks_at_what_it_uses_and_at_nothing_else() -> None:
+    registry = discover()
+    looks = of_study(load(AIMING, registry), registry)
+    assert [look.area for look in looks] == [
+        "input dual_joystick",
+        "feedback tone",
+        "view operator",
+        "view examiner",
+    ]
+    everything, left_out = of_everything(registry)
+    assert {"dual_joystick", "sonification", "view"} <= {look.name for look in everything}
+    assert left_out == ["input can: give --protocol with a study that uses it"]
+
+
+def test_the_command_says_all_as_json_and_keeps_it_for_the_record(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "study.yaml").write_text(SHORT)
+    path = str(tmp_path / "study.yaml")
+    status = main(["doctor", "--protocol", path, "--json", "--local"])
+    said = json.loads(capfd.readouterr().out)
+    areas = {check["area"] for check in said["checks"]}
+    assert areas == {"clock", "scheduling", "disk", "input dual_joystick", "lsl"}
+    failed = [check for check in said["checks"] if check["verdict"] == "FAIL"]
+    assert all(check["advice"] for check in failed)
+    assert (status == 1) == bool(failed)
+    assert any("two joysticks" in check["text"] for check in failed)
+
+    assert main(["run", path, "--participant", "P001", "--simulate", "--fast"]) == 0
+    file = tmp_path / "data" / "P001-SIMULATED" / "P001-SIMULATED.h5"
+    context = labcrane.open_recording(file).session(1).context
+    assert context["doctor"]["examination"] == said
+    at_start = context["doctor"]["at_start"]
+    assert at_start["computer"] == platform.node()
+    assert {check["area"] for check in at_start["checks"]} == {"clock", "scheduling", "disk"}
+
+
+def test_only_a_diagnosis_of_this_computer_and_of_the_last_day_counts(tmp_path: Path) -> None:
+    assert latest(tmp_path) is None
+    made = diagnosis([Check("lamp", Finding(Verdict.PASS, "the lamp is lit"))])
+    path = keep(made, tmp_path)
+    now = datetime.now(UTC)
+    assert latest(tmp_path, now + timedelta(hours=23)) == made.as_data()
+    assert latest(tmp_path, now + timedelta(hours=25)) is None
+    path.write_text(path.read_text().replace(f'"{platform.node()}"', '"another"'))
+    assert latest(tmp_path, now) is None
+    path.write_text("{}")
+    with pytest.raises(RecordingError, match=r"holds no diagnosis .* run labcrane doctor again"):
+        latest(tmp_path)

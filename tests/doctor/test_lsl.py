@@ -1,0 +1,133 @@
+"""A stream that is missing is told apart from one that is blocked, with real LSL on loopback."""
+
+import os
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from xml.etree import ElementTree
+
+import pylsl
+import pytest
+from recording.test_full_disk import needs_mounts
+
+from labcrane.doctor import lsl
+from labcrane.finding import Finding, Verdict
+from labcrane.streams.request import StreamRequest
+
+HOST = "127.0.0.1"
+NAME = f"Doctors test {os.getpid()}"
+
+
+@pytest.fixture(scope="module")
+def outlet() -> pylsl.StreamOutlet:
+    return pylsl.StreamOutlet(pylsl.StreamInfo(NAME, "EEG", 4, 250.0, "float32", "amplifier-7"))
+
+
+def about(found: list[Finding], word: str) -> Finding:
+    (one,) = [finding for finding in found if word in finding.text]
+    return one
+
+
+def test_streams_that_are_there_missing_or_wrong_are_told_apart(
+    outlet: pylsl.StreamOutlet,
+) -> None:
+    found = lsl.examine(
+        [
+            StreamRequest("eeg", name=NAME, rate_hz=250.0, channels=4),
+            StreamRequest("gaze", name="No such stream"),
+            StreamRequest("maybe", name="Nor this", required=False),
+            StreamRequest("wrong", name=NAME, channels=32),
+        ]
+    )
+    assert about(found, "of our own").verdict is Verdict.PASS
+    assert "this computer only" in about(found, "of our own").text
+    assert about(found, "stream eeg").verdict is Verdict.PASS
+    missing = about(found, "gaze")
+    assert missing.verdict is Verdict.FAIL
+    assert missing.text == "stream gaze (name 'No such stream') is not announced"
+    assert "labcrane doctor --peer" in missing.advice
+    assert about(found, "maybe").verdict is Verdict.WARN
+    assert "has 4 channels, 32 are expected" in about(found, "wrong").text
+
+
+@needs_mounts
+def test_our_own_stream_is_not_found_when_nothing_gets_through() -> None:
+    # In a network of its own in which not even loopback is up.
+    code = (
+        "from labcrane.doctor import lsl\n"
+        "for one in lsl.examine(): print(one.verdict, one.text, '|', one.advice)"
+    )
+    done = subprocess.run(
+        ["unshare", "--user", "--map-root-user", "--net", sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.startswith("FAIL a stream of our own is not found (UDP 16571) | the fire")
+
+
+@contextmanager
+def mute_ports(count: int) -> Iterator[int]:
+    """Hold consecutive UDP ports that take everything and say nothing, as a firewall does."""
+    with ExitStack() as held:
+        for first in range(36000, 60000, count):
+            try:
+                for port in range(first, first + count):
+                    each = held.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+                    each.bind((HOST, port))
+            except OSError:
+                continue
+            yield first
+            return
+
+
+def test_silence_is_a_firewall_and_a_refusal_is_a_missing_program() -> None:
+    with mute_ports(lsl.PORTS) as first:
+        (silent,) = lsl.ask_peer(HOST, first, wait_s=0.3)
+    (refused,) = lsl.ask_peer(HOST, first, wait_s=0.3)
+    assert silent.text == f"{HOST} does not say a word on UDP {first} to {first + 33}"
+    assert "a firewall stops LSL" in silent.advice
+    assert refused.text.endswith("lets LSL through, and no program sends a stream there")
+
+
+def test_a_peer_that_answers_passes(outlet: pylsl.StreamOutlet) -> None:
+    port = int(ElementTree.fromstring(outlet.get_info().as_xml()).findtext("v4service_port") or 0)
+    found = lsl.ask_peer(HOST, port)
+    one = about(found, NAME)
+    assert one.verdict is Verdict.PASS
+    assert "answers on UDP and on TCP" in one.text
+
+
+def test_a_peer_whose_tcp_is_blocked_fails(outlet: pylsl.StreamOutlet) -> None:
+    # What liblsl says of the stream, but for the port of the data, which is shut.
+    info = ElementTree.fromstring(outlet.get_info().as_xml())
+    with socket.socket() as shut, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as announcer:
+        shut.bind((HOST, 0))
+        announcer.bind((HOST, 0))
+        port = shut.getsockname()[1]
+        data_port = info.find("v4data_port")
+        assert data_port is not None
+        data_port.text = str(port)
+
+        def announce() -> None:
+            query, _ = announcer.recvfrom(4096)
+            *_, back = query.decode().strip().split("\r\n")
+            where, number = back.split()
+            answer = f"{number}\r\n".encode() + ElementTree.tostring(info)
+            announcer.sendto(answer, (HOST, int(where)))
+
+        thread = threading.Thread(target=announce)
+        thread.start()
+        found = lsl.ask_peer(HOST, announcer.getsockname()[1], wait_s=0.5)
+        thread.join()
+    one = about(found, NAME)
+    assert one.verdict is Verdict.FAIL
+    assert f"is announced, but TCP {port} is not open" in one.text
+
+
+def test_a_name_without_an_address_is_told() -> None:
+    (found,) = lsl.ask_peer("no-such-host.invalid")
+    assert found.text.startswith("no-such-host.invalid has no address")
