@@ -12,10 +12,12 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
 import numpy as np
 
+from labcrane.culprit import told
 from labcrane.errors import LabcraneError
 from labcrane.records import Frame, Run, Situation
 from labcrane.registry import Registry, discover
@@ -56,6 +58,8 @@ class HostOrder:
         What is presented.
     source
         Whose streams it follows (:attr:`labcrane.session.Visit.source`).
+    study
+        The protocol, beside which there may be plugins.
     always
         Whether it presents every frame, or only those of trials in which it is switched on.
     """
@@ -64,6 +68,7 @@ class HostOrder:
     part: Part
     run: Run
     source: str
+    study: Path
     always: bool
     cues: Mapping[str, Part] = field(default_factory=dict)
 
@@ -74,6 +79,7 @@ class HostOrder:
             "part": asdict(self.part),
             "run": write_run(self.run),
             "source": self.source,
+            "study": str(self.study.resolve()),
             "always": self.always,
             "cues": {name: asdict(part) for name, part in self.cues.items()},
         }
@@ -88,6 +94,7 @@ class HostOrder:
             Part(**found["part"]),
             read_run(found["run"]),
             found["source"],
+            Path(found["study"]),
             found["always"],
             {name: Part(**part) for name, part in found["cues"].items()},
         )
@@ -192,7 +199,7 @@ class FeedbackProcess:
         from labcrane.streams.feedback_log import FeedbackLog  # noqa: PLC0415
         from labcrane.streams.frames import FRAME, FrameInlet  # noqa: PLC0415
 
-        presenter = Presenter(self._order, discover())
+        presenter = Presenter(self._order, discover(study=self._order.study))
         try:
             presenter.open()
             log = FeedbackLog(self._order.name, self._order.source, presenter)
@@ -272,7 +279,7 @@ def main() -> int:
         say({"failed": str(error)})
         return 1
     except Exception as error:
-        say({"failed": f"{type(error).__name__}: {error}"})
+        say({"failed": told(error)})
         raise  # a plugin's mistake: its author needs the traceback
     return 0
 

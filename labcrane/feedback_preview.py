@@ -55,7 +55,7 @@ def write_preview(
         frames = movement(open_recording(recording).session(session), trial)
     written: list[Path] = []
     for order in orders:
-        presenter = Presenter(order, discover())
+        presenter = Presenter(order, discover(study=study.path))
         try:
             for cue in presenter.cues.values():
                 cue.open(run)

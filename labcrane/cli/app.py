@@ -15,6 +15,7 @@ from labcrane.cli import (
     feedback,
     inspect,
     people,
+    plugins,
     recording,
     results,
     running,
@@ -33,7 +34,8 @@ app.command("run")(running.run)
 app.command("resume")(running.resume)
 app.command("check")(inspect.check)
 app.command("plan")(inspect.plan)
-app.command("plugins")(inspect.plugins)
+app.add_typer(plugins.app, name="plugins")
+app.command("schema")(plugins.schema)
 app.command("streams")(recording.streams)
 app.command("record")(recording.record)
 app.command("recover")(recording.recover)

@@ -56,7 +56,7 @@ def consent(protocol: ProtocolPath, participant: Someone, data: DataBeside = Non
     from labcrane.registry import discover
     from labcrane.study import load
 
-    registry = discover()
+    registry = discover(study=protocol)
     study = load(protocol, registry)
     lock = verify(study, registry, today())
     text = (lock.approval["consent"], lock.consent_version)
@@ -134,7 +134,8 @@ def ask_for_consent(visit: "Visit") -> None:
     from labcrane.participants.register import read
     from labcrane.registry import discover
 
-    lock, places = verify(visit.study, discover(), today()), Places(visit.data)
+    places = Places(visit.data)
+    lock = verify(visit.study, discover(study=visit.study.path), today())
     entry = read(places).participants.get(visit.participant)
     if entry and any(given.version == lock.consent_version for given in entry.consent):
         return
