@@ -106,16 +106,15 @@ def _sheet(
     role: type[Component], offer: Offer[Component], plugin: str, machine: Machine
 ) -> OfferSheet:
     schema = offer.settings.model_json_schema()
-    shared = schema.get("$defs", {})
-    written = schema.get("properties", {})
+    fields = offer.settings.model_fields
     settings = tuple(
         Setting(
             name,
-            possible(written.get(field.alias or name, {}), shared),
-            None if field.is_required() else _default(field),
-            " ".join((field.description or "").split()),
+            possible(written, schema.get("$defs", {})),
+            None if name in schema.get("required", ()) else _default(fields[name]),
+            " ".join((fields[name].description or "").split()),
         )
-        for name, field in offer.settings.model_fields.items()
+        for name, written in schema.get("properties", {}).items()
     )
     about = " ".join((offer.settings.__doc__ or "").split("\n\n")[0].split())
     return OfferSheet(
@@ -132,9 +131,9 @@ def _sheet(
 def _default(field: FieldInfo) -> str:
     value = field.get_default(call_default_factory=True)
     plain = value.model_dump(mode="json") if hasattr(value, "model_dump") else value
-    if plain is None:
-        return "none"
-    return plain if isinstance(plain, str) else json.dumps(plain, default=str, ensure_ascii=False)
+    if isinstance(plain, str) and plain not in {"", "true", "false", "null"}:
+        return plain  # as YAML takes it
+    return json.dumps(plain, default=str, ensure_ascii=False)
 
 
 BOUNDS = {
@@ -193,5 +192,5 @@ def _example(role: type[Component], name: str, settings: tuple[Setting, ...]) ->
     lines.append(f"{inner}use: {name}")
     for setting in settings:
         value = "..." if setting.default is None else setting.default
-        lines.append(f"{inner}{setting.name}: {value.replace('none', 'null')}")
+        lines.append(f"{inner}{setting.name}: {value}")
     return "\n".join(lines)

@@ -124,5 +124,5 @@ def test_lists_checks_and_plans_are_there_for_programs(
     assert any("feedback 'spere' is not installed" in each for each in problems)
     assert main(["plan", str(protocol), "--participants", "2", "--json"]) == 0
     plans = json.loads(capsys.readouterr().out)
-    assert [each["participant"] for each in plans] == ["P000", "P001"]
+    assert [each["participant"] for each in plans] == ["P001", "P002"]
     assert all(block["trials"] == 32 for each in plans for block in each["blocks"])
