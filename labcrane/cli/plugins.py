@@ -87,6 +87,21 @@ def schema(
         out.print(f"schema: {file}", markup=False)
 
 
+def new_plugin(
+    role: Annotated[str, typer.Argument(help="input, controller, dynamics, task, cue, ...")],
+    name: Annotated[str, typer.Argument(help="what a protocol is to write after use:")],
+    into: Annotated[Path, typer.Option(help="where the folder is made")] = Path(),
+) -> None:
+    """Write a plugin that installs and passes its tests, for you to change."""
+    from labcrane.registry import discover
+    from labcrane.scaffold import write_plugin
+
+    folder = write_plugin(role, name, into, discover())
+    out.print(f"plugin: {folder}", markup=False)
+    said = f"next: pip install -e '{folder}[test]', and change {folder}/labcrane_{name}.py"
+    out.print(said, markup=False)
+
+
 def _listed(registry: "Registry") -> dict[str, object]:
     from labcrane.registry import ROLES
 
