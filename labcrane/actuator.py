@@ -6,7 +6,16 @@ from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    GetJsonSchemaHandler,
+    NonNegativeFloat,
+    PositiveFloat,
+    model_validator,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 
 class ActuatorSettings(BaseModel):
@@ -24,6 +33,13 @@ class ActuatorSettings(BaseModel):
 
     rate_limit: PositiveFloat | None = None
     """Largest change of speed, as a fraction of full joint speed per second; none by default."""
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, core: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Say that a name will do."""
+        return {"anyOf": [{"enum": list(PRESETS)}, handler(core)]}
 
     @model_validator(mode="before")
     @classmethod

@@ -77,7 +77,7 @@ def gate(visit: Visiting, today: date | None = None) -> Admission:
     places = Places(visit.data)
     visit.study.check_participant(visit.participant)
     visit.study.check_session(visit.session)
-    lock = verify(visit.study, discover(), today)
+    lock = verify(visit.study, discover(study=visit.study.path), today)
     register = read(places)
     register.check_finished()
     entry = register.participants.get(visit.participant)

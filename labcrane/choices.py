@@ -1,16 +1,18 @@
 """Which components a protocol uses, found among those installed."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 from labcrane.errors import PluginError, ProtocolError
 from labcrane.machine import Machine
 from labcrane.machine_file import find_machine, load_machine
 from labcrane.offers import Offer, Settings
+from labcrane.oversight import Oversight
 from labcrane.protocol import Protocol, Use
 from labcrane.registry import Registry
 from labcrane.roles import Component, Cue, Feedback, Questionnaire, Task
+from labcrane.watched import watched
 from labcrane.yaml_file import Place, YamlFile
 
 RoleT = TypeVar("RoleT", bound=Component)
@@ -24,10 +26,13 @@ class Choice:
     plugin: str
     offer: Offer[Component]
     settings: Settings
+    oversight: Oversight = field(default_factory=Oversight, compare=False)
 
     def build(self, machine: Machine) -> Component:
-        """Build, but do not open, the component."""
-        return self.offer.build(self.settings, machine)
+        """Build, but do not open, the component, under oversight."""
+        build = self.oversight.place(repr(self.name), self.plugin, "build", self.offer.build)
+        component = self.oversight.call(build, self.offer.build, self.settings, machine)
+        return watched(component, self.name, self.plugin, self.oversight)
 
 
 class Chooser:
@@ -36,6 +41,7 @@ class Chooser:
     def __init__(self, source: YamlFile, registry: Registry) -> None:
         self._source = source
         self._registry = registry
+        self.oversight = Oversight()
 
     def choose(self, role: type[RoleT], place: Place, default: Use | None = None) -> Choice | None:
         """Return the component that the protocol uses at ``place``, or note why there is none."""
@@ -53,7 +59,9 @@ class Chooser:
             return None
         settings = self._source.check(offer.settings, place, use.settings)
         plugin = self._registry.plugins[role][use.use]
-        return Choice(use.use, plugin, offer, settings) if settings is not None else None
+        if settings is None:
+            return None
+        return Choice(use.use, plugin, offer, settings, self.oversight)
 
     def choose_tasks(self) -> dict[str, Choice]:
         """Return the tasks that can be chosen, by the protocol's names for them."""
@@ -90,7 +98,9 @@ class Chooser:
             return None
         settings = self._source.check(offer.settings, place, {})
         plugin = self._registry.plugins[Questionnaire][name]
-        return Choice(name, plugin, offer, settings) if settings is not None else None
+        if settings is None:
+            return None
+        return Choice(name, plugin, offer, settings, self.oversight)
 
     def choose_feedback(self) -> tuple[dict[str, Choice], dict[str, Choice], dict[str, Choice]]:
         """Return cues, sounds and views by the protocol's names for them."""

@@ -3,7 +3,7 @@
 import hashlib
 import platform
 from datetime import UTC, datetime
-from importlib.metadata import version
+from importlib.metadata import entry_points, version
 from importlib.util import find_spec
 from typing import Any, Protocol
 
@@ -11,7 +11,9 @@ from labcrane.attempt import trial_units
 from labcrane.choices import Choice
 from labcrane.data_folder import DataFolder
 from labcrane.doctor.examination import at_start
+from labcrane.hookspecs import PROJECT
 from labcrane.plan import SessionPlan
+from labcrane.plugin_modules import own_plugins
 from labcrane.records import Run
 from labcrane.rig import Rig
 from labcrane.study import Study
@@ -83,6 +85,9 @@ def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> 
         "facts": the_rig.facts(),
         "versions": _versions(),
         "doctor": at_start(visit.folder.root),
+        "own_plugins": {
+            name: path.read_text(encoding="utf-8") for name, path in own_plugins(study.path).items()
+        },
         "streams": {
             label: need.model_dump(mode="json", exclude_none=True)
             for label, need in study.protocol.streams.items()
@@ -115,4 +120,5 @@ def _versions() -> dict[str, str]:
         "python": platform.python_version(),
         "system": platform.platform(),
         **{name: version(name) for name in RECORDED_PACKAGES if find_spec(name)},
+        **{each.dist.name: each.dist.version for each in entry_points(group=PROJECT) if each.dist},
     }

@@ -84,7 +84,7 @@ class Stage:
 
     def __init__(self, order: HostOrder, frame: Frame, kind: Kind, event: str) -> None:
         self._kind, self._event, self._frame = kind, event, frame
-        self._presenter = Presenter(order, discover())
+        self._presenter = Presenter(order, discover(study=order.study))
         self._name = order.name
         self._count = self._number = 0
         self._order = order

@@ -73,11 +73,11 @@ def host_orders(study: Study, run: Run, source: str) -> list[HostOrder]:
     cues = {name: _part(choice) for name, choice in study.cues.items()}
     return [
         *(
-            HostOrder(name, _part(choice), run, source, always=True, cues=cues)
+            HostOrder(name, _part(choice), run, source, study.path, always=True, cues=cues)
             for name, choice in study.views.items()
         ),
         *(
-            HostOrder(name, _part(choice), run, source, always=False)
+            HostOrder(name, _part(choice), run, source, study.path, always=False)
             for name, choice in study.sounds.items()
         ),
     ]

@@ -12,12 +12,14 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
 import numpy as np
 
+from labcrane.culprit import told
 from labcrane.delay_file import Measured, delay_in_words, measured_of
-from labcrane.errors import LabcraneError
+from labcrane.errors import LabcraneError, PluginError
 from labcrane.records import Frame, Run, Situation, Value
 from labcrane.registry import Registry, discover
 from labcrane.roles import Component, Cue, Feedback
@@ -57,6 +59,8 @@ class HostOrder:
         What is presented.
     source
         Whose streams it follows (:attr:`labcrane.session.Visit.source`).
+    study
+        The protocol, beside which there may be plugins.
     always
         Whether it presents every frame, or only those of trials in which it is switched on.
     measured
@@ -67,6 +71,7 @@ class HostOrder:
     part: Part
     run: Run
     source: str
+    study: Path
     always: bool
     cues: Mapping[str, Part] = field(default_factory=dict)
     measured: Measured | None = None
@@ -78,6 +83,7 @@ class HostOrder:
             "part": asdict(self.part),
             "run": write_run(self.run),
             "source": self.source,
+            "study": str(self.study.resolve()),
             "always": self.always,
             "cues": {name: asdict(part) for name, part in self.cues.items()},
             "measured": asdict(self.measured) if self.measured else None,
@@ -93,6 +99,7 @@ class HostOrder:
             Part(**found["part"]),
             read_run(found["run"]),
             found["source"],
+            Path(found["study"]),
             found["always"],
             {name: Part(**part) for name, part in found["cues"].items()},
             measured_of(found["measured"]) if found["measured"] else None,
@@ -162,11 +169,13 @@ class Presenter:
         for name, cue in self.cues.items():
             if name in active and frame.trial:
                 shapes += cue.draw(frame)
-                values.append(cue.values(frame))
+                values.append(_promised(f"cue {name!r}", cue, cue.values, frame))
             else:
                 values.append(np.full(Layout(name, cue.signals).size, np.nan))
         frame.shapes = tuple(shapes)
-        return np.concatenate([self.feedback.present(frame), *values])
+        said = f"feedback {self._order.name!r}"
+        shown = _promised(said, self.feedback, self.feedback.present, frame)
+        return np.concatenate([shown, *values])
 
     def _rebuild(self, name: str) -> None:
         if name in self.cues:
@@ -182,6 +191,23 @@ class Presenter:
         offer = self._registry.find(role, part.use)
         settings = {**part.settings, **self._situation.settings.get(name, {})}
         return offer.build(offer.settings.model_validate(settings), self._order.run.machine)
+
+
+def _promised(
+    said: str, component: Component, method: Callable[[Frame], FloatArray], frame: Frame
+) -> FloatArray:
+    """Return what a method says of a frame, if it is what its component's signals promise."""
+    values = method(frame)
+    size = Layout(said, component.signals).size
+    shape = getattr(values, "shape", type(values).__name__)
+    if shape != (size,):
+        code = getattr(method, "__code__", None)
+        where = f" ({code.co_filename}:{code.co_firstlineno})" if code else ""
+        raise PluginError(
+            f"{said} returned shape {shape} from {method.__name__}(){where}, and its signals "
+            f"promise ({size},)"
+        )
+    return values
 
 
 class FeedbackProcess:
@@ -204,7 +230,7 @@ class FeedbackProcess:
         from labcrane.streams.feedback_log import FeedbackLog  # noqa: PLC0415
         from labcrane.streams.frames import FRAME, FrameInlet  # noqa: PLC0415
 
-        presenter = Presenter(self._order, discover())
+        presenter = Presenter(self._order, discover(study=self._order.study))
         try:
             presenter.open()
             log = FeedbackLog(self._order.name, self._order.source, presenter)
@@ -284,7 +310,7 @@ def main() -> int:
         say({"failed": str(error)})
         return 1
     except Exception as error:
-        say({"failed": f"{type(error).__name__}: {error}"})
+        say({"failed": told(error)})
         raise  # a plugin's mistake: its author needs the traceback
     return 0
 

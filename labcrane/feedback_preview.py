@@ -58,7 +58,7 @@ def write_preview(
         frames, scene = movement(record, trial), scene_of(record, trial)
     written: list[Path] = []
     for order in orders:
-        presenter = Presenter(order, discover())
+        presenter = Presenter(order, discover(study=study.path))
         try:
             for cue in presenter.cues.values():
                 cue.open(run)

@@ -104,9 +104,9 @@ class FrameLog:
             self.trouble = None if free >= self._reserve else self._nearly_full(free)
         self._wrote = time.perf_counter() - began
 
-    def note(self, event: Event) -> None:
-        """Write an event that belongs to no frame, before the first tick."""
-        self._journal.write_event(event, 0)
+    def note(self, event: Event, tick: int = 0) -> None:
+        """Write an event that is in no frame: before the first, or found out after ``tick``."""
+        self._journal.write_event(event, tick)
 
     def close(self) -> None:
         """Write what waits, if the disk takes it now, and close the journal.

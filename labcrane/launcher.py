@@ -19,7 +19,9 @@ from labcrane.recorder_keeper import RecorderKeeper
 from labcrane.recording.parts import parts
 from labcrane.session import Visit, finish
 from labcrane.session_process import Ended, VisitOrder, serve
+from labcrane.stillness import Stillness
 from labcrane.streams.sync_report import SyncReport
+from labcrane.whereabouts import read_whereabouts
 
 if TYPE_CHECKING:
     from multiprocessing.context import SpawnProcess
@@ -38,11 +40,14 @@ class Outcome:
     ----------
     died
         Exit code of a session process that died; None when it ended in order.
+    where
+        In which component it was when it died; empty when that is not known.
     sync_report
         How right the session's time stamps are; None when nothing was recorded.
     """
 
     died: int | None = None
+    where: str = ""
     sync_report: SyncReport | None = None
 
 
@@ -102,7 +107,8 @@ class Launcher:
                 self._recorder.stop()
             if parts(visit.journal):
                 report = self.sync_report = finish(visit)
-        return Outcome(died, report)
+        where = read_whereabouts(visit.whereabouts) if died is not None else None
+        return Outcome(died, str(where or ""), report)
 
     @property
     def streams_status(self) -> dict[str, Any]:
@@ -143,6 +149,7 @@ class Launcher:
 
     def _watch(self, process: "SpawnProcess", pipe: Connection) -> int | None:
         """Return the exit code of a session that died, None of one that ended in order."""
+        stillness = Stillness(self._visit.whereabouts, self._say)
         while True:
             try:
                 for command in self._console.commands():
@@ -160,6 +167,8 @@ class Launcher:
             if process.sentinel in ready:
                 process.join()
                 return process.exitcode
+            if stillness.hangs():
+                process.kill()  # its journal is whole; the exit code is passed on as any other
             self._watch_streams(pipe)
             if self._crew:
                 for news in self._crew.watch(self._say):

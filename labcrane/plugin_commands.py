@@ -1,15 +1,12 @@
 """Find the commands that installed plugins offer."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from typing import cast
 
-import pluggy
-
-from labcrane import hookspecs
 from labcrane.errors import PluginError
-from labcrane.hookspecs import PROJECT
 from labcrane.offers import CommandOffer
+from labcrane.plugin_modules import load_plugins
 
 
 def plugin_commands(
@@ -24,13 +21,7 @@ def plugin_commands(
     PluginError
         Two plugins offer the same words.
     """
-    manager = pluggy.PluginManager(PROJECT)
-    manager.add_hookspecs(hookspecs)
-    for point in entry_points(group=PROJECT) if plugins is None else plugins:
-        try:
-            manager.register(point.load(), name=point.name)
-        except Exception:  # noqa: BLE001, S112 - noted by the registry, which says why
-            continue
+    manager = load_plugins(plugins).manager
     found: dict[tuple[str, str], CommandOffer] = {}
     owners: dict[tuple[str, str], str] = {}
     for implementation in manager.hook.labcrane_commands.get_hookimpls():

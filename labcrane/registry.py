@@ -1,17 +1,18 @@
 """Find installed plugins and look up what they offer."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from difflib import get_close_matches
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
+from pathlib import Path
 from typing import TypeVar, cast
 
 import pluggy
 
-from labcrane import hookspecs
+from labcrane.culprit import told
 from labcrane.errors import PluginError
-from labcrane.hookspecs import PROJECT
 from labcrane.offers import Offer
+from labcrane.plugin_modules import load_plugins
 from labcrane.roles import (
     Component,
     Controller,
@@ -66,12 +67,15 @@ class Registry:
     plugins
         Which plugin made each offer, by role and name.
     broken
-        Why a plugin could not be imported, by plugin.
+        What is wrong with a plugin that offers nothing, or not all it should, by plugin.
+    local
+        The files of the study's own plugins, by plugin.
     """
 
     offers: Mapping[type[Component], Mapping[str, Offer[Component]]]
     plugins: Mapping[type[Component], Mapping[str, str]]
     broken: Mapping[str, str]
+    local: Mapping[str, Path] = field(default_factory=dict)
 
     def find(self, role: type[RoleT], name: str) -> Offer[RoleT]:
         """Return the offer called ``name``, or say what there is instead."""
@@ -88,40 +92,43 @@ class Registry:
         raise PluginError(message)
 
 
-def discover(plugins: Iterable[EntryPoint] | None = None) -> Registry:
-    """Import every plugin in the ``labcrane`` entry-point group and collect its offers.
+def discover(plugins: Iterable[EntryPoint] | None = None, *, study: Path | None = None) -> Registry:
+    """Import every plugin in the ``labcrane`` entry-point group and collect what it offers.
 
     A plugin that cannot be imported is noted, not raised: a missing audio library must not
     stop a study that makes no sound.
+
+    Parameters
+    ----------
+    study
+        A protocol; the plugins in the folder beside it are collected as well.
+
+    Raises
+    ------
+    PluginError
+        Two plugins offer the same name, so that nobody could say which is meant.
     """
-    manager = pluggy.PluginManager(PROJECT)
-    manager.add_hookspecs(hookspecs)
-    broken: dict[str, str] = {}
-    for point in entry_points(group=PROJECT) if plugins is None else plugins:
-        try:
-            manager.register(point.load(), name=point.name)
-        except Exception as error:  # noqa: BLE001 - someone else's import can raise anything
-            broken[point.name] = f"{type(error).__name__}: {error}"
-    try:
-        manager.check_pending()
-    except pluggy.PluginValidationError as error:
-        raise PluginError(f"misspelt hook: {error}") from error
+    modules = load_plugins(plugins, study)
     offers: dict[type[Component], dict[str, Offer[Component]]] = {}
     origins: dict[type[Component], dict[str, str]] = {}
     for role in ROLES:
-        offers[role], origins[role] = _collect(manager, role)
-    return Registry(offers, origins, broken)
+        offers[role], origins[role] = _collect(modules.manager, role, modules.broken)
+    return Registry(offers, origins, modules.broken, modules.local)
 
 
 def _collect(
-    manager: pluggy.PluginManager, role: type[Component]
+    manager: pluggy.PluginManager, role: type[Component], broken: dict[str, str]
 ) -> tuple[dict[str, Offer[Component]], dict[str, str]]:
     hook: pluggy.HookCaller = getattr(manager.hook, ROLES[role].hook)
     found: dict[str, Offer[Component]] = {}
     origins: dict[str, str] = {}
     for implementation in hook.get_hookimpls():
         plugin = implementation.plugin_name
-        offers = cast("Sequence[Offer[Component]]", implementation.function())
+        try:
+            offers = _offers(implementation)
+        except Exception as error:  # noqa: BLE001 - someone else's hook can raise anything
+            broken[plugin] = str(error) if isinstance(error, PluginError) else told(error)
+            continue
         for offer in offers:
             if offer.name in found:
                 raise PluginError(
@@ -131,3 +138,13 @@ def _collect(
             found[offer.name] = offer
             origins[offer.name] = plugin
     return found, origins
+
+
+def _offers(implementation: pluggy.HookImpl) -> list[Offer[Component]]:
+    offers: object = implementation.function()
+    if isinstance(offers, list | tuple) and all(isinstance(each, Offer) for each in offers):
+        return cast("list[Offer[Component]]", list(offers))
+    raise PluginError(
+        f"{implementation.function.__name__} must return a list of labcrane.offer(...), not "
+        f"{offers!r}"
+    )

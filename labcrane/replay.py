@@ -122,7 +122,7 @@ def replay(
             "not part of the input, so only sessions of one piece can be replayed"
         )
     with TemporaryDirectory(prefix="labcrane-replay-") as folder:
-        study = load(restore(record, Path(folder), protocol, machine), discover())
+        study = load(restore(record, Path(folder), protocol, machine), discover(study=protocol))
     parts = differing_parts(record, study)
     return _run(record, study, session, parts, speed, sinks)
 

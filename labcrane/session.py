@@ -14,7 +14,7 @@ from labcrane.console import Console
 from labcrane.context import context
 from labcrane.course import Course
 from labcrane.data_folder import DataFolder
-from labcrane.errors import ProtocolError
+from labcrane.errors import DeviceError, PluginError, ProtocolError
 from labcrane.frame_log import FrameLog, columns, frame_bytes
 from labcrane.plan import SessionPlan, plan_session
 from labcrane.progress import Policy, Progress, progress, remaining, within_limits
@@ -23,8 +23,10 @@ from labcrane.recording.journal import SessionJournal
 from labcrane.recording.participant_file import consolidate
 from labcrane.recording.parts import journal_path, next_part, parts
 from labcrane.records import Event, Frame, Phase, Run
+from labcrane.slowness import Slowness
 from labcrane.streams.sync_report import SyncReport
 from labcrane.study import Study
+from labcrane.whereabouts import Whereabouts, read_whereabouts, whereabouts_path
 
 RESERVE_S = 60.0
 """Seconds of recording for which the disk must always have room; below it the session pauses."""
@@ -78,6 +80,11 @@ class Visit:
         return journal_path(self.folder.path, self.session, "run")
 
     @property
+    def whereabouts(self) -> Path:
+        """The file that says in which component it is, while it runs and after it has died."""
+        return whereabouts_path(self.journal)
+
+    @property
     def streams_journal(self) -> Path:
         """The first part of the journal of the streams of others."""
         return journal_path(self.folder.path, self.session, "streams")
@@ -129,7 +136,11 @@ def record(visit: Visit, console: Console) -> None:
         visit.folder.claim(visit.session)
     the_rig = rig.build(study, simulated=visit.simulated)
     clock: Clock = ManualClock() if visit.fast else SystemClock()
-    with rig.opened(the_rig, study, plan.seed) as this_run:
+    died = read_whereabouts(visit.whereabouts) if visit.resumed else None
+    with (
+        study.oversight.published(visit.whereabouts),
+        rig.opened(the_rig, study, plan.seed) as this_run,
+    ):
         if so_far is not None and so_far.angles:
             the_rig.dynamics.reset(within_limits(study, so_far.angles))
         second = frame_bytes(this_run) * this_run.rate_hz
@@ -139,11 +150,20 @@ def record(visit: Visit, console: Console) -> None:
         journal = SessionJournal(next_part(visit.journal), columns(this_run), this_run.rate_hz)
         log = FrameLog(journal, this_run, reserve=round(RESERVE_S * second))
         try:
-            for event in _opening(about, so_far, clock.now()):
+            for event in _opening(about, so_far, died, clock.now()):
                 log.note(event)
             with _outlets(visit, plan, this_run) as outlets:
-                onlookers = (*outlets, _teller(console))
+                onlookers = [*outlets, _teller(console)]
+                if not visit.fast:
+                    onlookers.append(Slowness(study.oversight, this_run.rate_hz, log, console))
                 loop.run(the_rig, this_run, course, clock, console, log, onlookers)
+        except (PluginError, DeviceError) as error:
+            log.note(Event("session.failed", clock.now(), {"why": str(error)}))
+            error.add_note(
+                "what was recorded until then is in the participant file; go on with: labcrane "
+                f"resume {study.path} --participant {visit.participant} --session {visit.session}"
+            )
+            raise
         finally:
             log.close()
 
@@ -159,9 +179,13 @@ def _go_on(visit: Visit, whole: SessionPlan) -> tuple[Progress, SessionPlan]:
     return so_far, remaining(visit.study, whole, so_far, policy)
 
 
-def _opening(about: Mapping[str, Any], so_far: Progress | None, now: float) -> Iterator[Event]:
+def _opening(
+    about: Mapping[str, Any], so_far: Progress | None, died: Whereabouts | None, now: float
+) -> Iterator[Event]:
     """Yield what is to be known before the first tick."""
     yield Event("session.start", now, about)
+    if died is not None:
+        yield Event("session.died", now, {"where": str(died), "died_in_tick": died.tick})
     if so_far is not None and so_far.interrupted is not None:
         # The dead process could not close its trial; it is a row like any other.
         lost = {**so_far.interrupted, "outcome": str(Phase.INTERRUPTED)}

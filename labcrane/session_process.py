@@ -43,7 +43,7 @@ class VisitOrder:
     def visit(self) -> Visit:
         """Load the study and return the visit."""
         return Visit(
-            load(self.protocol, discover()),
+            load(self.protocol, discover(study=self.protocol)),
             self.participant,
             self.session,
             self.data,

@@ -9,6 +9,7 @@ from pathlib import Path
 from labcrane.choices import Choice, Chooser
 from labcrane.errors import ProtocolError
 from labcrane.machine import Machine
+from labcrane.oversight import Oversight
 from labcrane.protocol import DEFAULT_OPERATOR, Protocol, read
 from labcrane.registry import Registry
 from labcrane.roles import Controller, Dynamics, InputDevice, Questionnaire, Task
@@ -37,6 +38,8 @@ class Study:
     cues, sounds, views
         What presents the session to people, by the protocol's names: cues and sounds are switched
         on block by block, views are always there.
+    oversight
+        Watches over all components that are built.
     """
 
     path: Path
@@ -55,6 +58,7 @@ class Study:
     cues: dict[str, Choice] = field(default_factory=dict)
     sounds: dict[str, Choice] = field(default_factory=dict)
     views: dict[str, Choice] = field(default_factory=dict)
+    oversight: Oversight = field(default_factory=Oversight)
 
     @property
     def sha256(self) -> str:
@@ -205,4 +209,5 @@ def load(path: Path, registry: Registry) -> Study:
         cues=cues,
         sounds=sounds,
         views=views,
+        oversight=chooser.oversight,
     )

@@ -10,7 +10,7 @@ from typing import Any
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from labcrane.approval.source_tree import hashes
+from labcrane.approval.source_tree import digest, hashes
 from labcrane.errors import ProtocolError
 from labcrane.hookspecs import PROJECT
 from labcrane.registry import Registry
@@ -18,6 +18,9 @@ from labcrane.study import Study
 from labcrane.yaml_file import YamlFile
 
 DATA = frozenset({".yaml", ".yml", ".json"})
+OWN = "the study's own"
+"""What stands for the version of a file in the study's plugins folder."""
+
 WORDS_ONLY = frozenset({"study", "title", "participants", "operator", "labcrane"})
 """Keys of a protocol under which no plugin for people is named."""
 
@@ -188,7 +191,13 @@ def _plugins(
     for offers in registry.plugins.values():
         used |= {plugin for name, plugin in offers.items() if name in said}
     points = {point.name: point for point in plugins or entry_points(group=PROJECT)}
-    return {name: _plugin(points[name]) for name in sorted(used)}
+    found = {name: _plugin(points[name]) for name in sorted(used - registry.local.keys())}
+    # Every file in the study's own folder runs when the study is read, whatever it offers.
+    own = {
+        name: {"version": OWN, "files": {name: digest(path)}}
+        for name, path in registry.local.items()
+    }
+    return found | own
 
 
 def _plugin(point: EntryPoint) -> dict[str, Any]:

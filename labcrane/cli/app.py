@@ -16,6 +16,7 @@ from labcrane.cli import (
     feedback,
     inspect,
     people,
+    plugins,
     recording,
     results,
     running,
@@ -34,8 +35,10 @@ app.command("run")(running.run)
 app.command("resume")(running.resume)
 app.command("check")(inspect.check)
 app.command("plan")(inspect.plan)
-app.command("plugins")(inspect.plugins)
 app.command("doctor")(doctor.doctor)
+app.add_typer(plugins.app, name="plugins")
+app.command("schema")(plugins.schema)
+app.command("new-plugin")(plugins.new_plugin)
 app.command("streams")(recording.streams)
 app.command("record")(recording.record)
 app.command("recover")(recording.recover)

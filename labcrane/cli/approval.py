@@ -22,7 +22,7 @@ def approve(
     from labcrane.registry import discover
     from labcrane.study import load
 
-    registry = discover()
+    registry = discover(study=protocol)
     grant = decision.Grant(board, reference, a_date(valid_until), consent)
     lock = decision.approve(load(protocol, registry), registry, grant, today())
     materials = lock.content["materials"]
@@ -49,7 +49,7 @@ def amend(
     from labcrane.registry import discover
     from labcrane.study import load
 
-    registry, old = discover(), read_lock(protocol)
+    registry, old = discover(study=protocol), read_lock(protocol)
     grant = decision.Grant(
         board or old.approval["board"],
         reference,

@@ -61,7 +61,7 @@ def missing_consent(visit: "Visit") -> Missing | None:
     from labcrane.registry import discover
 
     visit.study.check_participant(visit.participant)
-    lock = verify(visit.study, discover(), today())
+    lock = verify(visit.study, discover(study=visit.study.path), today())
     entry = read(Places(visit.data)).participants.get(visit.participant)
     if entry and any(given.version == lock.consent_version for given in entry.consent):
         return None

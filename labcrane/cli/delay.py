@@ -52,7 +52,7 @@ def _measure(
     from labcrane.registry import discover
     from labcrane.study import load
 
-    study = load(protocol, discover())
+    study = load(protocol, discover(study=protocol))
     there = list(study.views if word == "view" else study.sounds)
     if name is None and len(there) == 1:
         name = there[0]

@@ -73,7 +73,7 @@ def _examine(
     from labcrane.registry import discover
     from labcrane.study import load
 
-    registry = discover()
+    registry = discover(study=protocol)
     study = load(protocol, registry) if protocol else None
     folder = data or (protocol.parent if protocol else Path()) / "data"
     needed = _session_bytes(study) if study else disk.NEEDED_BYTES

@@ -23,6 +23,6 @@ def preview(
     from labcrane.registry import discover
     from labcrane.study import load
 
-    study = load(protocol, discover())
+    study = load(protocol, discover(study=protocol))
     for path in write_preview(study, folder, recording, session, trial):
         out.print(str(path), markup=False)

@@ -1,12 +1,20 @@
-"""Commands that look and run nothing: check, plan, plugins."""
+"""Commands that look and run nothing: check and plan."""
 
+import json
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.table import Table
 
+from labcrane.errors import ProtocolError
+
+if TYPE_CHECKING:
+    from labcrane.plan import SessionPlan
+
+AsJson = Annotated[bool, typer.Option("--json", help="for programs")]
 ProtocolPath = Annotated[Path, typer.Argument(metavar="PROTOCOL", help="the study's YAML file")]
 
 out = Console(soft_wrap=True, highlight=False)
@@ -20,12 +28,20 @@ def whole_table(*titles: str) -> Table:
     return table
 
 
-def check(protocol: ProtocolPath) -> None:
+def check(protocol: ProtocolPath, as_json: AsJson = False) -> None:
     """Check a protocol and everything it refers to, without running it."""
     from labcrane.registry import discover
     from labcrane.study import load
 
-    study = load(protocol, discover())
+    try:
+        study = load(protocol, discover(study=protocol))
+    except ProtocolError as error:
+        if as_json:
+            typer.echo(json.dumps({"fine": False, "problems": str(error).splitlines()}))
+        raise
+    if as_json:
+        typer.echo(json.dumps({"fine": True, "problems": [], "study": study.protocol.study}))
+        return
     sessions = len(study.protocol.sessions)
     out.print(
         f"{protocol}: study {study.protocol.study!r} is fine: {sessions} "
@@ -45,6 +61,7 @@ def plan(
     export: Annotated[
         Path | None, typer.Option(help="write the whole allocation into this CSV file as well")
     ] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Show blocks, each participant's order, and how long a session is likely to take."""
     from labcrane.allocation import allocate, as_csv, balance
@@ -54,48 +71,67 @@ def plan(
     from labcrane.registry import discover
     from labcrane.study import load
 
-    study = load(protocol, discover())
+    study = load(protocol, discover(study=protocol))
     count = participants or study.protocol.participants.planned
     names = [participant] if participant else pseudonyms(study.protocol.participants.pattern, count)
-    for number, session in enumerate(study.protocol.sessions, start=1):
-        table = whole_table("participant", "slot", "seed", "block", "trials", "order", "minutes")
-        for name in names:
-            session_plan = plan_session(study, name, number)
-            for block in session_plan.blocks:
-                counted = sum(trial.planned.counted for trial in block.trials)
-                table.add_row(
-                    name,
-                    f"{session_plan.slot}{f' {block.group}' if block.group else ''}",
-                    str(session_plan.seed),
-                    f"{block.number} {block.name}{' (practice)' if block.practice else ''}",
-                    str(counted),
-                    "; ".join(
-                        f"{factor}: {', '.join(levels)}" for factor, levels in block.levels.items()
-                    ),
-                    f"{block.expected_s / 60:.1f}",
-                )
-        whole = plan_session(study, names[0], number).expected_s / 60
-        out.print(f"session {number} {session.name!r}: about {whole:.0f} minutes")
-        out.print(table)
+    plans = [
+        [plan_session(study, name, number) for name in names]
+        for number, _ in enumerate(study.protocol.sessions, start=1)
+    ]
     allotments = allocate(study, dict.fromkeys(names))
+    if export:
+        write_text(export, as_csv(allotments), SHARED_FILE)
+    if as_json:
+        typer.echo(json.dumps([_row(each) for session in plans for each in session], indent=1))
+        return
+    for session in plans:
+        _print(session)
     if not participant:
         for line in balance(study, allotments):
             out.print(line, markup=False)
     if export:
-        write_text(export, as_csv(allotments), SHARED_FILE)
         out.print(f"allocation: {export}", markup=False)
 
 
-def plugins() -> None:
-    """List what installed plugins offer."""
-    from labcrane.registry import ROLES, discover
+def _row(session: "SessionPlan") -> dict[str, object]:
+    return {
+        "participant": session.participant,
+        "session": session.number,
+        "name": session.name,
+        "slot": session.slot,
+        "seed": session.seed,
+        "expected_s": session.expected_s,
+        "blocks": [
+            {
+                "number": block.number,
+                "name": block.name,
+                "practice": block.practice,
+                "group": block.group,
+                "trials": sum(trial.planned.counted for trial in block.trials),
+                "levels": {factor: list(levels) for factor, levels in block.levels.items()},
+                "expected_s": block.expected_s,
+            }
+            for block in session.blocks
+        ],
+    }
 
-    registry = discover()
-    table = Table("role", "name", "plugin", "settings")
-    for role, entry in ROLES.items():
-        for name, offer in sorted(registry.offers[role].items()):
-            settings = ", ".join(offer.settings.model_fields)
-            table.add_row(entry.word, name, registry.plugins[role][name], settings)
+
+def _print(plans: "Sequence[SessionPlan]") -> None:
+    table = whole_table("participant", "slot", "seed", "block", "trials", "order", "minutes")
+    for plan in plans:
+        for block in plan.blocks:
+            counted = sum(trial.planned.counted for trial in block.trials)
+            table.add_row(
+                plan.participant,
+                f"{plan.slot}{f' {block.group}' if block.group else ''}",
+                str(plan.seed),
+                f"{block.number} {block.name}{' (practice)' if block.practice else ''}",
+                str(counted),
+                "; ".join(
+                    f"{factor}: {', '.join(levels)}" for factor, levels in block.levels.items()
+                ),
+                f"{block.expected_s / 60:.1f}",
+            )
+    whole = plans[0].expected_s / 60
+    out.print(f"session {plans[0].number} {plans[0].name!r}: about {whole:.0f} minutes")
     out.print(table)
-    for plugin, why in registry.broken.items():
-        out.print(f"plugin {plugin!r} is broken: {why}", markup=False, style="red")

@@ -52,7 +52,7 @@ def consent(protocol: ProtocolPath, participant: Someone, data: DataBeside = Non
     from labcrane.registry import discover
     from labcrane.study import load
 
-    registry = discover()
+    registry = discover(study=protocol)
     study = load(protocol, registry)
     lock = verify(study, registry, today())
     text = (lock.approval["consent"], lock.consent_version)

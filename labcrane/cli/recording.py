@@ -124,6 +124,8 @@ def _recover(folder: Path) -> None:
             out.print(f"{where}: {kept}{samples}", markup=False)
             for note in each.done.notes:
                 out.print(f"  {note}", markup=False)
+        if each.where:
+            out.print(f"  its process was last in {each.where}", markup=False)
     if not found:
         out.print(f"no journals below {folder}", markup=False)
     if problems := sum(bool(each.problem) for each in found):

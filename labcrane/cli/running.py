@@ -161,7 +161,8 @@ def _launch(order: "VisitOrder", *, page: bool) -> None:
         out.print(f"participant file: {visit.folder.participant_file}", markup=False)
     if outcome.died is not None:
         raise LabcraneError(
-            f"the session process died with exit code {outcome.died}; what it recorded is in the "
+            f"the session process died with exit code {outcome.died}"
+            f"{f' in {outcome.where}' if outcome.where else ''}; what it recorded is in the "
             f"participant file; go on with: labcrane resume {order.protocol} --participant "
             f"{order.participant} --session {order.session}"
         )

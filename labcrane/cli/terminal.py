@@ -235,7 +235,7 @@ def _event_line(event: Event) -> str | None:
             return f"break of {data['seconds']:g} s"
         case "block.start":
             return f"block {data['block']}: {data['block_name']}"
-        case "input.lost" | "disk.lost":
+        case "input.lost" | "disk.lost" | "plugin.slow":
             return f"{event.name.upper().replace('.', ' ')}: {data['why']}"
         case "stream.lost":
             return f"STREAM LOST: {data['what']}"

@@ -1,6 +1,6 @@
 """What a protocol may say about its design."""
 
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import Field, PositiveInt, field_validator
 
@@ -22,6 +22,9 @@ class Order(Settings):
     """How often a level may come in a row, where the order is random."""
 
 
+RuleName = Annotated[str, Field(json_schema_extra={"enum": sorted(RULES)})]
+"""A rule in its short form; only a schema needs it, the long form is checked."""
+
 AS_WRITTEN = Order(rule="as_written")
 
 
@@ -37,7 +40,7 @@ class Design(Settings):
     ``{pairs: {rule: shuffled, times: 3, in_a_row: 2}}``. Factors that are not named come as
     written."""
 
-    @field_validator("order", mode="before")
+    @field_validator("order", mode="before", json_schema_input_type=dict[str, RuleName | Order])
     @classmethod
     def _rules_exist(cls, order: Any) -> Any:
         if not isinstance(order, dict):

@@ -37,12 +37,15 @@ class Look:
         The component's name.
     settings
         As the protocol has them.
+    study
+        The protocol, beside which there may be plugins.
     """
 
     area: str
     role: str
     name: str
     settings: Settings
+    study: Path | None = None
 
 
 def of_study(study: Study, registry: Registry) -> list[Look]:
@@ -58,7 +61,7 @@ def of_study(study: Study, registry: Registry) -> list[Look]:
         for offer in offers.values()
     }
     return [
-        Look(area, words[id(choice.offer)], choice.name, choice.settings)
+        Look(area, words[id(choice.offer)], choice.name, choice.settings, study.path)
         for area, choice in chosen.items()
         if choice.offer.examine is not None
     ]
@@ -121,7 +124,7 @@ def _look(pipe: Connection, look: Look, move: bool, complaints: str) -> None:  #
     # Sound libraries fill the terminal with what they did not find; it is kept for a crash.
     with Path(complaints).open("a") as file:
         os.dup2(file.fileno(), sys.stderr.fileno())
-    registry = discover()
+    registry = discover(study=look.study)
     (role,) = (role for role, entry in ROLES.items() if entry.word == look.role)
     examine = registry.offers[role][look.name].examine
     assert examine is not None  # noqa: S101 - why it is looked at

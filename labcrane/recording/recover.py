@@ -8,6 +8,7 @@ from labcrane.recording.foreign_streams import Conclude
 from labcrane.recording.hdf5_columns import texts_of
 from labcrane.recording.participant_file import Consolidated, consolidate, group_name, opened
 from labcrane.recording.parts import journal_path, parts, session_of
+from labcrane.whereabouts import read_whereabouts, whereabouts_path
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,12 +23,15 @@ class Recovery:
         What was put into it; None when it was in it already, or could not be.
     problem
         Why it could not be; empty otherwise.
+    where
+        In which component the session's process died; empty when it did not, or is not known.
     """
 
     path: Path
     session: int
     done: Consolidated | None = None
     problem: str = ""
+    where: str = ""
 
 
 def recover(folder: Path, conclude: Conclude | None = None) -> list[Recovery]:
@@ -55,10 +59,11 @@ def _recover(folder: Path, session: int, conclude: Conclude | None) -> Recovery:
     path = folder / f"{folder.resolve().name}.h5"
     firsts = [journal_path(folder, session, kind) for kind in ("run", "streams")]
     journals = [first for first in firsts if parts(first)]
+    where = str(read_whereabouts(whereabouts_path(firsts[0])) or "")
     try:
         if _is_current(path, session, journals):
-            return Recovery(path, session)
-        return Recovery(path, session, consolidate(path, journals, conclude))
+            return Recovery(path, session, where=where)
+        return Recovery(path, session, consolidate(path, journals, conclude), where=where)
     except RecordingError as error:
         return Recovery(path, session, problem=str(error))
 

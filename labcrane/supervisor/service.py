@@ -78,7 +78,7 @@ def serve(order: PageOrder, pipe: Connection) -> None:
     from fastapi import FastAPI  # noqa: PLC0415
     from nicegui import ui  # noqa: PLC0415 - loads for a second
 
-    study = load(order.protocol, discover())
+    study = load(order.protocol, discover(study=order.protocol))
     plan = plan_session(study, order.participant, order.session)
     lock = threading.Lock()
 

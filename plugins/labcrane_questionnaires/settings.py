@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import ConfigDict, Field, ValidationInfo, field_validator, model_validator
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
@@ -52,8 +52,16 @@ class LabText(Settings):
     """Words at the highest end of every scale."""
 
 
+def _only_the_file(schema: dict[str, Any]) -> None:
+    """Leave out what is read from the file: nobody writes it into a protocol."""
+    del schema["properties"]["text"]
+    schema["required"].remove("text")
+
+
 class LabTextSettings(Settings):
     """Of a questionnaire whose words the lab has to bring."""
+
+    model_config = ConfigDict(json_schema_extra=_only_the_file)
 
     file: StudyPath
     """YAML file with the words, beside the protocol: rights, items, and perhaps title, left and

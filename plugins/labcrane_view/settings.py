@@ -74,7 +74,11 @@ def _named(value: Any) -> Any:
     return CAMERAS[value]
 
 
-Camera = Annotated[CameraSettings, BeforeValidator(_named)]
+CameraName = Annotated[str, Field(json_schema_extra={"enum": list(CAMERAS)})]
+Camera = Annotated[
+    CameraSettings,
+    BeforeValidator(_named, json_schema_input_type=CameraName | CameraSettings),
+]
 
 
 class PatchSettings(Settings):

@@ -286,6 +286,7 @@ def presenter(*, always: bool) -> Presenter:
         Part("notebook", {}),
         a_run(ch8(), task=TARGETS),
         "test",
+        Path("study.yaml"),
         always=always,
         cues={"ball": Part("sphere", {"at": "tip"})},
     )

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import labcrane
 from labcrane import Dynamics, PluginError, Task
 from labcrane.registry import ROLES, discover
 
@@ -75,7 +76,8 @@ def test_a_plugin_that_raises_anything_on_import_is_noted(
     (tmp_path / "raises_on_import.py").write_text("1 / 0\n")
     monkeypatch.syspath_prepend(tmp_path)
     registry = discover([point("zero", "raises_on_import")])
-    assert registry.broken == {"zero": "ZeroDivisionError: division by zero"}
+    where = tmp_path / "raises_on_import.py"
+    assert registry.broken == {"zero": f"ZeroDivisionError: division by zero ({where}:1)"}
 
 
 def test_two_plugins_may_not_offer_the_same_name(
@@ -90,10 +92,54 @@ def test_two_plugins_may_not_offer_the_same_name(
         discover([point("a", "labcrane_aiming"), point("b", "copycat")])
 
 
-def test_misspelt_hook_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "typo_in_hook.py").write_text(
-        "import labcrane\n@labcrane.hookimpl\ndef labcrane_dynamic(): return []\n"
-    )
+BROKEN = {
+    "import labcrane\n@labcrane.hookimpl\ndef labcrane_task(): return []\n": (
+        "unknown hook 'labcrane_task'; did you mean 'labcrane_tasks'?"
+    ),
+    "labcrane_api = 2\n": (
+        "it is built for plugin interface 2, and this labcrane has 1; install a newer labcrane, or "
+        "see docs/compatibility.md"
+    ),
+    "labcrane_api = 0\n": (
+        "it is built for plugin interface 0, and this labcrane has 1; install a newer version of "
+        "the plugin, or see docs/compatibility.md"
+    ),
+    "from labcrane import Crane\n": (
+        f"ImportError: cannot import name 'Crane' from 'labcrane' ({labcrane.__file__}) (FILE:1)"
+    ),
+    "import sys\nsys.exit('no licence')\n": "SystemExit: no licence (FILE:2)",
+    "def labcrane_cues(:\n": "SyntaxError: invalid syntax (plugin_FILE, line 1)",
+    "import labcrane\n@labcrane.hookimpl\ndef labcrane_cues():\n    return 1 / 0\n": (
+        "ZeroDivisionError: division by zero (FILE:4)"
+    ),
+    "import labcrane\n@labcrane.hookimpl\ndef labcrane_cues():\n    return 'arrow'\n": (
+        "labcrane_cues must return a list of labcrane.offer(...), not 'arrow'"
+    ),
+}
+
+
+@pytest.mark.parametrize(("number", "source"), [*enumerate(BROKEN)])
+def test_a_plugin_that_does_not_fit_is_named_and_the_others_go_on(
+    number: int, source: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = f"plugin_that_does_not_fit_{number}"
+    path = tmp_path / f"{module}.py"
+    path.write_text(source)
     monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(PluginError, match="unknown hook 'labcrane_dynamic' in plugin"):
-        discover([point("typo", "typo_in_hook")])
+    registry = discover([point("misfit", module), point("aiming", "labcrane_aiming")])
+    why = BROKEN[source].replace("plugin_FILE", path.name).replace("FILE", str(path))
+    assert registry.broken == {"misfit": why}
+    assert registry.find(Task, "aiming").name == "aiming"
+
+
+def test_the_line_of_a_plugin_is_told_though_a_library_raised(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "in_two_files"
+    package.mkdir()
+    (package / "__init__.py").write_text("import in_two_files.lamp\n")
+    (package / "lamp.py").write_text("import json\n\njson.loads('{')\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    (why,) = discover([point("lamp", "in_two_files")]).broken.values()
+    assert why.startswith("JSONDecodeError: ")
+    assert why.endswith(f"({package / 'lamp.py'}:3)")

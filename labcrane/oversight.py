@@ -1,0 +1,146 @@
+"""Watches over components: which one is running, how long it takes, whether it keeps its word.
+
+Every call of a component that fails becomes a :class:`PluginError` that names component, plugin,
+tick and line. Errors of labcrane's own kind pass as they are: they are the plugin's own words.
+"""
+
+import inspect
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ParamSpec, TypeVar
+
+import numpy as np
+
+from labcrane.culprit import told
+from labcrane.errors import LabcraneError, PluginError
+from labcrane.signals import FloatArray, Layout
+from labcrane.whereabouts import SHIFT, Place, WhereaboutsFile
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+@dataclass(slots=True)
+class Overrun:
+    """Calls of one method that took longer than a tick may."""
+
+    calls: int = 0
+    worst_s: float = 0.0
+
+
+class Oversight:
+    """What is known of all components of one study.
+
+    Attributes
+    ----------
+    patience_s
+        A call that takes longer is an overrun; a tick's period, once a session runs.
+    overruns
+        By place; whoever tells of them takes them out.
+    """
+
+    def __init__(self) -> None:
+        self.patience_s = float("inf")
+        self.overruns: dict[Place, Overrun] = {}
+        self._places: list[Place] = []
+        self._number = memoryview(bytearray(8)).cast("q")
+        self._base = 0
+        self._inside = 0
+
+    @property
+    def tick(self) -> int:
+        """Number of the tick under way, -1 before the first."""
+        return (self._base >> SHIFT) - 1
+
+    def begin_tick(self, number: int) -> None:
+        """Take note of the tick that begins."""
+        self._base = (number + 1) << SHIFT
+
+    @contextmanager
+    def published(self, path: Path) -> Iterator[None]:
+        """Say in a file where the session is; the file goes when that ends in order."""
+        file = WhereaboutsFile(path, self._places)
+        private, self._number = self._number, file.number
+        try:
+            yield
+        finally:
+            self._number = private
+            file.close()
+
+    def place(
+        self, component: str, plugin: str, method: str, function: Callable[..., object]
+    ) -> int:
+        """Return the number of a method, for :meth:`call`."""
+        self._places.append(Place(component, plugin, method, _source(function)))
+        return len(self._places)
+
+    def call(self, number: int, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """Call a component's method.
+
+        Raises
+        ------
+        PluginError
+            It raised something that is none of labcrane's errors, or wanted to end the process.
+        """
+        before, self._inside = self._inside, number
+        self._number[0] = self._base + number
+        began = time.perf_counter()
+        try:
+            result = function(*args, **kwargs)
+        except LabcraneError:
+            raise
+        except (Exception, SystemExit) as error:
+            raise PluginError(
+                self.complaint(number, f"raised {told(error, _module(function))}")
+            ) from error
+        finally:
+            self._inside = before
+            self._number[0] = self._base + before
+        took = time.perf_counter() - began
+        if took > self.patience_s:
+            overrun = self.overruns.setdefault(self._places[number - 1], Overrun())
+            overrun.calls += 1
+            overrun.worst_s = max(overrun.worst_s, took)
+        return result
+
+    def check(self, number: int, values: FloatArray, layout: Layout, *, finite: bool) -> None:
+        """Check what a method returned against what the component's signals promise.
+
+        Raises
+        ------
+        PluginError
+            It is no array of that shape, or holds what is no number.
+        """
+        if type(values) is not np.ndarray or values.dtype != np.float64:
+            kind = getattr(values, "dtype", type(values).__name__)
+            raise PluginError(
+                self.complaint(number, f"returned {kind}, and not an array of float64")
+            )
+        if values.shape != (layout.size,):
+            promised = f"its signals promise ({layout.size},)"
+            raise PluginError(
+                self.complaint(number, f"returned shape {values.shape}, and {promised}")
+            )
+        # The product is a number when all are, and costs half a microsecond.
+        if finite and not np.isfinite(values @ values) and not np.isfinite(values).all():
+            wrong = zip(layout.columns, values.tolist(), strict=True)
+            named = ", ".join(f"{name} {x}" for name, x in wrong if not np.isfinite(x))
+            raise PluginError(self.complaint(number, f"returned {named}"))
+
+    def complaint(self, number: int, what: str) -> str:
+        """Return what a method did wrong, with all that is known of it."""
+        when = f" in tick {self.tick}" if self.tick >= 0 else ""
+        return f"{self._places[number - 1]}, {what}{when}"
+
+
+def _module(function: Callable[..., object]) -> Path | None:
+    code = getattr(inspect.unwrap(function), "__code__", None)
+    return Path(code.co_filename) if code else None
+
+
+def _source(function: Callable[..., object]) -> str:
+    code = getattr(inspect.unwrap(function), "__code__", None)
+    return f"{code.co_filename}:{code.co_firstlineno}" if code else "no source"

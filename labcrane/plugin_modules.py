@@ -1,0 +1,122 @@
+"""Import plugins: those that are installed, and the files in a study's own folder."""
+
+import hashlib
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from difflib import get_close_matches
+from importlib.machinery import SourceFileLoader
+from importlib.metadata import EntryPoint, entry_points
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from types import CodeType, ModuleType
+
+import pluggy
+
+from labcrane import hookspecs
+from labcrane.culprit import told
+from labcrane.errors import PluginError
+from labcrane.hookspecs import API, PROJECT
+
+FOLDER = "plugins"
+"""Where a study keeps plugins of its own, beside its protocol."""
+
+
+@dataclass(frozen=True, slots=True)
+class Modules:
+    """The plugins that could be imported, and why others could not.
+
+    Attributes
+    ----------
+    manager
+        Knows their hooks.
+    broken
+        What is wrong with a plugin, by its name.
+    local
+        The files of the study's own plugins, by name: ``plugins/arrow.py``.
+    """
+
+    manager: pluggy.PluginManager
+    broken: dict[str, str]
+    local: dict[str, Path]
+
+
+def load_plugins(
+    installed: Iterable[EntryPoint] | None = None, study: Path | None = None
+) -> Modules:
+    """Import every plugin; one that fails is noted, and the others are imported all the same.
+
+    Parameters
+    ----------
+    installed
+        Instead of what is in the ``labcrane`` entry-point group.
+    study
+        A protocol; the Python files in the folder ``plugins`` beside it are plugins too.
+    """
+    manager = pluggy.PluginManager(PROJECT)
+    manager.add_hookspecs(hookspecs)
+    local = own_plugins(study) if study else {}
+    points = entry_points(group=PROJECT) if installed is None else installed
+    loaders: list[tuple[str, Callable[[], ModuleType]]] = [(p.name, p.load) for p in points]
+    loaders += [(name, _Source(path).load) for name, path in local.items()]
+    broken: dict[str, str] = {}
+    for name, load in loaders:
+        try:
+            module = load()
+            _check_interface(module)
+            manager.register(module, name=name)
+            _check_hooks(manager, module)
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - someone else's import
+            broken[name] = str(error) if isinstance(error, PluginError) else told(error)
+            if manager.get_plugin(name):
+                manager.unregister(name=name)
+    return Modules(manager, broken, local)
+
+
+def own_plugins(study: Path) -> dict[str, Path]:
+    """Return the plugins in the folder beside a protocol, by name: ``plugins/arrow.py``."""
+    return {f"{FOLDER}/{path.name}": path for path in sorted((study.parent / FOLDER).glob("*.py"))}
+
+
+class _Source(SourceFileLoader):
+    """A file that is compiled anew each time: what is approved byte by byte is what runs."""
+
+    def __init__(self, path: Path) -> None:
+        # Two studies may each have an arrow.py.
+        where = hashlib.sha256(str(path.resolve()).encode()).hexdigest()[:12]
+        super().__init__(f"labcrane_study_{where}_{path.stem}", str(path))
+
+    def get_code(self, fullname: str) -> CodeType:
+        path = self.get_filename(fullname)
+        code: CodeType = self.source_to_code(self.get_data(path), path)
+        return code
+
+    def load(self) -> ModuleType:
+        """Import the file as a module of its own."""
+        spec = spec_from_file_location(self.name, self.path, loader=self)
+        if spec is None:
+            raise AssertionError("a loader is given")
+        module = module_from_spec(spec)
+        sys.modules[self.name] = module  # pydantic looks up annotations there
+        self.exec_module(module)
+        return module
+
+
+def _check_interface(module: ModuleType) -> None:
+    built_for = getattr(module, "labcrane_api", API)
+    if built_for != API:
+        older = isinstance(built_for, int) and built_for < API
+        raise PluginError(
+            f"it is built for plugin interface {built_for!r}, and this labcrane has {API}; install "
+            f"{'a newer version of the plugin' if older else 'a newer labcrane'}, or see "
+            "docs/compatibility.md"
+        )
+
+
+def _check_hooks(manager: pluggy.PluginManager, module: ModuleType) -> None:
+    known = [name for name in vars(hookspecs) if name.startswith("labcrane_")]
+    for caller in manager.get_hookcallers(module) or ():
+        if not caller.has_spec():
+            close = get_close_matches(caller.name, known, n=1)
+            hint = f"did you mean {close[0]!r}?" if close else f"there is {', '.join(known)}"
+            raise PluginError(f"unknown hook {caller.name!r}; {hint}")

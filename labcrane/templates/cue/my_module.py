@@ -1,0 +1,67 @@
+"""my_part: something the operator sees in every view."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from pydantic import PositiveFloat
+
+from labcrane import (
+    Beam,
+    Cue,
+    FloatArray,
+    Frame,
+    Machine,
+    Offer,
+    Run,
+    Settings,
+    Shape,
+    Signal,
+    hookimpl,
+    offer,
+)
+
+labcrane_api = 1
+
+
+class MyPartSettings(Settings):
+    """Settings of my_part; a protocol writes them beside ``use``."""
+
+    radius: PositiveFloat = 0.03
+    """Of the line, in metres."""
+
+    colour: tuple[float, float, float] = (1.0, 0.8, 0.1)
+    """Red, green and blue, each 0 to 1."""
+
+
+class MyPart(Cue):
+    """A line from the tip to the target."""
+
+    # The numbers behind the picture; recorded with every frame shown.
+    signals = (Signal("length", "m"),)
+
+    def __init__(self, settings: MyPartSettings) -> None:
+        self._settings = settings
+
+    def open(self, run: Run) -> None:
+        self._tip = run.state.find("tip.position")
+        self._target = run.task.find("target.position")
+
+    def draw(self, frame: Frame) -> Sequence[Shape]:
+        x, y, z = frame.task[self._target].tolist()
+        if math.isnan(x):  # between trials there is no target
+            return ()
+        tip_x, tip_y, tip_z = frame.state[self._tip].tolist()
+        colour = (*self._settings.colour, 1.0)
+        return (Beam("my_part", (tip_x, tip_y, tip_z), (x, y, z), self._settings.radius, colour),)
+
+    def values(self, frame: Frame) -> FloatArray:
+        return np.array([np.linalg.norm(frame.task[self._target] - frame.state[self._tip])])
+
+
+@hookimpl
+def labcrane_cues() -> list[Offer[Cue]]:
+    def build(settings: MyPartSettings, machine: Machine) -> Cue:
+        return MyPart(settings)
+
+    return [offer("my_part", MyPartSettings, build)]

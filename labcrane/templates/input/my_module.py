@@ -1,0 +1,56 @@
+"""my_part: a device that the operator moves."""
+
+import math
+
+import numpy as np
+
+from labcrane import (
+    FloatArray,
+    Frame,
+    InputDevice,
+    Machine,
+    Offer,
+    Run,
+    Settings,
+    Signal,
+    Tick,
+    hookimpl,
+    offer,
+)
+
+labcrane_api = 1
+
+
+class MyPartSettings(Settings):
+    """Settings of my_part; a protocol writes them beside ``use``."""
+
+    period_s: float = 4.0
+    """How long the wave takes that stands in for a hand, in seconds."""
+
+
+class MyPart(InputDevice):
+    """Two sticks. A wave stands in for the device until you read a real one."""
+
+    signals = (Signal("left", "1", ("x", "y")), Signal("right", "1", ("x", "y")))
+
+    def __init__(self, settings: MyPartSettings) -> None:
+        self._settings = settings
+
+    def open(self, run: Run) -> None:
+        """Connect here, and raise labcrane.DeviceError when nobody answers."""
+
+    def read(self, tick: Tick, seen: Frame) -> FloatArray:
+        # Never wait here. Say in self.fault why the device cannot be trusted, None when it can.
+        wave = math.sin(2.0 * math.pi * tick.number / 240.0 / self._settings.period_s)
+        return np.array([wave, 0.0, 0.0, 0.0])
+
+    def close(self) -> None:
+        """Disconnect here; called even when open failed."""
+
+
+@hookimpl
+def labcrane_inputs() -> list[Offer[InputDevice]]:
+    def build(settings: MyPartSettings, machine: Machine) -> InputDevice:
+        return MyPart(settings)
+
+    return [offer("my_part", MyPartSettings, build)]

@@ -1,0 +1,86 @@
+"""my_part: what the operator is asked to do."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from labcrane import (
+    Event,
+    Frame,
+    Judgement,
+    Machine,
+    Offer,
+    Phase,
+    Planned,
+    Run,
+    Settings,
+    Signal,
+    Task,
+    Trial,
+    hookimpl,
+    offer,
+)
+
+labcrane_api = 1
+
+
+class MyPartSettings(Settings):
+    """Settings of my_part; a protocol writes them beside ``use``."""
+
+    heights: tuple[float, ...] = (0.5, 1.5)
+    """Heights of the targets above the base, in metres; each is one trial."""
+
+    radius: float = 0.3
+    """Of a target, in metres."""
+
+    limit_s: float = 30.0
+    """Time after which a trial ends without success, in seconds."""
+
+
+class MyPart(Task):
+    """Touch a target 5 m ahead, at one height after the other."""
+
+    # What is shown every tick: views, sounds and simulated operators look for these two.
+    signals = (Signal("target.position", "m", ("x", "y", "z")), Signal("target.radius", "m"))
+    # What a finished trial is measured by.
+    results = (Signal("duration", "s"),)
+    condition_units = {"height": "m"}  # noqa: RUF012 - a constant of the class, as signals are
+
+    def __init__(self, settings: MyPartSettings) -> None:
+        self._settings = settings
+
+    def factors(self) -> Mapping[str, Sequence[str]]:
+        """Return what a protocol may order: design: {order: {heights: shuffled}}."""
+        return {"heights": [f"{height:g}" for height in self._settings.heights]}
+
+    def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[Planned]:
+        return [Planned({"height": float(level)}, expected_s=8.0) for level in levels["heights"]]
+
+    def open(self, run: Run) -> None:
+        self._tip = run.state.find("tip.position")
+
+    def begin_trial(self, trial: Trial) -> None:
+        self._target = np.array([5.0, 0.0, float(str(trial.planned.condition["height"]))])
+        self._limit_s = self._settings.limit_s
+
+    def overrule(self) -> None:
+        self._limit_s = math.inf
+
+    def judge(self, frame: Frame) -> Judgement:
+        values = np.array([*self._target, self._settings.radius])
+        distance = float(np.linalg.norm(frame.state[self._tip] - self._target))
+        if distance <= self._settings.radius:
+            touched = Event("target.touched", frame.tick.due, {"distance": distance})
+            return Judgement(Phase.SUCCESS, values, (touched,), {"duration": frame.elapsed})
+        if frame.elapsed >= self._limit_s:
+            return Judgement(Phase.TIMEOUT, values, (), {"duration": frame.elapsed})
+        return Judgement(Phase.RUNNING, values)
+
+
+@hookimpl
+def labcrane_tasks() -> list[Offer[Task]]:
+    def build(settings: MyPartSettings, machine: Machine) -> Task:
+        return MyPart(settings)
+
+    return [offer("my_part", MyPartSettings, build)]

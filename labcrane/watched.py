@@ -1,0 +1,161 @@
+"""Components under oversight: the same methods, and every call is watched."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from labcrane.clock import Tick
+from labcrane.errors import PluginError
+from labcrane.machine import Body
+from labcrane.oversight import Oversight
+from labcrane.questions import Answers, Item
+from labcrane.records import Frame, Judgement, Planned, Run, Trial, Value
+from labcrane.roles import Component, Controller, Dynamics, InputDevice, Questionnaire, Task
+from labcrane.signals import FloatArray, Layout
+
+
+def watched(component: Component, name: str, plugin: str, oversight: Oversight) -> Component:
+    """Return ``component`` under oversight; what runs in a process of its own as it is."""
+    for role, made in WATCHED.items():
+        if isinstance(component, role):
+            return made(component, f"{WORDS[role]} {name!r}", plugin, oversight)
+    return component
+
+
+class _Watched(Component):
+    """What every role has."""
+
+    def __init__(self, component: Any, called: str, plugin: str, oversight: Oversight) -> None:
+        self._inner = component
+        self._oversight = oversight
+        self._call = oversight.call
+        self._number = {
+            method: oversight.place(called, plugin, method, getattr(component, method))
+            for method in dir(type(self))
+            if not method.startswith("_") and callable(getattr(component, method, None))
+        }
+        self._layout = Layout(called, component.signals)
+        for attribute in ("signals", "results", "condition_units", "title", "rights", "scores"):
+            if hasattr(component, attribute):
+                setattr(self, attribute, getattr(component, attribute))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.__dict__["_inner"], name)
+
+    def open(self, run: Run) -> None:
+        self._call(self._number["open"], self._inner.open, run)
+
+    def begin_trial(self, trial: Trial) -> None:
+        self._call(self._number["begin_trial"], self._inner.begin_trial, trial)
+
+    def close(self) -> None:
+        self._call(self._number["close"], self._inner.close)
+
+    def facts(self) -> Mapping[str, Value]:
+        facts: Mapping[str, Value] = self._call(self._number["facts"], self._inner.facts)
+        return facts
+
+    def _checked(self, number: int, values: FloatArray) -> FloatArray:
+        self._oversight.check(number, values, self._layout, finite=True)
+        return values
+
+
+class WatchedInput(_Watched, InputDevice):
+    """An input device; the first that a tick enters."""
+
+    @property
+    def fault(self) -> str | None:  # type: ignore[override]  # nobody but the device sets it
+        fault: str | None = self._inner.fault
+        return fault
+
+    def read(self, tick: Tick, seen: Frame) -> FloatArray:
+        self._oversight.begin_tick(tick.number)
+        number = self._number["read"]
+        return self._checked(number, self._call(number, self._inner.read, tick, seen))
+
+
+class WatchedController(_Watched, Controller):
+    """A controller."""
+
+    def command(self, axes: FloatArray, state: FloatArray) -> FloatArray:
+        number = self._number["command"]
+        return self._checked(number, self._call(number, self._inner.command, axes, state))
+
+    def rest(self) -> FloatArray:
+        number = self._number["rest"]
+        return self._checked(number, self._call(number, self._inner.rest))
+
+    def steer(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
+        axes: FloatArray = self._call(self._number["steer"], self._inner.steer, velocity, state)
+        return axes
+
+
+class WatchedDynamics(_Watched, Dynamics):
+    """A machine."""
+
+    def state(self) -> FloatArray:
+        number = self._number["state"]
+        return self._checked(number, self._call(number, self._inner.state))
+
+    def step(self, command: FloatArray, dt: float) -> FloatArray:
+        number = self._number["step"]
+        return self._checked(number, self._call(number, self._inner.step, command, dt))
+
+    def reset(self, pose: Sequence[float]) -> None:
+        self._call(self._number["reset"], self._inner.reset, pose)
+
+    def bodies(self) -> Sequence[Body]:
+        bodies: Sequence[Body] = self._call(self._number["bodies"], self._inner.bodies)
+        return bodies
+
+
+class WatchedTask(_Watched, Task):
+    """A task. Its values may be NaN: there is not always something to be shown."""
+
+    def factors(self) -> Mapping[str, Sequence[str]]:
+        factors: Mapping[str, Sequence[str]]
+        factors = self._call(self._number["factors"], self._inner.factors)
+        return factors
+
+    def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[Planned]:
+        planned: Sequence[Planned] = self._call(self._number["plan"], self._inner.plan, levels)
+        return planned
+
+    def judge(self, frame: Frame) -> Judgement:
+        number = self._number["judge"]
+        judgement: Judgement = self._call(number, self._inner.judge, frame)
+        if not isinstance(judgement, Judgement):
+            raise PluginError(self._oversight.complaint(number, f"returned {judgement!r}"))
+        self._oversight.check(number, judgement.values, self._layout, finite=False)
+        return judgement
+
+    def overrule(self) -> None:
+        self._call(self._number["overrule"], self._inner.overrule)
+
+
+class WatchedQuestionnaire(_Watched, Questionnaire):
+    """A questionnaire."""
+
+    def items(self) -> Sequence[Item]:
+        items: Sequence[Item] = self._call(self._number["items"], self._inner.items)
+        return items
+
+    def score(self, answers: Answers) -> Mapping[str, float]:
+        scores: Mapping[str, float] = self._call(self._number["score"], self._inner.score, answers)
+        return scores
+
+
+WATCHED: Mapping[type[Component], type[_Watched]] = {
+    InputDevice: WatchedInput,
+    Controller: WatchedController,
+    Dynamics: WatchedDynamics,
+    Task: WatchedTask,
+    Questionnaire: WatchedQuestionnaire,
+}
+WORDS: Mapping[type[Component], str] = {
+    InputDevice: "input",
+    Controller: "scheme",
+    Dynamics: "dynamics",
+    Task: "task",
+    Questionnaire: "questionnaire",
+}
+"""What a researcher calls each role."""
