@@ -16,8 +16,13 @@ GRAVITY = 9.81
 """In m/s²."""
 
 ITERATIONS = 400
-"""Solver passes per tick. A crane stretched out level under its own weight creeps by 2.6 degrees in
-10 s with the engine's 50, by 0.024 with 200 and by less than 0.0001 with 400 (ch8, 240 Hz)."""
+"""Solver passes of a tick in which a motor is not strong enough, or a joint is beyond its limit. A
+crane stretched out level under its own weight creeps by 2.6 degrees in 10 s with the engine's 50, by
+0.024 with 200 and by less than 0.0001 with 400 (ch8, 240 Hz)."""
+
+FEW_ITERATIONS = 10
+"""Solver passes of every other tick: the torques that the motors must find are worked out before
+(docs/decisions/0090-torques-before-passes.md), and rounding is left for the solver."""
 
 RESIDUAL = 0.0
 """All passes are made: with any threshold, joints go further through their limits."""
@@ -38,6 +43,9 @@ class BulletCrane(Crane):
         super().__init__(settings, machine)
         self._joints = tuple(range(len(machine.joints)))
         self._efforts = tuple(joint.effort for joint in machine.joints)
+        self._bounds = tuple(
+            (*joint.limits, joint.effort) for joint in machine.joints
+        )  # lowest and highest angle, largest torque
         self._client: int | None = None
         self._folder: tempfile.TemporaryDirectory[str] | None = None
 
@@ -65,7 +73,7 @@ class BulletCrane(Crane):
         pybullet.setPhysicsEngineParameter(
             fixedTimeStep=self._dt,
             numSubSteps=0,
-            numSolverIterations=ITERATIONS,
+            numSolverIterations=FEW_ITERATIONS,
             solverResidualThreshold=RESIDUAL,
             deterministicOverlappingPairs=1,
             physicsClientId=client,
@@ -80,22 +88,45 @@ class BulletCrane(Crane):
         for joint, angle in zip(self._joints, angles, strict=True):
             _prepare(body, joint, client)
             pybullet.resetJointState(body, joint, angle, 0.0, physicsClientId=client)
+        self._angles, self._speeds = tuple(angles), (0.0,) * len(self._joints)
+        self._few = True
         # One call moves all joints and one reads them; a call per joint costs three times more.
-        self._push = partial(
-            pybullet.setJointMotorControlArray,
-            body,
-            self._joints,
-            pybullet.VELOCITY_CONTROL,
-            forces=self._efforts,
-            physicsClientId=client,
+        motors = partial(
+            pybullet.setJointMotorControlArray, body, self._joints, physicsClientId=client
         )
+        self._push = partial(motors, pybullet.VELOCITY_CONTROL, forces=self._efforts)
+        self._help = partial(motors, pybullet.TORQUE_CONTROL)
+        self._torques = partial(pybullet.calculateInverseDynamics, body, physicsClientId=client)
+        self._set = partial(pybullet.setPhysicsEngineParameter, physicsClientId=client)
+        self._step = partial(pybullet.stepSimulation, physicsClientId=client)
         self._read = partial(pybullet.getJointStates, body, self._joints, physicsClientId=client)
 
     def _move(self, speeds: Sequence[float]) -> FloatArray:
+        dt, before = self._dt, self._speeds
+        change = [(speed - was) / dt for speed, was in zip(speeds, before, strict=True)]
+        torques = self._torques(self._angles, before, change)
+        few = self._suffice(torques)
+        if few is not self._few:
+            self._set(numSolverIterations=FEW_ITERATIONS if few else ITERATIONS)
+            self._few = few
         self._push(targetVelocities=speeds)
-        pybullet.stepSimulation(physicsClientId=self._client)
-        angles, moved, *_ = zip(*self._read(), strict=True)
-        return self._state.fill(angles, moved)
+        if few:
+            self._help(forces=torques)
+        self._step()
+        self._angles, self._speeds, *_ = zip(*self._read(), strict=True)
+        return self._state.fill(self._angles, self._speeds)
+
+    def _suffice(self, torques: Sequence[float]) -> bool:
+        """Say whether the motors can give these torques, and no joint is beyond its limits.
+
+        Otherwise the solver must find out what the joints can do instead.
+        """
+        for angle, torque, (lowest, highest, effort) in zip(
+            self._angles, torques, self._bounds, strict=True
+        ):
+            if not (lowest <= angle <= highest and -effort <= torque <= effort):
+                return False
+        return True
 
     def _disconnect(self) -> None:
         if self._client is not None:
