@@ -35,6 +35,7 @@ class Attempt:
         self._trial = trial
         self._task = task
         self._rate_hz = rate_hz
+        self._period = 1.0 / rate_hz
         self._ticks = 0
         self._paused_ticks = 0
         self._late_ticks = 0
@@ -50,8 +51,8 @@ class Attempt:
         if self._began is None:
             self._began = frame.tick.due
         lateness = frame.tick.woke - frame.tick.due
-        self._late_ticks += lateness > 1.0 / self._rate_hz
         self._worst_s = max(self._worst_s, lateness)
+        self._late_ticks += lateness > self._period
         frame.trial = self._trial.number
         frame.elapsed = self._ticks / self._rate_hz
         judgement = None
@@ -61,7 +62,8 @@ class Attempt:
             self._ticks += 1
             judgement = self._task.judge(frame)
             frame.task = judgement.values
-            frame.events += tuple(self._of_this_trial(event) for event in judgement.events)
+            if judgement.events:
+                frame.events += tuple(self._of_this_trial(event) for event in judgement.events)
             self.phase = judgement.phase
         if wish is not None and not self.phase.over:
             self.phase = wish

@@ -67,7 +67,7 @@ def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> 
         "participant": visit.folder.name,
         "session": visit.session,
         "session_name": plan.name,
-        "started": datetime.now(UTC).isoformat(timespec="milliseconds"),
+        "started": _started(visit).isoformat(timespec="milliseconds"),
         "simulated": visit.simulated,
         "fast": visit.fast,
         "pilot": visit.pilot,
@@ -105,6 +105,11 @@ def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> 
             for column, unit in trial_units(task).items()
         },
     }
+
+
+def _started(visit: Recorded) -> datetime:
+    """Return when the session begins: with --fast on the simulation's clock, which starts at 0."""
+    return datetime.fromtimestamp(0.0, UTC) if visit.fast else datetime.now(UTC)
 
 
 def _choice(choice: Choice) -> dict[str, Any]:

@@ -273,6 +273,8 @@ class Course:
         self._notes.append((name, data))
 
     def _stamped(self, frame: Frame) -> tuple[Event, ...]:
+        if not self._notes:
+            return ()
         events = tuple(Event(name, frame.tick.due, data) for name, data in self._notes)
         self._notes.clear()
         return events

@@ -10,8 +10,8 @@ from labcrane.console import Command, Order
 from labcrane.delay_file import read_delays
 from labcrane.design.seeds import derive
 from labcrane.errors import DeviceError
-from labcrane.feedback_host import HostOrder, Part
 from labcrane.feedback_keeper import FeedbackKeeper
+from labcrane.host_order import HostOrder, Part
 from labcrane.records import Run
 from labcrane.session import Visit
 from labcrane.streams.feedback_log import log_source

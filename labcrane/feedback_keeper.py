@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from labcrane.console import Command, Order
-from labcrane.feedback_host import HostOrder
+from labcrane.host_order import HostOrder
 
 READY_S = 60.0
 """How long a feedback process may take until it is ready: windows and sound servers are slow."""

@@ -84,18 +84,7 @@ class FrameLog:
         """Write one frame and its events; when this returns, the operating system has them."""
         began = time.perf_counter()
         row, tick = self._row, frame.tick
-        row[0], row[1], row[2] = tick
-        row[3:8] = (
-            self._wrote,
-            frame.trial,
-            frame.elapsed,
-            PHASES[frame.phase],
-            frame.paused,
-        )
-        row[self._axes] = frame.axes
-        row[self._command] = frame.command
-        row[self._state] = frame.state
-        row[self._task] = frame.task
+        self._fill(row, frame)
         if self._waiting or not self._through(frame, row):
             self._waiting.append(partial(self._journal.write_frame, tick.due, row.copy()))
             self._write_events(frame)
@@ -127,6 +116,23 @@ class FrameLog:
             raise
         if lost:
             raise RecordingError(self._not_written(lost))
+
+    def _fill(self, row: FloatArray, frame: Frame) -> None:
+        number, due, woke = frame.tick
+        row[: len(LOOP)] = (
+            number,
+            due,
+            woke,
+            self._wrote,
+            frame.trial,
+            frame.elapsed,
+            PHASES[frame.phase],
+            frame.paused,
+        )
+        row[self._axes] = frame.axes
+        row[self._command] = frame.command
+        row[self._state] = frame.state
+        row[self._task] = frame.task
 
     def _not_written(self, lost: int) -> str:
         return (

@@ -29,7 +29,10 @@ class Phase(StrEnum):
     @property
     def over(self) -> bool:
         """Whether the trial has ended."""
-        return self not in (Phase.IDLE, Phase.RUNNING)
+        return self not in _OPEN
+
+
+_OPEN = (Phase.RUNNING, Phase.IDLE)
 
 
 @dataclass(frozen=True, slots=True)

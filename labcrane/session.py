@@ -8,6 +8,7 @@ from typing import Any
 
 from labcrane import loop, rig
 from labcrane.admission import dismiss, gate
+from labcrane.batch_log import BatchLog
 from labcrane.clock import Clock, ManualClock, SystemClock
 from labcrane.conclusion import SessionConclusion
 from labcrane.console import Console
@@ -147,8 +148,7 @@ def record(visit: Visit, console: Console) -> None:
         visit.folder.check_space(plan.expected_s, second, RESERVE_S)
         about = context(visit, plan, the_rig, this_run) | admission.context
         course = Course(study, plan, the_rig, waits=not visit.simulated)
-        journal = SessionJournal(next_part(visit.journal), columns(this_run), this_run.rate_hz)
-        log = FrameLog(journal, this_run, reserve=round(RESERVE_S * second))
+        log = _log(visit, this_run, clock, reserve=round(RESERVE_S * second))
         try:
             for event in _opening(about, so_far, died, clock.now()):
                 log.note(event)
@@ -166,6 +166,13 @@ def record(visit: Visit, console: Console) -> None:
             raise
         finally:
             log.close()
+
+
+def _log(visit: Visit, this_run: Run, clock: Clock, reserve: int) -> FrameLog:
+    now = clock.now if visit.fast else None
+    path, held = next_part(visit.journal), columns(this_run)
+    journal = SessionJournal(path, held, this_run.rate_hz, now=now)
+    return BatchLog(journal, this_run) if visit.fast else FrameLog(journal, this_run, reserve)
 
 
 def _go_on(visit: Visit, whole: SessionPlan) -> tuple[Progress, SessionPlan]:

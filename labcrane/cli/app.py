@@ -21,6 +21,7 @@ from labcrane.cli import (
     results,
     running,
     scoring,
+    simulating,
     upkeep,
 )
 from labcrane.errors import LabcraneError, ProtocolError
@@ -46,6 +47,7 @@ app.command("resync")(recording.resync)
 app.command("score")(scoring.score)
 app.command("export")(results.export)
 app.command("report")(results.report)
+app.command("simulate")(simulating.simulate)
 app.command("replay")(results.replay)
 app.command("approve")(approval.approve)
 app.command("amend")(approval.amend)

@@ -46,7 +46,7 @@ def export(
     _, first = next(cohort.included[0].sessions())
     exporter = offer.build(chosen, machine_of(first))
     folder.mkdir(parents=True, exist_ok=True)
-    with _bar(f"export to {to}", len(cohort.included)) as advance:
+    with progress_bar(f"export to {to}", len(cohort.included)) as advance:
         exporter.export(_counted(cohort.included, advance), folder)
     _write_manifest(folder, to, chosen.model_dump(mode="json"), cohort)
     _keep_track(data, to, folder, cohort)
@@ -64,7 +64,7 @@ def report(
     from labcrane.analysis.report import write_report
 
     cohort = cohort_of(data, include)
-    with _bar("report", len(cohort.included)) as advance:
+    with progress_bar("report", len(cohort.included)) as advance:
         page = write_report(cohort, folder, progress=lambda done, of: advance())
     out.print(f"report: {page}", markup=False)
 
@@ -163,7 +163,7 @@ def _keep_track(data: Path, to: str, folder: Path, cohort: "Cohort") -> None:
 
 
 @contextmanager
-def _bar(what: str, total: int) -> Iterator[Any]:
+def progress_bar(what: str, total: int) -> Iterator[Any]:
     parts = (
         TextColumn("{task.description}"),
         BarColumn(),

@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -59,13 +59,20 @@ class SessionJournal:
         Frames per second.
     sync_s
         Longest time, in seconds, that data wait for the disk.
+    now
+        The clock of a simulation; see :class:`~labcrane.recording.xdf.XdfWriter`.
     """
 
     def __init__(
-        self, path: Path, columns: Sequence[Column], rate_hz: float, sync_s: float = SYNC_S
+        self,
+        path: Path,
+        columns: Sequence[Column],
+        rate_hz: float,
+        sync_s: float = SYNC_S,
+        now: Callable[[], float] | None = None,
     ) -> None:
         _check(columns)
-        self._writer = XdfWriter(path, sync_s)
+        self._writer = XdfWriter(path, sync_s, now)
         self._frames = self._writer.add_stream(frames_header(columns, rate_hz))
         self._events = self._writer.add_stream(
             StreamHeader(EVENTS, "Markers", (Channel("event"),), "string", source_id=EVENTS)
@@ -97,6 +104,10 @@ class SessionJournal:
             The frame is not in the file, everything before it is: pause, and write it again.
         """
         self._writer.write_sample(self._frames, stamp, row)
+
+    def write_frames(self, stamps: FloatArray, rows: FloatArray) -> None:
+        """Write frames in one chunk: shapes ``(n_frames,)`` and ``(n_frames, n_columns)``."""
+        self._writer.write_samples(self._frames, stamps, rows)
 
     def write_event(self, event: Event, tick: int) -> None:
         """Write one event, stamped with the time at which it happened."""

@@ -8,9 +8,9 @@ of its own, ``labcrane.check``, holds the running CRC-32 of all that was written
 import struct
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -86,6 +86,9 @@ class XdfWriter:
         Must not exist; see :mod:`labcrane.recording.parts` for the names of further parts.
     sync_s
         Longest time, in seconds, that data wait for the disk.
+    now
+        The clock of a simulation, in seconds: its files then depend on nothing but what was
+        simulated, and their dates are counted from 1970. The computer's clock by default.
 
     Raises
     ------
@@ -93,14 +96,17 @@ class XdfWriter:
         From every method: what was to be written is not in the file, everything before it is.
     """
 
-    def __init__(self, path: Path, sync_s: float = SYNC_S) -> None:
+    def __init__(
+        self, path: Path, sync_s: float = SYNC_S, now: Callable[[], float] | None = None
+    ) -> None:
         self._file = AppendFile(path, sync_s)
         self._lock = threading.Lock()
         self._streams: dict[int, _Written] = {}
         self._checks = CheckLog()
-        self._due = time.monotonic() + CHECK_EVERY_S
+        self._now = now or time.monotonic
+        self._due = self._now() + CHECK_EVERY_S
         # In one call, so that no check can come before the header of the checks.
-        start = MAGIC + pack(Tag.FILE_HEADER, _file_header(part_number(path)).encode())
+        start = MAGIC + pack(Tag.FILE_HEADER, _file_header(part_number(path), now).encode())
         self._write(start + pack_stream(Tag.STREAM_HEADER, CHECK_ID, CHECK_HEADER.xml), 0.0)
 
     @property
@@ -231,7 +237,7 @@ class XdfWriter:
 
     def _write(self, chunk: bytes, stamp: float) -> None:
         """Write a chunk and note its check; once a second the checks go with it, in one call."""
-        if (now := time.monotonic()) < self._due:
+        if (now := self._now()) < self._due:
             self._file.write(chunk)
             self._checks.add(chunk, stamp)
         else:
@@ -251,8 +257,9 @@ class XdfWriter:
         self._checks = checks
 
 
-def _file_header(part: int) -> str:
-    started = datetime.now().astimezone().isoformat()
+def _file_header(part: int, now: Callable[[], float] | None) -> str:
+    moment = datetime.fromtimestamp(now(), UTC) if now else datetime.now().astimezone()
+    started = moment.isoformat()
     return (
         '<?xml version="1.0"?><info><version>1.0</version>'
         f"<datetime>{started}</datetime><writer>labcrane</writer><part>{part}</part></info>"

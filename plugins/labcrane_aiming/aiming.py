@@ -119,6 +119,7 @@ class Aiming(Task):
         start, target = _point(condition, "start"), _point(condition, "target")
         self._movement = Movement(self._settings, start, target)
         self._values = np.array([*target, self._settings.width / 2, *start])
+        self._going_on = Judgement(Phase.RUNNING, self._values)  # what most ticks are
         self._limit = self._settings.limit_s
         self._pressed = True  # a trigger still held from the last movement ends nothing
 
@@ -126,17 +127,12 @@ class Aiming(Task):
         self._limit = math.inf
 
     def judge(self, frame: Frame) -> Judgement:
-        movement = self._movement
-        movement.see(
-            frame.elapsed,
-            frame.tick.due,
-            frame.state[self._tip].tolist(),
-            frame.state[self._velocity].tolist(),
-        )
+        movement, state = self._movement, frame.state.tolist()
+        movement.see(frame.elapsed, frame.tick.due, state[self._tip], state[self._velocity])
         events = self._moments(frame)
         phase, end = self._phase(frame)
         if not phase.over:
-            return Judgement(phase, self._values, tuple(events))
+            return Judgement(phase, self._values, tuple(events)) if events else self._going_on
         onset = movement.onset()
         if onset is not None:
             # Known only now, because it depends on the peak; stamped when it happened.
@@ -148,7 +144,7 @@ class Aiming(Task):
     def _moments(self, frame: Frame) -> list[Event]:
         movement, due = self._movement, frame.tick.due
         events = []
-        if len(movement.elapsed) == 1:
+        if movement.ticks == 1:
             events.append(Event("targets.shown", due))
         if math.isnan(movement.command_onset) and frame.command[self._command].any():
             movement.command_onset = frame.elapsed
@@ -166,7 +162,7 @@ class Aiming(Task):
             pressed = bool(frame.axes[self._trigger] > PRESSED)
             edge, self._pressed = pressed and not self._pressed, pressed
             if edge:
-                return Phase.SUCCESS, len(movement.elapsed) - 1
+                return Phase.SUCCESS, movement.ticks - 1
         elif movement.rested and self._arrived():
             return Phase.SUCCESS, movement.tick_at(movement.rest_since)
         if frame.elapsed >= self._limit:

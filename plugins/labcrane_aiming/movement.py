@@ -24,6 +24,8 @@ class Movement:
         Trial time and time on the run's clock of every tick, in seconds.
     speed, position, distance
         Tip speed in m/s, position in m, and distance to the target's centre in m.
+    inside, entered
+        Whether the tip is in the target now, and whether it came into it in this very tick.
     """
 
     settings: AimingSettings
@@ -32,42 +34,36 @@ class Movement:
     elapsed: list[float] = field(default_factory=list)
     due: list[float] = field(default_factory=list)
     speed: list[float] = field(default_factory=list)
-    position: list[Point] = field(default_factory=list)
+    position: list[Sequence[float]] = field(default_factory=list)
     distance: list[float] = field(default_factory=list)
     entries: int = 0
     first_entry: float = math.nan
     command_onset: float = math.nan
     rest_since: float = math.nan
+    ticks: int = 0
+    inside: bool = False
+    entered: bool = False
 
     def see(
         self, elapsed: float, due: float, tip: Sequence[float], velocity: Sequence[float]
     ) -> None:
         """Take one tick."""
-        x, y, z = tip
+        settings = self.settings
         speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
-        distance = math.dist((x, y, z), self.target)
-        somewhere = self.settings.end != "rest_inside"
-        resting = speed < self.settings.rest_speed
-        if not (resting and (somewhere or distance <= self.settings.width / 2)):
+        distance = math.dist(tip, self.target)
+        inside = distance <= settings.width / 2
+        self.entered = inside and not self.inside
+        self.inside = inside
+        if speed >= settings.rest_speed or not (inside or settings.end != "rest_inside"):
             self.rest_since = math.nan
         elif math.isnan(self.rest_since):
             self.rest_since = elapsed
+        self.ticks += 1
         self.elapsed.append(elapsed)
         self.due.append(due)
         self.speed.append(speed)
-        self.position.append((x, y, z))
+        self.position.append(tip)
         self.distance.append(distance)
-
-    @property
-    def inside(self) -> bool:
-        """Whether the tip is in the target now."""
-        return self.distance[-1] <= self.settings.width / 2
-
-    @property
-    def entered(self) -> bool:
-        """Whether the tip came into the target in this very tick."""
-        before = len(self.distance) > 1 and self.distance[-2] <= self.settings.width / 2
-        return self.inside and not before
 
     @property
     def rested(self) -> bool:
@@ -130,7 +126,7 @@ class Movement:
             "peak_speed": max(self.speed),
         }
 
-    def _error(self, tip: Point) -> tuple[float, float]:
+    def _error(self, tip: Sequence[float]) -> tuple[float, float]:
         axis: FloatArray = np.subtract(self.target, self.start)
         axis = axis / np.linalg.norm(axis)
         miss = np.subtract(tip, self.target)

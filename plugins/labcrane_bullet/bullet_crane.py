@@ -16,8 +16,9 @@ GRAVITY = 9.81
 """In m/s²."""
 
 ITERATIONS = 400
-"""Solver passes per tick. A crane stretched out level under its own weight creeps by 2.6 degrees in
-10 s with the engine's 50, by 0.024 with 200 and by less than 0.0001 with 400 (ch8, 240 Hz)."""
+"""Solver passes of a tick in which the solver is needed. A crane stretched out level under its own
+weight creeps by 2.6 degrees in 10 s with the engine's 50, by 0.024 with 200 and by less than 0.0001
+with 400 (ch8, 240 Hz)."""
 
 RESIDUAL = 0.0
 """All passes are made: with any threshold, joints go further through their limits."""
@@ -30,6 +31,10 @@ URDF's effort is not used for it (bullet3 #2944)."""
 class BulletCrane(Crane):
     """Velocity motors that hold against gravity up to each joint's effort.
 
+    In an ordinary tick the torques that give the speeds asked for are worked out, and no solver is
+    needed (docs/decisions/0090-torques-before-passes.md). When one of them is more than its motor
+    has, or a joint is beyond its limit, the engine's motors and its solver find out what happens.
+
     Every reset starts the engine anew: setting joints by hand leaves contact and solver caches
     behind, and the same commands would then not give the same bits.
     """
@@ -38,6 +43,8 @@ class BulletCrane(Crane):
         super().__init__(settings, machine)
         self._joints = tuple(range(len(machine.joints)))
         self._efforts = tuple(joint.effort for joint in machine.joints)
+        self._no_efforts = (0.0,) * len(machine.joints)
+        self._bounds = tuple((*joint.limits, joint.effort) for joint in machine.joints)
         self._client: int | None = None
         self._folder: tempfile.TemporaryDirectory[str] | None = None
 
@@ -80,22 +87,43 @@ class BulletCrane(Crane):
         for joint, angle in zip(self._joints, angles, strict=True):
             _prepare(body, joint, client)
             pybullet.resetJointState(body, joint, angle, 0.0, physicsClientId=client)
+        self._angles, self._speeds = tuple(angles), (0.0,) * len(self._joints)
+        self._motors_on = True
         # One call moves all joints and one reads them; a call per joint costs three times more.
-        self._push = partial(
-            pybullet.setJointMotorControlArray,
-            body,
-            self._joints,
-            pybullet.VELOCITY_CONTROL,
-            forces=self._efforts,
-            physicsClientId=client,
+        motors = partial(
+            pybullet.setJointMotorControlArray, body, self._joints, physicsClientId=client
         )
+        self._solve = partial(motors, pybullet.VELOCITY_CONTROL, forces=self._efforts)
+        self._let_go = partial(motors, pybullet.VELOCITY_CONTROL, forces=self._no_efforts)
+        self._push = partial(motors, pybullet.TORQUE_CONTROL)
+        self._torques = partial(pybullet.calculateInverseDynamics, body, physicsClientId=client)
+        self._step = partial(pybullet.stepSimulation, physicsClientId=client)
         self._read = partial(pybullet.getJointStates, body, self._joints, physicsClientId=client)
 
     def _move(self, speeds: Sequence[float]) -> FloatArray:
-        self._push(targetVelocities=speeds)
-        pybullet.stepSimulation(physicsClientId=self._client)
-        angles, moved, *_ = zip(*self._read(), strict=True)
-        return self._state.fill(angles, moved)
+        dt, before = self._dt, self._speeds
+        change = [(speed - was) / dt for speed, was in zip(speeds, before, strict=True)]
+        torques = self._torques(self._angles, before, change)
+        if self._suffice(torques):
+            if self._motors_on:
+                self._let_go()
+                self._motors_on = False
+            self._push(forces=torques)
+        else:
+            self._solve(targetVelocities=speeds)
+            self._motors_on = True
+        self._step()
+        self._angles, self._speeds, *_ = zip(*self._read(), strict=True)
+        return self._state.fill(self._angles, self._speeds)
+
+    def _suffice(self, torques: Sequence[float]) -> bool:
+        """Say whether the motors can give these torques, and no joint is beyond its limits."""
+        for angle, torque, (lowest, highest, effort) in zip(
+            self._angles, torques, self._bounds, strict=True
+        ):
+            if not (lowest <= angle <= highest and -effort <= torque <= effort):
+                return False
+        return True
 
     def _disconnect(self) -> None:
         if self._client is not None:

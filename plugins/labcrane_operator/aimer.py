@@ -125,7 +125,8 @@ class Aimer:
 
     def _advance(self, plan: SubMovement, lag: float) -> float:
         """Go on in the plan by a tick; return its pace, below 1 when the machine lags behind."""
-        pace = max(0.0, min(1.0, 2.0 - 2.0 * lag / self._settings.patience_m))
+        pace = 2.0 - 2.0 * lag / self._settings.patience_m
+        pace = 1.0 if pace > 1.0 else pace if pace > 0.0 else 0.0
         if self._doing is Doing.MOVING:
             self._time += pace * self._dt
             if self._time >= plan.duration:

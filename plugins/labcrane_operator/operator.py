@@ -27,11 +27,12 @@ class SimulatedOperator(InputDevice):
     def __init__(self, settings: OperatorSettings) -> None:
         self._settings = settings
         axes = Layout("the operator", self.signals)
-        self._connected = [axes.index("left.connected"), axes.index("right.connected")]
+        self._left, self._right = axes.index("left.connected"), axes.index("right.connected")
         self._trigger = axes.index("right.trigger")
         self._out = np.zeros(axes.size)
+        self._asked = np.zeros(3)
         self._rest = np.zeros(axes.size)
-        self._rest[self._connected] = 1.0
+        self._rest[[self._left, self._right]] = 1.0
         self._pace = 1.0
         self._trial = 0
         self._aimer: Aimer | None = None
@@ -59,19 +60,21 @@ class SimulatedOperator(InputDevice):
         out[:] = self._rest
         if aimer is None or not self._sees(seen):  # what the last trial left is no target
             return out
-        target = seen.task[self._target].tolist()
-        if math.isnan(target[0]):
+        task, state = seen.task.tolist(), seen.state.tolist()  # once: plain floats are cheaper
+        x, y, z = task[self._target]
+        if math.isnan(x):
             aimer.rest()
             return out
         velocity = aimer.move(
-            tuple(seen.state[self._tip].tolist()),
-            math.hypot(*seen.state[self._velocity].tolist()),
-            tuple(target),
-            seen.task.item(self._radius),
+            tuple(state[self._tip]),
+            math.hypot(*state[self._velocity]),
+            (x, y, z),
+            task[self._radius],
         )
         if velocity is not STILL:
-            out[:] = self._run.steer(np.array(velocity), seen.state)
-            out[self._connected] = 1.0
+            self._asked[:] = velocity
+            out[:] = self._run.steer(self._asked, seen.state)
+            out[self._left] = out[self._right] = 1.0
         if aimer.pressing:
             out[self._trigger] = 1.0
         return out

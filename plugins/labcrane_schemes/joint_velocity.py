@@ -35,12 +35,13 @@ class JointVelocity(Controller):
     def command(self, axes: FloatArray, state: FloatArray) -> FloatArray:
         pushes, angles, out = axes.tolist(), state[self._angle].tolist(), self._out
         shape, factor = self._shaping.shape, self._stops.factor
-        limited = len(angles) + 1
+        speeds, limited = [], []
         for joint, (axis, sign) in enumerate(self._axes):
             speed = sign * shape(pushes[axis]) * self._full[joint]
             left = factor(joint, angles[joint], speed)
-            out[joint] = speed * left
-            out[limited + joint] = left
+            speeds.append(speed * left)
+            limited.append(left)
+        out[:] = (*speeds, 1.0, *limited)
         return out
 
     def rest(self) -> FloatArray:
@@ -50,10 +51,10 @@ class JointVelocity(Controller):
         angles = state[self._angle].tolist()
         speeds = self._rate.solve_base(angles, *velocity.tolist())
         scale, factors = self._rate.fit(angles, speeds, self._full)
-        axes = np.zeros(self._n_axes)
+        axes, unshape = [0.0] * self._n_axes, self._shaping.unshape
         for (axis, sign), speed, full, left in zip(
             self._axes, speeds, self._full, factors, strict=True
         ):
             if abs(speed) > NOTHING and left > 0.0:
-                axes[axis] = sign * self._shaping.unshape(scale * speed / (full * left))
-        return axes
+                axes[axis] = sign * unshape(scale * speed / (full * left))
+        return np.array(axes)

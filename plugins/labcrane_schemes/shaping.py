@@ -19,29 +19,34 @@ class Shaping:
 
     def __init__(self, dead_zone: float, expo: float) -> None:
         self._edge = dead_zone
+        self._rest = 1.0 - dead_zone
         self._expo = expo
         self._linear = 1.0 - expo
+        self._straight = expo < ROUNDING
+        cubic = not self._straight and self._linear > 0.0
+        self._stretch = math.sqrt(self._linear / (3.0 * expo)) if cubic else 0.0
 
     def shape(self, push: float) -> float:
         """Return the share of full speed, in [-1, 1], that a deflection in [-1, 1] asks for."""
         beyond = abs(push) - self._edge
         if beyond <= 0.0:
             return 0.0
-        x = beyond / (1.0 - self._edge)
+        x = beyond / self._rest
         return math.copysign(x * (self._linear + self._expo * x * x), push)
 
     def unshape(self, share: float) -> float:
         """Return the deflection that asks for a share of full speed, both in [-1, 1]."""
         if share == 0.0:
             return 0.0
-        x = self._root(min(abs(share), 1.0))
-        return math.copysign(min(self._edge + (1.0 - self._edge) * x, 1.0), share)
+        size = abs(share)
+        push = self._edge + self._rest * self._root(size if size < 1.0 else 1.0)
+        return math.copysign(push if push < 1.0 else 1.0, share)
 
     def _root(self, share: float) -> float:
         """Return the one real root of the cubic, after Cardano in its hyperbolic form."""
-        if self._expo < ROUNDING:
+        if self._straight:
             return share
-        if self._linear == 0.0:
+        stretch = self._stretch
+        if stretch == 0.0:
             return math.cbrt(share)
-        stretch = math.sqrt(self._linear / (3.0 * self._expo))
         return 2.0 * stretch * math.sinh(math.asinh(1.5 * share / (self._linear * stretch)) / 3.0)

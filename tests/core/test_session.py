@@ -15,7 +15,7 @@ from rehearsal import SHORT, ScriptedConsole, a_study, rehearse
 from virtual_sticks import desk
 
 import labcrane
-from labcrane import DeviceError, ProtocolError, RecordingError, rig
+from labcrane import DeviceError, PluginError, ProtocolError, RecordingError, rig
 from labcrane.session import Visit, run
 
 ROOT = Path(__file__).parents[2]
@@ -135,7 +135,11 @@ def test_a_component_that_raises_leaves_what_was_recorded(
         return step(self, command, dt)
 
     monkeypatch.setattr(KinematicCrane, "step", fails)
-    with pytest.raises(ZeroDivisionError):
+    with pytest.raises(
+        PluginError,
+        match=r"^dynamics 'kinematic_crane' of plugin 'bullet', in step\(\) .* raised "
+        r"ZeroDivisionError: a bug in a plugin \(.*test_session\.py:\d+\) in tick 499$",
+    ):
         run(visit, ScriptedConsole())
     session = labcrane.open_recording(visit.folder.participant_file).session(1)
     assert len(session.streams["state"].time) == 499

@@ -220,3 +220,32 @@ def test_two_cranes_in_one_process_leave_each_other_alone() -> None:
             other.step(-command, 1 / RATE_HZ)
             beside.append(crane.step(command, 1 / RATE_HZ).copy())
     np.testing.assert_array_equal(beside, alone)
+
+
+@needs_bullet
+@rates
+@pytest.mark.parametrize("share", [0.2, 1.0])
+def test_torques_worked_out_before_the_step_change_its_time_only(
+    rate_hz: float, share: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Full steps of command ask for more than the motors have, gentle ones do not."""
+    from labcrane_bullet.bullet_crane import BulletCrane
+
+    machine = ch8()
+    steps = np.random.default_rng(9).uniform(-share, share, (12, 4)) * machine.speeds
+    commands = np.repeat(steps, round(rate_hz / 4), axis=0)
+    if share < 1.0:
+        commands = random_sticks(machine, rate_hz, 3.0)
+    paths, passes = [], []
+    suffice = BulletCrane._suffice
+
+    def count(crane: BulletCrane, torques: list[float]) -> bool:
+        passes.append(suffice(crane, torques))
+        return passes[-1]
+
+    for decide in (count, lambda crane, torques: False):
+        monkeypatch.setattr(BulletCrane, "_suffice", decide)
+        with standing("bullet_crane", machine, rate_hz) as crane:
+            paths.append(drive(crane, commands, rate_hz))
+    assert all(passes) == (share < 1.0), "either kind of tick is tried"
+    np.testing.assert_allclose(paths[0][:, :8], paths[1][:, :8], rtol=0, atol=1e-6)

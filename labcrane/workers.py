@@ -1,0 +1,106 @@
+"""The same work for many things at once: here, on the cores of this computer, or on a cluster."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import TypeVar
+
+from labcrane.errors import LabcraneError, PluginError, ProtocolError
+
+OrderT = TypeVar("OrderT")
+ResultT = TypeVar("ResultT")
+
+RETRIES = 3
+"""How often work is given to another worker after its own has died."""
+
+CONNECT_S = 10.0
+"""Longest time to wait for a scheduler to answer, in seconds."""
+
+
+def work(
+    do: Callable[[OrderT], ResultT],
+    orders: Sequence[OrderT],
+    workers: int = 1,
+    scheduler: str | None = None,
+) -> Iterator[ResultT]:
+    """Yield what comes of each order, in the order in which they are finished.
+
+    What a worker does must not depend on which worker it is, and must bear being done twice.
+
+    Parameters
+    ----------
+    do
+        A function of a module; it and the orders are sent to other processes.
+    workers
+        Processes on this computer; 1 is this one.
+    scheduler
+        Address of a Dask scheduler, ``tcp://host:8786``, whose workers do it instead.
+
+    Raises
+    ------
+    LabcraneError
+        What a worker raised; or the workers died again and again.
+    """
+    if scheduler is not None:
+        return _on_cluster(do, orders, scheduler)
+    if workers > 1:
+        return _on_cores(do, orders, workers)
+    return map(do, orders)
+
+
+def _on_cores(
+    do: Callable[[OrderT], ResultT], orders: Sequence[OrderT], workers: int
+) -> Iterator[ResultT]:
+    from concurrent.futures import as_completed  # noqa: PLC0415 - only for many workers
+    from concurrent.futures.process import BrokenProcessPool  # noqa: PLC0415
+
+    from loky import ProcessPoolExecutor  # noqa: PLC0415
+
+    left = list(orders)
+    for _ in range(1 + RETRIES):
+        with ProcessPoolExecutor(max_workers=workers) as pool:
+            given = {pool.submit(do, order): order for order in left}
+            try:
+                for future in as_completed(given):
+                    result = future.result()
+                    left.remove(given[future])
+                    yield result
+            except BrokenProcessPool:
+                continue  # a worker was lost, and the whole pool with it
+            finally:
+                for future in given:
+                    future.cancel()
+        return
+    raise LabcraneError(
+        f"worker processes died {1 + RETRIES} times, and {len(left)} of {len(orders)} pieces of "
+        "work are not done; look for what kills them (memory?), or use fewer with --workers"
+    )
+
+
+def _on_cluster(
+    do: Callable[[OrderT], ResultT], orders: Sequence[OrderT], scheduler: str
+) -> Iterator[ResultT]:
+    try:
+        from distributed import Client, as_completed  # noqa: PLC0415 - an extra, and slow to load
+        from distributed.scheduler import KilledWorker  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        raise PluginError(
+            "--scheduler needs Dask, which is not installed; install labcrane[cluster]"
+        ) from error
+    try:
+        client = Client(scheduler, timeout=CONNECT_S)
+    except (OSError, ValueError) as error:
+        raise ProtocolError(
+            f"no Dask scheduler answers at {scheduler!r}: {error}; start one with dask scheduler, "
+            "and give the address that it prints"
+        ) from error
+    with client:
+        # A worker that dies takes no result with it: the scheduler gives its work to another.
+        futures = client.map(do, orders, pure=False, retries=0)
+        try:
+            for _, result in as_completed(futures, with_results=True):
+                yield result
+        except KilledWorker as error:
+            raise LabcraneError(
+                f"workers of {scheduler} died again and again: {error}; look into their logs"
+            ) from error
+        finally:
+            client.cancel(futures)

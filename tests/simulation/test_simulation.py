@@ -1,0 +1,230 @@
+"""Whole studies without people: the same files whoever makes them, and however often."""
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from labcrane.cli.app import main
+from labcrane.errors import LabcraneError, ProtocolError, RecordingError
+from labcrane.recording.recording import open_recording
+from labcrane.simulation import SimulationOrder, simulate, simulate_study
+
+STUDY = """\
+labcrane: 1
+study: rehearsal
+title: Few movements
+participants: {pattern: 'P\\d{3}', planned: 6}
+rate_hz: 60
+machine: ch8
+input: {use: dual_joystick}
+scheme:
+  use: joint_velocity
+  map: {slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}
+dynamics: {use: kinematic_crane}
+tasks:
+  aiming: {use: aiming, distances: [2, 4], movements: 2}
+design:
+  groups: {none: [], slow: []}
+  order: {pairs: shuffled}
+sessions:
+  - {name: one, steps: [{block: {task: aiming, pairs: 2}}]}
+  - {name: two, steps: [{block: {task: aiming, pairs: 1}}]}
+"""
+COHORT = """\
+labcrane_cohort: 1
+operator:
+  learning_rate: {median: 0.1, log_sd: 0.4}
+  reaction_s: {lowest: 0.3, highest: 0.5}
+groups:
+  slow: {fitts_b_s: 2.0}
+"""
+NAMES = ("P001", "P002", "P003", "P004", "P005", "P006")
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    path = tmp_path / "study" / "protocol.yaml"
+    path.parent.mkdir()
+    path.write_text(STUDY)
+    return path
+
+
+@pytest.fixture
+def cohort(study: Path) -> Path:
+    path = study.with_name("cohort.yaml")
+    path.write_text(COHORT)
+    return path
+
+
+def orders(study: Path, cohort: Path | None, data: Path, names: tuple[str, ...] = NAMES):
+    return [SimulationOrder(study, cohort, data, name) for name in names]
+
+
+def digests(folder: Path) -> dict[str, str]:
+    """Return the hash of every file, by its path in the folder."""
+    return {
+        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
+
+
+@pytest.fixture(scope="module")
+def local(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """What one process makes of the study."""
+    folder = tmp_path_factory.mktemp("local")
+    (folder / "protocol.yaml").write_text(STUDY)
+    (folder / "cohort.yaml").write_text(COHORT)
+    data = folder / "data"
+    list(simulate_study(orders(folder / "protocol.yaml", folder / "cohort.yaml", data)))
+    return digests(data)
+
+
+def test_a_simulation_leaves_the_files_of_a_study_all_stamped(
+    study: Path, cohort: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["simulate", str(study), "--out", str(tmp_path / "data")]) == 0
+    assert "SIMULATED: 6 participants" in capsys.readouterr().out
+    for name in NAMES:
+        folder = tmp_path / "data" / f"{name}-SIMULATED"
+        left = sorted(path.name for path in folder.iterdir())
+        assert left == [f"{name}-SIMULATED.h5", "ses-01_run.xdf", "ses-02_run.xdf"]
+        recording = open_recording(folder / left[0])
+        assert list(recording.sessions) == [1, 2]
+        for number in (1, 2):
+            session = recording.session(number)
+            assert session.attrs["simulated"] == "yes"
+            assert len(session.trials) == 4 / number
+
+
+def test_two_cores_make_the_same_bits_as_one(
+    study: Path, cohort: Path, tmp_path: Path, local: dict[str, str]
+) -> None:
+    list(simulate_study(orders(study, cohort, tmp_path / "data"), workers=2))
+    assert digests(tmp_path / "data") == local
+
+
+def test_an_interrupted_simulation_goes_on_and_keeps_who_is_there(
+    study: Path, cohort: Path, tmp_path: Path, local: dict[str, str]
+) -> None:
+    data = tmp_path / "data"
+    list(simulate_study(orders(study, cohort, data, NAMES[:5])))
+    kept = data / "P001-SIMULATED" / "P001-SIMULATED.h5"
+    before = kept.stat().st_mtime_ns
+    left_by_a_kill = data / ".unfinished" / "P006-half" / "P006-SIMULATED"
+    left_by_a_kill.mkdir(parents=True)
+    (left_by_a_kill / "ses-01_run.xdf").write_bytes(b"XDF:")
+    found = list(simulate_study(orders(study, cohort, data)))
+    assert [folder.participant for folder in found] == list(NAMES)
+    assert kept.stat().st_mtime_ns == before
+    assert digests(data) == local
+
+
+def test_another_population_is_not_mixed_into_a_folder(
+    study: Path, cohort: Path, tmp_path: Path
+) -> None:
+    data = tmp_path / "data"
+    list(simulate_study(orders(study, cohort, data, NAMES[:1])))
+    with pytest.raises(ProtocolError, match="holds a simulation with another cohort; give a new"):
+        list(simulate_study(orders(study, None, data)))
+
+
+def test_two_simulations_do_not_share_a_folder(study: Path, tmp_path: Path) -> None:
+    import fcntl
+
+    data = tmp_path / "data"
+    data.mkdir()
+    fd = os.open(data, os.O_RDONLY)
+    fcntl.flock(fd, fcntl.LOCK_EX)
+    with pytest.raises(RecordingError, match="another simulation is at work"):
+        list(simulate_study(orders(study, None, data)))
+    os.close(fd)
+
+
+def test_a_participant_who_leaves_has_no_later_session(study: Path, tmp_path: Path) -> None:
+    cohort = study.with_name("leaving.yaml")
+    cohort.write_text("labcrane_cohort: 1\ndropout: 1.0\n")
+    folder = simulate(SimulationOrder(study, cohort, tmp_path, "P001"))
+    recording = open_recording(folder.participant_file)
+    assert list(recording.sessions) == [1]
+    ends = recording.session(1).events.query("name == 'session.end'")
+    assert ends.iloc[-1]["data"]["reason"] == "by order"
+
+
+def die_once(order: tuple[Path, int]) -> int:
+    """Kill the worker when this is tried for the first time."""
+    mark, number = order
+    if number == 1 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+def test_work_of_a_core_that_was_lost_is_done_again(tmp_path: Path) -> None:
+    from labcrane.workers import work
+
+    given = [(tmp_path / "mark", number) for number in range(4)]
+    assert sorted(work(die_once, given, workers=2)) == [0, 1, 2, 3]
+    assert (tmp_path / "mark").exists()
+
+
+def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    from labcrane.workers import work
+
+    monkeypatch.setattr("labcrane.workers.CONNECT_S", 1.0)
+    with pytest.raises(LabcraneError, match=r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:1'"):
+        list(work(die_once, [(Path(), 0)], scheduler="tcp://127.0.0.1:1"))
+
+
+@contextmanager
+def cluster(folder: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """Start a Dask scheduler and two workers as processes; yield address and workers."""
+    file = folder / "scheduler.json"
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    where = ["--host", "127.0.0.1", "--no-dashboard"]
+    running = []
+
+    def start(kind: str, *more: str) -> subprocess.Popen[bytes]:
+        words = [sys.executable, "-m", f"distributed.cli.dask_{kind}", *where, *more]
+        running.append(subprocess.Popen(words, cwd=folder, **quiet))
+        return running[-1]
+
+    try:
+        start("scheduler", "--port", "0", "--scheduler-file", str(file))
+        deadline = time.monotonic() + 60.0
+        while not file.exists() or not file.read_text():
+            assert time.monotonic() < deadline, "the scheduler does not start"
+            time.sleep(0.05)
+        address = json.loads(file.read_text())["address"]
+        options = ("--nthreads", "1", "--nworkers", "1", "--no-nanny", "--local-directory")
+        workers = [start("worker", address, *options, str(folder / str(n))) for n in (1, 2)]
+        yield address, workers
+    finally:
+        for process in running:
+            process.kill()
+            process.wait()
+
+
+def test_a_cluster_makes_the_same_bits_even_when_a_worker_is_killed(
+    study: Path, cohort: Path, tmp_path: Path, local: dict[str, str]
+) -> None:
+    data = tmp_path / "data"
+    with cluster(tmp_path) as (address, workers):
+        making = simulate_study(orders(study, cohort, data), scheduler=address)
+        next(making)
+        while len(list((data / ".unfinished").iterdir())) < len(workers):
+            time.sleep(0.005)
+        workers[0].kill()  # in the middle of a participant, as the other one is
+        done = list(making)
+        assert workers[0].wait(10) == -signal.SIGKILL
+    assert len(done) == len(NAMES) - 1
+    assert digests(data) == local
