@@ -84,7 +84,8 @@ def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> 
         "components": {part: _choice(choice) for part, choice in choices.items()},
         "facts": the_rig.facts(),
         "versions": _versions(),
-        "doctor": at_start(visit.folder.root),
+        # What a simulation records does not depend on the computer that it is made on.
+        "doctor": None if visit.fast else at_start(visit.folder.root),
         "own_plugins": {
             name: path.read_text(encoding="utf-8") for name, path in own_plugins(study.path).items()
         },

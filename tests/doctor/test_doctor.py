@@ -6,16 +6,18 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
-from rehearsal import SHORT
+from rehearsal import SHORT, ScriptedConsole
 
 import labcrane
 from labcrane.cli.app import main
+from labcrane.console import Command, Order
 from labcrane.doctor import components
 from labcrane.doctor.components import Look, of_everything, of_study
 from labcrane.doctor.diagnosis import Check, diagnosis, keep, latest
 from labcrane.errors import RecordingError
 from labcrane.finding import Finding, Verdict
 from labcrane.registry import discover
+from labcrane.session import Visit, run
 from labcrane.study import load
 
 AIMING = Path(__file__).parents[2] / "protocols" / "aiming" / "protocol.yaml"
@@ -116,8 +118,9 @@ def test_the_command_says_all_as_json_and_keeps_it_for_the_record(
     assert (status == 1) == bool(failed)
     assert any("two joysticks" in check["text"] for check in failed)
 
-    assert main(["run", path, "--participant", "P001", "--simulate", "--fast"]) == 0
-    file = tmp_path / "data" / "P001-SIMULATED" / "P001-SIMULATED.h5"
+    study = load(tmp_path / "study.yaml", discover())
+    visit = Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=False)
+    file = run(visit, ScriptedConsole({3: [Command(Order.END)]}))
     context = labcrane.open_recording(file).session(1).context
     assert context["doctor"]["examination"] == said
     at_start = context["doctor"]["at_start"]
