@@ -77,9 +77,11 @@ def keys(schema: Schema) -> Iterator[str]:
     models = schema.get("$defs", {})
     yield "| key | takes | default | means |"
     yield "|---|---|---|---|"
-    needed = schema.get("required", ())
+    ways = (schema, *schema.get("anyOf", ()))  # what can be left out when another key is given
+    needed = {name for way in ways for name in way.get("required", ())}
     for name, part in schema.get("properties", {}).items():
-        default = "needed" if name in needed else shown(part.get("default", {}))
+        wanted = name in needed and "default" not in part
+        default = "needed" if wanted else shown(part.get("default", {}))
         model = models.get(part.get("$ref", "").rsplit("/", 1)[-1], {})
         means = cell(part.get("description") or model.get("description", ""))
         yield f"| `{name}` | {takes(part)} | {default} | {means} |"

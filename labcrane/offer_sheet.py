@@ -111,7 +111,7 @@ def _sheet(
         Setting(
             name,
             possible(written, schema.get("$defs", {})),
-            None if name in schema.get("required", ()) else _default(fields[name]),
+            None if fields[name].is_required() else _default(fields[name]),
             " ".join((fields[name].description or "").split()),
         )
         for name, written in schema.get("properties", {}).items()

@@ -1,8 +1,12 @@
 """Where pages are served."""
 
+from typing import Literal
+
 from pydantic import Field
 
 from labcrane.offers import Settings
+
+Language = Literal["en", "de"]
 
 
 class PageSettings(Settings):
@@ -14,3 +18,6 @@ class PageSettings(Settings):
 
     port: int = Field(default=0, ge=0, le=65535)
     """Port; 0 takes a free one."""
+
+    language: Language = "en"
+    """In which the participant's page speaks; questionnaires have languages of their own."""

@@ -33,8 +33,8 @@ class Item:
         Of a scale or number; a step of 0 allows every number between.
     left, right
         Words at the ends of a scale.
-    choices
-        Of a choice.
+    choices, labels
+        Of a choice: what is recorded, and what is shown for each; the same by default.
     required
         Whether the questionnaire cannot be handed in before this is answered, or declined.
     """
@@ -49,6 +49,7 @@ class Item:
     right: str = ""
     choices: tuple[str, ...] = ()
     required: bool = True
+    labels: tuple[str, ...] = ()
 
     @property
     def takes(self) -> str:

@@ -7,6 +7,8 @@ From the bottom up::
     live        machine and scenario signals, from LSL
     form        a questionnaire on a page
     consent     the consent text on a page, before the session
+    surroundings
+                what stands around the machine
     scene       the machine in three dimensions
     participant_page, supervisor_page
     service     the process: one pipe to the launcher, and the web server

@@ -25,6 +25,9 @@ class Board:
         The newest events, oldest first.
     stage, holds, trial, trials_done, counts
         Where the session stands, who holds it, the running trial, and what happened in it.
+    things
+        What stands around the machine in the running trial, as of
+        :func:`labcrane.scene_text.read_placed`; empty for nothing.
     form, answers, refusal
         The questionnaire that is asked, its recorded answers, and the last refusal.
     form_version
@@ -44,6 +47,7 @@ class Board:
         self.holds: set[str] = set()
         self.trial: Mapping[str, Value] = {}
         self.trials_done = 0
+        self.things = ""
         self.counts: Counter[str] = Counter()
         self.form: str | None = None
         self.form_version = 0
@@ -65,6 +69,8 @@ class Board:
                 self._form(what, event.data)
             case "trial":
                 self._trial(what, event.data)
+            case "scene":
+                self.things = str(event.data["things"])
             case "consent":
                 self.consent = event.data if what == "needed" else {}
             case "pause":
@@ -107,7 +113,7 @@ class Board:
             self.trial = data
             self.counts.clear()
         elif what == "end":
-            self.trial = {}
+            self.trial, self.things = {}, ""
             self.last_trial = data
             self.trials_done += bool(data.get("counted"))
 

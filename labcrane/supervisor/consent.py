@@ -2,13 +2,10 @@
 
 from labcrane.console import Order
 from labcrane.supervisor.desk import Desk
-from labcrane.supervisor.rights import PARTICIPANT, SUPERVISOR
+from labcrane.supervisor.rights import PARTICIPANT
 
-CONFIRM = {
-    PARTICIPANT: "I have read this text and take part",
-    SUPERVISOR: "The participant has signed this text",
-}
-"""What the button says, by page."""
+SIGNED = "The participant has signed this text"
+"""What the supervisor confirms."""
 
 
 class ConsentCard:
@@ -38,14 +35,16 @@ class ConsentCard:
     def _rebuild(self, version: str) -> None:
         from nicegui import ui  # noqa: PLC0415
 
-        asked = self._desk.board.consent
+        asked, words = self._desk.board.consent, self._desk.words(self._page)
         with ui.card().classes("w-full").props('id="consent"'):
-            ui.label("Consent").classes("text-2xl font-medium").props("role=heading")
-            ui.label(f"{asked['file']}, version {version}").props('id="consent-version"')
+            ui.label(words.consent).classes("text-2xl font-medium").props("role=heading")
+            ui.label(f"{asked['file']}, {words.version} {version}").props('id="consent-version"')
             if asked["text"]:
                 ui.label(str(asked["text"])).classes("whitespace-pre-wrap text-lg")
-            ui.link(f"Open {asked['file']}", "/consent", new_tab=True).classes("text-blue-10")
+            ui.link(f"{words.open_file} {asked['file']}", "/consent", new_tab=True).classes(
+                "text-blue-10"
+            )
             ui.button(
-                CONFIRM[self._page],
+                words.take_part if self._page == PARTICIPANT else SIGNED,
                 on_click=lambda: self._desk.give(self._page, Order.CONSENT, version),
             ).props('no-caps size=lg color=blue-10 id="order-consent"')

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 MOST_TICKS = 21
 """A scale with more steps is a field to write into."""
 
-SAVED, DECLINED, OPEN = "saved", "declined", ""
-
 
 class Form:
     """Shows the questionnaire that is asked, and what the record has of its answers.
@@ -28,6 +26,7 @@ class Form:
     def __init__(self, desk: Desk, page: str) -> None:
         self._desk = desk
         self._page = page
+        self._words = desk.words(page)
         self._refreshers: list[Callable[[], object]] = []
         self._shown = -1
 
@@ -54,8 +53,10 @@ class Form:
         from nicegui import ui  # noqa: PLC0415
 
         if name is None:
-            ui.label("Please wait. There is nothing to answer now.").classes("text-lg").props(
-                'id="wait"'
+            wait = ui.label().classes("text-lg").props('id="wait"')
+            board = self._desk.board
+            self._refreshers.append(
+                lambda: wait.set_text("" if board.consent else self._words.wait)
             )
             return
         questionnaire = self._desk.study.questionnaires[name]
@@ -63,10 +64,10 @@ class Form:
         for item in questionnaire.items():
             self._item(name, item)
         refusal = ui.label().classes("text-red-900 text-lg").props('role=alert id="refusal"')
-        self._refreshers.append(lambda: refusal.set_text(self._desk.board.refusal))
-        ui.button("Hand in", on_click=lambda: self._desk.give(self._page, Order.SUBMIT)).props(
-            'size=lg id="submit"'
-        )
+        self._refreshers.append(lambda: refusal.set_text(self._refusal()))
+        ui.button(
+            self._words.hand_in, on_click=lambda: self._desk.give(self._page, Order.SUBMIT)
+        ).props('size=lg no-caps color=blue-10 id="submit"')
 
     def _item(self, name: str, item: Item) -> None:
         from nicegui import ui  # noqa: PLC0415
@@ -74,16 +75,18 @@ class Form:
         with ui.card().classes("w-full").props(f'role=group id="item-{item.name}"'):
             ui.label(item.text).classes("text-lg")
             if item.kind == "choice":
-                self._choices(name, item, dict(zip(item.choices, item.choices, strict=True)))
+                self._choices(
+                    name, item, dict(zip(item.choices, item.labels or item.choices, strict=True))
+                )
             elif item.kind == "scale" and item.step and _ticks(item) <= MOST_TICKS:
                 values = [item.lowest + item.step * tick for tick in range(_ticks(item))]
                 self._choices(name, item, {value: f"{value:g}" for value in values})
             else:
                 self._field(name, item)
             with ui.row().classes("items-center gap-4"):
-                ui.button("No answer", on_click=lambda: self._answer(name, item, None)).props(
-                    "flat dense no-caps color=grey-9"
-                )
+                ui.button(
+                    self._words.no_answer, on_click=lambda: self._answer(name, item, None)
+                ).props(f'flat dense no-caps color=grey-9 id="decline-{item.name}"')
                 status = ui.label().classes("text-green-900").props(f'id="status-{item.name}"')
             self._refreshers.append(lambda: status.set_text(self._status(item)))
 
@@ -100,7 +103,8 @@ class Form:
                     label, on_click=lambda value=value: self._answer(name, item, value)
                 )
                 button.props('outline dense no-caps padding="6px 7px" color=blue-10')
-                button.props(f'id="{item.name}-{label}"').classes("min-w-8")
+                ident = value if isinstance(value, str) else label
+                button.props(f'id="{item.name}-{ident}"').classes("min-w-8")
                 self._refreshers.append(self._marking(button, item, value))
             if item.right:
                 ui.label(item.right).classes("font-medium ml-2")
@@ -122,7 +126,7 @@ class Form:
         from nicegui import ui  # noqa: PLC0415
 
         held = self._desk.board.answers.get(item.name)
-        hint = "" if item.kind == "text" else item.takes
+        hint = "" if item.kind == "text" else self._words.takes(item)
         shown = "" if held is None else f"{held:g}" if isinstance(held, float) else str(held)
         field = ui.input(hint, value=shown).classes("w-full")
         field.props(f'outlined for="{item.name}-field"')
@@ -140,13 +144,20 @@ class Form:
         self._desk.give(self._page, Order.ANSWER, json.dumps(given, ensure_ascii=False))
 
     def _status(self, item: Item) -> str:
-        board = self._desk.board
-        answers = board.answers
+        board, words = self._desk.board, self._words
         if board.refusal and board.refused_item == item.name:
-            return f"not taken: {board.refusal}"
-        if item.name not in answers:
-            return OPEN
-        return DECLINED if answers[item.name] is None else SAVED
+            return f"{words.not_taken}: {words.refused(board.refusal, item)}"
+        if item.name not in board.answers:
+            return ""
+        return words.declined if board.answers[item.name] is None else words.saved
+
+    def _refusal(self) -> str:
+        """Return why the last answer, or what was handed in, was not taken."""
+        board = self._desk.board
+        if not (board.refusal and board.form):
+            return ""
+        items = {item.name: item for item in self._desk.study.questionnaires[board.form].items()}
+        return self._words.refused(board.refusal, items.get(board.refused_item))
 
 
 def _ticks(item: Item) -> int:

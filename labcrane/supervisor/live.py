@@ -12,6 +12,7 @@ from labcrane.streams.frames import FRAME
 HISTORY_S = 20.0
 CHART_HZ = 20.0
 PAUSE_S = 0.02
+PATIENCE_S = 5.0
 RECENT_S = 1.0
 """The lateness that is shown is the worst of this time."""
 
@@ -77,7 +78,10 @@ class Live:
             return None
         # One second of buffer, and a connection that comes back by itself.
         inlet = pylsl.StreamInlet(found[0], max_buflen=1, recover=True)
-        channel = inlet.info(5.0).desc().child("channels").child("channel")
+        try:
+            channel = inlet.info(PATIENCE_S).desc().child("channels").child("channel")
+        except TimeoutError:  # a busy computer, or a session that has just ended: once more
+            return None
         columns = []
         while not channel.empty():
             columns.append(channel.child_value("label"))

@@ -1,7 +1,7 @@
 """The participant's page: consent, the questionnaire that is asked, and nothing else."""
 
 from labcrane.supervisor.consent import ConsentCard
-from labcrane.supervisor.desk import Desk
+from labcrane.supervisor.desk import PRIMARY, Desk
 from labcrane.supervisor.form import Form
 from labcrane.supervisor.rights import PARTICIPANT
 
@@ -11,6 +11,7 @@ def participant_page(desk: Desk) -> None:
     from nicegui import ui  # noqa: PLC0415 - loads for a second
 
     ui.page_title("labcrane")
+    ui.colors(primary=PRIMARY)
     with ui.column().classes("w-full max-w-4xl mx-auto p-4"):
         ConsentCard(desk, PARTICIPANT).build()
         Form(desk, PARTICIPANT).build()

@@ -1,6 +1,7 @@
 """The machine in three dimensions, from its joint angles."""
 
 import itertools
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -8,16 +9,20 @@ import numpy as np
 from labcrane.kinematics import frames
 from labcrane.machine import Machine
 from labcrane.supervisor.desk import Desk
+from labcrane.supervisor.surroundings import Surroundings
 
 RATE_S = 0.1
+THICK = 0.04
+"""Of a beam, as a share of the machine's reach."""
+
 UPRIGHT = 1e-9
 """Below this a link stands upright, and every direction across it is as good."""
 
-TARGET = ("target_x", "target_y", "target_z")
+TARGET = tuple(f"task.target.position.{axis}" for axis in "xyz")
 
 
 class Scene:
-    """Draws a beam for each link, the tip, and the trial's target if it says where it is."""
+    """Draws a beam for each link, the tip, the target if there is one, and what stands around."""
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
@@ -30,18 +35,20 @@ class Scene:
         rest = machine.rest
         points = _points(machine, rest)
         span = float(np.abs(points).max())
+        thick = THICK * span
         with ui.scene(grid=(round(2 * span), 20), background_color="#eef2f6").classes(
             "w-full h-72"
         ) as scene:
             self._beams = [
-                scene.box(float(np.linalg.norm(b - a)) or 0.01, 0.3, 0.3).material("#b45309")
+                scene.box(float(np.linalg.norm(b - a)) or 0.01, thick, thick).material("#b45309")
                 for a, b in itertools.pairwise(points)
             ]
-            self._tip = scene.sphere(0.15).material("#111827")
-            self._target = scene.sphere(0.25).material("#15803d", opacity=0.6)
+            self._tip = scene.sphere(thick / 2).material("#111827")
+            self._target = scene.sphere(0.8 * thick).material("#15803d", opacity=0.6)
         scene.move_camera(
             x=1.1 * span, y=-1.6 * span, z=1.1 * span, look_at_z=0.2 * span, duration=0
         )
+        self._surroundings = Surroundings(self._desk, scene)
         self._place(points)
         ui.timer(RATE_S, self._update)
 
@@ -51,17 +58,18 @@ class Scene:
         given = [angle for angle in angles if angle is not None]
         if len(given) == len(angles):
             self._place(_points(machine, given))
+        self._surroundings.update()
 
     def _place(self, points: "Sequence[np.ndarray]") -> None:
         for beam, a, b in zip(self._beams, points, points[1:], strict=False):
             beam.move(*((a + b) / 2).tolist())
             beam.rotate_R(_along(b - a))
         self._tip.move(*points[-1].tolist())
-        where = [self._desk.board.trial.get(name) for name in TARGET]
-        known = [float(value) for value in where if isinstance(value, int | float)]
-        self._target.visible(len(known) == len(TARGET))
-        if len(known) == len(TARGET):
-            self._target.move(*known)
+        where = [self._desk.live.newest.get(name, math.nan) for name in TARGET]
+        known = all(map(math.isfinite, where))
+        self._target.visible(known)
+        if known:
+            self._target.move(*where)
 
 
 def _points(machine: Machine, angles: Sequence[float]) -> "list[np.ndarray]":

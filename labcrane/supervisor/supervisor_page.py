@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from labcrane.console import Order
 from labcrane.records import Event
 from labcrane.supervisor.consent import ConsentCard
-from labcrane.supervisor.desk import Desk
+from labcrane.supervisor.desk import PRIMARY, Desk
 from labcrane.supervisor.form import Form
 from labcrane.supervisor.rights import SUPERVISOR
 from labcrane.supervisor.scene import Scene
@@ -21,6 +21,7 @@ BUTTONS: Mapping[str, tuple[Order, str, str]] = {
     "Not completed": (Order.COMPLETION, "0", "blue-10"),
 }
 LINES = 12
+AXIS = {"axisLine": {"onZero": False}, "axisLabel": {"color": "#333"}}
 RATE_S = 0.25
 
 
@@ -29,6 +30,7 @@ def supervisor_page(desk: Desk) -> None:
     from nicegui import ui  # noqa: PLC0415 - loads for a second
 
     ui.page_title(f"labcrane: {desk.participant}")
+    ui.colors(primary=PRIMARY)
     with ui.column().classes("w-full max-w-7xl mx-auto p-3 gap-3"):
         _status(desk)
         ConsentCard(desk, SUPERVISOR).build()
@@ -132,8 +134,8 @@ def _chart(desk: Desk) -> None:
         {
             "animation": False,
             "grid": {"left": 50, "right": 15, "top": 15, "bottom": 30},
-            "xAxis": {"type": "value", "min": -20, "max": 0, "name": "s"},
-            "yAxis": {"type": "value", "scale": True, "axisLine": {"onZero": False}},
+            "xAxis": {"type": "value", "min": -20, "max": 0, "name": "s", **AXIS},
+            "yAxis": {"type": "value", "scale": True, **AXIS},
             "series": [{"type": "line", "showSymbol": False, "data": []}],
         }
     ).classes("w-full h-60")

@@ -21,6 +21,12 @@ WORDS = {
         "handedness": "Mit welcher Hand schreiben Sie?",
         "experience": "Seit wie vielen Jahren bedienen Sie Kräne oder Manipulatoren?",
         "gaming": "Wie viele Stunden in der Woche spielen Sie Computerspiele?",
+        "female": "weiblich",
+        "male": "männlich",
+        "other": "divers",
+        "left": "links",
+        "right": "rechts",
+        "both": "beide",
     },
 }
 
@@ -38,11 +44,15 @@ class Demographics(Questionnaire):
         words = self._words
         return [
             Item("age", words["age"], "number", 16.0, 99.0, 1.0),
-            Item("sex", words["sex"], "choice", choices=("female", "male", "other")),
-            Item("handedness", words["handedness"], "choice", choices=("left", "right", "both")),
+            self._choice("sex", ("female", "male", "other")),
+            self._choice("handedness", ("left", "right", "both")),
             Item("experience", words["experience"], "number", 0.0, 70.0, 0.0),
             Item("gaming", words["gaming"], "number", 0.0, 168.0, 0.0),
         ]
+
+    def _choice(self, name: str, choices: tuple[str, ...]) -> Item:
+        labels = tuple(self._words.get(choice, choice) for choice in choices)
+        return Item(name, self._words[name], "choice", choices=choices, labels=labels)
 
     def score(self, answers: Answers) -> Mapping[str, float]:
         return {}

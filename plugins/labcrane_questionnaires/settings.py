@@ -139,8 +139,15 @@ class Question(Settings):
         return Item(**self.model_dump())
 
 
+def _or_in_the_file(schema: dict[str, Any]) -> None:
+    """Let a protocol write the file alone."""
+    schema["anyOf"] = [{"required": schema.pop("required")}, {"required": ["file"]}]
+
+
 class FreeSettings(Settings):
     """Of a questionnaire of the lab's own, written in the protocol or in a file beside it."""
+
+    model_config = ConfigDict(json_schema_extra=_or_in_the_file)
 
     file: StudyPath | None = None
     """YAML file beside the protocol with title, questions and whatever else can be set here. What

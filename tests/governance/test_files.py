@@ -12,6 +12,7 @@ from governed import Lab, edit
 from labcrane import ProtocolError
 from labcrane.admission import gate
 from labcrane.approval.lock import lock_path
+from labcrane.participants.places import Places
 
 RESCUE = Path(__file__).parents[2] / "protocols" / "retrieval"
 ASKED = """
@@ -52,7 +53,7 @@ DRIFTS = {
 def test_labcrane_run_refuses_another_number_or_question_in_any_file_and_names_it(
     rescue: Lab,
 ) -> None:
-    """With the command itself, from another folder than the one in which it was approved."""
+    """With the command itself, in another working folder than the one it was approved from."""
     for name, (old, new) in DRIFTS.items():
         edit(rescue.folder / name, old, new)
     done = subprocess.run(
@@ -78,6 +79,14 @@ def test_each_of_these_files_alone_is_refused(rescue: Lab) -> None:
         with pytest.raises(ProtocolError, match=f"\n  file {name}: "):
             gate(rescue.visit("R001"))
         edit(rescue.folder / name, new, old)
+
+
+def test_the_lock_holds_wherever_the_files_are_moved(rescue: Lab) -> None:
+    elsewhere = rescue.folder.with_name("another disk")
+    rescue.folder.rename(elsewhere)
+    rescue.folder, rescue.protocol = elsewhere, elsewhere / "study.yaml"
+    rescue.places = Places(elsewhere / "data")
+    gate(rescue.visit("R001"))
 
 
 def test_a_file_that_would_not_move_with_the_study_is_not_approved(rescue: Lab) -> None:

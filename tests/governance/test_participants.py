@@ -100,7 +100,7 @@ def test_the_deviations_of_a_session_that_was_killed_come_from_its_journal(lab: 
                 return super().commands()
 
         try:
-            run(lab.visit("P001", fast=True), Killer({50: [Command(Order.SKIP)]}))
+            run(lab.visit("P001"), Killer({50: [Command(Order.SKIP)]}))
         finally:
             os._exit(1)
     _, status = os.waitpid(child, 0)

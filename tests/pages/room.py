@@ -66,11 +66,15 @@ class Room:
     def process(self, word: str) -> psutil.Process | None:
         """Return the session's or the pages' process, by what it has open."""
         for child in psutil.Process(self.launcher.pid).children():
-            if "spawn_main" not in " ".join(child.cmdline()):
+            try:
+                if "spawn_main" not in " ".join(child.cmdline()):
+                    continue
+                serves = any(
+                    c.status == "LISTEN" and c.laddr.port == self.port
+                    for c in child.net_connections()
+                )
+            except psutil.NoSuchProcess:  # it is ending this very moment
                 continue
-            serves = any(
-                c.status == "LISTEN" and c.laddr.port == self.port for c in child.net_connections()
-            )
             if serves == (word == "pages"):
                 return child
         return None

@@ -143,6 +143,7 @@ def check_record(data: Path) -> None:
     assert all(d["by"] == "supervisor" and d["refused"] is None for d in given.values())
 
 
+@pytest.mark.long
 def test_no_answer_is_lost_when_the_session_is_killed_in_the_middle(
     protocol: Path, tmp_path: Path, browser: webdriver.Chrome
 ) -> None:

@@ -1,0 +1,65 @@
+"""The supervisor sees the scene of a running scenario, where the session has it."""
+
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from faults.sessions import unique, wait_for
+from governed import edit
+from pages.room import a_room, photograph, press, shown
+from selenium import webdriver
+
+from labcrane import open_recording, read_placed
+
+ROOT = Path(__file__).parents[2]
+SEEN = """
+const found = {};
+window['scene_' + document.querySelector('.nicegui-scene').id].traverse(o => {
+    if (o.name) found[o.name] = [o.position.x, o.position.y, o.position.z, o.children.length];
+});
+return found;
+"""
+"""Where three.js has what has a name, and of how many parts it is."""
+
+
+@pytest.mark.long
+def test_what_stands_around_the_machine_is_drawn_where_the_session_has_it(
+    tmp_path: Path, browser: webdriver.Chrome
+) -> None:
+    folder = tmp_path / "rescue"
+    shutil.copytree(
+        ROOT / "protocols" / "retrieval", folder, ignore=shutil.ignore_patterns("hydraulic_arm")
+    )
+    protocol = folder / "protocol.yaml"
+    text = protocol.read_text()
+    start = text.index("input:")
+    text = text[:start] + "input: {use: scenario_operator}\n" + text[text.index("operator:") :]
+    text = re.sub(r"views:\n( .*\n)*", "", text)  # windows need a screen
+    protocol.write_text(text.replace("study: retrieval", f"study: {unique('rescue')}"))
+    edit(protocol, r"pattern: 'R\d{3}'", r"pattern: 'P\d{3}'")
+    with a_room(protocol, tmp_path / "data") as room:
+        wait_for(lambda: room.process("pages"), 60)
+        browser.get(room.links()["supervisor"])
+        for what in ("instructions", "retrieval"):
+            shown(browser, "stage", f"waits to start: {what}")
+            press(browser, "order-start")
+        shown(browser, "stage", "trial")
+        wait_for(lambda: browser.execute_script(SEEN), 30)
+        shown(browser, "facts", "loop at most")
+        seen = browser.execute_script(SEEN)
+        photograph(browser, "scenario")
+        press(browser, "order-end")
+        press(browser, "order-end-sure")
+        assert room.launcher.wait(60) == 0, "".join(room.said)
+    session = open_recording(room.folder / "P001-PILOT.h5").session(1)
+    events = session.events
+    placed = read_placed(events[events["name"] == "scene.placed"]["data"].iloc[0]["things"])
+    assert {each.name: len(each.parts) for each in placed} == {
+        name: parts for name, (*_, parts) in seen.items()
+    }
+    state = session.streams["state"].data
+    for name, (*where, _) in seen.items():
+        recorded = state[[f"scene.{name}.position.{axis}" for axis in "xyz"]].to_numpy()
+        assert np.nanmin(np.linalg.norm(recorded - where, axis=1)) < 0.001
