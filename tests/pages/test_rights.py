@@ -190,12 +190,12 @@ def test_every_refusal_is_in_the_record(visited) -> None:
 
 
 def test_two_hundred_reconnects_and_a_client_that_never_reads_do_not_slow_the_loop(visited) -> None:
-    """Ten times in turn; a loop that such clients slow is later each time, whatever else runs."""
+    """Ten times in turn; the median turn counts, for something else may run in one of them."""
     _, session, (opened, quiet, rude) = visited
     assert opened == RECONNECTS
     before, during = lateness(session, quiet), lateness(session, rude)
     later = during - before
-    assert min(later) < LATER_S, f"ms: quiet {1e3 * before}, later each time by {1e3 * later}"
+    assert np.median(later) < LATER_S, f"ms: quiet {1e3 * before}, later each time by {1e3 * later}"
     assert len(later) == SPELLS
 
 
