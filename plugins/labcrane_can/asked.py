@@ -81,6 +81,23 @@ class PanelCommands:
         signals = [asked.signal if new else 0.0 for asked, new in pairs]
         return signals, [asked.floats and new for asked, new in pairs], any(fresh)
 
+    def silent(self, now: float) -> str | None:
+        """Return which valves fell silent at ``now`` in s while they were open, in words.
+
+        Panels may leave out valves that are shut, but no valve is shut by silence.
+        """
+        fallen = [
+            f"{joint} at {asked.signal:g}"
+            for joint, asked in self.asked.items()
+            if asked.signal != 0.0 and now - asked.time > self._timeout
+        ]
+        if not fallen:
+            return None
+        return (
+            f"no command for {self._timeout:g} s to a valve that was open: {', '.join(fallen)}; "
+            "see what the panel sends, or move that lever again"
+        )
+
     def complaint(self) -> str:
         """Return what came instead of commands, in words; empty when nothing did."""
         parts = []

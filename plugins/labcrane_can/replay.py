@@ -71,9 +71,11 @@ class CanReplay(InputDevice):
                 if ended
                 else f"no valve command for {self._settings.timeout_s:g} s at {now:.3f} s of it"
             )
+        else:
+            self.fault = self._commands.silent(now)
+        if self.fault is not None:
             out[:] = 0.0
             return out
-        self.fault = None
         out[:joints] = [signal / FULL for signal in signals]
         out[joints:-1] = floats
         out[-1] = 1.0
