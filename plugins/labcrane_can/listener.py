@@ -1,6 +1,7 @@
 """A thread beside the loop that reads a bus, and opens it again when it was unplugged."""
 
 import contextlib
+import socket
 import threading
 import time
 from collections import deque
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
 
 WAIT_S = 0.02
 """How long one look at the bus may take; what waits to be sent waits as long."""
+
+DIAL_AFTER_S, DIAL_S = 1.0, 0.5
+"""Silence after which a socketcand server is dialled again, and how long that may take."""
 
 AGAIN_S = 0.2
 """Time between attempts to open a bus that was lost."""
@@ -37,6 +41,7 @@ class Listener:
         self._over = threading.Event()
         self._second, self._count = 0.0, 0
         self._flooded = False
+        self._heard = time.perf_counter()
         self._bus: can.BusABC | None = open_bus(settings)
         self._thread = threading.Thread(target=self._work, name="labcrane-can", daemon=True)
         self._thread.start()
@@ -64,6 +69,7 @@ class Listener:
                 while self._outgoing:
                     self._bus.send(self._outgoing.popleft(), timeout=WAIT_S)
                 frame = self._bus.recv(WAIT_S)
+                self._watch_end(came=frame is not None)
             except (can.CanError, OSError, TypeError, ValueError) as error:
                 # pyserial raises what it likes when its file is closed under it.
                 self._shut()
@@ -73,6 +79,15 @@ class Listener:
             if frame is not None:
                 self._commands.take(frame, now)
             self._watch_flood(now, came=frame is not None)
+
+    def _watch_end(self, *, came: bool) -> None:
+        # python-can 4.6 does not tell that a socketcand server has hung up: it hears nothing.
+        now = time.perf_counter()
+        if came or not self._settings.bus.startswith("socketcand:"):
+            self._heard = now
+        elif now - self._heard > DIAL_AFTER_S:
+            self._heard = now
+            raise OSError(f"nothing was heard for {DIAL_AFTER_S:g} s; it is dialled again")
 
     def _watch_flood(self, now: float, *, came: bool) -> None:
         self._count += came
@@ -124,6 +139,9 @@ def open_bus(settings: CanSettings) -> "can.BusABC":
         host, _, port = where.partition(":")
         options |= {"host": host or "127.0.0.1", "port": int(port or 29536)}
     try:
+        if interface == "socketcand":
+            # python-can tries for 10 s without a pause, which would slow the loop down.
+            socket.create_connection((options["host"], options["port"]), DIAL_S).close()
         return can.Bus(interface=interface, channel=channel, bitrate=settings.bitrate, **options)
     except Exception as error:
         raise DeviceError(
