@@ -66,7 +66,7 @@ class PanelCommands:
     def take(self, frame: CanFrame, time: float) -> None:
         """Take one frame that came at ``time`` in s."""
         if frame.is_error_frame:
-            self._refuse("the bus reports an error frame")
+            self.refuse("the bus reports an error frame")
         elif self._signals:
             self._take_described(frame, time)
         elif not frame.is_extended_id:
@@ -107,11 +107,16 @@ class PanelCommands:
             parts.append(f"{self.foreign} frames were not for these valves")
         return "; ".join(parts)
 
+    def refuse(self, why: str) -> None:
+        """Count something that could not be obeyed, and why."""
+        self.refused += 1
+        self.why = why
+
     def _take_valve(self, frame: CanFrame, time: float) -> None:
         try:
             command = decode(frame.arbitration_id, bytes(frame.data))
         except FrameError as error:
-            self._refuse(str(error))
+            self.refuse(str(error))
             return
         if command is None or command.valve not in self._joints or not self._ours(frame):
             self.foreign += 1
@@ -127,13 +132,13 @@ class PanelCommands:
             return
         message, joints = found
         if len(frame.data) < message.length:
-            self._refuse(f"{message.name} has {len(frame.data)} bytes instead of {message.length}")
+            self.refuse(f"{message.name} has {len(frame.data)} bytes instead of {message.length}")
             return
         values: Any = message.decode(bytes(frame.data), decode_choices=False)
         for signal, joint in joints.items():
             value = float(values[signal]) / self._full * FULL
             if abs(value) > FULL * (1 + 1e-9):
-                self._refuse(f"{message.name}.{signal} is {values[signal]}, beyond {self._full:g}")
+                self.refuse(f"{message.name}.{signal} is {values[signal]}, beyond {self._full:g}")
                 continue
             asked = self.asked[joint]
             asked.signal, asked.floats, asked.time = float(round(value)), False, time
@@ -144,10 +149,6 @@ class PanelCommands:
         return (self._node is None or identifier & NODE == self._node) and (
             self._priority is None or priority == self._priority
         )
-
-    def _refuse(self, why: str) -> None:
-        self.refused += 1
-        self.why = why
 
 
 def _from_dbc(settings: ValveMap) -> "dict[int, tuple[Message, dict[str, str]]]":

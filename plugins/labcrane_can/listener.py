@@ -20,6 +20,9 @@ WAIT_S = 0.02
 DIAL_AFTER_S, DIAL_S = 1.0, 0.5
 """Silence after which a socketcand server is dialled again, and how long that may take."""
 
+MOST_GARBLED = 20
+"""Lines in a row that are no frames, after which a bus is opened again."""
+
 AGAIN_S = 0.2
 """Time between attempts to open a bus that was lost."""
 
@@ -41,7 +44,7 @@ class Listener:
         self._over = threading.Event()
         self._second, self._count = 0.0, 0
         self._flooded = False
-        self._heard = time.perf_counter()
+        self._heard, self._garbled = time.perf_counter(), 0
         self._bus: can.BusABC | None = open_bus(settings)
         self._thread = threading.Thread(target=self._work, name="labcrane-can", daemon=True)
         self._thread.start()
@@ -68,9 +71,9 @@ class Listener:
             try:
                 while self._outgoing:
                     self._bus.send(self._outgoing.popleft(), timeout=WAIT_S)
-                frame = self._bus.recv(WAIT_S)
+                frame = self._look(self._bus)
                 self._watch_end(came=frame is not None)
-            except (can.CanError, OSError, TypeError, ValueError) as error:
+            except (can.CanError, OSError, TypeError) as error:
                 # pyserial raises what it likes when its file is closed under it.
                 self._shut()
                 self.lost = f"{self._settings.bus} is gone: {error}"
@@ -79,6 +82,19 @@ class Listener:
             if frame is not None:
                 self._commands.take(frame, now)
             self._watch_flood(now, came=frame is not None)
+
+    def _look(self, bus: "can.BusABC") -> "can.Message | None":
+        """Return the next frame; what an adapter garbled is refused, and it goes on."""
+        try:
+            frame = bus.recv(WAIT_S)
+        except (ValueError, IndexError) as error:
+            self._garbled += 1
+            if self._garbled > MOST_GARBLED:
+                raise OSError(f"{MOST_GARBLED} lines in a row are no frames ({error})") from error
+            self._commands.refuse(f"the adapter's line is no frame ({error})")
+            return None
+        self._garbled = 0 if frame is not None else self._garbled
+        return frame
 
     def _watch_end(self, *, came: bool) -> None:
         # python-can 4.6 does not tell that a socketcand server has hung up: it hears nothing.

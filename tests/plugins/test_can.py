@@ -6,6 +6,7 @@ from pathlib import Path
 import can
 import numpy as np
 import pytest
+from slcan_adapter import SlcanAdapter
 
 from labcrane import InputDevice, ProtocolError, Tick
 from labcrane.testing import InputContract, a_frame, a_run, ch8
@@ -131,6 +132,29 @@ def wait_for(ready, seconds: float = 5.0) -> None:
     while not ready():
         assert time.perf_counter() < end, "waited in vain"
         time.sleep(0.005)
+
+
+@pytest.mark.parametrize(
+    "garbled", [b"T0CFE3\r", b"T0CFE31ZZ8000000\r", b"T0CFE31258GG\r", b"\r\x07"]
+)
+def test_a_garbled_line_is_refused_and_the_next_frame_obeyed(garbled: bytes) -> None:
+    adapter = SlcanAdapter()
+    device = CanPanel(CanSettings(bus=f"slcan:{adapter.path}", valves=VALVES), ch8())
+    try:
+        device.open(a_run(ch8(), axes=device.signals))
+        wait_for(lambda: adapter.opened)
+        for _ in range(3):
+            adapter.garble(garbled)
+        adapter.send(*encode(1, 100, 0x25))
+        wait_for(lambda: device._commands.asked["slew"].signal == 100.0)
+        assert device._listener is not None
+        assert device._listener.lost is None
+        if garbled.startswith(b"T"):
+            assert device._commands.refused == 3
+            assert device._commands.why.startswith("the adapter's line is no frame (")
+    finally:
+        device.close()
+        adapter.unplug()
 
 
 def test_float_block_and_old_commands_ask_for_no_flow() -> None:
