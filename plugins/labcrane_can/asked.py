@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from labcrane import ProtocolError
 from labcrane_can.avc import FULL, FrameError, State, decode
+from labcrane_can.dbc import described
 from labcrane_can.settings import ValveMap
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ class PanelCommands:
                     )
                 self._joints[int(valve)] = joint
         else:
-            self._signals = _from_dbc(settings)
+            self._signals = described(settings)
 
     def take(self, frame: CanFrame, time: float) -> None:
         """Take one frame that came at ``time`` in s."""
@@ -149,26 +150,3 @@ class PanelCommands:
         return (self._node is None or identifier & NODE == self._node) and (
             self._priority is None or priority == self._priority
         )
-
-
-def _from_dbc(settings: ValveMap) -> "dict[int, tuple[Message, dict[str, str]]]":
-    import cantools  # noqa: PLC0415 - loads for a moment
-
-    try:
-        described: Any = cantools.database.load_file(str(settings.map))
-    except (OSError, ValueError, cantools.Error) as error:
-        raise ProtocolError(f"map {str(settings.map)!r} is no DBC file: {error}") from error
-    messages = {message.name: message for message in described.messages}
-    found: dict[int, tuple[Message, dict[str, str]]] = {}
-    for joint, name in settings.valves.items():
-        message_name, _, signal = str(name).partition(".")
-        message = messages.get(message_name)
-        if message is None or signal not in {each.name for each in message.signals}:
-            known = ", ".join(
-                f"{each.name}.{one.name}" for each in messages.values() for one in each.signals
-            )
-            raise ProtocolError(
-                f"{settings.map} has no {name!r} for joint {joint!r}; it has {known}"
-            )
-        found.setdefault(message.frame_id, (message, {}))[1][signal] = joint
-    return found

@@ -208,29 +208,6 @@ def test_another_node_or_priority_is_foreign_when_the_protocol_names_them() -> N
     assert commands.signals(0.0)[0][0] == 120.0
 
 
-def test_a_dbc_file_maps_another_panel(tmp_path: Path) -> None:
-    (tmp_path / "panel.dbc").write_text(
-        'VERSION ""\nNS_ :\nBS_:\nBU_: P\n\nBO_ 256 Levers: 4 P\n'
-        ' SG_ Boom : 0|16@1- (0.1,0) [-100|100] "%" P\n'
-        ' SG_ Arm : 16|16@1- (0.1,0) [-100|100] "%" P\n'
-    )
-    settings = ValveMap(
-        valves={"elbow": "Levers.Boom", "shoulder": "Levers.Arm"}, map=tmp_path / "panel.dbc"
-    )
-    commands = PanelCommands(settings)
-    frame = can.Message(
-        arbitration_id=256,
-        is_extended_id=False,
-        data=(500).to_bytes(2, "little") + (-1000).to_bytes(2, "little", signed=True),
-    )
-    commands.take(frame, 0.0)
-    assert commands.signals(0.0)[0] == [125.0, -250.0]
-    with pytest.raises(
-        ProtocolError, match=r"has no 'Levers.Bom' for joint 'elbow'; it has Levers"
-    ):
-        PanelCommands(ValveMap(valves={"elbow": "Levers.Bom"}, map=tmp_path / "panel.dbc"))
-
-
 def test_the_same_log_gives_the_same_commands_bit_for_bit_in_every_format(tmp_path: Path) -> None:
     first = None
     for ending in ("log", "asc", "blf"):
