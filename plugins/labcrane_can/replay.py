@@ -82,4 +82,4 @@ class CanReplay(InputDevice):
         return out
 
     def facts(self) -> Mapping[str, Value]:
-        return {"file": str(self._settings.file), "frames": len(self._frames)}
+        return {"file": self._settings.file.name, "frames": len(self._frames)}
