@@ -85,8 +85,11 @@ class LoadedCrane(BulletCrane):
             pybullet.resetJointState(self._body, hinge, angle, 0.0, physicsClientId=self._client)
 
     def _move(self, speeds: Sequence[float]) -> FloatArray:
-        super()._move(speeds)
+        # Inverse dynamics know no joints without drives: every tick is the solver's.
+        self._solve(targetVelocities=speeds)
+        self._step()
         states = self._read()
+        self._state.fill([state[0] for state in states], [state[1] for state in states])
         loads = [
             state[3] / joint.effort
             for state, joint in zip(states, self._machine.joints, strict=True)
