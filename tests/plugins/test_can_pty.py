@@ -96,18 +96,23 @@ def test_a_panel_process_unplugged_in_the_middle_pauses_the_session_and_resumes_
     said = told(process)
     unplugged, back = float(said["unplugged"]), float(said["back"])
     events = [(woke, event) for woke, _, _, events in frames for event in events]
-    lost = [(woke, event) for woke, event in events if event.name == "input.lost"]
-    found = [(woke, event) for woke, event in events if event.name == "input.back"]
-    assert lost[-1][0] - unplugged < 0.25
-    assert "is gone" in str(lost[-1][1].data["why"])
-    assert found[-1][0] > back
+    # A busy computer begins before the panel and ends after it, which are losses too.
+    lost, why = next(
+        (woke, event.data["why"])
+        for woke, event in events
+        if event.name == "input.lost" and woke > unplugged
+    )
+    found = next(woke for woke, event in events if event.name == "input.back" and woke > lost)
+    assert lost - unplugged < 0.25
+    assert "is gone" in str(why)
+    assert found > back
     for woke, command, paused, _ in frames:
-        if lost[-1][0] <= woke < found[-1][0]:
+        if lost <= woke < found:
             assert paused
             assert not command.any()
-    assert found[-1][0] - back < 1.5
+    assert found - back < 1.5
     before = np.array([command for woke, command, _, _ in frames if woke < unplugged])
-    after = np.array([command for woke, command, _, _ in frames if woke > found[-1][0] + 0.1])
+    after = np.array([command for woke, command, _, _ in frames if woke > found + 0.1])
     assert np.abs(before).max() > 190
     assert np.abs(after).max() > 190
     sent, heard = map(int, said["sent"].split())
