@@ -5,6 +5,7 @@ import platform
 from datetime import UTC, datetime
 from importlib.metadata import entry_points, version
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, Protocol
 
 from labcrane.attempt import trial_units
@@ -17,6 +18,7 @@ from labcrane.plugin_modules import own_plugins
 from labcrane.records import Run
 from labcrane.rig import Rig
 from labcrane.study import Study
+from labcrane.study_files import named_files, plain_settings
 
 RECORDED_PACKAGES = (
     "labcrane",
@@ -51,7 +53,7 @@ class Recorded(Protocol):
 
 def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> dict[str, Any]:
     """Return everything that whoever reads the recording must know, ready for JSON."""
-    study = visit.study
+    study, folder = visit.study, visit.study.path.parent
     choices = {
         "input": study.operator if visit.simulated else study.input,
         "scheme": study.scheme,
@@ -81,7 +83,8 @@ def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> 
         "protocol_sha256": study.sha256,
         "machine": study.machine_text,
         "machine_sha256": hashlib.sha256(study.machine_text.encode()).hexdigest(),
-        "components": {part: _choice(choice) for part, choice in choices.items()},
+        "components": {part: _choice(choice, folder) for part, choice in choices.items()},
+        "files": named_files((choice.settings for choice in choices.values()), folder),
         "facts": the_rig.facts(),
         "versions": _versions(),
         # What a simulation records does not depend on the computer that it is made on.
@@ -113,11 +116,11 @@ def _started(visit: Recorded) -> datetime:
     return datetime.fromtimestamp(0.0, UTC) if visit.fast else datetime.now(UTC)
 
 
-def _choice(choice: Choice) -> dict[str, Any]:
+def _choice(choice: Choice, folder: Path) -> dict[str, Any]:
     return {
         "use": choice.name,
         "plugin": choice.plugin,
-        "settings": choice.settings.model_dump(mode="json"),
+        "settings": plain_settings(choice.settings, folder),
     }
 
 

@@ -158,9 +158,13 @@ class Body:
         0 for the base frame, otherwise the DH frame behind joint number ``frame``.
     size, centre
         Edge lengths and centre in that frame, in metres, x, y, z.
+    moves
+        What it moves with instead of a joint: its frame is then the state's ``MOVES.position`` and
+        ``MOVES.orientation``, a quaternion x, y, z, w.
     """
 
     name: str
     frame: int
     size: tuple[float, float, float]
     centre: tuple[float, float, float]
+    moves: str = ""

@@ -123,8 +123,8 @@ def replay(
         )
     with TemporaryDirectory(prefix="labcrane-replay-") as folder:
         study = load(restore(record, Path(folder), protocol, machine), discover(study=protocol))
-    parts = differing_parts(record, study)
-    return _run(record, study, session, parts, speed, sinks)
+        parts = differing_parts(record, study)
+        return _run(record, study, session, parts, speed, sinks)  # components read files too
 
 
 def _run(

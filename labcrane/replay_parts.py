@@ -9,6 +9,7 @@ from typing import Any
 
 from labcrane.recording.recording import SessionRecord
 from labcrane.study import Study
+from labcrane.study_files import plain_settings, write_files
 
 IRRELEVANT = ("pygame", "pylsl")
 """Of the recorded versions, those that bring input in or send frames out, and move nothing."""
@@ -33,6 +34,7 @@ def restore(
     _write_instructions(content, record, folder)
     if protocol is None:
         _put_in_questionnaires(content, record)
+        write_files(record.context.get("files", {}), folder)
     path = folder / "protocol.yaml"
     path.write_text(json.dumps(content), encoding="utf-8")  # JSON is YAML
     return path
@@ -81,7 +83,7 @@ def differing_parts(record: SessionRecord, study: Study) -> tuple[str, ...]:
         chosen = {
             "use": choice.name,
             "plugin": choice.plugin,
-            "settings": choice.settings.model_dump(mode="json"),
+            "settings": plain_settings(choice.settings, study.path.parent),
         }
         found += _compared(part, recorded, chosen)
     found += _compared("rate_hz", float(context["rate_hz"]), study.protocol.rate_hz)

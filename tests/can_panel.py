@@ -1,7 +1,8 @@
 """A control panel in a process of its own: frames over a pty, unplugged for a while on request.
 
 Run as: can_panel.py LINK RATE_HZ SECONDS UNPLUG_AT BACK_AT. Prints "open" when it is listened to,
-"unplugged TIME" and "back TIME" (perf_counter) as it does so, and how many frames it sent.
+"unplugged TIME" and "back TIME" (perf_counter) as it does so, how many frames it sent, and the
+largest estimated flow of each valve, in percent, that it was told since it was plugged in last.
 """
 
 import math
@@ -35,7 +36,12 @@ for number in range(round(seconds * rate)):
         adapter = SlcanAdapter(link)
         print("back", time.perf_counter(), flush=True)
     if adapter is not None:
-        level = round(200 * math.sin(at))
-        adapter.send(*encode(1 + number % 4, level, 0x25))
+        valve = 1 + number % 4
+        adapter.send(*encode(valve, round(200 / valve * math.sin(at)), 0x25))
         sent += adapter.opened
+told = dict.fromkeys(range(1, 5), 0)
+for identifier, data in adapter.sent if adapter else ():
+    if (valve := ((identifier >> 8) & 0x3FFFF) - 0xFE10) in told:  # estimated flow, ISO 11783-7
+        told[valve] = max(told[valve], abs(data[0] - 125), abs(data[1] - 125))
+print("told", *told.values())
 print("sent", sent, len(adapter.sent) if adapter else 0, flush=True)

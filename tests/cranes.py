@@ -12,7 +12,6 @@ import pytest
 from labcrane import Dynamics, FloatArray, Machine
 from labcrane.testing import RATE_HZ, a_run
 from labcrane_bullet import labcrane_dynamics
-from labcrane_bullet.settings import CraneSettings
 
 needs_bullet = pytest.mark.skipif(
     find_spec("pybullet") is None and not os.environ.get("CI"),
@@ -25,18 +24,23 @@ machines = pytest.mark.parametrize("model", MACHINES)
 rates = pytest.mark.parametrize("rate_hz", [240.0, 1000.0])
 
 
-def build(name: str, machine: Machine, actuator: object = "ideal") -> Dynamics:
+def build(name: str, machine: Machine, actuator: object = "ideal", **hanging: object) -> Dynamics:
     """Return a crane as a rig builds it."""
-    (build,) = (offer.build for offer in labcrane_dynamics() if offer.name == name)
-    return build(CraneSettings.model_validate({"actuator": actuator}), machine)
+    (offer,) = (offer for offer in labcrane_dynamics() if offer.name == name)
+    settings = {"actuator": actuator, **hanging}
+    return offer.build(offer.settings.model_validate(settings), machine)
 
 
 @contextmanager
 def standing(
-    name: str, machine: Machine, rate_hz: float = RATE_HZ, actuator: object = "ideal"
+    name: str,
+    machine: Machine,
+    rate_hz: float = RATE_HZ,
+    actuator: object = "ideal",
+    **hanging: object,
 ) -> Iterator[Dynamics]:
     """Yield an open crane at its pose of rest."""
-    crane = build(name, machine, actuator)
+    crane = build(name, machine, actuator, **hanging)
     try:
         crane.open(replace(a_run(machine), rate_hz=rate_hz))
         yield crane

@@ -34,6 +34,9 @@ class SlcanAdapter:
             text = f"T{identifier:08X}{len(data)}{data.hex().upper()}\r"
             os.write(self._master, text.encode())
 
+    def garble(self, text: bytes) -> None:
+        os.write(self._master, text)
+
     def unplug(self) -> None:
         os.write(self._waker, b"x")
         self._thread.join()

@@ -1,20 +1,21 @@
 """The study's crane: moved by PyBullet, or by its velocity law alone."""
 
 from labcrane import Dynamics, Machine, Offer, PluginError, hookimpl, offer
-from labcrane_bullet.settings import CraneSettings
+from labcrane_bullet.settings import BulletSettings, CraneSettings
 
 
 @hookimpl
 def labcrane_dynamics() -> list[Offer[Dynamics]]:
     return [
-        offer("bullet_crane", CraneSettings, _bullet_crane),
+        offer("bullet_crane", BulletSettings, _bullet_crane),
         offer("kinematic_crane", CraneSettings, _kinematic_crane),
     ]
 
 
-def _bullet_crane(settings: CraneSettings, machine: Machine) -> Dynamics:
+def _bullet_crane(settings: BulletSettings, machine: Machine) -> Dynamics:
     try:
         from labcrane_bullet.bullet_crane import BulletCrane
+        from labcrane_bullet.loaded_crane import LoadedCrane
     except ModuleNotFoundError as error:
         if error.name != "pybullet":
             raise
@@ -22,7 +23,7 @@ def _bullet_crane(settings: CraneSettings, machine: Machine) -> Dynamics:
             "'bullet_crane' needs PyBullet, which is not installed (its wheels end at Python "
             "3.11); use 'kinematic_crane', which needs no engine, or install pybullet"
         ) from error
-    return BulletCrane(settings, machine)
+    return (LoadedCrane if settings.loaded else BulletCrane)(settings, machine)
 
 
 def _kinematic_crane(settings: CraneSettings, machine: Machine) -> Dynamics:

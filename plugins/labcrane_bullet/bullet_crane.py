@@ -51,7 +51,7 @@ class BulletCrane(Crane):
     def open(self, run: Run) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="labcrane-")
         self._file = Path(self._folder.name) / "crane.urdf"
-        self._file.write_text(urdf(self._machine), encoding="utf-8")
+        self._file.write_text(self._urdf(), encoding="utf-8")
         super().open(run)
 
     def close(self) -> None:
@@ -62,6 +62,9 @@ class BulletCrane(Crane):
 
     def facts(self) -> Mapping[str, Value]:
         return {**super().facts(), "engine": f"pybullet {version('pybullet')}"}
+
+    def _urdf(self) -> str:
+        return urdf(self._machine)
 
     def _place(self, angles: Sequence[float]) -> None:
         self._disconnect()
@@ -84,6 +87,7 @@ class BulletCrane(Crane):
             flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
             physicsClientId=client,
         )
+        self._body = body
         for joint, angle in zip(self._joints, angles, strict=True):
             _prepare(body, joint, client)
             pybullet.resetJointState(body, joint, angle, 0.0, physicsClientId=client)

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from labcrane import ProtocolError
 from labcrane_can.avc import FULL, FrameError, State, decode
+from labcrane_can.dbc import described
 from labcrane_can.settings import ValveMap
 
 if TYPE_CHECKING:
@@ -61,12 +62,12 @@ class PanelCommands:
                     )
                 self._joints[int(valve)] = joint
         else:
-            self._signals = _from_dbc(settings)
+            self._signals = described(settings)
 
     def take(self, frame: CanFrame, time: float) -> None:
         """Take one frame that came at ``time`` in s."""
         if frame.is_error_frame:
-            self._refuse("the bus reports an error frame")
+            self.refuse("the bus reports an error frame")
         elif self._signals:
             self._take_described(frame, time)
         elif not frame.is_extended_id:
@@ -81,6 +82,23 @@ class PanelCommands:
         signals = [asked.signal if new else 0.0 for asked, new in pairs]
         return signals, [asked.floats and new for asked, new in pairs], any(fresh)
 
+    def silent(self, now: float) -> str | None:
+        """Return which valves fell silent at ``now`` in s while they were open, in words.
+
+        Panels may leave out valves that are shut, but no valve is shut by silence.
+        """
+        fallen = [
+            f"{joint} at {asked.signal:g}"
+            for joint, asked in self.asked.items()
+            if asked.signal != 0.0 and now - asked.time > self._timeout
+        ]
+        if not fallen:
+            return None
+        return (
+            f"no command for {self._timeout:g} s to a valve that was open: {', '.join(fallen)}; "
+            "see what the panel sends, or move that lever again"
+        )
+
     def complaint(self) -> str:
         """Return what came instead of commands, in words; empty when nothing did."""
         parts = []
@@ -90,11 +108,16 @@ class PanelCommands:
             parts.append(f"{self.foreign} frames were not for these valves")
         return "; ".join(parts)
 
+    def refuse(self, why: str) -> None:
+        """Count something that could not be obeyed, and why."""
+        self.refused += 1
+        self.why = why
+
     def _take_valve(self, frame: CanFrame, time: float) -> None:
         try:
             command = decode(frame.arbitration_id, bytes(frame.data))
         except FrameError as error:
-            self._refuse(str(error))
+            self.refuse(str(error))
             return
         if command is None or command.valve not in self._joints or not self._ours(frame):
             self.foreign += 1
@@ -110,13 +133,13 @@ class PanelCommands:
             return
         message, joints = found
         if len(frame.data) < message.length:
-            self._refuse(f"{message.name} has {len(frame.data)} bytes instead of {message.length}")
+            self.refuse(f"{message.name} has {len(frame.data)} bytes instead of {message.length}")
             return
         values: Any = message.decode(bytes(frame.data), decode_choices=False)
         for signal, joint in joints.items():
             value = float(values[signal]) / self._full * FULL
             if abs(value) > FULL * (1 + 1e-9):
-                self._refuse(f"{message.name}.{signal} is {values[signal]}, beyond {self._full:g}")
+                self.refuse(f"{message.name}.{signal} is {values[signal]}, beyond {self._full:g}")
                 continue
             asked = self.asked[joint]
             asked.signal, asked.floats, asked.time = float(round(value)), False, time
@@ -127,30 +150,3 @@ class PanelCommands:
         return (self._node is None or identifier & NODE == self._node) and (
             self._priority is None or priority == self._priority
         )
-
-    def _refuse(self, why: str) -> None:
-        self.refused += 1
-        self.why = why
-
-
-def _from_dbc(settings: ValveMap) -> "dict[int, tuple[Message, dict[str, str]]]":
-    import cantools  # noqa: PLC0415 - loads for a moment
-
-    try:
-        described: Any = cantools.database.load_file(str(settings.map))
-    except (OSError, ValueError, cantools.Error) as error:
-        raise ProtocolError(f"map {str(settings.map)!r} is no DBC file: {error}") from error
-    messages = {message.name: message for message in described.messages}
-    found: dict[int, tuple[Message, dict[str, str]]] = {}
-    for joint, name in settings.valves.items():
-        message_name, _, signal = str(name).partition(".")
-        message = messages.get(message_name)
-        if message is None or signal not in {each.name for each in message.signals}:
-            known = ", ".join(
-                f"{each.name}.{one.name}" for each in messages.values() for one in each.signals
-            )
-            raise ProtocolError(
-                f"{settings.map} has no {name!r} for joint {joint!r}; it has {known}"
-            )
-        found.setdefault(message.frame_id, (message, {}))[1][signal] = joint
-    return found

@@ -1,5 +1,6 @@
 """From a CAN bus to the open gateway protocol and back (docs/gateway.md)."""
 
+import threading
 import time
 from collections.abc import Callable
 from types import TracebackType
@@ -13,12 +14,14 @@ from labcrane_can.settings import CanSettings
 RATE_HZ = 50.0
 FULL_PERCENT = 0.4
 FLOW = "gateway.flow"
+LOOK_S = 0.2
 
 
 class Bridge:
     """Pushes what the panel asks, and sends the valves' flow back to it.
 
-    While the panel is silent nothing is pushed: the other end shuts the valves by itself.
+    While the panel is silent, or one of its open valves is, nothing is pushed: the other end shuts
+    the valves by itself.
     """
 
     def __init__(self, settings: CanSettings, name: str) -> None:
@@ -40,7 +43,10 @@ class Bridge:
             channel.append_child_value("unit", "0.4 percent")
         self._outlet = pylsl.StreamOutlet(info)
         self._flow: pylsl.StreamInlet | None = None
-        self._resolver = pylsl.ContinuousResolver(prop="name", value=FLOW)
+        self._valves: list[int | None] = []
+        self._over = threading.Event()
+        self._seeker = threading.Thread(target=self._seek, name="labcrane-flow", daemon=True)
+        self._seeker.start()
         self._listener = Listener(self._settings, self._commands)
         return self
 
@@ -50,6 +56,8 @@ class Bridge:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        self._over.set()
+        self._seeker.join()
         self._listener.close()
         del self._outlet
 
@@ -59,9 +67,11 @@ class Bridge:
         while seconds is None or time.perf_counter() - began < seconds:
             now = time.perf_counter()
             signals, _, there = self._commands.signals(now)
-            if there and self._listener.lost is None:
+            new = self._listener.lost or (
+                self._commands.silent(now) or "" if there else "the panel is silent"
+            )
+            if not new:
                 self._outlet.push_sample(signals)
-            new = self._listener.lost or ("" if there else "the panel is silent")
             if new != trouble:
                 say(new or "the panel is there")
                 trouble = new
@@ -70,20 +80,35 @@ class Bridge:
                 sent_back = now
             time.sleep(1.0 / RATE_HZ)
 
-    def _send_back(self) -> None:
+    def _seek(self) -> None:
+        """Look for the valves' flow: in a thread, because a look waits, and commands must not."""
         import pylsl  # noqa: PLC0415
 
+        while not self._over.is_set():
+            found = pylsl.resolve_byprop("name", FLOW, timeout=LOOK_S)
+            if not found:
+                continue
+            inlet = pylsl.StreamInlet(found[0], max_buflen=1, recover=True)
+            try:
+                labels = inlet.info(timeout=2.0).get_channel_labels() or []
+            except Exception:  # noqa: BLE001, S112 - pylsl has its own for one that is gone again
+                continue
+            valves = self._settings.valves
+            numbers = [valves.get(str(label)) for label in labels]
+            self._valves = [each if isinstance(each, int) else None for each in numbers]
+            self._flow = inlet
+            return
+
+    def _send_back(self) -> None:
         if self._flow is None:
-            found = self._resolver.results()
-            self._flow = pylsl.StreamInlet(found[0], max_buflen=1) if found else None
             return
         sample, stamp = None, None
         while (next_ := self._flow.pull_sample(timeout=0.0))[1] is not None:
             sample, stamp = next_
         if stamp is None or sample is None:
             return
-        for flow, valve in zip(sample, self._settings.valves.values(), strict=False):
-            if isinstance(valve, int):
+        for flow, valve in zip(sample, self._valves, strict=True):
+            if valve is not None:
                 percent = flow * FULL_PERCENT
                 self._listener.send(
                     *encode_flow(ESTIMATED, valve, percent, self._settings.own_node)

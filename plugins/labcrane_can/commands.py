@@ -12,11 +12,15 @@ out = Console(soft_wrap=True, highlight=False)
 def can(
     bus: Annotated[str, typer.Option(help="interface:channel, as slcan:/dev/ttyUSB0")],
     valve: Annotated[
-        list[str],
+        list[str] | None,
         typer.Option(help="joint=number, or joint=Message.Signal with --map; once per joint"),
-    ],
+    ] = None,
     map_: Annotated[
-        Path | None, typer.Option("--map", help="DBC file of a panel without valve commands")
+        Path | None,
+        typer.Option(
+            "--map",
+            help="DBC file of a panel without valve commands; its signals' names are the joints'",
+        ),
     ] = None,
     full: Annotated[float, typer.Option(help="value of a DBC signal that is full flow")] = 100.0,
     bitrate: Annotated[int, typer.Option(help="bits per second")] = 250_000,
@@ -27,11 +31,26 @@ def can(
     from labcrane_can.bridge import Bridge
     from labcrane_can.settings import CanSettings
 
-    pairs = dict(each.split("=", 1) for each in valve if "=" in each)
-    if len(pairs) < len(valve):
-        raise typer.BadParameter("write joint=number: --valve boom=3", param_hint="--valve")
-    valves = {joint: int(what) if what.isdigit() else what for joint, what in pairs.items()}
+    valves = _valves(valve or [], map_)
     settings = CanSettings(bus=bus, bitrate=bitrate, valves=valves, map=map_, full=full)
-    out.print(f"{bus} -> LSL stream {name!r}: {', '.join(pairs)}; Ctrl-C ends", markup=False)
+    out.print(f"{bus} -> LSL stream {name!r}: {', '.join(valves)}; Ctrl-C ends", markup=False)
     with Bridge(settings, name) as bridge:
         bridge.run(seconds, lambda text: out.print(text, markup=False))
+
+
+def _valves(written: list[str], map_: Path | None) -> dict[str, int | str]:
+    """Return the valves as written; of a DBC file alone, every signal by its own name."""
+    pairs = dict(each.split("=", 1) for each in written if "=" in each)
+    if len(pairs) < len(written):
+        raise typer.BadParameter("write joint=number: --valve boom=3", param_hint="--valve")
+    if pairs:
+        return {joint: int(what) if what.isdigit() else what for joint, what in pairs.items()}
+    if map_ is None:
+        raise typer.BadParameter(
+            "say which valve moves which joint, as in --valve boom=3, or give a DBC file with "
+            "--map whose signals have the joints' names",
+            param_hint="--valve",
+        )
+    from labcrane_can.dbc import signal_names
+
+    return dict(signal_names(map_))

@@ -1,6 +1,7 @@
 """A thread beside the loop that reads a bus, and opens it again when it was unplugged."""
 
 import contextlib
+import socket
 import threading
 import time
 from collections import deque
@@ -15,6 +16,12 @@ if TYPE_CHECKING:
 
 WAIT_S = 0.02
 """How long one look at the bus may take; what waits to be sent waits as long."""
+
+DIAL_AFTER_S, DIAL_S = 1.0, 0.5
+"""Silence after which a socketcand server is dialled again, and how long that may take."""
+
+MOST_GARBLED = 20
+"""Lines in a row that are no frames, after which a bus is opened again."""
 
 AGAIN_S = 0.2
 """Time between attempts to open a bus that was lost."""
@@ -37,6 +44,7 @@ class Listener:
         self._over = threading.Event()
         self._second, self._count = 0.0, 0
         self._flooded = False
+        self._heard, self._garbled = time.perf_counter(), 0
         self._bus: can.BusABC | None = open_bus(settings)
         self._thread = threading.Thread(target=self._work, name="labcrane-can", daemon=True)
         self._thread.start()
@@ -63,8 +71,9 @@ class Listener:
             try:
                 while self._outgoing:
                     self._bus.send(self._outgoing.popleft(), timeout=WAIT_S)
-                frame = self._bus.recv(WAIT_S)
-            except (can.CanError, OSError, TypeError, ValueError) as error:
+                frame = self._look(self._bus)
+                self._watch_end(came=frame is not None)
+            except (can.CanError, OSError, TypeError) as error:
                 # pyserial raises what it likes when its file is closed under it.
                 self._shut()
                 self.lost = f"{self._settings.bus} is gone: {error}"
@@ -73,6 +82,28 @@ class Listener:
             if frame is not None:
                 self._commands.take(frame, now)
             self._watch_flood(now, came=frame is not None)
+
+    def _look(self, bus: "can.BusABC") -> "can.Message | None":
+        """Return the next frame; what an adapter garbled is refused, and it goes on."""
+        try:
+            frame = bus.recv(WAIT_S)
+        except (ValueError, IndexError) as error:
+            self._garbled += 1
+            if self._garbled > MOST_GARBLED:
+                raise OSError(f"{MOST_GARBLED} lines in a row are no frames ({error})") from error
+            self._commands.refuse(f"the adapter's line is no frame ({error})")
+            return None
+        self._garbled = 0 if frame is not None else self._garbled
+        return frame
+
+    def _watch_end(self, *, came: bool) -> None:
+        # python-can 4.6 does not tell that a socketcand server has hung up: it hears nothing.
+        now = time.perf_counter()
+        if came or not self._settings.bus.startswith("socketcand:"):
+            self._heard = now
+        elif now - self._heard > DIAL_AFTER_S:
+            self._heard = now
+            raise OSError(f"nothing was heard for {DIAL_AFTER_S:g} s; it is dialled again")
 
     def _watch_flood(self, now: float, *, came: bool) -> None:
         self._count += came
@@ -124,6 +155,9 @@ def open_bus(settings: CanSettings) -> "can.BusABC":
         host, _, port = where.partition(":")
         options |= {"host": host or "127.0.0.1", "port": int(port or 29536)}
     try:
+        if interface == "socketcand":
+            # python-can tries for 10 s without a pause, which would slow the loop down.
+            socket.create_connection((options["host"], options["port"]), DIAL_S).close()
         return can.Bus(interface=interface, channel=channel, bitrate=settings.bitrate, **options)
     except Exception as error:
         raise DeviceError(

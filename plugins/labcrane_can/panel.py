@@ -64,7 +64,7 @@ class CanPanel(InputDevice):
 
     def read(self, tick: Tick, seen: Frame) -> FloatArray:
         signals, floats, there = self._commands.signals(tick.woke)
-        self.fault = self._trouble(there=there)
+        self.fault = self._trouble(tick.woke, there=there)
         out, joints = self._out, len(self._joints)
         if self.fault is not None:
             out[:] = 0.0
@@ -86,11 +86,11 @@ class CanPanel(InputDevice):
 
         return {"bus": self._settings.bus, "python-can": version("python-can")}
 
-    def _trouble(self, *, there: bool) -> str | None:
+    def _trouble(self, now: float, *, there: bool) -> str | None:
         if self._listener is not None and self._listener.lost is not None:
             return self._listener.lost
         if there:
-            return None
+            return self._commands.silent(now)
         complaint = self._commands.complaint()
         return f"no valve command for {self._settings.timeout_s:g} s on {self._settings.bus}" + (
             f"; {complaint}" if complaint else ""

@@ -71,13 +71,15 @@ class CanReplay(InputDevice):
                 if ended
                 else f"no valve command for {self._settings.timeout_s:g} s at {now:.3f} s of it"
             )
+        else:
+            self.fault = self._commands.silent(now)
+        if self.fault is not None:
             out[:] = 0.0
             return out
-        self.fault = None
         out[:joints] = [signal / FULL for signal in signals]
         out[joints:-1] = floats
         out[-1] = 1.0
         return out
 
     def facts(self) -> Mapping[str, Value]:
-        return {"file": str(self._settings.file), "frames": len(self._frames)}
+        return {"file": self._settings.file.name, "frames": len(self._frames)}

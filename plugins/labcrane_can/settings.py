@@ -35,7 +35,7 @@ class ValveMap(Settings):
 
     timeout_s: PositiveFloat = 0.25
     """Age, in seconds, at which a valve's last command counts no more and the valve shuts; the
-    panel is lost when that is so of all of them."""
+    panel is lost when that is so of all of them, or of one that was open."""
 
     @model_validator(mode="after")
     def _names_need_a_map(self) -> "ValveMap":

@@ -141,7 +141,7 @@ class DmdArm(Dynamics):
     def facts(self) -> Mapping[str, Value]:
         return {
             "engine": f"pybullet {version('pybullet')}",
-            "model": str(self._settings.model),
+            "model": self._settings.model.name,
             "model.between": self._model.settings.between,
             **{f"model.{name}.sha256": each.sha256 for name, each in self._model.sources.items()},
         }

@@ -10,7 +10,7 @@ from pydantic import Field, NonNegativeFloat, ValidationError, model_validator
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from labcrane import ProtocolError, Settings
+from labcrane import ProtocolError, RecordingError, Settings
 from labcrane_dmd.layer import Layer
 from labcrane_dmd.model import Direction, Model, Segment, Source
 from labcrane_dmd.recordings import FULL
@@ -141,7 +141,13 @@ def load(path: Path | str, between: Between | None = None) -> Model:
 
 
 def save(model: Model, path: Path) -> None:
-    """Write a model; the same model gives the same bytes."""
+    """Write a model; the same model gives the same bytes.
+
+    Raises
+    ------
+    RecordingError
+        The file cannot be written.
+    """
     text = {
         "labcrane_dmd": 1,
         "fitted_by": model.labcrane,
@@ -162,7 +168,12 @@ def save(model: Model, path: Path) -> None:
     yaml.width = 100
     out = io.StringIO()
     yaml.dump(text, out)
-    path.write_text(HEADER + out.getvalue(), encoding="utf-8")
+    try:
+        path.write_text(HEADER + out.getvalue(), encoding="utf-8")
+    except OSError as error:
+        raise RecordingError(
+            f"the model cannot be written to {path}: {error.strerror}; give --out another place"
+        ) from error
 
 
 def _segment(name: str, text: SegmentText, between: Between) -> Segment:

@@ -53,6 +53,7 @@ class Stage:
         self._scene = ""
         self._things: list[Any] = []
         self._moving: list[tuple[Any, slice, slice]] = []
+        self._carried: list[tuple[Any, slice, slice]] = []
         self._scenery = scenery
         if shaders:
             self._light(shadow)
@@ -70,7 +71,7 @@ class Stage:
         """
         if self._scenery and scene != self._scene:
             self._furnish(scene)
-        for node, position, orientation in self._moving:
+        for node, position, orientation in (*self._carried, *self._moving):
             x, y, z, w = state[orientation].tolist()
             node.set_pos_quat(core.LPoint3(*state[position].tolist()), core.LQuaternion(w, x, y, z))
         for number, node in self._parts:
@@ -90,8 +91,11 @@ class Stage:
                 self._add(node, thing.name, mesh, colour, 0.0)
             self._things.append(node)
             if f"scene.{thing.name}.position" in (signal.name for signal in self._state.signals):
-                places = (f"scene.{thing.name}.{what}" for what in ("position", "orientation"))
-                self._moving.append((node, *map(self._state.find, places)))
+                self._moving.append((node, *self._places(f"scene.{thing.name}")))
+
+    def _places(self, name: str) -> tuple[slice, slice]:
+        """Return where the state holds a position and an orientation."""
+        return self._state.find(f"{name}.position"), self._state.find(f"{name}.orientation")
 
     def show(self, shapes: Sequence[Shape]) -> None:
         """Draw ``shapes`` instead of those drawn before."""
@@ -127,9 +131,14 @@ class Stage:
     def _add_machine(self, bodies: Sequence[Body]) -> None:
         last = max((body.frame for body in bodies), default=0)
         for body in bodies:
-            paint = LAST if body.frame == last else PAINT[min(body.frame, len(PAINT) - 1)]
+            paint = (
+                LAST if body.frame == last or body.moves else PAINT[min(body.frame, len(PAINT) - 1)]
+            )
             node = self.root.attach_new_node(body.name)
             self._add(node, body.name, bevelled_box(body.size, body.centre), paint, 0.0)
+            if body.moves:
+                self._carried.append((node, *self._places(body.moves)))
+                continue
             if body.frame > 0:
                 self._add_joint(node, body)
             self._parts.append((body.frame, node))

@@ -264,3 +264,5 @@ def test_the_commands_leave_model_tables_and_figures(tmp_path: Path, capsys) -> 
     assert (tmp_path / "arm.png").read_bytes().startswith(b"\x89PNG")
     assert main(["dmd", "validate", str(tmp_path / "no.yaml"), str(FOLDER)]) == 2
     assert "cannot be read" in capsys.readouterr().err
+    with pytest.raises(RecordingError, match=r"cannot be written to .*arm.yaml: No such file or"):
+        save(labcrane_dmd.load(Path(arm)), tmp_path / "no folder" / "arm.yaml")

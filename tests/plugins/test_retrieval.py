@@ -102,7 +102,7 @@ def test_the_study_can_be_scored(data: Path, session, tmp_path: Path) -> None:
     from openpyxl import load_workbook
 
     workbook = tmp_path / "evaluation.xlsx"
-    said = labcrane_command("score", str(data), "--out", str(workbook))
+    said = labcrane_command("score", str(data), "--out", str(workbook), "--include", "simulated")
     assert all(name in said for name in SCENES)
     head, *rows = load_workbook(workbook)["Tests"].iter_rows(values_only=True)
     tests = [dict(zip(head, row, strict=True)) for row in rows]

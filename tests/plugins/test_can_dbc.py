@@ -1,0 +1,58 @@
+"""Panels whose messages a DBC file describes."""
+
+from pathlib import Path
+
+import can
+import pytest
+
+from labcrane import ProtocolError
+from labcrane.__main__ import main
+from labcrane_can.asked import PanelCommands
+from labcrane_can.settings import ValveMap
+
+LEVERS = (
+    'VERSION ""\nNS_ :\nBS_:\nBU_: P\n\nBO_ 256 Levers: 4 P\n'
+    ' SG_ Boom : 0|16@1- (0.1,0) [-100|100] "%" P\n'
+    ' SG_ Arm : 16|16@1- (0.1,0) [-100|100] "%" P\n'
+)
+
+
+@pytest.fixture
+def panel(tmp_path: Path) -> Path:
+    (tmp_path / "panel.dbc").write_text(LEVERS)
+    return tmp_path / "panel.dbc"
+
+
+def test_a_dbc_file_maps_another_panel(panel: Path) -> None:
+    settings = ValveMap(valves={"elbow": "Levers.Boom", "shoulder": "Levers.Arm"}, map=panel)
+    commands = PanelCommands(settings)
+    frame = can.Message(
+        arbitration_id=256,
+        is_extended_id=False,
+        data=(500).to_bytes(2, "little") + (-1000).to_bytes(2, "little", signed=True),
+    )
+    commands.take(frame, 0.0)
+    assert commands.signals(0.0)[0] == [125.0, -250.0]
+    with pytest.raises(
+        ProtocolError, match=r"has no 'Levers.Bom' for joint 'elbow'; it has Levers"
+    ):
+        PanelCommands(ValveMap(valves={"elbow": "Levers.Bom"}, map=panel))
+
+
+BRIDGE = ("gateway", "can", "--bus", "virtual:by-name", "--seconds", "0.01")
+
+
+def test_a_dbc_file_alone_maps_its_signals_by_their_names(panel: Path, capsys) -> None:
+    assert main([*BRIDGE, "--map", str(panel)]) == 0
+    assert "LSL stream 'gateway.command': boom, arm; Ctrl-C ends" in capsys.readouterr().out
+
+
+def test_two_signals_of_one_name_and_no_map_at_all_are_refused(panel: Path, capsys) -> None:
+    twice = LEVERS[LEVERS.index("BO_ 256") :].replace("BO_ 256 Levers", "BO_ 257 Others")
+    panel.write_text(LEVERS + "\n" + twice)
+    assert main([*BRIDGE, "--map", str(panel)]) == 2
+    assert "has two signals 'boom', Levers.Boom and Others.Boom; say which moves the joint" in (
+        capsys.readouterr().err
+    )
+    assert main([*BRIDGE]) == 2
+    assert "say which valve moves which joint" in capsys.readouterr().err
