@@ -223,6 +223,7 @@ class View(Feedback):
         poses = frames(self._machine, frame.state[self._angles].tolist())
         shapes = [*self._task_shapes(frame), *frame.shapes]
         self.stage.place(poses, self._situation.scene, frame.state)
+        self._areas.hear(self._situation.scene)
         self.stage.show(shapes)
         return poses, shapes
 
