@@ -11,7 +11,7 @@ from labcrane.clock import Tick
 from labcrane.console import Command, Order, QueueConsole
 from labcrane.errors import ProtocolError
 from labcrane.feedback_crew import host_orders
-from labcrane.feedback_host import Presenter
+from labcrane.presenter import Presenter
 from labcrane.pseudonyms import pseudonyms
 from labcrane.recording.recording import SessionRecord, open_recording
 from labcrane.records import Event, Frame, Situation

@@ -3,8 +3,8 @@
 import select
 import sys
 
-from labcrane.feedback_host import Presenter
 from labcrane.host_order import HostOrder, Part
+from labcrane.presenter import Presenter
 from labcrane.registry import discover
 from labcrane.streams.feedback_log import FeedbackLog
 from labcrane.testing import TARGETS, a_run, a_target, ch8
