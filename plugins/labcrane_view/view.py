@@ -202,7 +202,7 @@ class View(Feedback):
     def save(self, path: Path) -> None:
         """Write what the window shows to a PNG file."""
         if self._window is None or not self._window.output.save_screenshot(
-            core.Filename.from_os_specific(str(path))
+            core.Filename.from_os_specific(str(path.absolute()))  # Panda3D's own folder stays
         ):
             raise PluginError(f"the picture could not be written to {path}")
 
