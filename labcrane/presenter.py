@@ -9,6 +9,7 @@ import numpy as np
 from labcrane.delay_file import delay_in_words
 from labcrane.errors import PluginError
 from labcrane.host_order import HostOrder, Part
+from labcrane.offers import Offer, Settings
 from labcrane.records import Frame, Situation, Value
 from labcrane.registry import Registry
 from labcrane.roles import Component, Cue, Feedback
@@ -59,7 +60,7 @@ class Presenter:
             component.close()
 
     def hear(self, situation: Situation) -> None:
-        """Take up a new situation; what has new settings is built anew with them."""
+        """Take up a new situation; what has new settings takes them, or is built anew with them."""
         before, self._situation = self._situation, situation
         for name in {*situation.settings, *before.settings}:
             if situation.settings.get(name) != before.settings.get(name):
@@ -94,14 +95,20 @@ class Presenter:
             self.cues[name] = self._built(Cue, name, self._order.cues[name])
             self.cues[name].open(self._order.run)
         elif name == self._order.name:
+            offer = self._registry.find(Feedback, self._order.part.use)
+            if self.feedback.adjust(self._settings(offer, name, self._order.part)):
+                return
             self.feedback.close()
             self.feedback = self._built(Feedback, name, self._order.part)
             self.feedback.open(self._order.run)
 
     def _built(self, role: type[RoleT], name: str, part: Part) -> RoleT:
         offer = self._registry.find(role, part.use)
-        settings = {**part.settings, **self._situation.settings.get(name, {})}
-        return offer.build(offer.settings.model_validate(settings), self._order.run.machine)
+        return offer.build(self._settings(offer, name, part), self._order.run.machine)
+
+    def _settings(self, offer: Offer[RoleT], name: str, part: Part) -> Settings:
+        changed = self._situation.settings.get(name, {})
+        return offer.settings.model_validate({**part.settings, **changed})
 
 
 def _promised(

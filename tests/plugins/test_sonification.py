@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from jack_server import a_jack_server
 from pydantic import ValidationError
 
 from labcrane import Feedback, Frame
@@ -112,6 +113,26 @@ def test_the_time_inside_counts_from_the_last_entry() -> None:
         assert [level > 0 for level in levels] == [True, True, False, False]
         assert sonification.present(inside(90, away=1.0))[2] > 0
         assert sonification.present(inside(100))[2] > 0
+    finally:
+        sonification.close()
+
+
+def test_laws_change_while_the_server_runs_and_its_own_settings_do_not() -> None:
+    sonification = Sonification(SonificationSettings(far=4.0), offline_server)
+    assert not sonification.adjust(SonificationSettings(far=2.0))  # it is not open
+    sonification.open(RUN)
+    try:
+        made, frame = sonification.synth, a_target(RUN)
+        wide = sonification.present(frame)
+        assert sonification.adjust(SonificationSettings(far=9.0, pan="away", ramp_s=0.0))
+        assert sonification.synth is made
+        narrow = sonification.present(frame)
+        distance = np.linalg.norm(frame.task[:3] - frame.state[8:11])
+        expected = [220 * 4 ** (1 - min(distance / far, 1)) for far in (4.0, 9.0)]
+        np.testing.assert_allclose([wide[0], narrow[0]], expected)
+        assert narrow[3] == -wide[3] != 0.0
+        for other in ({"block": 512}, {"driver": "jack"}, {"overtones": (0, 9)}):
+            assert not sonification.adjust(SonificationSettings(far=9.0, **other))
     finally:
         sonification.close()
 
@@ -243,24 +264,6 @@ def test_an_unknown_device_is_refused(tmp_path: Path) -> None:
 
 def test_a_missing_jack_server_is_told_so() -> None:
     assert "in blocks of 256 samples; start a JACK server first" in refusal(driver="jack")
-
-
-@contextmanager
-def a_jack_server(folder: Path) -> Iterator[tuple[str, Path]]:
-    """Start a JACK server without hardware, in real time; give its name and its log."""
-    name, log = f"labcrane-{os.getpid()}", folder / "jack.log"
-    driver = ["-d", "dummy", "-r", str(RATE), "-p", "1024"]
-    with log.open("w") as file:
-        server = subprocess.Popen(
-            ["jackd", "-n", name, "--no-realtime", *driver], stdout=file, stderr=file
-        )
-        try:
-            waiting = ["jack_wait", "-s", name, "-w", "-t", "20"]
-            subprocess.run(waiting, capture_output=True, check=True)
-            yield name, log
-        finally:
-            server.terminate()
-            server.wait()
 
 
 def play(server: str, seconds: float, *how: str) -> "subprocess.Popen[str]":
