@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,7 @@ scheme:
   map: {{slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}}
 dynamics: {{use: kinematic_crane}}
 tasks:
-  aiming: {{use: aiming, distances: [2], movements: 2, limit_s: 1.5}}
+  aiming: {{use: aiming, distances: [2], movements: 20, limit_s: 1.2}}
 feedback:
   ball: {{use: sphere, far: 4.0}}
   tone: {{use: sonification, driver: jack, block: 1024, far: 4.0, aside: 2.0, silent_after_s: null}}
@@ -48,13 +49,23 @@ SETTLED_S = 0.5
 
 
 class ChangingConsole(QueueConsole):
-    """An examiner who changes settings when a trial begins."""
+    """An examiner who changes settings when all have presented something, and ends soon after."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.presented: Callable[[], list[int]] = list
+        self.begun = 0
 
     def report(self, event: Event) -> None:
         super().report(event)
-        if event.name == "trial.start" and event.data["trial"] == 3:
+        if event.name != "trial.start" or not (self.begun or min(self.presented()) > 60):
+            return
+        if not self.begun:
             for change in CHANGES:
                 self.give(Command(Order.SETTING, change))
+        elif self.begun == 3:
+            self.give(Command(Order.END))
+        self.begun += 1
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +79,10 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> lab.SessionRecord:
     said: list[str] = []
     with a_jack_server(folder) as (name, _), pytest.MonkeyPatch.context() as patch:
         patch.setenv("JACK_DEFAULT_SERVER", name)
-        outcome = Launcher(order, ChangingConsole(), said.append).run()
+        console = ChangingConsole()
+        launcher = Launcher(order, console, said.append)
+        console.presented = lambda: [keeper.presented for keeper in launcher._crew.keepers]
+        outcome = launcher.run()
     assert outcome.died is None, said
     path = Path("P001-SIMULATED", "P001-SIMULATED.h5")
     return lab.open_recording(folder / "data" / path).session(1)
