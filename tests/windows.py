@@ -90,6 +90,7 @@ def an_x_server(*more: str) -> Iterator[str]:
         "1000x700x24",
         "-nolisten",
         "tcp",
+        "-noreset",  # or it refuses new clients for a moment when the last one has gone
         *more,
     ]
     try:
