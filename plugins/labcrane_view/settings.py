@@ -106,8 +106,9 @@ class ViewSettings(Settings):
     size: tuple[Pixels, Pixels] = (1280, 720)
     """Width and height, in pixels; a full screen has its own."""
 
-    screen: NonNegativeInt | None = None
-    """Number of the monitor to fill, counted from 0; a window by default."""
+    screen: NonNegativeInt | str | None = None
+    """The monitor to fill: its name (``HDMI-1``), or its number, counted from 0; a window by
+    default."""
 
     flip: Literal["none", "horizontal", "vertical"] = "none"
     """Turns the picture over, for a mirror."""

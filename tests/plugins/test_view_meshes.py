@@ -185,7 +185,7 @@ def meshed(folder: Path, **settings: object) -> Machine:
     """Return the crane with a pyramid instead of its last link."""
     mesh = MeshFile(file=written(folder, "a.stl"), colour=(1.0, 0.0, 1.0), **settings)
     joints = (*MACHINE.joints[:-1], MACHINE.joints[-1].model_copy(update={"mesh": mesh}))
-    return Machine(**{**dict(MACHINE), "joints": joints})
+    return Machine.model_validate({**MACHINE.model_dump(), "joints": joints})
 
 
 def test_a_mesh_changes_nothing_that_is_touched_and_is_sent_along(tmp_path: Path) -> None:
