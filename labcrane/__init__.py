@@ -12,6 +12,7 @@ from labcrane.finding import Finding, Verdict
 from labcrane.hookspecs import hookimpl
 from labcrane.kinematics import Arm, frames, jacobian
 from labcrane.machine import Body, Joint, Machine
+from labcrane.mesh_file import MeshFile
 from labcrane.offers import Ask, CommandOffer, Offer, Settings, StudyPath, offer
 from labcrane.questions import AnswerError, Answers, Item, Score, numbers
 from labcrane.reach import reach
@@ -68,6 +69,7 @@ __all__ = [
     "LabcraneError",
     "Layout",
     "Machine",
+    "MeshFile",
     "Offer",
     "Part",
     "Participant",

@@ -14,9 +14,9 @@ from labcrane.clock import Tick
 from labcrane.delay_file import Measured
 from labcrane.errors import ProtocolError, StreamError
 from labcrane.feedback_crew import host_orders
-from labcrane.feedback_host import Presenter
 from labcrane.host_order import HostOrder
 from labcrane.presentation_delay import Change, Kind, delay, onsets, steps
+from labcrane.presenter import Presenter
 from labcrane.records import Frame, Phase, Run, Situation
 from labcrane.registry import discover
 from labcrane.study import Study

@@ -79,6 +79,11 @@ class FeedbackKeeper:
         return self._life.ready
 
     @property
+    def presented(self) -> int:
+        """How many frames the present process has presented."""
+        return self._life.presented
+
+    @property
     def failure(self) -> str | None:
         """Return why the present process is of no use, in words; None while all is well."""
         life = self._life

@@ -11,7 +11,7 @@ from labcrane.clock import Tick
 from labcrane.console import Command, Order, QueueConsole
 from labcrane.errors import ProtocolError
 from labcrane.feedback_crew import host_orders
-from labcrane.feedback_host import Presenter
+from labcrane.presenter import Presenter
 from labcrane.pseudonyms import pseudonyms
 from labcrane.recording.recording import SessionRecord, open_recording
 from labcrane.records import Event, Frame, Situation
@@ -44,20 +44,11 @@ def write_preview(
     list of Path
         The files written: pictures of every view, a sound file of every sound.
     """
+    frames, scene = chosen(study, recording, session, trial)
     run = rig.describe(rig.build(study, simulated=True), study, participant_seed=0)
-    orders = host_orders(study, run, "preview")
-    if not orders:
-        raise ProtocolError(f"{study.path} has neither views nor sounds; add views: or feedback:")
     folder.mkdir(parents=True, exist_ok=True)
-    if recording is None:
-        with tempfile.TemporaryDirectory(prefix="labcrane-preview-") as place:
-            record = open_recording(_simulated(study, Path(place))).session(1)
-            frames, scene = movement(record, trial), scene_of(record, trial)
-    else:
-        record = open_recording(recording).session(session)
-        frames, scene = movement(record, trial), scene_of(record, trial)
     written: list[Path] = []
-    for order in orders:
+    for order in host_orders(study, run, "preview"):
         presenter = Presenter(order, discover(study=study.path))
         try:
             for cue in presenter.cues.values():
@@ -68,6 +59,26 @@ def write_preview(
         finally:
             presenter.close()
     return written
+
+
+def chosen(
+    study: Study, recording: Path | None, session: int, trial: int | None
+) -> tuple[list[Frame], str]:
+    """Return the frames of one movement, and what stood around; as for :func:`write_preview`.
+
+    Raises
+    ------
+    ProtocolError
+        The study shows and sounds nothing, or there is no such trial.
+    """
+    if not (study.views or study.sounds):
+        raise ProtocolError(f"{study.path} has neither views nor sounds; add views: or feedback:")
+    if recording is not None:
+        record = open_recording(recording).session(session)
+        return movement(record, trial), scene_of(record, trial)
+    with tempfile.TemporaryDirectory(prefix="labcrane-preview-") as place:
+        record = open_recording(_simulated(study, Path(place))).session(1)
+        return movement(record, trial), scene_of(record, trial)
 
 
 def movement(record: SessionRecord, trial: int | None = None) -> list[Frame]:

@@ -14,6 +14,8 @@ from pydantic import (
     model_validator,
 )
 
+from labcrane.mesh_file import MeshFile
+
 Point = tuple[float, float, float]
 Extent = tuple[float, float]
 
@@ -39,6 +41,8 @@ class Part:
         Edge lengths in m; for a capsule its whole length, and twice its diameter.
     centre, yaw
         In the thing's frame, in m and rad.
+    mesh
+        What it looks like instead.
     """
 
     name: str
@@ -46,6 +50,7 @@ class Part:
     size: Point
     centre: Point
     yaw: float
+    mesh: MeshFile | None = None
 
 
 LIMBS: dict[str, tuple[str | None, float, float, Point]] = {

@@ -10,6 +10,8 @@ from functools import cached_property
 
 from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
 
+from labcrane.mesh_file import Looks, MeshFile
+
 FEWEST_JOINTS = 3
 
 UPWARD_TO_LEVEL = -90.0
@@ -55,6 +57,9 @@ class Joint(BaseModel):
 
     thickness: PositiveFloat = 0.3
     """Height and width of the link's beam, in metres."""
+
+    mesh: Looks | None = None
+    """What the link looks like instead of a beam, in the frame at its far end: x along the link."""
 
     @model_validator(mode="after")
     def _rest_is_within_range(self) -> "Joint":
@@ -103,6 +108,9 @@ class Machine(BaseModel):
 
     base_x: float = 0.0
     """Distance of the slew axis in front of the base frame's origin, in metres."""
+
+    base_mesh: Looks | None = None
+    """What its foot looks like instead of a plate, in the base frame."""
 
     joints: tuple[Joint, ...]
     """From the base outward, three or more; the first one slews."""
@@ -161,6 +169,8 @@ class Body:
     moves
         What it moves with instead of a joint: its frame is then the state's ``MOVES.position`` and
         ``MOVES.orientation``, a quaternion x, y, z, w.
+    mesh
+        What it looks like instead of a box, in that frame.
     """
 
     name: str
@@ -168,3 +178,4 @@ class Body:
     size: tuple[float, float, float]
     centre: tuple[float, float, float]
     moves: str = ""
+    mesh: MeshFile | None = None

@@ -15,6 +15,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from pydantic import BaseModel
 
 from labcrane.analysis.cohort import Participant
 from labcrane.clock import Tick
@@ -216,6 +217,14 @@ class Feedback(Component):
 
     def rest(self) -> None:
         """Present nothing: between trials, and where the protocol switches it off."""
+
+    def adjust(self, settings: BaseModel) -> bool:
+        """Take other settings while open, if that is possible; whether it was.
+
+        The examiner changes them while a session runs. Otherwise this component is closed and
+        built anew, which may take long: windows and sound servers do.
+        """
+        return False
 
     def preview(self, run: Run, frames: Sequence[Frame], path: Path) -> Sequence[Path]:
         """Write what consecutive frames look or sound like to files, and return their paths.

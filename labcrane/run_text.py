@@ -2,11 +2,12 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 from labcrane.errors import PluginError
 from labcrane.machine import Body, Machine
+from labcrane.mesh_file import read_mesh, write_mesh
 from labcrane.records import Run
 from labcrane.signals import FloatArray, Layout, Signal
 
@@ -20,7 +21,7 @@ def write_run(run: Run) -> str:
             "seed": run.participant_seed,
             "machine": run.machine.model_dump(mode="json"),
             "layouts": {part: asdict(layout) for part, layout in layouts.items()},
-            "bodies": [asdict(body) for body in run.bodies],
+            "bodies": [_fields(body) for body in run.bodies],
         }
     )
 
@@ -46,8 +47,13 @@ def _layout(found: Mapping[str, Any]) -> Layout:
     return Layout(found["owner"], tuple(signals))
 
 
+def _fields(body: Body) -> dict[str, Any]:
+    return {**asdict(replace(body, mesh=None)), "mesh": write_mesh(body.mesh)}
+
+
 def _body(found: Mapping[str, Any]) -> Body:
-    return Body(**{**found, "size": tuple(found["size"]), "centre": tuple(found["centre"])})
+    tuples = {name: tuple(found[name]) for name in ("size", "centre")}
+    return Body(**{**found, **tuples, "mesh": read_mesh(found["mesh"])})
 
 
 def _nobody(velocity: FloatArray, state: FloatArray) -> FloatArray:

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveFlo
 
 from labcrane.errors import ProtocolError
 from labcrane.figure import Figure, Form, Part, figure_parts
+from labcrane.mesh_file import Looks
 from labcrane.yaml_file import YamlFile
 
 Point = tuple[float, float, float]
@@ -77,6 +78,9 @@ class Thing(_Model):
 
     scatter: Scatter = Scatter()
     """Where it may stand instead."""
+
+    mesh: Looks | None = None
+    """What it looks like instead of its shape, in a frame at its centre; its touch is the same."""
 
 
 class Goal(_Model):
@@ -229,7 +233,7 @@ def _placed(name: str, thing: Thing, random: np.random.Generator) -> Placed:
     return Placed(
         name=name,
         kind="obstacle" if thing.fixed else "object",
-        parts=(Part(name, Form(thing.shape), thing.size, (0.0, 0.0, 0.0), 0.0),),
+        parts=(Part(name, Form(thing.shape), thing.size, (0.0, 0.0, 0.0), 0.0, thing.mesh),),
         position=(x + random.uniform(*scatter.x), y + random.uniform(*scatter.y), z),
         yaw=math.radians(thing.yaw_deg + random.uniform(*scatter.yaw_deg)),
         mass=thing.mass_kg,

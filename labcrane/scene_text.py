@@ -2,10 +2,11 @@
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 from labcrane.figure import Form, Part
+from labcrane.mesh_file import read_mesh, write_mesh
 from labcrane.scene import Placed
 
 SCENE_PLACED = "scene.placed"
@@ -15,12 +16,20 @@ text. A thing that can move has the state signals ``scene.NAME.position`` and ``
 
 def write_placed(placed: Iterable[Placed]) -> str:
     """Return the things as JSON."""
-    return json.dumps([asdict(each) for each in placed])
+    return json.dumps([_fields(each) for each in placed])
 
 
 def read_placed(text: str) -> tuple[Placed, ...]:
     """Return what :func:`write_placed` wrote; nothing for an empty text."""
     return tuple(_placed(found) for found in json.loads(text or "[]"))
+
+
+def _fields(placed: Placed) -> dict[str, Any]:
+    plain = replace(placed, parts=tuple(replace(part, mesh=None) for part in placed.parts))
+    fields = asdict(plain)
+    for part, found in zip(placed.parts, fields["parts"], strict=True):
+        found["mesh"] = write_mesh(part.mesh)
+    return fields
 
 
 def _placed(found: Mapping[str, Any]) -> Placed:
@@ -30,4 +39,5 @@ def _placed(found: Mapping[str, Any]) -> Placed:
 
 def _part(found: Mapping[str, Any]) -> Part:
     size, centre = tuple(found["size"]), tuple(found["centre"])
-    return Part(found["name"], Form(found["shape"]), size, centre, found["yaw"])
+    mesh = read_mesh(found["mesh"])
+    return Part(found["name"], Form(found["shape"]), size, centre, found["yaw"], mesh)

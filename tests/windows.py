@@ -78,7 +78,7 @@ def magenta(picture: np.ndarray) -> np.ndarray:
 
 
 @contextmanager
-def an_x_server() -> Iterator[str]:
+def an_x_server(*more: str) -> Iterator[str]:
     """Start an X server, and give its display; the server itself chooses the number."""
     read, write = os.pipe()
     arguments = [
@@ -90,6 +90,8 @@ def an_x_server() -> Iterator[str]:
         "1000x700x24",
         "-nolisten",
         "tcp",
+        "-noreset",  # or it refuses new clients for a moment when the last one has gone
+        *more,
     ]
     try:
         server = subprocess.Popen(arguments, pass_fds=[write], stderr=subprocess.DEVNULL)

@@ -1,6 +1,7 @@
 """Everything that a protocol refers to, as plain data that can be compared and hashed."""
 
 import hashlib
+import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from importlib.metadata import EntryPoint, entry_points, version
@@ -103,25 +104,33 @@ def _portable(value: object, folder: Path, part: str) -> Any:
 def referred(data: object, folder: Path) -> list[Path]:
     """Return the files that ``data`` names, and those that these name, below ``folder``.
 
-    Every text that is the path of a file counts, whatever stands before it; a folder counts with
-    all that is in it when it is written with a slash.
+    Every text that is the path of a file counts, from ``folder`` or from beside the file that names
+    it; a folder counts with all that is in it when it is written with a slash.
     """
     found: dict[Path, None] = {}
-    waiting = list(_strings(data))
+    waiting = [(text, folder) for text in _strings(data)]
     while waiting:
-        for path in _paths(waiting.pop(), folder):
+        text, beside = waiting.pop()
+        for path in (*_paths(text, folder, folder), *_paths(text, beside, folder)):
             if path in found:
                 continue
             found[path] = None
-            if path.suffix in DATA:
-                waiting += _strings(_parsed(path.read_text(encoding="utf-8")))
+            waiting += [(name, path.parent) for name in _strings(_named_in(path))]
     return list(found)
 
 
-def _paths(text: str, folder: Path) -> list[Path]:
+def _named_in(path: Path) -> Any:
+    if path.suffix in DATA:
+        return _parsed(path.read_text(encoding="utf-8"))
+    if path.suffix == ".gltf":  # names its textures and its numbers
+        return json.loads(path.read_text(encoding="utf-8"))
+    return None
+
+
+def _paths(text: str, beside: Path, folder: Path) -> list[Path]:
     if not text or len(text) > 255 or "\n" in text or "\0" in text:  # noqa: PLR2004 - NAME_MAX
         return []
-    path = folder / text
+    path = beside / text
     if not path.resolve().is_relative_to(folder.resolve()):
         return []
     if path.is_file():

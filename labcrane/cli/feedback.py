@@ -1,16 +1,24 @@
 """Commands for views and sounds."""
 
+import os
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from labcrane.cli.inspect import ProtocolPath, out
+from labcrane.cli.network import stay_on_this_computer
+
+FILES = Path("preview")
 
 
 def preview(
     protocol: ProtocolPath,
-    folder: Annotated[Path, typer.Option("--to", help="folder for the files")] = Path("preview"),
+    folder: Annotated[
+        Path | None,
+        typer.Option("--to", help="write PNG and WAV files into this folder, and show nothing"),
+    ] = None,
     recording: Annotated[
         Path | None,
         typer.Option(help="participant file with the movement; a simulated one by default"),
@@ -18,11 +26,20 @@ def preview(
     session: Annotated[int, typer.Option(help="session of the recording")] = 1,
     trial: Annotated[int | None, typer.Option(help="which trial; the first counted one")] = None,
 ) -> None:
-    """Write what a movement looks and sounds like: PNG for every view, WAV for every sound."""
-    from labcrane.feedback_preview import write_preview
+    """Play a movement in the study's windows and sounds; as files where there is no display."""
+    stay_on_this_computer()
+    from labcrane.feedback_player import play
+    from labcrane.feedback_preview import chosen, write_preview
     from labcrane.registry import discover
     from labcrane.study import load
 
     study = load(protocol, discover(study=protocol))
-    for path in write_preview(study, folder, recording, session, trial):
+    shows = sys.platform != "linux" or bool(os.environ.get("DISPLAY"))
+    if folder is None and shows:
+        frames, scene = chosen(study, recording, session, trial)
+        play(study, frames, scene, lambda text: out.print(text, markup=False))
+        return
+    if folder is None:
+        out.print(f"there is no display (DISPLAY is not set); files go to {FILES}/", markup=False)
+    for path in write_preview(study, folder or FILES, recording, session, trial):
         out.print(str(path), markup=False)

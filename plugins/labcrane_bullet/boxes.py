@@ -12,10 +12,22 @@ def crane_boxes(machine: Machine) -> tuple[Body, ...]:
     slew, *chain = machine.joints
     wide = slew.thickness
     boxes = [
-        Body("foot", 0, (3.0 * wide, 3.0 * wide, 0.5 * wide), (0.0, 0.0, 0.25 * wide)),
-        Body(slew.name, 1, (wide, abs(slew.d) or wide, wide), (0.0, 0.5 * slew.d, 0.0)),
+        Body(
+            "foot",
+            0,
+            (3.0 * wide, 3.0 * wide, 0.5 * wide),
+            (0.0, 0.0, 0.25 * wide),
+            mesh=machine.base_mesh,
+        ),
+        Body(
+            slew.name,
+            1,
+            (wide, abs(slew.d) or wide, wide),
+            (0.0, 0.5 * slew.d, 0.0),
+            mesh=slew.mesh,
+        ),
     ]
     for frame, joint in enumerate(chain, start=2):
         size = (joint.a or joint.thickness, joint.thickness, joint.thickness)
-        boxes.append(Body(joint.name, frame, size, (-0.5 * joint.a, 0.0, 0.0)))
+        boxes.append(Body(joint.name, frame, size, (-0.5 * joint.a, 0.0, 0.0), mesh=joint.mesh))
     return tuple(boxes)

@@ -7,11 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import BaseModel
 
 from labcrane import Feedback, FloatArray, Frame, Run, Signal, Situation, Value
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sonification.synth import Maker, Synth, offline_server, server
 from labcrane_sonification.tone import Tone, tone
+
+LIVE = ("far", "pitch_hz", "level", "aside", "pan", "silent_after_s", "ramp_s")
+"""Settings that can change while the sound server runs: a server that is closed and opened again is
+silent for seconds."""
 
 
 class Sonification(Feedback):
@@ -55,6 +60,16 @@ class Sonification(Feedback):
         if self._synth is not None:
             self._synth.close()
             self._synth = None
+
+    def adjust(self, settings: BaseModel) -> bool:
+        if not isinstance(settings, SonificationSettings) or self._synth is None:
+            return False
+        before, now = (each.model_dump(exclude=set(LIVE)) for each in (self._settings, settings))
+        if before != now:
+            return False
+        self._settings = settings
+        self._synth.ramp(settings.ramp_s)
+        return True
 
     def hear(self, situation: Situation) -> None:
         if situation.trial != self._trial:

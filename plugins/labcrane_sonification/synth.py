@@ -110,6 +110,11 @@ class Synth:
         for side, gain in zip(self._sides, gains(wanted.pan), strict=True):
             self._set(side, gain)
 
+    def ramp(self, seconds: float) -> None:
+        """Let every change from now on take so long."""
+        for control in (self._pitch, *self._levels, *self._sides):
+            control.setTime(seconds)
+
     def silence(self) -> None:
         """Fade out."""
         for level in self._levels:

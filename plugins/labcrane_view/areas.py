@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labcrane import Ball, Body, FloatArray, Frame, Run, Shape
+from labcrane import Ball, FloatArray, Frame, Placed, Run, Shape, read_placed
 
 TIP = 0.12
 """Radius in metres of the tip's area of interest."""
@@ -115,6 +115,15 @@ class Areas:
         self._names, self._size, self._flip = names, size, flip
         self._tip = run.state.find("tip.position")
         self._bodies = [body for body in run.bodies if body.name in names]
+        self._state = run.state
+        self._scene = ""
+        self._things: list[Placed] = []
+
+    def hear(self, scene: str) -> None:
+        """Take up what stands around, as of :func:`labcrane.read_placed`."""
+        if scene != self._scene:
+            self._scene = scene
+            self._things = [thing for thing in read_placed(scene) if thing.name in self._names]
 
     def of(
         self, projection: Projection, frame: Frame, shapes: Sequence[Shape], poses: FloatArray
@@ -123,7 +132,10 @@ class Areas:
         balls = {shape.name: shape for shape in shapes if isinstance(shape, Ball)}
         x, y, z = frame.state[self._tip].tolist()
         balls["tip"] = Ball("tip", (x, y, z), TIP, (0.0, 0.0, 0.0, 0.0))
-        corners = {body.name: corners_of(body, poses[body.frame]) for body in self._bodies}
+        corners = {
+            body.name: _corners(body.size, body.centre, poses[body.frame]) for body in self._bodies
+        }
+        corners |= {thing.name: self._extent(thing, frame.state) for thing in self._things}
         boxes: list[float] = []
         for name in self._names:
             if name in balls:
@@ -136,9 +148,44 @@ class Areas:
             boxes += turned(box, self._size, self._flip)
         return boxes
 
+    def _extent(self, thing: Placed, state: FloatArray) -> FloatArray:
+        """Return the corners of all parts of a thing where it is now, shape ``(n, 3)``."""
+        pose = np.eye(4)
+        moving = f"scene.{thing.name}.position"
+        if any(signal.name == moving for signal in self._state.signals):
+            pose[:3, 3] = state[self._state.find(moving)]
+            turn = state[self._state.find(f"scene.{thing.name}.orientation")]
+            pose[:3, :3] = rotation(turn)
+        else:
+            pose[:3, 3] = thing.position
+            pose[:3, :3] = _turned(thing.yaw)
+        found = []
+        for part in thing.parts:  # a thing moves with the centre of its first part
+            own = np.eye(4)
+            own[:3, 3] = np.subtract(part.centre, thing.parts[0].centre)
+            own[:3, :3] = _turned(part.yaw)
+            found.append(_corners(part.size, (0.0, 0.0, 0.0), pose @ own))
+        return np.vstack(found)
 
-def corners_of(body: Body, pose: FloatArray) -> FloatArray:
-    """Return the corners of a body's box in the base frame, shape ``(8, 3)``."""
+
+def _corners(size: Sequence[float], centre: Sequence[float], pose: FloatArray) -> FloatArray:
+    """Return the corners of a box in a frame with ``pose``, shape ``(8, 3)``."""
     signs = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
-    inside = np.array(body.centre) + signs * np.array(body.size)
+    inside = np.array(centre) + signs * np.array(size)
     return np.asarray(inside @ pose[:3, :3].T + pose[:3, 3])
+
+
+def _turned(yaw: float) -> FloatArray:
+    return rotation(np.array([0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)]))
+
+
+def rotation(quaternion: FloatArray) -> FloatArray:
+    """Return the rotation of a unit quaternion x, y, z, w, shape ``(3, 3)``."""
+    x, y, z, w = quaternion.tolist()
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )

@@ -106,8 +106,9 @@ class ViewSettings(Settings):
     size: tuple[Pixels, Pixels] = (1280, 720)
     """Width and height, in pixels; a full screen has its own."""
 
-    screen: NonNegativeInt | None = None
-    """Number of the monitor to fill, counted from 0; a window by default."""
+    screen: NonNegativeInt | str | None = None
+    """The monitor to fill: its name (``HDMI-1``), or its number, counted from 0; a window by
+    default."""
 
     flip: Literal["none", "horizontal", "vertical"] = "none"
     """Turns the picture over, for a mirror."""
@@ -151,7 +152,7 @@ class ViewSettings(Settings):
     """Square for a photodiode; none by default."""
 
     areas: tuple[str, ...] = ("tip", "target", "other", "sphere")
-    """What has a box for eye tracking: the tip, targets, shapes of cues, and bodies by name."""
+    """What has a box for eye tracking: tip, targets, shapes of cues; links and things by name."""
 
     shadow: NonNegativeInt = Field(default=2048, le=8192)
     """Edge of the shadow map in pixels; 0 for no shadows."""

@@ -11,6 +11,7 @@ from labcrane import Ball, Body, FloatArray, Run, Shape, read_placed
 from labcrane_view import shader
 from labcrane_view.forest import forest
 from labcrane_view.mesh import Mesh, bevelled_box, cone, sphere
+from labcrane_view.mesh_reader import painted, read_mesh
 from labcrane_view.things import pieces
 
 HAZE = (0.66, 0.75, 0.82)
@@ -135,11 +136,15 @@ class Stage:
                 LAST if body.frame == last or body.moves else PAINT[min(body.frame, len(PAINT) - 1)]
             )
             node = self.root.attach_new_node(body.name)
-            self._add(node, body.name, bevelled_box(body.size, body.centre), paint, 0.0)
+            if body.mesh is not None:
+                mesh, paint = read_mesh(body.mesh), painted(body.mesh, paint)
+            else:
+                mesh = bevelled_box(body.size, body.centre)
+            self._add(node, body.name, mesh, paint, 0.0)
             if body.moves:
                 self._carried.append((node, *self._places(body.moves)))
                 continue
-            if body.frame > 0:
+            if body.frame > 0 and body.mesh is None:
                 self._add_joint(node, body)
             self._parts.append((body.frame, node))
 

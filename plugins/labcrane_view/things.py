@@ -7,6 +7,7 @@ import numpy as np
 
 from labcrane import Form, Part, Placed
 from labcrane_view.mesh import Mesh, bevelled_box, cone, joined, sphere
+from labcrane_view.mesh_reader import painted, read_mesh
 
 Colour = tuple[float, float, float, float]
 
@@ -26,7 +27,10 @@ def pieces(thing: Placed) -> Iterator[tuple[Mesh, Colour]]:
     first = thing.parts[0].centre
     for part in thing.parts:
         x, y, z = (at - origin for at, origin in zip(part.centre, first, strict=True))
-        yield _turned(_solid(part), part.yaw).moved((x, y, z)), _colour(thing, part)
+        colour = _colour(thing, part)
+        if part.mesh is not None:
+            colour = painted(part.mesh, colour)
+        yield _turned(_solid(part), part.yaw).moved((x, y, z)), colour
 
 
 def _colour(thing: Placed, part: Part) -> Colour:
@@ -42,6 +46,8 @@ def _colour(thing: Placed, part: Part) -> Colour:
 
 
 def _solid(part: Part) -> Mesh:
+    if part.mesh is not None:
+        return read_mesh(part.mesh)
     x, y, z = part.size
     if part.shape is Form.BOX:
         return bevelled_box(part.size, (0.0, 0.0, 0.0))

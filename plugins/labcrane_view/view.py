@@ -202,7 +202,7 @@ class View(Feedback):
     def save(self, path: Path) -> None:
         """Write what the window shows to a PNG file."""
         if self._window is None or not self._window.output.save_screenshot(
-            core.Filename.from_os_specific(str(path))
+            core.Filename.from_os_specific(str(path.absolute()))  # Panda3D's own folder stays
         ):
             raise PluginError(f"the picture could not be written to {path}")
 
@@ -223,6 +223,7 @@ class View(Feedback):
         poses = frames(self._machine, frame.state[self._angles].tolist())
         shapes = [*self._task_shapes(frame), *frame.shapes]
         self.stage.place(poses, self._situation.scene, frame.state)
+        self._areas.hear(self._situation.scene)
         self.stage.show(shapes)
         return poses, shapes
 

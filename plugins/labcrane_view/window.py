@@ -119,12 +119,13 @@ def _output(
     return output if output.is_valid() else None
 
 
-def _monitor(number: int) -> Monitor:
+def _monitor(wanted: int | str) -> Monitor:
     found = monitors()
-    if number < len(found):
-        return found[number]
+    for number, monitor in enumerate(found):
+        if wanted in (number, monitor.name):
+            return monitor
     known = ", ".join(f"{n} ({m.name}, {m.size[0]}x{m.size[1]})" for n, m in enumerate(found))
-    raise DeviceError(f"there is no screen {number}; there is {known}")
+    raise DeviceError(f"there is no screen {wanted}; there is {known}")
 
 
 def font(path: str | None) -> Any:

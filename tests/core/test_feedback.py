@@ -26,10 +26,10 @@ from labcrane import (
 from labcrane.console import Command, Order
 from labcrane.design.fading import faded
 from labcrane.feedback_crew import FeedbackCrew
-from labcrane.feedback_host import Presenter
 from labcrane.feedback_preview import movement, write_preview
 from labcrane.host_order import HostOrder, Part
 from labcrane.plan import plan_session
+from labcrane.presenter import Presenter
 from labcrane.registry import Registry, discover
 from labcrane.run_text import read_run, write_run
 from labcrane.session import Visit, run

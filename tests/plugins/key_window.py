@@ -2,9 +2,10 @@
 
 import select
 import sys
+from pathlib import Path
 
-from labcrane.feedback_host import Presenter
 from labcrane.host_order import HostOrder, Part
+from labcrane.presenter import Presenter
 from labcrane.registry import discover
 from labcrane.streams.feedback_log import FeedbackLog
 from labcrane.testing import TARGETS, a_run, a_target, ch8
@@ -12,9 +13,8 @@ from labcrane.testing import TARGETS, a_run, a_target, ch8
 name = sys.argv[1]
 run = a_run(ch8(), task=TARGETS)
 settings = {"size": (400, 300), "keys": ("a", "d", "arrow_up", "arrow_down"), "hud": ()}
-presenter = Presenter(
-    HostOrder(name, Part("view", settings), run, "a/test", always=True), discover()
-)
+order = HostOrder(name, Part("view", settings), run, "a/test", Path("study.yaml"), always=True)
+presenter = Presenter(order, discover())
 presenter.open()
 log = FeedbackLog(name, "a/test", presenter)
 number = 0

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from jack_server import a_jack_server
 from pydantic import ValidationError
 
 from labcrane import Feedback, Frame
@@ -112,6 +113,26 @@ def test_the_time_inside_counts_from_the_last_entry() -> None:
         assert [level > 0 for level in levels] == [True, True, False, False]
         assert sonification.present(inside(90, away=1.0))[2] > 0
         assert sonification.present(inside(100))[2] > 0
+    finally:
+        sonification.close()
+
+
+def test_laws_change_while_the_server_runs_and_its_own_settings_do_not() -> None:
+    sonification = Sonification(SonificationSettings(far=4.0), offline_server)
+    assert not sonification.adjust(SonificationSettings(far=2.0))  # it is not open
+    sonification.open(RUN)
+    try:
+        made, frame = sonification.synth, a_target(RUN)
+        wide = sonification.present(frame)
+        assert sonification.adjust(SonificationSettings(far=9.0, pan="away", ramp_s=0.0))
+        assert sonification.synth is made
+        narrow = sonification.present(frame)
+        distance = np.linalg.norm(frame.task[:3] - frame.state[8:11])
+        expected = [220 * 4 ** (1 - min(distance / far, 1)) for far in (4.0, 9.0)]
+        np.testing.assert_allclose([wide[0], narrow[0]], expected)
+        assert narrow[3] == -wide[3] != 0.0
+        for other in ({"block": 512}, {"driver": "jack"}, {"overtones": (0, 9)}):
+            assert not sonification.adjust(SonificationSettings(far=9.0, **other))
     finally:
         sonification.close()
 
@@ -245,52 +266,44 @@ def test_a_missing_jack_server_is_told_so() -> None:
     assert "in blocks of 256 samples; start a JACK server first" in refusal(driver="jack")
 
 
-ATTEMPTS = 3
-"""Other programs on this computer can make a sound server late; a fault of ours is there always."""
+def play(server: str, seconds: float, *how: str) -> "subprocess.Popen[str]":
+    program = Path(__file__).with_name("play_tone.py")
+    return subprocess.Popen(
+        [sys.executable, str(program), str(seconds), *how],
+        env={**os.environ, "JACK_DEFAULT_SERVER": server},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
 
 
-@contextmanager
-def a_jack_server(folder: Path) -> Iterator[tuple[str, Path]]:
-    """Start a JACK server without hardware, in real time; give its name and its log."""
-    name, log = f"labcrane-{os.getpid()}", folder / "jack.log"
-    driver = ["-d", "dummy", "-r", str(RATE), "-p", "1024"]
-    with log.open("w") as file:
-        server = subprocess.Popen(
-            ["jackd", "-n", name, "--no-realtime", *driver], stdout=file, stderr=file
-        )
-        try:
-            waiting = ["jack_wait", "-s", name, "-w", "-t", "20"]
-            subprocess.run(waiting, capture_output=True, check=True)
-            yield name, log
-        finally:
-            server.terminate()
-            server.wait()
-
-
-def underruns(folder: Path, seconds: float) -> list[str]:
-    """Play a moving tone in real time; return what the server's log says of blocks that it missed.
-
-    What the log says of the stand-in for hardware, which is late by microseconds, is left out.
-    """
-    with a_jack_server(folder) as (name, log):
-        program = Path(__file__).with_name("play_tone.py")
-        done = subprocess.run(
-            [sys.executable, str(program), str(seconds)],
-            env={**os.environ, "JACK_DEFAULT_SERVER": name},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-    assert done.returncode == 0, done.stderr
-    played, changes = (float(word) for word in done.stdout.split()[-2:])
-    assert played == pytest.approx(seconds * RATE, rel=0.05)
-    assert changes > 50 * seconds
-    return [line for line in log.read_text().splitlines() if "was not finished" in line]
+def finished(player: "subprocess.Popen[str]") -> tuple[float, float]:
+    """Return how many samples a player sounded, and how many changes it was given."""
+    said, complaint = player.communicate()
+    assert player.returncode == 0, complaint
+    played, changes = (float(word) for word in said.split()[-2:])
+    return played, changes
 
 
 @pytest.mark.skipif(
     shutil.which("jackd") is None and not os.environ.get("CI"), reason="needs jackd"
 )
 @pytest.mark.parametrize("seconds", [5.0, pytest.param(60.0, marks=pytest.mark.long)])
-def test_real_time_sound_runs_without_an_underrun(tmp_path: Path, seconds: float) -> None:
-    assert any(not underruns(tmp_path, seconds) for _ in range(ATTEMPTS))
+def test_a_moving_tone_misses_no_block_that_silence_would_not(
+    tmp_path: Path, seconds: float
+) -> None:
+    # Without a real-time kernel, others on this computer make any client late now and then. So a
+    # silent client plays beside the tone, on the same server at the same time: what the tone
+    # itself costs is missed by the tone alone.
+    with a_jack_server(tmp_path) as (name, log):
+        players = [play(name, seconds), play(name, seconds, "silent")]
+        (played, changes), (silence, _) = (finished(player) for player in players)
+    assert played == pytest.approx(seconds * RATE, rel=0.05)
+    assert silence == pytest.approx(seconds * RATE, rel=0.05)
+    assert changes > 50 * seconds
+    text = log.read_text()
+    tone, silent = (
+        text.count(f"client = {client} was not finished") for client in ("labcrane", "silent")
+    )
+    assert tone - silent <= 3.0 * math.sqrt(tone + silent), f"{tone} blocks missed, {silent} silent"
+    assert tone < 0.05 * played / 1024

@@ -252,6 +252,16 @@ def test_a_window_shows_the_newest_frame_and_is_never_late(x_server: str) -> Non
     assert set(behind) == {0}
 
 
+@pytest.mark.parametrize("screen", [0, "screen"])
+def test_a_monitor_is_filled_by_number_or_by_name(
+    screen: int | str, x_server: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DISPLAY", x_server)
+    with a_view(display="window", screen=screen, renderer="software") as view:
+        view.present(a_frame())
+        assert view.picture().shape == (700, 1000, 3)
+
+
 def test_an_unknown_monitor_is_refused(x_server: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("DISPLAY", x_server)
     with (

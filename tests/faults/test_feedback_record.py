@@ -1,0 +1,149 @@
+"""What was seen and heard can be computed again from the file, also when settings were changed."""
+
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from faults.sessions import unique
+from jack_server import a_jack_server
+
+import labcrane as lab
+from labcrane.console import Command, Order, QueueConsole
+from labcrane.launcher import Launcher
+from labcrane.records import Event
+from labcrane.session_process import VisitOrder
+
+STUDY = """\
+labcrane: 1
+study: {study}
+title: A study whose examiner changes settings
+rate_hz: 240
+machine: ch8
+input: {{use: dual_joystick}}
+scheme:
+  use: joint_velocity
+  map: {{slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}}
+dynamics: {{use: kinematic_crane}}
+tasks:
+  aiming: {{use: aiming, distances: [2], movements: 20, limit_s: 1.2}}
+feedback:
+  ball: {{use: sphere, far: 4.0}}
+  tone: {{use: sonification, driver: jack, block: 1024, far: 4.0, aside: 2.0, silent_after_s: null}}
+views:
+  window: {{use: view, display: hidden, renderer: software, size: [160, 90], rate_hz: 30}}
+sessions:
+  - name: only
+    steps:
+      - block: {{task: aiming}}
+"""
+
+CHANGES = ("tone.far=2.5", "ball.far=2.5", "tone.pan=away", "tone.fat=1")
+"""Given in the middle of the session; the last one is refused."""
+
+SETTLED_S = 0.5
+"""A change is in the next picture and the next tone, on however busy a computer."""
+
+
+class ChangingConsole(QueueConsole):
+    """An examiner who changes settings when all have presented something, and ends soon after."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.presented: Callable[[], list[int]] = list
+        self.begun = 0
+
+    def report(self, event: Event) -> None:
+        super().report(event)
+        if event.name != "trial.start" or not (self.begun or min(self.presented()) > 60):
+            return
+        if not self.begun:
+            for change in CHANGES:
+                self.give(Command(Order.SETTING, change))
+        elif self.begun == 3:
+            self.give(Command(Order.END))
+        self.begun += 1
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> lab.SessionRecord:
+    if shutil.which("jackd") is None and not os.environ.get("CI"):
+        pytest.skip("needs jackd")
+    folder = tmp_path_factory.mktemp("settings")
+    protocol = folder / "study.yaml"
+    protocol.write_text(STUDY.format(study=unique("settings")))
+    order = VisitOrder(protocol, "P001", 1, folder / "data", simulated=True)
+    said: list[str] = []
+    with a_jack_server(folder) as (name, _), pytest.MonkeyPatch.context() as patch:
+        patch.setenv("JACK_DEFAULT_SERVER", name)
+        console = ChangingConsole()
+        launcher = Launcher(order, console, said.append)
+        console.presented = lambda: [keeper.presented for keeper in launcher._crew.keepers]
+        outcome = launcher.run()
+    assert outcome.died is None, said
+    path = Path("P001-SIMULATED", "P001-SIMULATED.h5")
+    return lab.open_recording(folder / "data" / path).session(1)
+
+
+def distances(session: lab.SessionRecord, tick: np.ndarray) -> np.ndarray:
+    """Return the way from tip to target at recorded ticks, shape ``(n, 3)``."""
+    state, task = session.streams["state"].data, session.streams["task"].data
+    tip, target = (
+        data[[f"{name}.position.{axis}" for axis in "xyz"]].to_numpy()[tick]
+        for data, name in ((state, "tip"), (task, "target"))
+    )
+    return target - tip
+
+
+def before_and_after(session: lab.SessionRecord, shown: pd.DataFrame) -> tuple[np.ndarray, ...]:
+    """Return which rows were presented before the settings were changed, and which well after."""
+    (changed,) = set(session.events.query("name == 'feedback.setting'")["time"])
+    due = shown["frame.due"].to_numpy()
+    return due < changed, due > changed + SETTLED_S
+
+
+def test_every_change_of_a_setting_is_an_event(session: lab.SessionRecord) -> None:
+    events = session.events
+    made = [dict(data) for data in events.loc[events["name"] == "feedback.setting", "data"]]
+    assert [{key: data[key] for key in ("feedback", "key", "value")} for data in made] == [
+        {"feedback": "tone", "key": "far", "value": 2.5},
+        {"feedback": "ball", "key": "far", "value": 2.5},
+        {"feedback": "tone", "key": "pan", "value": "away"},
+    ]
+    asked = list(events.loc[events["name"] == "order.setting", "data"])
+    assert [data["refused"] is None for data in asked] == [True, True, True, False]
+
+
+def test_the_tone_is_rebuilt_from_the_record(session: lab.SessionRecord) -> None:
+    heard = session.streams["labcrane.feedback.tone"].data
+    way = distances(session, heard["frame.tick"].to_numpy(int))
+    there = np.isfinite(way[:, 0])
+    settings = session.context["components"]["feedback.tone"]["settings"]
+    (low, high), (quiet, loud) = settings["pitch_hz"], settings["level"]
+    for rows, far, side in zip(
+        before_and_after(session, heard), (4.0, 2.5), (-1.0, 1.0), strict=True
+    ):
+        chosen = rows & there
+        assert chosen.sum() > 50
+        near = 1.0 - np.minimum(np.linalg.norm(way[chosen], axis=1) / far, 1.0)
+        expected = {
+            "pitch": low * (high / low) ** near,
+            "level": quiet + (loud - quiet) * near,
+            "pan": np.clip(side * way[chosen, 1] / 2.0, -1.0, 1.0),
+        }
+        for name, values in expected.items():
+            np.testing.assert_allclose(heard[f"tone.{name}"].to_numpy()[chosen], values, rtol=1e-9)
+
+
+def test_the_sphere_follows_a_changed_setting_in_every_view(session: lab.SessionRecord) -> None:
+    shown = session.streams["labcrane.feedback.window"].data
+    way = distances(session, shown["frame.tick"].to_numpy(int))
+    radius = shown["cue.ball.radius"].to_numpy()
+    for rows, far in zip(before_and_after(session, shown), (4.0, 2.5), strict=True):
+        chosen = rows & np.isfinite(radius)
+        assert chosen.sum() > 20
+        away = np.minimum(np.linalg.norm(way[chosen], axis=1) / far, 1.0)
+        np.testing.assert_allclose(radius[chosen], 0.15 + 0.45 * away, rtol=1e-9)

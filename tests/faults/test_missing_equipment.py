@@ -1,0 +1,80 @@
+"""A computer without OpenGL, second monitor, font or sound: said in words, and then as asked."""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from rehearsal import SHORT, a_study
+from windows import an_x_server
+
+from labcrane.errors import DeviceError
+from labcrane.feedback_crew import FeedbackCrew
+from labcrane.session import Visit
+
+STUDY = """\
+feedback:
+  tone: {use: sonification, driver: jack}
+views:
+  plain: {use: view, size: [160, 90]}
+  mirror: {use: view, size: [160, 90], flip: horizontal}
+  second: {use: view, screen: 7}
+  lettered: {use: view, size: [160, 90], font: no.ttf}
+"""
+
+MESSAGES = {
+    "mirror": r"the window is flipped, which the software renderer cannot; use OpenGL \(Mesa's",
+    "second": r"there is no screen 7; there is 0 \(\S+, 1000x700\)",
+    "lettered": r"there is no font file 'no\.ttf'; correct font: or leave it out",
+    "tone": r"the jack sound system does not take 48000 Hz in .*; start a JACK server first",
+}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def bare_computer() -> Iterator[None]:
+    """A display that has no OpenGL, and nothing that plays sound."""
+    with an_x_server("-extension", "GLX") as display, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("DISPLAY", display)
+        patch.setenv("JACK_DEFAULT_SERVER", "nobody")
+        patch.setenv("JACK_NO_START_SERVER", "1")
+        yield
+
+
+def crew(folder: Path, text: str, policy: str) -> FeedbackCrew:
+    study = a_study(folder, SHORT + text + f"on_fault: {{feedback_lost: {policy}}}\n")
+    return FeedbackCrew(Visit(study, "P001", 1, folder, simulated=True))
+
+
+def test_a_session_goes_on_without_what_is_missing_where_the_protocol_says_so(
+    tmp_path: Path,
+) -> None:
+    made = crew(tmp_path, STUDY, "continue")
+    said: list[str] = []
+    try:
+        assert made.wait(said.append, lambda: False)
+        (ready,) = (keeper for keeper in made.keepers if not keeper.given_up)
+        made.watch(said.append)
+    finally:
+        made.stop()
+    assert ready.name == "plain"
+    told = "\n".join(said)
+    for name, message in MESSAGES.items():
+        assert re.search(rf"^feedback {name}: {message}.*; it is left out$", told, re.M), told
+    # Without OpenGL the picture is drawn in software, and that is said.
+    assert "feedback plain is ready: renderer p3tinydisplay (software: no graphics card" in told
+
+
+@pytest.mark.parametrize(
+    ("name", "policy"),
+    [("mirror", "restart"), ("second", "pause"), ("lettered", "restart"), ("tone", "pause")],
+)
+def test_a_session_is_refused_where_it_does_not(name: str, policy: str, tmp_path: Path) -> None:
+    lines = [line for line in STUDY.splitlines() if f"  {name}:" in line]
+    group = "feedback" if name == "tone" else "views"
+    made = crew(tmp_path, f"{group}:\n{lines[0]}\n", policy)
+    try:
+        said = rf"^feedback '{name}' cannot be started: {MESSAGES[name]}"
+        with pytest.raises(DeviceError, match=said):
+            made.wait(lambda said: None, lambda: False)
+    finally:
+        made.stop()

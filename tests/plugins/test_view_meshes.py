@@ -1,0 +1,291 @@
+"""Meshes and scenes in the view: read alike from every format, drawn where they are."""
+
+import base64
+import json
+import math
+import struct
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rehearsal import SHORT, a_study
+from windows import MACHINE, POSE, a_frame, projected
+
+from labcrane import (
+    DeviceError,
+    Frame,
+    Machine,
+    MeshFile,
+    ProtocolError,
+    Signal,
+    Situation,
+    frames,
+    read_placed,
+    write_placed,
+)
+from labcrane.approval.materials import referred
+from labcrane.run_text import read_run, write_run
+from labcrane.scene import load_scene, place
+from labcrane.testing import TARGETS, a_run, crane_state
+from labcrane_bullet.boxes import crane_boxes
+from labcrane_bullet.urdf import urdf
+from labcrane_view.mesh_reader import read_mesh
+from labcrane_view.settings import CameraSettings, ViewSettings
+from labcrane_view.view import View
+
+POINTS = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]])
+FACES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+"""A pyramid with different edges along x, y and z."""
+
+
+def stl() -> bytes:
+    rows = [struct.pack("<12fH", 0, 0, 0, *POINTS[face].ravel(), 0) for face in FACES]
+    return bytes(80) + struct.pack("<I", len(rows)) + b"".join(rows)
+
+
+def ascii_stl() -> bytes:
+    facets = "".join(
+        "facet normal 0 0 0\nouter loop\n"
+        + "".join("vertex {:g} {:g} {:g}\n".format(*POINTS[corner]) for corner in face)
+        + "endloop\nendfacet\n"
+        for face in FACES
+    )
+    return f"solid pyramid\n{facets}endsolid pyramid\n".encode()
+
+
+def obj() -> bytes:
+    points = "".join("v {:g} {:g} {:g}\n".format(*point) for point in POINTS)
+    return (points + "".join("f {} {} {}\n".format(*(face + 1)) for face in FACES)).encode()
+
+
+NUMBERS = POINTS.astype("<f4").tobytes() + FACES.astype("<u2").tobytes()
+
+
+def gltf(**buffer: str) -> dict[str, object]:
+    views = [
+        {"buffer": 0, "byteOffset": start, "byteLength": n} for start, n in ((0, 48), (48, 24))
+    ]
+    ends = {"min": POINTS.min(axis=0).tolist(), "max": POINTS.max(axis=0).tolist()}
+    return {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "buffers": [{"byteLength": len(NUMBERS), **buffer}],
+        "bufferViews": views,
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3", **ends},
+            {"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"},
+        ],
+    }
+
+
+def whole_gltf() -> bytes:
+    uri = "data:application/octet-stream;base64," + base64.b64encode(NUMBERS).decode()
+    return json.dumps(gltf(uri=uri)).encode()
+
+
+def glb() -> bytes:
+    text = json.dumps(gltf()).encode()
+    text += b" " * (-len(text) % 4)
+    head = struct.pack("<III", 0x46546C67, 2, 28 + len(text) + len(NUMBERS))
+    chunks = ((text, 0x4E4F534A), (NUMBERS, 0x004E4942))
+    return head + b"".join(struct.pack("<II", len(part), kind) + part for part, kind in chunks)
+
+
+KINDS = {"a.stl": stl, "b.stl": ascii_stl, "c.obj": obj, "d.gltf": whole_gltf, "e.glb": glb}
+
+
+def written(folder: Path, name: str) -> Path:
+    path = folder / name
+    path.write_bytes(KINDS[name]())
+    return path
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_mesh_is_the_same_in_every_format(name: str, tmp_path: Path) -> None:
+    mesh = read_mesh(MeshFile(file=written(tmp_path, name)))
+    corners = mesh.points[mesh.faces]
+    found = sorted(sorted(map(tuple, triangle)) for triangle in corners.round(6).tolist())
+    assert found == sorted(sorted(map(tuple, POINTS[face].tolist())) for face in FACES)
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert ((corners.mean(axis=1) - POINTS.mean(axis=0)) * outward).sum(axis=1).min() > 0
+    np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1.0, atol=1e-6)
+
+
+def test_a_mesh_is_scaled_turned_and_put_in_its_place(tmp_path: Path) -> None:
+    asked = MeshFile(
+        file=written(tmp_path, "a.stl"), scale=0.1, turn_deg=(90, 0, 90), position=(1, 2, 3)
+    )
+    # About x, the pyramid's y goes to z and its z to -y; then about z, x to y and -y to x.
+    points = read_mesh(asked).points
+    np.testing.assert_allclose(points.min(axis=0), [1.0, 2.0, 3.0], atol=1e-6)
+    np.testing.assert_allclose(points.max(axis=0), [1.3, 2.1, 3.2], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "why"),
+    [
+        ("x.stl", b"nonsense" * 20, r"^mesh '.*x\.stl' cannot be read; write it again as STL, OBJ"),
+        ("x.obj", b"v 0 0 0\nv 1 0 0\nl 1 2\n" * 20, r"^mesh '.*x\.obj' (holds no|cannot be)"),
+    ],
+)
+def test_a_mesh_that_cannot_be_read_is_named(
+    name: str, content: bytes, why: str, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(DeviceError, match=why):
+        read_mesh(MeshFile(file=tmp_path / name))
+
+
+CRANE = Path(__file__).parents[2] / "labcrane" / "machines" / "ch8.yaml"
+
+
+def a_machine_study(folder: Path, mesh: str) -> Path:
+    """Write a study whose machine, in a folder of its own, has a mesh on its last link."""
+    (folder / "cranes").mkdir(exist_ok=True)
+    lines = CRANE.read_text().rstrip().splitlines()
+    assert "name: wrist" in lines[-1]
+    lines[-1] = lines[-1].rstrip("}") + f", mesh: {mesh}}}"
+    (folder / "cranes" / "mine.yaml").write_text("\n".join(lines) + "\n")
+    text = SHORT.replace("machine: ch8", "machine: cranes/mine.yaml")
+    return a_study(folder, text).path
+
+
+@pytest.mark.parametrize(
+    ("mesh", "why"),
+    [
+        (
+            "no.stl",
+            r"mine\.yaml:\d+: joints\[4\]\.mesh.*there is no mesh '.*no\.stl'; a path",
+        ),
+        ("arm.step", r"'.*arm\.step' is no mesh; \.stl, \.obj, \.gltf, \.glb can be shown"),
+        ("{file: a.stl, scale: -1}", r"mesh\.scale is -1; it must be greater than 0"),
+    ],
+)
+def test_a_protocol_with_a_wrong_mesh_is_refused(mesh: str, why: str, tmp_path: Path) -> None:
+    (tmp_path / "cranes").mkdir()
+    written(tmp_path / "cranes", "a.stl")
+    with pytest.raises(ProtocolError, match=why):
+        a_machine_study(tmp_path, mesh)
+
+
+def test_meshes_are_part_of_what_is_approved(tmp_path: Path) -> None:
+    (tmp_path / "cranes").mkdir()
+    (tmp_path / "cranes" / "x.gltf").write_text(json.dumps(gltf(uri="x.bin")))
+    (tmp_path / "cranes" / "x.bin").write_bytes(NUMBERS)
+    protocol = a_machine_study(tmp_path, "{file: x.gltf, scale: 0.5}")
+    named = referred({"machine": "cranes/mine.yaml"}, protocol.parent)
+    assert {path.name for path in named} == {"mine.yaml", "x.gltf", "x.bin"}
+
+
+def meshed(folder: Path, **settings: object) -> Machine:
+    """Return the crane with a pyramid instead of its last link."""
+    mesh = MeshFile(file=written(folder, "a.stl"), colour=(1.0, 0.0, 1.0), **settings)
+    joints = (*MACHINE.joints[:-1], MACHINE.joints[-1].model_copy(update={"mesh": mesh}))
+    return Machine.model_validate({**MACHINE.model_dump(), "joints": joints})
+
+
+def test_a_mesh_changes_nothing_that_is_touched_and_is_sent_along(tmp_path: Path) -> None:
+    machine = meshed(tmp_path)
+    assert urdf(machine) == urdf(MACHINE)
+    run = replace(a_run(machine, task=TARGETS), bodies=crane_boxes(machine))
+    again = read_run(write_run(run))
+    assert again.bodies == run.bodies
+    assert again.machine == machine
+
+
+def spots(picture: np.ndarray) -> np.ndarray:
+    """Return where it is magenta, in the sun or in the shade."""
+    red, green, blue = np.moveaxis(picture.astype(int), -1, 0)
+    return (red > 60) & (blue > 60) & (green < 0.4 * red)
+
+
+def test_a_link_is_drawn_as_its_mesh(tmp_path: Path) -> None:
+    machine = meshed(tmp_path, scale=0.3, position=(-0.5, 0.0, 0.0))
+    run = replace(a_run(machine, task=TARGETS), bodies=crane_boxes(machine))
+    view = View(ViewSettings(display="hidden", size=(640, 360), camera="free", hud=()), machine)
+    view.open(run)
+    try:
+        view.present(a_frame())
+        view.present(a_frame())
+        rows, columns = np.nonzero(spots(view.picture()))
+    finally:
+        view.close()
+    link = frames(machine, POSE)[len(machine.joints)]
+    corners = (0.3 * POINTS + [-0.5, 0.0, 0.0]) @ link[:3, :3].T + link[:3, 3]
+    camera = ViewSettings(camera="free").camera
+    x, y = np.array([projected(tuple(corner), camera) for corner in corners]).T
+    edges = (columns.min(), columns.max() + 1, rows.min(), rows.max() + 1)
+    np.testing.assert_allclose(edges, (x.min(), x.max(), y.min(), y.max()), atol=2.0)
+
+
+SCENE = """\
+labcrane_scene: 1
+title: a crate behind a wall
+things:
+  crate:
+    {shape: sphere, size: [0.4, 0.4, 0.4], position: [5, 0, 1], mesh: {file: a.stl, scale: 0.2}}
+  wall: {shape: box, size: [0.2, 1.5, 0.8], position: [6, 1, 0.4], yaw_deg: 30, fixed: true}
+  post: {shape: cylinder, size: [0.3, 0.3, 1.2], position: [4.5, 1.5, 0.6], fixed: true}
+figure: {position: [4.0, -1.2, 0.13], yaw_deg: 40}
+goals: [{position: [5, 0, 1], radius: 0.2}]
+"""
+CAMERA = {"name": "c", "eye": (0.5, 0.0, 2.5), "look": (5.0, 0.0, 0.5)}
+
+
+def a_scene_file(folder: Path) -> Path:
+    written(folder, "a.stl")
+    path = folder / "scene.yaml"
+    path.write_text(SCENE)
+    return path
+
+
+def test_a_scene_is_drawn_where_its_things_stand_and_are_moved(tmp_path: Path) -> None:
+    things = place(load_scene(a_scene_file(tmp_path)), 1)
+    assert read_placed(write_placed(things)) == things
+    crate = Signal("scene.crate.position", "m", ("x", "y", "z"))
+    turn = Signal("scene.crate.orientation", "1", ("x", "y", "z", "w"))
+    state = (*crane_state(MACHINE).signals, crate, turn)
+    run = replace(a_run(MACHINE, task=TARGETS, state=state), bodies=crane_boxes(MACHINE))
+
+    def at(*where: float) -> Frame:
+        frame = a_frame()
+        quarter = math.sqrt(0.5)  # turned to the left by a quarter
+        frame.state = np.array([*frame.state, *where, 0.0, 0.0, quarter, quarter])
+        return frame
+
+    settings = {"display": "hidden", "size": (640, 360), "camera": CAMERA, "hud": ()}
+    view = View(ViewSettings(**settings, areas=("crate", "wall", "post")), MACHINE)
+    view.open(run)
+    try:
+        view.present(at(5.0, 0.0, 1.0))
+        view.present(at(5.0, 0.0, 1.0))  # the first picture is drawn while textures are made
+        empty = view.picture()
+        view.hear(Situation(scene=write_placed(things)))
+        boxes = []
+        for where in ((5.0, 0.0, 1.0), (4.6, -0.5, 1.3)):
+            view.present(at(*where))
+            boxes.append(view.samples()["areas"].reshape(3, 4))
+            seen = (np.abs(view.picture().astype(int) - empty) > 8).any(axis=-1)
+            corners = [
+                (where[0] + sx * 0.2, where[1] + sy * 0.2, where[2] + sz * 0.2)
+                for sx in (-1, 1)
+                for sy in (-1, 1)
+                for sz in (-1, 1)
+            ]
+            x, y = np.array([projected(each, CameraSettings(**CAMERA)) for each in corners]).T
+            expected = (x.min(), y.min(), x.max(), y.max())
+            np.testing.assert_allclose(boxes[-1][0], expected, atol=0.01)
+            # The pyramid's tip, 0.6 m above the crate's centre, wherever that is.
+            column, row = projected((where[0], where[1], where[2] + 0.6), CameraSettings(**CAMERA))
+            assert seen[round(row) + 4, round(column) - 1 : round(column) + 3].any()
+            assert not seen[round(row) - 3, round(column) - 20 : round(column) + 20].any()
+        np.testing.assert_array_equal(boxes[0][1:], boxes[1][1:])  # the wall stands
+        view.hear(Situation())
+        view.present(at(5.0, 0.0, 1.0))
+        np.testing.assert_array_equal(view.picture(), empty)
+    finally:
+        view.close()
