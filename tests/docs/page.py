@@ -182,7 +182,9 @@ class Reader:
         path = self._folder / "page.yaml"
         with path.open("w") as file:
             yaml.dump(part, file)
-        load(path, discover())
+        study = load(path, discover())
+        for choice in (*study.views.values(), *study.sounds.values(), *study.cues.values()):
+            choice.build(study.machine)
 
 
 PARSERS = {
