@@ -9,6 +9,7 @@ from docs.page import ROOT
 
 from labcrane.protocol import Protocol
 from labcrane.registry import ROLES, discover
+from labcrane.study import load
 
 
 @pytest.fixture(scope="module")
@@ -74,3 +75,9 @@ def test_links_within_a_generated_page_lead_to_its_headings(pages: dict[str, str
             heading.lower().replace(" ", "-") for heading in re.findall(r"^## (.+)$", text, re.M)
         }
         assert set(re.findall(r"\(#([\w-]+)\)", text)) <= headings, name
+
+
+def test_the_picture_is_small_and_its_study_is_right() -> None:
+    assert (ROOT / "docs" / "picture.png").stat().st_size < 150_000
+    study = load(ROOT / "docs" / "picture.yaml", discover())
+    assert list(study.views) == ["examiner"]
