@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from typing import TypeVar
 
 from labcrane.errors import PluginError, ProtocolError
@@ -107,7 +108,7 @@ class Chooser:
         cues, sounds = {}, {}
         written = self._at(("feedback",))
         for name, use in (written if isinstance(written, dict) else {}).items():
-            is_cue = isinstance(use, dict) and use.get("use") in self._registry.offers[Cue]
+            is_cue = self._is_cue(use.get("use") if isinstance(use, dict) else None)
             place = ("feedback", name)
             if is_cue and (choice := self.choose(Cue, place)):
                 cues[name] = choice
@@ -119,6 +120,13 @@ class Chooser:
         for name in set(names) & {*cues, *sounds}:
             self._source.problem(("views", name), f"{name!r} is the name of a feedback already")
         return cues, sounds, {name: choice for name, choice in views.items() if choice}
+
+    def _is_cue(self, name: object) -> bool:
+        """Whether what is named under ``feedback`` is a cue, or is one misspelt."""
+        cues, others = self._registry.offers[Cue], self._registry.offers[Feedback]
+        if name in cues or name in others or not isinstance(name, str):
+            return name in cues
+        return bool(get_close_matches(name, cues)) and not get_close_matches(name, others)
 
     def machine(self) -> tuple[Machine, str] | None:
         """Return the machine and its file's text, or note what is wrong."""

@@ -29,6 +29,7 @@ plugin says ``labcrane_api = 1`` in its module; ``docs/compatibility.md`` says w
 
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
+"""Marks a function of a plugin as the hook of its name; a decorator."""
 
 
 @hookspec

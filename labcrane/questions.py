@@ -30,7 +30,8 @@ class Item:
         ``scale``: a number on steps between ``lowest`` and ``highest``; ``number``: any number
         between them; ``choice``: one of ``choices``; ``text``: words.
     lowest, highest, step
-        Of a scale or number; a step of 0 allows every number between.
+        Of a scale or number, in the unit that ``text`` asks for; a step of 0 allows every answer
+        between.
     left, right
         Words at the ends of a scale.
     choices, labels
@@ -90,7 +91,15 @@ class Item:
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """A number worked out of answers, and the range in which it can be."""
+    """A number worked out of answers.
+
+    Attributes
+    ----------
+    name
+        A lower-case word; names the score in the record.
+    lowest, highest
+        The range in which the score can be.
+    """
 
     name: str
     lowest: float

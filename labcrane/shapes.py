@@ -32,7 +32,19 @@ class Ball:
 
 @dataclass(frozen=True, slots=True)
 class Beam:
-    """A round bar from ``start`` to ``end``, in metres."""
+    """A round bar.
+
+    Attributes
+    ----------
+    name
+        What it is, unique in a picture: it names its box for eye tracking.
+    start, end
+        The middles of its two ends, x, y and z in metres.
+    radius
+        In metres.
+    colour
+        Red, green, blue and opacity, each 0 to 1.
+    """
 
     name: str
     start: Point
@@ -42,6 +54,7 @@ class Beam:
 
 
 Shape = Ball | Beam
+"""What a cue may draw."""
 
 TARGET: Colour = (0.90, 0.12, 0.10, 0.85)
 OTHER: Colour = (0.92, 0.92, 0.88, 0.55)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from labcrane.errors import ProtocolError
 
 FloatArray = npt.NDArray[np.float64]
+"""Numbers in float64; who gives or takes them says their shape and unit."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,9 @@ class Channel:
     Attributes
     ----------
     label, unit, type
-        As the XDF metadata conventions have them; ``extra`` holds further fields by name.
+        As the XDF metadata conventions have them.
+    extra
+        Further fields by name.
     """
 
     label: str

@@ -138,6 +138,8 @@ class XdfWriter:
     def write_sample(self, stream: int, stamp: float, values: FloatArray) -> None:
         """Write one sample of a double64 stream, ``values`` of shape ``(n_channels,)``.
 
+        ``stamp`` is in seconds on the writer's clock.
+
         The way of the loop: one call to the operating system, and little before it.
         """
         written = self._find(stream)
@@ -176,7 +178,10 @@ class XdfWriter:
     def write_texts(
         self, stream: int, stamps: Sequence[float], rows: Sequence[Sequence[str]]
     ) -> None:
-        """Write samples of a stream of texts as one chunk; a row has one text per channel."""
+        """Write samples of a stream of texts as one chunk.
+
+        A row has one text per channel; ``stamps`` are in seconds, one per row.
+        """
         written = self._find(stream)
         channels = len(written.header.channels)
         if written.header.format != "string" or any(len(row) != channels for row in rows):

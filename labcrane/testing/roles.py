@@ -14,6 +14,7 @@ from labcrane.roles import Component, Controller, Dynamics, InputDevice, Task
 from labcrane.signals import FloatArray, Layout, Signal
 
 RATE_HZ = 240.0
+"""Ticks a second of a run made by :func:`a_run`."""
 
 
 def ch8() -> Machine:
@@ -100,7 +101,15 @@ def opened(component: Component, run: Run) -> Iterator[None]:
 
 
 def check_array(component: Component, array: FloatArray) -> None:
-    """Check that a tick method returned what the component's signals promise."""
+    """Check that a tick method returned what the component's signals promise.
+
+    Parameters
+    ----------
+    component
+        Whose ``signals`` say how many numbers there are.
+    array
+        What it returned: shape ``(n_signals,)``, in the signals' units.
+    """
     name = type(component).__name__
     size = Layout(name, component.signals).size
     assert array.shape == (size,), f"{name}.signals promise shape ({size},), got {array.shape}"

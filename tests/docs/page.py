@@ -16,6 +16,7 @@ A comment on the line above a block says what else is to be known of it:
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 import tomllib
@@ -26,6 +27,7 @@ from xml.etree import ElementTree
 
 from ruamel.yaml import YAML
 
+from labcrane.cli.app import main
 from labcrane.registry import discover
 from labcrane.study import load
 
@@ -41,6 +43,9 @@ BLOCK = re.compile(
 MARK = re.compile(r"<!-- (file|first|with|installed|fails|runs|long|not run): (.+?) -->")
 
 RUNS_S = 2.0
+
+COMMANDS = re.compile(r"(?:labcrane [^|&;<>$`]+\n)+")
+"""Lines that need no shell."""
 
 BASE = """\
 labcrane: 1
@@ -137,6 +142,11 @@ class Reader:
             PARSERS.get(language, lambda text: None)(block.text)
 
     def _shell(self, text: str, status: int = 0) -> None:
+        if COMMANDS.fullmatch(text):
+            # Each as a process of its own would load the same libraries again and again.
+            found = [main(shlex.split(line)[1:]) for line in text.splitlines()]
+            assert found == [0] * (len(found) - 1) + [status], f"{text}: ended with {found}"
+            return
         done = subprocess.run(
             ["bash", "-euo", "pipefail", "-c", text],
             cwd=self._folder,
@@ -182,7 +192,9 @@ class Reader:
         path = self._folder / "page.yaml"
         with path.open("w") as file:
             yaml.dump(part, file)
-        load(path, discover())
+        study = load(path, discover())
+        for choice in (*study.views.values(), *study.sounds.values(), *study.cues.values()):
+            choice.build(study.machine)
 
 
 PARSERS = {

@@ -4,7 +4,11 @@ import re
 from pathlib import Path
 
 import pytest
+import typer
 from docs.page import ROOT
+
+from labcrane.cli.app import app
+from labcrane.cli.extension import extend
 
 PAGES = sorted([ROOT / "README.md", ROOT / "plugins" / "README.md", *(ROOT / "docs").rglob("*.md")])
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
@@ -41,6 +45,21 @@ def test_links_lead_to_pages_and_headings_that_exist(page: Path) -> None:
 def test_files_that_are_named_exist(page: Path) -> None:
     for name in MENTION.findall(page.read_text()):
         assert list(ROOT.glob(name.rstrip("/"))), f"{page.relative_to(ROOT)} names {name}"
+
+
+COMMAND = re.compile(r"`(?:\.venv/bin/)?labcrane ([a-z][a-z-]*)")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_commands_that_are_named_exist(page: Path) -> None:
+    whole = typer.Typer()
+    whole.registered_commands = list(app.registered_commands)
+    whole.registered_groups = list(app.registered_groups)
+    extend(whole)
+    known = {command.name for command in whole.registered_commands}
+    known |= {group.name for group in whole.registered_groups}
+    named = set(COMMAND.findall(page.read_text()))
+    assert named <= known, f"{page.relative_to(ROOT)} names {named - known}"
 
 
 def test_links_to_others_are_listed(record_property) -> None:
