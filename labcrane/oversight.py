@@ -6,7 +6,7 @@ tick and line. Errors of labcrane's own kind pass as they are: they are the plug
 
 import inspect
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +16,7 @@ import numpy as np
 
 from labcrane.culprit import told
 from labcrane.errors import LabcraneError, PluginError
-from labcrane.signals import FloatArray, Layout
+from labcrane.signals import FloatArray, Layout, Signal
 from labcrane.whereabouts import SHIFT, Place, WhereaboutsFile
 
 P = ParamSpec("P")
@@ -134,6 +134,27 @@ class Oversight:
         """Return what a method did wrong, with all that is known of it."""
         when = f" in tick {self.tick}" if self.tick >= 0 else ""
         return f"{self._places[number - 1]}, {what}{when}"
+
+
+def promised(
+    called: str, signals: Sequence[Signal], method: Callable[[T], FloatArray], frame: T
+) -> FloatArray:
+    """Return what a method of feedback or a cue says of a frame.
+
+    Raises
+    ------
+    PluginError
+        It is not what the component's signals promise; NaN may be.
+    """
+    values = method(frame)
+    size = Layout(called, tuple(signals)).size
+    shape = getattr(values, "shape", type(values).__name__)
+    if shape != (size,):
+        raise PluginError(
+            f"{called} returned shape {shape} from {method.__name__}() ({_source(method)}), and "
+            f"its signals promise ({size},)"
+        )
+    return values
 
 
 def _module(function: Callable[..., object]) -> Path | None:

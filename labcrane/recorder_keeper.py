@@ -107,9 +107,10 @@ class RecorderKeeper:
         return process
 
     def _listen(self, process: "_Recorder", life: int) -> None:
-        for line in process.stdout:
-            if life == self.restarts:  # and not what a dead one had still to say
-                self.status = json.loads(line)
+        with process.stdout as lines:
+            for line in lines:
+                if life == self.restarts:  # and not what a dead one had still to say
+                    self.status = json.loads(line)
 
 
 class _Recorder(subprocess.Popen[str]):

@@ -11,7 +11,7 @@ import pytest
 from faults.sessions import unique
 from rehearsal import ScriptedConsole
 
-from labcrane import LabcraneError, PluginError, open_recording
+from labcrane import LabcraneError, PluginError, feedback_keeper, open_recording
 from labcrane import stillness as stillness_module
 from labcrane.cli.app import main
 from labcrane.console import QueueConsole
@@ -258,6 +258,57 @@ def test_a_component_that_hangs_is_named_and_its_process_ended(
     assert len(session.streams["loop"].data) == tick
 
 
+PRESENTING = """\
+feedback: {{dot: {{use: {cue}}}}}
+views:
+{views}
+on_fault: {{feedback_lost: continue}}
+"""
+
+
+def present(protocol: Path, cue: str, views: list[str]) -> tuple[SessionRecord, dict[str, str]]:
+    """Run a session with views; return it, and why each view was lost."""
+    lines = "\n".join(f"  {view}: {{use: faulty_feedback, how: {view}}}" for view in views)
+    study = protocol.read_text().replace("limit_s: 0.5", "limit_s: 3")
+    protocol.write_text(study + PRESENTING.format(cue=cue, views=lines))
+    order = VisitOrder(protocol, "P001", 1, protocol.parent / "data", simulated=True)
+    assert Launcher(order, QueueConsole(), lambda text: None).run().died is None
+    session = recorded(protocol)
+    assert session is not None
+    assert session.events["name"].iloc[-1] == "session.end"
+    assert session.trials["outcome"].isin(["success", "timeout"]).all()
+    lost = session.events.query("name == 'feedback.lost'")["data"]
+    return session, {data["what"]: data["why"] for data in lost}
+
+
+def test_feedback_that_fails_is_named_with_its_line_and_the_session_goes_on(
+    spoil: Spoil, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(feedback_keeper, "SILENT_S", 30.0)  # a busy computer makes all of them slow
+    protocol = spoil("nobody nothing 1 raising")
+    views = ["raising", "short", "exiting", "nan", "slow"]
+    session, why = present(protocol, "faulty_cue", views)
+    source = protocol.parent / "plugins" / "faulty.py"
+    assert set(why) == {"raising", "short", "exiting"}, why
+    mistake = f"ValueError: a mistake in a plugin ({source}:{line_of('raise ValueError')})"
+    assert mistake in why["raising"]
+    assert "feedback 'short' returned shape (1,) from present() (" in why["short"]
+    assert f"{source}:{line_of('def present')}" in why["short"]
+    assert "its process ended with exit code 7" in why["exiting"]
+    slow = session.streams["labcrane.feedback.slow"].data
+    assert slow["frame.skipped"].max() > 100, "the newest frame each time, and the others left out"
+    nan = session.streams["labcrane.feedback.nan"].data
+    assert nan["two"].isna().any()
+    assert nan["one"].notna().all()
+
+
+def test_a_cue_that_raises_takes_its_view_with_it_and_nothing_else(spoil: Spoil) -> None:
+    protocol = spoil("cue draw 5 raising")
+    _, why = present(protocol, "faulty_cue", ["fine"])
+    source = protocol.parent / "plugins" / "faulty.py"
+    assert f"({source}:{line_of('raise ValueError')})" in why["fine"]
+
+
 def test_a_slow_component_is_named_and_the_session_goes_on(spoil: Spoil) -> None:
     protocol = spoil("dynamics step 1 slow")
     protocol.write_text(protocol.read_text().replace("rate_hz: 240", "rate_hz: 60"))
@@ -273,4 +324,4 @@ def test_a_slow_component_is_named_and_the_session_goes_on(spoil: Spoil) -> None
     assert slow["worst_s"] >= 0.05
     loop = session.streams["loop"].data
     late = (loop["woke"] - loop["due"]).to_numpy()
-    assert late[-1] > 0.04 * len(late)  # nothing is skipped: lateness piles up, and is recorded
+    assert late[-1] > 0.03 * len(late)  # nothing is skipped: lateness piles up, and is recorded
