@@ -325,3 +325,23 @@ def test_a_slow_component_is_named_and_the_session_goes_on(spoil: Spoil) -> None
     loop = session.streams["loop"].data
     late = (loop["woke"] - loop["due"]).to_numpy()
     assert late[-1] > 0.03 * len(late)  # nothing is skipped: lateness piles up, and is recorded
+
+
+def test_an_exporter_that_raises_is_named_with_its_line(
+    spoil: Spoil,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    from labcrane_xdf.merged import MergedXdf
+
+    def export(self, participants, folder):
+        raise KeyError("no such stream")
+
+    run_fast(spoil("nobody nothing 1 raising"))
+    monkeypatch.setattr(MergedXdf, "export", export)
+    arguments = ["--to", "xdf", "--include", "simulated", "--out", str(tmp_path / "out")]
+    assert main(["export", str(tmp_path / "data"), *arguments]) == 1
+    said = capsys.readouterr().err
+    assert "exporter 'xdf' of plugin 'xdf'" in said
+    assert re.search(r"raised KeyError: 'no such stream' \(.*test_plugins\.py:\d+\)", said)
