@@ -135,7 +135,7 @@ class Oversight:
 
 def _wrong(values: FloatArray, layout: Layout, *, finite: bool) -> str:
     """Return what is wrong with what a method returned; empty when nothing is."""
-    if getattr(values, "dtype", None) != FLOAT64:
+    if type(values) is not np.ndarray or values.dtype != FLOAT64:
         return f"{getattr(values, 'dtype', type(values).__name__)}, and not an array of float64"
     if values.shape != (layout.size,):
         return f"shape {values.shape}, and its signals promise ({layout.size},)"

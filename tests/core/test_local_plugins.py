@@ -155,6 +155,7 @@ def test_a_changed_file_is_not_what_was_approved(protocol: Path) -> None:
         verify(*loaded(protocol), today)
 
 
+@pytest.mark.long
 def test_processes_of_a_session_find_it_and_its_source_is_recorded(protocol: Path) -> None:
     data = protocol.parent / "data"
     arguments = ("--participant", "P001", "--simulate", "--feedback", "--data", data)
