@@ -60,7 +60,9 @@ def labcrane_feedback():
 """
 
 STUDY = (
-    SHORT.replace("movements: 2", "movements: 1, limit_s: 4")
+    SHORT.replace("movements: 2", "movements: 1, limit_s: 4").replace(
+        "    steps:\n", "    steps:\n      - break: {seconds: 8}\n"
+    )
     + """\
 feedback: {ball: {use: arrow, radius: 0.2}}
 views: {count: {use: counter}}
