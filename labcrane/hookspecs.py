@@ -23,10 +23,6 @@ from labcrane.roles import (
 
 PROJECT = "labcrane"
 
-API = 1
-"""Version of the interface that plugins are written against: hooks, roles and public names. A
-plugin says ``labcrane_api = 1`` in its module; ``docs/compatibility.md`` says when it rises."""
-
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
 """Marks a function of a plugin as the hook of its name; a decorator."""

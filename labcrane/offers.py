@@ -16,6 +16,11 @@ RoleT_co = TypeVar("RoleT_co", bound=Component, covariant=True)
 SettingsT = TypeVar("SettingsT", bound="Settings")
 
 
+API = 1
+"""Version of the interface that plugins are written against: hooks, roles and public names. A
+plugin says ``labcrane_api = 1`` in its module; ``docs/compatibility.md`` says when it rises."""
+
+
 class Settings(BaseModel):
     """Base of every plugin's settings: unknown keys are errors, values never change."""
 

@@ -16,7 +16,8 @@ import pluggy
 from labcrane import hookspecs
 from labcrane.culprit import told
 from labcrane.errors import PluginError
-from labcrane.hookspecs import API, PROJECT
+from labcrane.hookspecs import PROJECT
+from labcrane.offers import API
 
 FOLDER = "plugins"
 """Where a study keeps plugins of its own, beside its protocol."""

@@ -1,15 +1,14 @@
 """Presents frames with one feedback component and the cues it draws."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
 
 from labcrane.delay_file import delay_in_words
-from labcrane.errors import PluginError
 from labcrane.host_order import HostOrder, Part
 from labcrane.offers import Offer, Settings
+from labcrane.oversight import promised
 from labcrane.records import Frame, Situation, Value
 from labcrane.registry import Registry
 from labcrane.roles import Component, Cue, Feedback
@@ -81,12 +80,12 @@ class Presenter:
         for name, cue in self.cues.items():
             if name in active and frame.trial:
                 shapes += cue.draw(frame)
-                values.append(_promised(f"cue {name!r}", cue, cue.values, frame))
+                values.append(promised(f"cue {name!r}", cue.signals, cue.values, frame))
             else:
                 values.append(np.full(Layout(name, cue.signals).size, np.nan))
         frame.shapes = tuple(shapes)
         said = f"feedback {self._order.name!r}"
-        shown = _promised(said, self.feedback, self.feedback.present, frame)
+        shown = promised(said, self.feedback.signals, self.feedback.present, frame)
         return np.concatenate([shown, *values])
 
     def _rebuild(self, name: str) -> None:
@@ -109,20 +108,3 @@ class Presenter:
     def _settings(self, offer: Offer[RoleT], name: str, part: Part) -> Settings:
         changed = self._situation.settings.get(name, {})
         return offer.settings.model_validate({**part.settings, **changed})
-
-
-def _promised(
-    said: str, component: Component, method: Callable[[Frame], FloatArray], frame: Frame
-) -> FloatArray:
-    """Return what a method says of a frame, if it is what its component's signals promise."""
-    values = method(frame)
-    size = Layout(said, component.signals).size
-    shape = getattr(values, "shape", type(values).__name__)
-    if shape != (size,):
-        code = getattr(method, "__code__", None)
-        where = f" ({code.co_filename}:{code.co_firstlineno})" if code else ""
-        raise PluginError(
-            f"{said} returned shape {shape} from {method.__name__}(){where}, and its signals "
-            f"promise ({size},)"
-        )
-    return values

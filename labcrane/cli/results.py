@@ -35,19 +35,25 @@ def export(
 ) -> None:
     """Export recordings for R, MATLAB, BIDS, Psych-DS or EEG programs."""
     from labcrane.analysis.movements import machine_of
+    from labcrane.oversight import Oversight
     from labcrane.registry import discover
     from labcrane.roles import Exporter
 
-    offer = discover().find(Exporter, to)
+    registry = discover()
+    offer = registry.find(Exporter, to)
+    oversight = Oversight()
+    place = oversight.place(
+        f"exporter {to!r}", registry.plugins[Exporter][to], "export", offer.build
+    )
     chosen = _settings(offer.settings, settings or [], to)
     if folder.exists() and any(folder.iterdir()):
         raise ProtocolError(f"{folder} is not empty, and nothing is overwritten; give a new folder")
     cohort = cohort_of(data, include)
     _, first = next(cohort.included[0].sessions())
-    exporter = offer.build(chosen, machine_of(first))
+    exporter = oversight.call(place, offer.build, chosen, machine_of(first))
     folder.mkdir(parents=True, exist_ok=True)
     with progress_bar(f"export to {to}", len(cohort.included)) as advance:
-        exporter.export(_counted(cohort.included, advance), folder)
+        oversight.call(place, exporter.export, _counted(cohort.included, advance), folder)
     _write_manifest(folder, to, chosen.model_dump(mode="json"), cohort)
     _keep_track(data, to, folder, cohort)
     out.print(f"{to}: {folder}", markup=False)

@@ -10,6 +10,7 @@ stand-ins for the other roles, and runs it.
 """
 
 from labcrane.testing.commands import CommandContract
+from labcrane.testing.every_role import PluginContract, check_closes_after_failed_open, check_soon
 from labcrane.testing.examinations import ExaminationContract
 from labcrane.testing.exporters import ExporterContract
 from labcrane.testing.presentation import TARGETS, CueContract, FeedbackContract, a_target
@@ -20,7 +21,6 @@ from labcrane.testing.roles import (
     ControllerContract,
     DynamicsContract,
     InputContract,
-    TaskContract,
     a_frame,
     a_run,
     a_trial,
@@ -31,6 +31,7 @@ from labcrane.testing.roles import (
     crane_state,
     opened,
 )
+from labcrane.testing.tasks import TaskContract
 
 __all__ = [
     "RATE_HZ",
@@ -44,6 +45,7 @@ __all__ = [
     "ExporterContract",
     "FeedbackContract",
     "InputContract",
+    "PluginContract",
     "QuestionnaireContract",
     "TaskContract",
     "a_frame",
@@ -52,7 +54,9 @@ __all__ = [
     "a_trial",
     "ch8",
     "check_array",
+    "check_closes_after_failed_open",
     "check_signals",
+    "check_soon",
     "crane_at",
     "crane_state",
     "opened",

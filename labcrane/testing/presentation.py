@@ -8,7 +8,8 @@ from labcrane.records import Frame, Run, Situation
 from labcrane.roles import Cue, Feedback
 from labcrane.shapes import Ball, Shape
 from labcrane.signals import Layout, Signal
-from labcrane.testing.roles import a_frame, a_run, ch8, check_signals, crane_at, opened
+from labcrane.testing.every_role import check_closes_after_failed_open, check_soon
+from labcrane.testing.roles import a_frame, a_run, a_trial, ch8, check_signals, crane_at, opened
 
 TARGETS = (
     Signal("target.position", "m", ("x", "y", "z")),
@@ -55,6 +56,16 @@ class CueContract:
             assert values.shape == (Layout("cue", cue.signals).size,)
             assert np.isfinite(values).all()
 
+    def test_cue_draws_at_once(self, cue: Cue) -> None:
+        run = a_run(ch8(), task=TARGETS)
+        frame = a_target(run)
+        with opened(cue, run):
+            cue.begin_trial(a_trial())
+            check_soon(lambda: cue.draw(frame))
+
+    def test_cue_closes_after_a_failed_open(self, cue: Cue) -> None:
+        check_closes_after_failed_open(cue)
+
     def test_cue_draws_nothing_between_trials(self, cue: Cue) -> None:
         run = a_run(ch8(), task=TARGETS)
         with opened(cue, run):
@@ -96,3 +107,6 @@ class FeedbackContract:
 
     def test_feedback_closes_without_having_been_opened(self, feedback: Feedback) -> None:
         feedback.close()
+
+    def test_feedback_closes_after_a_failed_open(self, feedback: Feedback) -> None:
+        check_closes_after_failed_open(feedback)

@@ -1,6 +1,6 @@
 """Contracts of the roles in the loop, and stand-ins for what a component needs beside it."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 
 import numpy as np
@@ -10,8 +10,9 @@ from labcrane.kinematics import Arm
 from labcrane.machine import Machine
 from labcrane.machine_file import load_machine
 from labcrane.records import Frame, Phase, Planned, Run, Trial
-from labcrane.roles import Component, Controller, Dynamics, InputDevice, Task
+from labcrane.roles import Component, Controller, Dynamics, InputDevice
 from labcrane.signals import FloatArray, Layout, Signal
+from labcrane.testing.every_role import check_closes_after_failed_open, check_soon
 
 RATE_HZ = 240.0
 """Ticks a second of a run made by :func:`a_run`."""
@@ -126,7 +127,12 @@ def check_signals(component: Component) -> None:
 
 
 class InputContract:
-    """What every input device must do. Provide the fixture ``device``."""
+    """What every input device must do. Provide the fixture ``device``.
+
+    Set ``goes_on`` for a device that does not begin anew with a trial: a log that is played.
+    """
+
+    goes_on = False
 
     def test_device_reads_what_its_signals_promise(self, device: InputDevice) -> None:
         check_signals(device)
@@ -139,8 +145,29 @@ class InputContract:
                 check_array(device, axes)
                 assert np.abs(axes).max(initial=0.0) <= 1.0, f"an axis is outside [-1, 1]: {axes}"
 
+    def test_a_trials_seed_decides_all_that_is_random(self, device: InputDevice) -> None:
+        run = a_run(ch8(), axes=device.signals)
+        with opened(device, run):
+            read = []
+            for _ in range(2):
+                device.begin_trial(a_trial(seed=7))
+                frames = [a_frame(run, number) for number in range(20)]
+                read.append([device.read(frame.tick, frame).copy() for frame in frames])
+            if not self.goes_on:
+                np.testing.assert_array_equal(read[0], read[1])
+
+    def test_device_reads_at_once(self, device: InputDevice) -> None:
+        run = a_run(ch8(), axes=device.signals)
+        frame = a_frame(run)
+        with opened(device, run):
+            device.begin_trial(a_trial())
+            check_soon(lambda: device.read(frame.tick, frame))
+
     def test_device_closes_without_having_been_opened(self, device: InputDevice) -> None:
         device.close()
+
+    def test_device_closes_after_a_failed_open(self, device: InputDevice) -> None:
+        check_closes_after_failed_open(device)
 
 
 class ControllerContract:
@@ -157,6 +184,30 @@ class ControllerContract:
                 command = controller.command(np.full(run.axes.size, push), state)
                 check_array(controller, command)
             check_array(controller, controller.rest())
+
+    def test_the_same_axes_give_the_same_command_in_every_trial(
+        self, controller: Controller
+    ) -> None:
+        machine = ch8()
+        run = a_run(machine, command=controller.signals)
+        state = crane_at(machine, machine.rest)
+        with opened(controller, run):
+            given = []
+            for _ in range(2):
+                controller.begin_trial(a_trial(seed=7))
+                commands = [controller.command(_push(run, x), state) for x in (0.2, -0.7, 1.0)]
+                given.append([command.copy() for command in commands])
+            np.testing.assert_array_equal(given[0], given[1])
+
+    def test_controller_commands_at_once(self, controller: Controller) -> None:
+        machine = ch8()
+        run = a_run(machine, command=controller.signals)
+        state = crane_at(machine, machine.rest)
+        with opened(controller, run):
+            check_soon(lambda: controller.command(_push(run, 0.5), state))
+
+    def test_controller_closes_after_a_failed_open(self, controller: Controller) -> None:
+        check_closes_after_failed_open(controller)
 
     def test_hands_at_rest_ask_for_no_motion(self, controller: Controller) -> None:
         machine = ch8()
@@ -192,6 +243,10 @@ class ControllerContract:
                 assert np.abs(axes).max() <= 1.0
 
 
+def _push(run: Run, push: float) -> FloatArray:
+    return np.full(run.axes.size, push)
+
+
 class DynamicsContract:
     """What every machine must do. Provide the fixture ``dynamics``."""
 
@@ -215,6 +270,16 @@ class DynamicsContract:
                 paths.append(np.array([dynamics.step(push, 1 / RATE_HZ).copy() for _ in range(50)]))
             np.testing.assert_array_equal(paths[0], paths[1])
 
+    def test_dynamics_steps_at_once(self, dynamics: Dynamics) -> None:
+        machine = ch8()
+        run = a_run(machine, state=dynamics.signals)
+        with opened(dynamics, run):
+            dynamics.begin_trial(a_trial())
+            check_soon(lambda: dynamics.step(np.zeros(run.command.size), 1 / RATE_HZ))
+
+    def test_dynamics_closes_after_a_failed_open(self, dynamics: Dynamics) -> None:
+        check_closes_after_failed_open(dynamics)
+
     def test_a_machine_at_rest_stays(self, dynamics: Dynamics) -> None:
         machine = ch8()
         run = a_run(machine, state=dynamics.signals)
@@ -224,63 +289,3 @@ class DynamicsContract:
             for _ in range(int(RATE_HZ)):
                 dynamics.step(np.zeros(run.command.size), 1 / RATE_HZ)
             np.testing.assert_allclose(dynamics.state()[angle], before, atol=np.radians(0.001))
-
-
-class TaskContract:
-    """What every task must do. Provide the fixture ``task``.
-
-    Name in ``needs`` what the task asks of the machine's state beside that of every crane; the
-    stand-in has zeros there.
-    """
-
-    needs: Sequence[Signal] = ()
-
-    def _run(self, task: Task) -> Run:
-        state = (*crane_state(ch8()).signals, *self.needs)
-        return a_run(ch8(), state=state, task=task.signals)
-
-    def _frame(self, run: Run, number: int = 0) -> Frame:
-        crane = crane_at(run.machine, run.machine.rest)
-        return a_frame(run, number, np.pad(crane, (0, run.state.size - crane.size)))
-
-    def test_a_plan_follows_the_order_of_its_levels(self, task: Task) -> None:
-        factors = task.factors()
-        forward = task.plan(factors)
-        backward = task.plan({name: list(levels)[::-1] for name, levels in factors.items()})
-        assert [p.condition for p in forward] == [p.condition for p in task.plan(factors)]
-        assert len(forward) == len(backward)
-        assert any(planned.counted for planned in forward)
-        assert all(planned.expected_s > 0 for planned in forward)
-
-    def test_task_judges_what_its_signals_promise(self, task: Task) -> None:
-        check_signals(task)
-        run = self._run(task)
-        with opened(task, run):
-            for planned in task.plan(task.factors())[:3]:
-                task.begin_trial(a_trial(planned))
-                judgement = task.judge(self._frame(run))
-                check_array(task, judgement.values)
-                assert judgement.phase is not Phase.IDLE
-
-    def test_an_overruled_trial_has_no_automatic_end(self, task: Task) -> None:
-        run = self._run(task)
-        with opened(task, run):
-            for planned in task.plan(task.factors())[:2]:
-                task.begin_trial(a_trial(planned))
-                task.overrule()
-                late = self._frame(run, number=int(3600 * RATE_HZ))
-                assert not task.judge(late).phase.over
-
-    def test_results_are_declared(self, task: Task) -> None:
-        run = self._run(task)
-        declared = {column for signal in task.results for column in signal.columns}
-        with opened(task, run):
-            for planned in task.plan(task.factors())[:3]:
-                task.begin_trial(a_trial(planned))
-                results: Mapping[str, object] = {}
-                for number in range(int(120 * RATE_HZ)):
-                    judgement = task.judge(self._frame(run, number))
-                    if judgement.phase.over:
-                        results = judgement.results
-                        break
-                assert set(results) == declared, "a machine that never moves must end by a limit"

@@ -3,6 +3,8 @@
 from labcrane import Machine, Offer, Task, hookimpl, offer
 from labcrane_aiming.settings import AimingSettings
 
+labcrane_api = 1
+
 
 @hookimpl
 def labcrane_tasks() -> list[Offer[Task]]:

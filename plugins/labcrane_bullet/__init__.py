@@ -3,6 +3,8 @@
 from labcrane import Dynamics, Machine, Offer, PluginError, hookimpl, offer
 from labcrane_bullet.settings import BulletSettings, CraneSettings
 
+labcrane_api = 1
+
 
 @hookimpl
 def labcrane_dynamics() -> list[Offer[Dynamics]]:

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from labcrane import Ask, CommandOffer, Finding, InputDevice, Machine, Offer, hookimpl, offer
 from labcrane_can.settings import CanSettings, ReplaySettings
 
+labcrane_api = 1
+
 
 @hookimpl
 def labcrane_inputs() -> list[Offer[InputDevice]]:

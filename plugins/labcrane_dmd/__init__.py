@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from labcrane_dmd.model import Model
     from labcrane_dmd.settings import Between
 
+labcrane_api = 1
+
 
 def load(path: Path | str, between: "Between | None" = None) -> "Model":
     """Read a model: ``load(path)["boom"].speed(signal, angle)`` in rad and rad/s."""

@@ -3,6 +3,8 @@
 from labcrane import InputDevice, Machine, Offer, hookimpl, offer
 from labcrane_gateway.settings import GatewaySettings
 
+labcrane_api = 1
+
 
 @hookimpl
 def labcrane_inputs() -> list[Offer[InputDevice]]:

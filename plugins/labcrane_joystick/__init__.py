@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from labcrane import Ask, Finding, InputDevice, Machine, Offer, hookimpl, offer
 from labcrane_joystick.settings import JoystickSettings
 
+labcrane_api = 1
+
 
 @hookimpl
 def labcrane_inputs() -> list[Offer[InputDevice]]:

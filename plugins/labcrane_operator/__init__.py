@@ -6,6 +6,8 @@ from labcrane import InputDevice, Machine, Offer, hookimpl, offer
 from labcrane_operator.recorded import RecordedInput, RecordedSettings
 from labcrane_operator.settings import OperatorSettings
 
+labcrane_api = 1
+
 
 @hookimpl
 def labcrane_inputs() -> Sequence[Offer[InputDevice]]:

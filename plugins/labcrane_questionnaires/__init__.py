@@ -13,6 +13,8 @@ from labcrane_questionnaires.settings import (
     TlxSettings,
 )
 
+labcrane_api = 1
+
 
 @hookimpl
 def labcrane_questionnaires() -> list[Offer[Questionnaire]]:

@@ -3,6 +3,8 @@
 from labcrane import InputDevice, Machine, Offer, Task, hookimpl, offer
 from labcrane_scenario.settings import OperatorSettings, ScenarioSettings
 
+labcrane_api = 1
+
 
 @hookimpl
 def labcrane_tasks() -> list[Offer[Task]]:

@@ -9,6 +9,8 @@ from labcrane_schemes.settings import (
     SwitchableSettings,
 )
 
+labcrane_api = 1
+
 
 @hookimpl
 def labcrane_controllers() -> Sequence[Offer[Controller]]:

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from labcrane import Ask, Feedback, Finding, Machine, Offer, hookimpl, offer
 from labcrane_sonification.settings import SonificationSettings
 
+labcrane_api = 1
+
 
 @hookimpl
 def labcrane_feedback() -> list[Offer[Feedback]]:

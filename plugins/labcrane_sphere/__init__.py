@@ -3,6 +3,8 @@
 from labcrane import Cue, Machine, Offer, hookimpl, offer
 from labcrane_sphere.sphere import Sphere, SphereSettings
 
+labcrane_api = 1
+
 
 @hookimpl
 def labcrane_cues() -> list[Offer[Cue]]:

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from labcrane import Exporter, Machine, Offer, hookimpl, offer
 from labcrane_tables.settings import PsychDsSettings, TableSettings
 
+labcrane_api = 1
+
 
 @hookimpl
 def labcrane_exporters() -> Sequence[Offer[Exporter]]:

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from labcrane import Ask, Feedback, Finding, Machine, Offer, hookimpl, offer
 from labcrane_view.settings import ViewSettings
 
+labcrane_api = 1
+
 
 @hookimpl
 def labcrane_feedback() -> list[Offer[Feedback]]:

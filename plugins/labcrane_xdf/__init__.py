@@ -4,6 +4,8 @@ from collections.abc import Sequence
 
 from labcrane import Exporter, Machine, Offer, Settings, hookimpl, offer
 
+labcrane_api = 1
+
 
 class XdfSettings(Settings):
     """Settings of :class:`~labcrane_xdf.merged.MergedXdf`; there are none."""

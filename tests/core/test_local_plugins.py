@@ -60,7 +60,9 @@ def labcrane_feedback():
 """
 
 STUDY = (
-    SHORT.replace("movements: 2", "movements: 1, limit_s: 4")
+    SHORT.replace("movements: 2", "movements: 1, limit_s: 4").replace(
+        "    steps:\n", "    steps:\n      - break: {seconds: 8}\n"
+    )
     + """\
 feedback: {ball: {use: arrow, radius: 0.2}}
 views: {count: {use: counter}}
@@ -155,6 +157,7 @@ def test_a_changed_file_is_not_what_was_approved(protocol: Path) -> None:
         verify(*loaded(protocol), today)
 
 
+@pytest.mark.long
 def test_processes_of_a_session_find_it_and_its_source_is_recorded(protocol: Path) -> None:
     data = protocol.parent / "data"
     arguments = ("--participant", "P001", "--simulate", "--feedback", "--data", data)

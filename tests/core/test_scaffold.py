@@ -1,13 +1,11 @@
 """A new plugin of every role installs, passes its tests, is listed, and does its part in a run."""
 
 import json
-import os
-import subprocess
 import sys
-import venv
 from pathlib import Path
 
 import pytest
+from fresh_environment import environment_with, run
 
 from labcrane import open_recording
 from labcrane.cli.app import main
@@ -27,31 +25,7 @@ def projects(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 @pytest.fixture(scope="module")
 def environment(projects: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Install all of them in a fresh environment that sees labcrane; return its Python."""
-    folder = tmp_path_factory.mktemp("environment")
-    venv.create(folder, with_pip=True)
-    python = folder / "bin" / "python"
-    (here,) = folder.glob("lib/python*/site-packages")
-    outer = [path for path in sys.path if path.endswith("site-packages")]
-    # addsitedir also reads the .pth files of what is installed as editable.
-    (here / "outer.pth").write_text(
-        "".join(f"import site; site.addsitedir({p!r})\n" for p in outer)
-    )
-    options = ["--no-deps", "--no-build-isolation", "--no-index", "-q"]
-    done = run(python, "-m", "pip", "install", *options, *projects.values())
-    assert done.returncode == 0, done.stderr
-    return python
-
-
-def run(*command: object, cwd: Path | None = None) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [*map(str, command)],
-        cwd=cwd,
-        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1", "PIP_DISABLE_PIP_VERSION_CHECK": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    return environment_with(projects.values(), tmp_path_factory.mktemp("environment"))
 
 
 def test_there_is_a_template_for_every_role() -> None:

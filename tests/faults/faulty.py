@@ -115,11 +115,20 @@ class Dot(Cue):
         return np.ones(1)
 
 
+class LampSettings(Settings):
+    how: str = "fine"
+
+
 class Lamp(Feedback):
-    signals = (Signal("one", "1"),)
+    signals = (Signal("one", "1"), Signal("two", "1"))
+
+    def __init__(self, settings):
+        self._fault = FAULTS.get(settings.how, lambda good: good())
+        self._seen = 0
 
     def present(self, frame):
-        return np.ones(1)
+        self._seen += 1
+        return np.ones(2) if self._seen < 5 else self._fault(lambda: np.ones(2))
 
 
 def offered(role, settings, build):
@@ -158,4 +167,4 @@ def labcrane_cues():
 
 @hookimpl
 def labcrane_feedback():
-    return offered("feedback", Settings, lambda settings, machine: Lamp())
+    return offered("feedback", LampSettings, lambda settings, machine: Lamp(settings))

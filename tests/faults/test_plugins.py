@@ -11,10 +11,12 @@ import pytest
 from faults.sessions import unique
 from rehearsal import ScriptedConsole
 
-from labcrane import LabcraneError, PluginError, open_recording
+from labcrane import LabcraneError, PluginError, feedback_keeper, open_recording
+from labcrane import session as session_module
 from labcrane import stillness as stillness_module
 from labcrane.cli.app import main
-from labcrane.console import QueueConsole
+from labcrane.console import Command, Order, QueueConsole
+from labcrane.frame_log import FrameLog
 from labcrane.launcher import Launcher, Outcome
 from labcrane.recording.recording import SessionRecord
 from labcrane.registry import discover
@@ -65,7 +67,15 @@ def spoil(tmp_path: Path) -> Spoil:
 def run_fast(protocol: Path) -> None:
     study = load(protocol, discover(study=protocol))
     visit = Visit(study, "P001", 1, protocol.parent / "data", simulated=True, fast=True)
-    run(visit, ScriptedConsole())
+    wanted = (protocol.parent / "plugins" / "order.txt").read_text().split()[1]
+    override = {20: [Command(Order.OVERRIDE)]} if wanted == "overrule" else {}
+    run(visit, ScriptedConsole(override))
+
+
+def run_through(protocol: Path) -> None:
+    """Run fast, and write each frame through as a session with people does, not in batches."""
+    session_module.BatchLog = FrameLog
+    run_fast(protocol)
 
 
 def recorded(protocol: Path) -> SessionRecord | None:
@@ -81,16 +91,19 @@ def recorded(protocol: Path) -> SessionRecord | None:
 
 METHODS = {
     "input": {"open": 1, "begin_trial": 2, "read": 50, "close": 1, "facts": 1},
-    "scheme": {"open": 1, "begin_trial": 2, "command": 50, "rest": 1, "close": 1, "facts": 1},
+    "scheme": {"open": 1, "begin_trial": 2, "command": 50, "rest": 1, "close": 1, "facts": 1}
+    | {"steer": 20},
     "dynamics": {"open": 1, "begin_trial": 2, "state": 50, "step": 50, "bodies": 1, "close": 1}
     | {"facts": 1},
-    "task": {"factors": 1, "plan": 1, "open": 1, "begin_trial": 2, "judge": 50, "close": 1},
-    "questionnaire": {"items": 1},
+    "task": {"factors": 1, "plan": 1, "open": 1, "begin_trial": 2, "judge": 50, "close": 1}
+    | {"overrule": 1},
+    "questionnaire": {"items": 1, "score": 1},
 }
 """Every method that a simulated session calls, and at which call it fails."""
 
 CASES = [(role, method, at) for role, calls in METHODS.items() for method, at in calls.items()]
-RUNNING = {"begin_trial", "read", "command", "state", "step", "judge", "items"}
+RUNNING = {"begin_trial", "read", "command", "steer", "state", "step", "judge", "overrule", "items"}
+RUNNING |= {"score"}
 
 
 def line_of(text: str) -> int:
@@ -141,6 +154,23 @@ def run_again(protocol: Path) -> None:
     assert len(last) == 2
 
 
+def test_a_machine_that_cannot_be_reset_is_named_when_its_session_is_gone_on_with(
+    spoil: Spoil,
+) -> None:
+    protocol = spoil("task judge 50 raising")
+    with pytest.raises(PluginError, match=r"in judge\(\)"):
+        run_fast(protocol)
+    # The crane resets itself once when it is opened.
+    (protocol.parent / "plugins" / "order.txt").write_text("dynamics reset 2 raising")
+    study = load(protocol, discover(study=protocol))
+    visit = Visit(
+        study, "P001", 1, protocol.parent / "data", simulated=True, fast=True, resumed=True
+    )
+    with pytest.raises(PluginError, match=r"^dynamics .* in reset\(\) .* raised ValueError"):
+        run(visit, ScriptedConsole())
+    run_again(protocol)
+
+
 NONSENSE = {
     ("input", "read", "nan"): "returned left.y nan in tick 49",
     ("input", "read", "short"): "returned shape (11,), and its signals promise (12,) in tick 49",
@@ -173,6 +203,7 @@ def test_nonsense_is_refused_before_it_is_recorded(
         assert np.isfinite(session.streams[name].data.to_numpy()).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("role", "method", "at"),
     [case for case in CASES if case[1] not in {"factors", "plan", "bodies"}],
@@ -181,7 +212,7 @@ def test_a_process_that_exits_has_left_word_where_it_was(
     role: str, method: str, at: int, spoil: Spoil, capsys: pytest.CaptureFixture[str]
 ) -> None:
     protocol = spoil(f"{role} {method} {at} exiting")
-    process = multiprocessing.get_context("fork").Process(target=run_fast, args=(protocol,))
+    process = multiprocessing.get_context("fork").Process(target=run_through, args=(protocol,))
     process.start()
     process.join(60)
     assert process.exitcode == 7
@@ -258,6 +289,60 @@ def test_a_component_that_hangs_is_named_and_its_process_ended(
     assert len(session.streams["loop"].data) == tick
 
 
+PRESENTING = """\
+feedback: {{dot: {{use: {cue}}}}}
+views:
+{views}
+on_fault: {{feedback_lost: continue}}
+"""
+
+
+def present(protocol: Path, cue: str, views: list[str]) -> tuple[SessionRecord, dict[str, str]]:
+    """Run a session with views; return it, and why each view was lost."""
+    lines = "\n".join(f"  {view}: {{use: faulty_feedback, how: {view}}}" for view in views)
+    study = protocol.read_text().replace("limit_s: 0.5", "limit_s: 3")
+    protocol.write_text(study + PRESENTING.format(cue=cue, views=lines))
+    order = VisitOrder(protocol, "P001", 1, protocol.parent / "data", simulated=True)
+    assert Launcher(order, QueueConsole(), lambda text: None).run().died is None
+    session = recorded(protocol)
+    assert session is not None
+    assert session.events["name"].iloc[-1] == "session.end"
+    assert session.trials["outcome"].isin(["success", "timeout"]).all()
+    lost = session.events.query("name == 'feedback.lost'")["data"]
+    return session, {data["what"]: data["why"] for data in lost}
+
+
+@pytest.mark.long
+def test_feedback_that_fails_is_named_with_its_line_and_the_session_goes_on(
+    spoil: Spoil, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(feedback_keeper, "SILENT_S", 30.0)  # a busy computer makes all of them slow
+    protocol = spoil("nobody nothing 1 raising")
+    views = ["raising", "short", "exiting", "nan", "slow"]
+    session, why = present(protocol, "faulty_cue", views)
+    source = protocol.parent / "plugins" / "faulty.py"
+    assert set(why) == {"raising", "short", "exiting"}, why
+    mistake = f"ValueError: a mistake in a plugin ({source}:{line_of('raise ValueError')})"
+    assert mistake in why["raising"]
+    assert "feedback 'short' returned shape (1,) from present() (" in why["short"]
+    assert f"{source}:{line_of('def present')}" in why["short"]
+    assert "its process ended with exit code 7" in why["exiting"]
+    slow = session.streams["labcrane.feedback.slow"].data
+    assert slow["frame.skipped"].max() > 100, "the newest frame each time, and the others left out"
+    nan = session.streams["labcrane.feedback.nan"].data
+    assert nan["two"].isna().any()
+    assert nan["one"].notna().all()
+
+
+@pytest.mark.long
+def test_a_cue_that_raises_takes_its_view_with_it_and_nothing_else(spoil: Spoil) -> None:
+    protocol = spoil("cue draw 5 raising")
+    _, why = present(protocol, "faulty_cue", ["fine"])
+    source = protocol.parent / "plugins" / "faulty.py"
+    assert f"({source}:{line_of('raise ValueError')})" in why["fine"]
+
+
+@pytest.mark.long
 def test_a_slow_component_is_named_and_the_session_goes_on(spoil: Spoil) -> None:
     protocol = spoil("dynamics step 1 slow")
     protocol.write_text(protocol.read_text().replace("rate_hz: 240", "rate_hz: 60"))
@@ -273,4 +358,24 @@ def test_a_slow_component_is_named_and_the_session_goes_on(spoil: Spoil) -> None
     assert slow["worst_s"] >= 0.05
     loop = session.streams["loop"].data
     late = (loop["woke"] - loop["due"]).to_numpy()
-    assert late[-1] > 0.04 * len(late)  # nothing is skipped: lateness piles up, and is recorded
+    assert late[-1] > 0.03 * len(late)  # nothing is skipped: lateness piles up, and is recorded
+
+
+def test_an_exporter_that_raises_is_named_with_its_line(
+    spoil: Spoil,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    from labcrane_xdf.merged import MergedXdf
+
+    def export(self, participants, folder):
+        raise KeyError("no such stream")
+
+    run_fast(spoil("nobody nothing 1 raising"))
+    monkeypatch.setattr(MergedXdf, "export", export)
+    arguments = ["--to", "xdf", "--include", "simulated", "--out", str(tmp_path / "out")]
+    assert main(["export", str(tmp_path / "data"), *arguments]) == 1
+    said = capsys.readouterr().err
+    assert "exporter 'xdf' of plugin 'xdf'" in said
+    assert re.search(r"raised KeyError: 'no such stream' \(.*test_plugins\.py:\d+\)", said)

@@ -40,6 +40,8 @@ class TestCommands(CommandContract):
 
 
 class TestCanReplay(InputContract):  # "can_replay"
+    goes_on = True
+
     @pytest.fixture
     def device(self, tmp_path: Path) -> InputDevice:
         return CanReplay(ReplaySettings(file=a_log(tmp_path / "a.log"), valves=VALVES), ch8())

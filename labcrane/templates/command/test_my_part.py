@@ -1,13 +1,21 @@
 """my_part keeps the contract of commands; add what else it promises."""
 
 from pathlib import Path
+from types import ModuleType
 
+import my_module
 import pytest
 from my_module import count, labcrane_commands
 
 from labcrane import CommandOffer
-from labcrane.testing import CommandContract
+from labcrane.testing import CommandContract, PluginContract
 from labcrane.testing.exporters import TRIALS, a_participant
+
+
+class TestPlugin(PluginContract):
+    @pytest.fixture
+    def plugin(self) -> ModuleType:
+        return my_module
 
 
 class TestCount(CommandContract):

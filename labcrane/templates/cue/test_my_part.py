@@ -1,12 +1,20 @@
 """my_part keeps the contract of its role; add what else it promises."""
 
 import math
+from types import ModuleType
 
+import my_module
 import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane import Beam, Cue
-from labcrane.testing import TARGETS, CueContract, a_run, a_target, ch8, opened
+from labcrane.testing import TARGETS, CueContract, PluginContract, a_run, a_target, ch8, opened
+
+
+class TestPlugin(PluginContract):
+    @pytest.fixture
+    def plugin(self) -> ModuleType:
+        return my_module
 
 
 class TestMyPart(CueContract):

@@ -1,11 +1,20 @@
 """my_part keeps the contract of its role; add what else it promises."""
 
+from types import ModuleType
+
+import my_module
 import numpy as np
 import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane import Dynamics
-from labcrane.testing import DynamicsContract, a_run, ch8, opened
+from labcrane.testing import DynamicsContract, PluginContract, a_run, ch8, opened
+
+
+class TestPlugin(PluginContract):
+    @pytest.fixture
+    def plugin(self) -> ModuleType:
+        return my_module
 
 
 class TestMyPart(DynamicsContract):

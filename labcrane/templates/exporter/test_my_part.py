@@ -2,13 +2,21 @@
 
 import csv
 from pathlib import Path
+from types import ModuleType
 
+import my_module
 import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane import Exporter
-from labcrane.testing import ExporterContract
+from labcrane.testing import ExporterContract, PluginContract
 from labcrane.testing.exporters import TRIALS, a_participant
+
+
+class TestPlugin(PluginContract):
+    @pytest.fixture
+    def plugin(self) -> ModuleType:
+        return my_module
 
 
 class TestMyPart(ExporterContract):

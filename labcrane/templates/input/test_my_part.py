@@ -1,11 +1,20 @@
 """my_part keeps the contract of its role; add what else it promises."""
 
+from types import ModuleType
+
+import my_module
 import numpy as np
 import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane import InputDevice
-from labcrane.testing import InputContract, a_frame, a_run, ch8, opened
+from labcrane.testing import InputContract, PluginContract, a_frame, a_run, ch8, opened
+
+
+class TestPlugin(PluginContract):
+    @pytest.fixture
+    def plugin(self) -> ModuleType:
+        return my_module
 
 
 class TestMyPart(InputContract):

@@ -1,0 +1,111 @@
+"""A lamp that brightens, and a motor that shakes the seat, as the tip comes closer.
+
+The device speaks lines of ASCII at 115200 baud. It answers ``?`` with its name, and takes
+``L 0`` to ``L 255`` (light) and ``M 0`` to ``M 255`` (motor). It goes dark when nothing comes for
+half a second, so that a dead program leaves no motor running.
+"""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from pydantic import Field, PositiveFloat
+
+from labcrane import (
+    DeviceError,
+    Feedback,
+    FloatArray,
+    Frame,
+    Machine,
+    Offer,
+    Run,
+    Settings,
+    Signal,
+    Value,
+    hookimpl,
+    offer,
+)
+
+labcrane_api = 1
+
+FULL = 255
+ANSWER_S = 2.0
+
+
+class LampSettings(Settings):
+    """Where the lamp is connected, and how it follows the distance."""
+
+    port: str
+    """Serial port: ``/dev/ttyUSB0``, or ``COM3``."""
+
+    far: PositiveFloat = 4.0
+    """Distance of tip and target, in metres, from which on it is dark."""
+
+    shake_below: float = Field(default=0.5, ge=0.0)
+    """Distance in metres below which the motor runs, the faster the closer."""
+
+
+class Lamp(Feedback):
+    """Light and motor as functions of the distance alone."""
+
+    signals = (Signal("light", "1"), Signal("motor", "1"))
+
+    def __init__(self, settings: LampSettings) -> None:
+        self._settings = settings
+        self._line = None
+        self._name = ""
+
+    def open(self, run: Run) -> None:
+        import serial
+
+        self._tip = run.state.find("tip.position")
+        self._target = run.task.find("target.position")
+        try:
+            self._line = serial.Serial(self._settings.port, 115200, timeout=ANSWER_S)
+            self._line.write(b"?\n")
+            self._name = self._line.readline().decode("ascii", "replace").strip()
+        except serial.SerialException as error:
+            raise DeviceError(
+                f"no lamp on {self._settings.port}: {error}; check the cable, and port: in the "
+                "protocol"
+            ) from error
+        if not self._name.startswith("lamp"):
+            raise DeviceError(
+                f"what is on {self._settings.port} answered {self._name!r}, and is no lamp; check "
+                "port: in the protocol"
+            )
+
+    def facts(self) -> Mapping[str, Value]:
+        return {"device": self._name}
+
+    def present(self, frame: Frame) -> FloatArray:
+        distance = float(np.linalg.norm(frame.task[self._target] - frame.state[self._tip]))
+        if math.isnan(distance):  # between trials there is no target
+            self.rest()
+            return np.zeros(2)
+        light = max(0.0, 1.0 - distance / self._settings.far)
+        near = self._settings.shake_below
+        motor = max(0.0, 1.0 - distance / near) if near else 0.0
+        self._send(light, motor)
+        return np.array([light, motor])
+
+    def rest(self) -> None:
+        self._send(0.0, 0.0)
+
+    def close(self) -> None:
+        if self._line is not None:
+            self._send(0.0, 0.0)
+            self._line.close()
+            self._line = None
+
+    def _send(self, light: float, motor: float) -> None:
+        if self._line is not None:
+            self._line.write(b"L %d\nM %d\n" % (round(FULL * light), round(FULL * motor)))
+
+
+@hookimpl
+def labcrane_feedback() -> list[Offer[Feedback]]:
+    def build(settings: LampSettings, machine: Machine) -> Feedback:
+        return Lamp(settings)
+
+    return [offer("lamp", LampSettings, build)]

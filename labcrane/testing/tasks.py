@@ -1,0 +1,103 @@
+"""The contract of tasks."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from labcrane.records import Frame, Phase, Run
+from labcrane.roles import Task
+from labcrane.signals import Signal
+from labcrane.testing.every_role import check_closes_after_failed_open, check_soon
+from labcrane.testing.roles import (
+    RATE_HZ,
+    a_frame,
+    a_run,
+    a_trial,
+    ch8,
+    check_array,
+    check_signals,
+    crane_at,
+    crane_state,
+    opened,
+)
+
+
+class TaskContract:
+    """What every task must do. Provide the fixture ``task``.
+
+    Name in ``needs`` what the task asks of the machine's state beside that of every crane; the
+    stand-in has zeros there.
+    """
+
+    needs: Sequence[Signal] = ()
+
+    def _run(self, task: Task) -> Run:
+        state = (*crane_state(ch8()).signals, *self.needs)
+        return a_run(ch8(), state=state, task=task.signals)
+
+    def _frame(self, run: Run, number: int = 0) -> Frame:
+        crane = crane_at(run.machine, run.machine.rest)
+        return a_frame(run, number, np.pad(crane, (0, run.state.size - crane.size)))
+
+    def test_a_plan_follows_the_order_of_its_levels(self, task: Task) -> None:
+        factors = task.factors()
+        forward = task.plan(factors)
+        backward = task.plan({name: list(levels)[::-1] for name, levels in factors.items()})
+        assert [p.condition for p in forward] == [p.condition for p in task.plan(factors)]
+        assert len(forward) == len(backward)
+        assert any(planned.counted for planned in forward)
+        assert all(planned.expected_s > 0 for planned in forward)
+
+    def test_task_judges_what_its_signals_promise(self, task: Task) -> None:
+        check_signals(task)
+        run = self._run(task)
+        with opened(task, run):
+            for planned in task.plan(task.factors())[:3]:
+                task.begin_trial(a_trial(planned))
+                judgement = task.judge(self._frame(run))
+                check_array(task, judgement.values)
+                assert judgement.phase is not Phase.IDLE
+
+    def test_the_same_frames_are_judged_alike_after_every_beginning(self, task: Task) -> None:
+        run = self._run(task)
+        with opened(task, run):
+            planned = task.plan(task.factors())[0]
+            judged = []
+            for _ in range(2):
+                task.begin_trial(a_trial(planned, seed=7))
+                seen = [task.judge(self._frame(run, number)) for number in range(20)]
+                judged.append([(each.phase, each.values.tolist(), each.events) for each in seen])
+            np.testing.assert_equal(judged[0], judged[1])
+
+    def test_task_judges_at_once(self, task: Task) -> None:
+        run = self._run(task)
+        frame = self._frame(run)
+        with opened(task, run):
+            task.begin_trial(a_trial(task.plan(task.factors())[0]))
+            check_soon(lambda: task.judge(frame))
+
+    def test_task_closes_after_a_failed_open(self, task: Task) -> None:
+        check_closes_after_failed_open(task)
+
+    def test_an_overruled_trial_has_no_automatic_end(self, task: Task) -> None:
+        run = self._run(task)
+        with opened(task, run):
+            for planned in task.plan(task.factors())[:2]:
+                task.begin_trial(a_trial(planned))
+                task.overrule()
+                late = self._frame(run, number=int(3600 * RATE_HZ))
+                assert not task.judge(late).phase.over
+
+    def test_results_are_declared(self, task: Task) -> None:
+        run = self._run(task)
+        declared = {column for signal in task.results for column in signal.columns}
+        with opened(task, run):
+            for planned in task.plan(task.factors())[:3]:
+                task.begin_trial(a_trial(planned))
+                results: Mapping[str, object] = {}
+                for number in range(int(120 * RATE_HZ)):
+                    judgement = task.judge(self._frame(run, number))
+                    if judgement.phase.over:
+                        results = judgement.results
+                        break
+                assert set(results) == declared, "a machine that never moves must end by a limit"

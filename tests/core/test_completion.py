@@ -1,0 +1,22 @@
+"""What a shell is told when the user presses the tabulator."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+
+@pytest.mark.parametrize(
+    ("typed", "completed"),
+    [("labcrane new-", "new-plugin"), ("labcrane plugins sh", "show"), ("labcrane dmd fi", "fit")],
+)
+def test_commands_are_completed_those_of_plugins_too(typed: str, completed: str) -> None:
+    program = Path(sys.executable).with_name("labcrane")
+    asked = {"_LABCRANE_COMPLETE": "complete_bash", "COMP_WORDS": typed}
+    asked["COMP_CWORD"] = str(len(typed.split()) - 1)
+    done = subprocess.run(
+        [program], env={**os.environ, **asked}, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == [completed]
