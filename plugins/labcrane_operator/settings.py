@@ -18,6 +18,12 @@ class OperatorSettings(Settings):
     reaction_sd: NonNegativeFloat = 0.2
     """Standard deviation of the logarithm of the reaction time."""
 
+    lapse_rate: float = Field(default=0.0, ge=0.0, le=1.0)
+    """Probability that the eyes are elsewhere when a trial's target appears."""
+
+    lapse_s: PositiveFloat = 2.0
+    """How much later the movement then begins, in seconds."""
+
     fitts_a_s: NonNegativeFloat = 1.0
     """Intercept of Fitts' law for one sub-movement, in seconds."""
 
