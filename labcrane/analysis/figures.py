@@ -200,5 +200,6 @@ def power_curve(table: "pd.DataFrame") -> "Figure":
     axes.axhline(0.05, color="0.6", linestyle=":", linewidth=1)
     axes.set(xlabel="participants", ylabel="share of cohorts with p < 0.05", ylim=(-0.03, 1.03))
     axes.set_title("simulated operators", fontsize="medium")
+    axes.set_xticks(table["participants"])
     axes.legend(loc="center right")
     return figure

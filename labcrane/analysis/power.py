@@ -166,7 +166,7 @@ def power(
     Parameters
     ----------
     cohorts
-        How many are drawn for each size.
+        How many are drawn for each size; fresh ones are as many as the pool has at most.
     fresh
         Whether cohorts are made of participants of their own, in the pool's order, rather than
         drawn with replacement.
@@ -188,7 +188,7 @@ def power(
         else:
             added = pool.steps if shuffled is None else pool.steps[shuffled][..., None]
             found = _p(permuted + effect.size * added, shuffled, pool) < alpha
-        yield Power(size, cohorts, *_share(found), *_share(null))
+        yield Power(size, len(found), *_share(found), *_share(null))
 
 
 def _drawn(
@@ -206,12 +206,13 @@ def _drawn(
 
 
 def _fresh(pool: Pool, size: int, cohorts: int) -> npt.NDArray[np.intp]:
-    if cohorts * size > len(pool.means):
+    there = min(cohorts, len(pool.means) // size)  # some participants have left
+    if there < 2:  # noqa: PLR2004
         raise ProtocolError(
-            f"{cohorts} cohorts of {size} need {cohorts * size} participants, and the pool has "
+            f"two cohorts of {size} need {2 * size} participants, and the pool has "
             f"{len(pool.means)} with a value at every level; simulate more of them"
         )
-    return np.arange(cohorts * size).reshape(cohorts, size)
+    return np.arange(there * size).reshape(there, size)
 
 
 def _permuted(
