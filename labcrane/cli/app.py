@@ -4,6 +4,7 @@ Importing this must stay instant: a command imports what it needs when it runs.
 """
 
 import os
+import sys
 from collections.abc import Sequence
 
 import typer
@@ -75,8 +76,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit status: 2 for what cannot be run as written."""
     before = os.umask(PRIVATE)
     try:
-        extension.extend(app)
-        app(args=None if arguments is None else list(arguments))
+        words = sys.argv[1:] if arguments is None else list(arguments)
+        extension.extend(app, words)
+        app(args=words)
     except SystemExit as leaving:
         return leaving.code if isinstance(leaving.code, int) else 0
     except LabcraneError as error:

@@ -1,6 +1,8 @@
 """How a simulated operator moves. Every default is invented, none is fitted to people."""
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pathlib import Path
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
 from labcrane import Settings
 
@@ -68,3 +70,13 @@ class OperatorSettings(Settings):
 
     press_s: PositiveFloat = 0.1
     """How long the trigger of the right stick is pressed at rest inside the target, in seconds."""
+
+
+class RecordedSettings(Settings):
+    """Settings of :class:`RecordedInput`."""
+
+    file: Path
+    """A participant file; a relative path counts from the folder in which labcrane runs."""
+
+    session: PositiveInt = 1
+    """Which session of it."""
