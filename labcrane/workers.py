@@ -86,7 +86,7 @@ def _on_cluster(
             "--scheduler needs Dask, which is not installed; install labcrane[cluster]"
         ) from error
     try:
-        client = Client(scheduler, timeout=CONNECT_S)  # type: ignore[no-untyped-call]
+        client = Client(scheduler, timeout=CONNECT_S)
     except (OSError, ValueError) as error:
         raise ProtocolError(
             f"no Dask scheduler answers at {scheduler!r}: {error}; start one with dask scheduler, "

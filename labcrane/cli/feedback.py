@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from labcrane.cli.inspect import ProtocolPath, out
+from labcrane.cli.inspect import ProtocolPath
+from labcrane.cli.output import out
 
 
 def preview(

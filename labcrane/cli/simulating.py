@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labcrane.cli.inspect import ProtocolPath, out
+from labcrane.cli.inspect import ProtocolPath
 from labcrane.cli.network import stay_on_this_computer
+from labcrane.cli.output import out
 from labcrane.cli.results import progress_bar
 
 if TYPE_CHECKING:
@@ -171,7 +172,7 @@ def _print_power(
     from labcrane.analysis.figures import power_curve
     from labcrane.analysis.power import make_pool
     from labcrane.analysis.power import power as power_of
-    from labcrane.cli.inspect import whole_table
+    from labcrane.cli.output import whole_table
     from labcrane.design.seeds import derive
 
     pool = make_pool(movements, tested)
