@@ -13,7 +13,10 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
+
+from benchmarks.table import Row
 
 PROTOCOL = Path(__file__).parents[1] / "protocols" / "aiming" / "protocol.yaml"
 
@@ -69,6 +72,33 @@ def run(*words: str) -> tuple[float, float]:
     )
     seconds, memory = map(float, done.stdout.split()[-2:])
     return seconds, memory
+
+
+def bare_s(data: Path) -> float:
+    """Return the processor's seconds per participant for reading every number with h5py alone."""
+    import h5py  # noqa: PLC0415 - loads for a second
+
+    files = sorted(data.glob("*/*.h5"))
+    began = time.process_time()
+    for path in files:
+        with h5py.File(path) as file:
+            file.visititems(lambda _, node: node[()] if isinstance(node, h5py.Dataset) else None)
+    return (time.process_time() - began) / len(files)
+
+
+def rows(participants: int = 9) -> list[Row]:
+    """Return what report and export take for each participant beside reading the files."""
+    found = []
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder)
+        data = multiply(record(root / "one", 4), root / "data", participants)
+        least = bare_s(data)
+        for words in (["report"], ["export", "--to", "tables"]):
+            out = root / f"out-{words[0]}"
+            seconds, _ = run(words[0], str(data), "--out", str(out), *words[1:])
+            what = f"{' '.join(words)}, s per participant"
+            found.append(Row("analysis", what, seconds / participants, least, "h5py alone"))
+    return found
 
 
 def main() -> None:

@@ -16,6 +16,7 @@ import h5py
 import numpy as np
 import pyxdf
 
+from benchmarks.table import Row
 from labcrane.recording.journal import Column, SessionJournal
 from labcrane.recording.participant_file import consolidate
 from labcrane.recording.recording import open_recording
@@ -41,7 +42,21 @@ def timed(call: Callable[[], object]) -> float:
     return time.perf_counter() - began
 
 
-def write_through(folder: Path, rows: np.ndarray, pause_s: float) -> Path:
+def rows() -> list[Row]:
+    """Return all ratios of a recording of five minutes."""
+    found: list[Row] = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        data = a_movement(int(5 * 60 * RATE_HZ))
+        journal = write_through(folder, data, 0.0, found)
+        consolidation(folder, journal, data, found)
+        loading(journal, found)
+    return found
+
+
+def write_through(
+    folder: Path, rows: np.ndarray, pause_s: float, found: list[Row] | None = None
+) -> Path:
     """Print what one frame costs: ours, and the same bytes by a bare os.write, in turns."""
     path = folder / "ses-01_run.xdf"
     bare = os.open(folder / "bare", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
@@ -70,6 +85,9 @@ def write_through(folder: Path, rows: np.ndarray, pause_s: float) -> Path:
     show(f"write_frame, {'paced' if pause_s else 'back to back'}", ours)
     show("bare os.write", theirs)
     print(f"    ratio of medians {statistics.median(ours) / statistics.median(theirs):.2f}")
+    if found is not None:
+        us = [1e6 * statistics.median(times) for times in (ours, theirs)]
+        found.append(Row("recording", "a frame, us", *us, "os.write of the same bytes"))
     return path
 
 
@@ -89,7 +107,9 @@ def plain_hdf5(path: Path, time_s: np.ndarray, rows: np.ndarray, **filters: obje
         os.fsync(written.fileno())
 
 
-def consolidation(folder: Path, journal: Path, rows: np.ndarray) -> None:
+def consolidation(
+    folder: Path, journal: Path, rows: np.ndarray, found: list[Row] | None = None
+) -> None:
     """Print how fast a journal becomes a participant file, against plain h5py."""
     size = rows.nbytes / 1e6
     times = np.arange(len(rows)) / RATE_HZ
@@ -107,12 +127,14 @@ def consolidation(folder: Path, journal: Path, rows: np.ndarray) -> None:
     print(f"h5py alone, same filters                  {same:6.2f} s {size / same:7.0f} MB/s")
     print(f"h5py alone, no filters                    {bare:6.2f} s {size / bare:7.0f} MB/s")
     print(f"    ratio {ours / same:.2f} to h5py with the same filters")
+    if found is not None:
+        found.append(Row("recording", "consolidation, s", ours, same, "h5py, same filters"))
     print(f"    file {(folder / 'P001.h5').stat().st_size / 1e6:.0f} MB")
     read = timed(lambda: open_recording(folder / "P001.h5").session(1).streams["state"].data)
     print(f"open_recording, all state columns         {read:6.2f} s {size / read:7.0f} MB/s")
 
 
-def loading(journal: Path) -> None:
+def loading(journal: Path, found: list[Row] | None = None) -> None:
     """Print how long it takes to read a journal, against pyxdf."""
     options = {"dejitter_timestamps": False, "synchronize_clocks": False}
     ours = timed(lambda: read_xdf(journal))
@@ -120,6 +142,8 @@ def loading(journal: Path) -> None:
     print(f"read_xdf, with all checks                 {ours:6.2f} s")
     print(f"pyxdf.load_xdf                            {theirs:6.2f} s")
     print(f"    ratio {theirs / ours:.1f}")
+    if found is not None:
+        found.append(Row("recording", "reading a journal, s", ours, theirs, "pyxdf"))
 
 
 def main() -> None:

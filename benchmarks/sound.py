@@ -7,11 +7,29 @@ import time
 
 import numpy as np
 
+from benchmarks.table import Row
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sonification.synth import Synth, offline_server
 from labcrane_sonification.tone import Tone, tone
 
 ROUNDS, SECONDS = 5, 4.0
+
+
+def rows() -> list[Row]:
+    """Return what a block with a change costs beside one without."""
+    settings = SonificationSettings(block=256, ramp_s=0.0)
+    synth = Synth(offline_server(settings), settings)
+    count = round(SECONDS * settings.rate_hz / settings.block)
+    ours, bare = [], []
+    for _ in range(ROUNDS):
+        ours.append(1e6 * SECONDS / _speed(synth, settings) / count)
+        began = time.perf_counter()
+        for _ in range(count):
+            synth.block()
+        bare.append(1e6 * (time.perf_counter() - began) / count)
+    synth.close()
+    what, least = "a block of 256 with a change, us", "pyo's block without"
+    return [Row("sound", what, float(np.median(ours)), float(np.median(bare)), least)]
 
 
 def main() -> None:

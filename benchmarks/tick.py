@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.table import Row
 from labcrane import Frame, InputDevice, Signal, Tick, loop, rig
 from labcrane.clock import Clock, ManualClock, SystemClock, ticks
 from labcrane.console import Command, Order
@@ -200,8 +201,20 @@ class Bare:
         return np.diff(ends)
 
 
-def cost(folder: Path) -> None:
-    """Print the cost of a tick, bare and whole."""
+def rows() -> list[Row]:
+    """Return the median cost of a whole tick beside a bare one."""
+    use_loopback()
+    with tempfile.TemporaryDirectory() as name:
+        found = cost(Path(name))
+    p50 = {kind: float(np.median([np.median(one) for one in each])) for kind, each in found.items()}
+    return [
+        Row("tick", f"{kind}, median us", 1e6 * p50[kind], 1e6 * p50["bare"], "bare PyBullet tick")
+        for kind in ("whole", "whole, LSL")
+    ]
+
+
+def cost(folder: Path) -> dict[str, list[np.ndarray]]:
+    """Print the cost of a tick, bare and whole; return all times in s."""
     study = study_at(240.0, folder)
     bare = Bare(study, folder)
     found: dict[str, list[np.ndarray]] = {"bare": [], "whole": [], "whole, LSL": []}
@@ -221,6 +234,7 @@ def cost(folder: Path) -> None:
             f"{name:12} {np.median(p50) * 1e6:8.1f} {np.median(p99) * 1e6:8.1f} "
             f"{spread(p50 / bare_p50):>18} {spread(p99 / bare_p99):>18}"
         )
+    return found
 
 
 def spread(ratios: np.ndarray) -> str:

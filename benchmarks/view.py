@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.table import Row
 from labcrane import Ball, Run, Situation
 from labcrane.machine import Body
 from labcrane.testing import TARGETS, a_run, a_target, ch8
@@ -32,9 +33,14 @@ def a_scene() -> Run:
     return replace(a_run(machine, task=TARGETS), bodies=tuple(boxes))
 
 
-def main() -> None:
+def rows() -> list[Row]:
+    """Return both figures as a table."""
+    return main()
+
+
+def main() -> list[Row]:
     """Print both figures for either renderer."""
-    run = a_scene()
+    run, found = a_scene(), []
     for renderer in ("auto", "software"):
         view = View(ViewSettings(display="hidden", renderer=renderer), run.machine)
         view.open(run)
@@ -50,6 +56,10 @@ def main() -> None:
         print(f"  bare scene {1000 * np.median(bare):6.2f} ms a picture; ratio {ratio:.2f}")
         print(f"  delay      {_delay(view, run)} frames")
         view.close()
+        what = f"a picture, {renderer} renderer, ms"
+        ours, least = 1000 * float(np.median(shown)), 1000 * float(np.median(bare))
+        found.append(Row("view", what, ours, least, "the bare scene"))
+    return found
 
 
 def _seconds(view: View, run: Run, *, whole: bool) -> float:

@@ -13,17 +13,20 @@ An Exporter works on what was recorded, long after: it is built, but never opene
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import BaseModel
 
-from labcrane.analysis.cohort import Participant
 from labcrane.clock import Tick
 from labcrane.machine import Body
 from labcrane.questions import Answers, Item, Score
 from labcrane.records import Frame, Judgement, Planned, Run, Situation, Trial, Value
 from labcrane.shapes import Shape
 from labcrane.signals import FloatArray, Signal
+
+if TYPE_CHECKING:
+    from labcrane.analysis.cohort import Participant
 
 
 class Component(ABC):
@@ -142,7 +145,7 @@ class Exporter(Component):
     """
 
     @abstractmethod
-    def export(self, participants: Iterable[Participant], folder: Path) -> None:
+    def export(self, participants: "Iterable[Participant]", folder: Path) -> None:
         """Write the data of ``participants`` into ``folder``, which exists and is empty.
 
         Go through the participants once and keep nothing of one while the next is read: there may

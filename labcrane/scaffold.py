@@ -31,6 +31,12 @@ A_ROLE: Mapping[str, str] = {
 }
 """What a plugin of each role is, in words."""
 
+GROUP = """
+# And this one names the group of its commands, which `labcrane --help` lists.
+[project.entry-points."labcrane.commands"]
+my_part = "my_module"
+"""
+
 USED: Mapping[str, tuple[str, str]] = {
     "input": (
         "operator: {use: simulated_operator}",
@@ -78,6 +84,8 @@ def write_plugin(role: str, name: str, into: Path, registry: Registry) -> Path:
             text = template.read_text(encoding="utf-8")
             if template.name == "protocol.yaml":
                 text = text.replace(*USED.get(role, ("", "")))
+            if template.name == "pyproject.toml" and role == "command":
+                text += GROUP
             path = folder / _filled(template.name, role, name)
             write_text(path, _filled(text, role, name), SHARED_FILE)
     return folder

@@ -1,14 +1,16 @@
 """What a protocol says of the streams of others: which, and how right their time must be."""
 
+from typing import TYPE_CHECKING
+
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
 from labcrane.offers import Settings
-from labcrane.recording.stream_header import StreamHeader
-from labcrane.streams.correction import Treatment
-from labcrane.streams.dejitter import Dejitter
 from labcrane.streams.request import MARKER_TYPES, StreamRequest
-from labcrane.streams.resync import treatment_of
 from labcrane.streams.verdict import Limit, Limits
+
+if TYPE_CHECKING:  # a protocol is checked without loading what corrects clocks
+    from labcrane.recording.stream_header import StreamHeader
+    from labcrane.streams.correction import Treatment
 
 
 class StreamNeed(Settings):
@@ -63,7 +65,7 @@ class StreamNeed(Settings):
             counter=self.counter,
         )
 
-    def is_for(self, header: StreamHeader) -> bool:
+    def is_for(self, header: "StreamHeader") -> bool:
         """Whether a recorded stream is the one, or one of those, that is needed."""
         if self.name is not None and self.name != header.name:
             return False
@@ -76,8 +78,12 @@ class StreamNeed(Settings):
             or (markers and header.type.lower() in MARKER_TYPES)
         )
 
-    def treatment(self, header: StreamHeader) -> Treatment:
+    def treatment(self, header: "StreamHeader") -> "Treatment":
         """Return how the stamps of a recorded stream are to be read."""
+        from labcrane.streams.correction import Treatment  # noqa: PLC0415
+        from labcrane.streams.dejitter import Dejitter  # noqa: PLC0415
+        from labcrane.streams.resync import treatment_of  # noqa: PLC0415
+
         stated = treatment_of(header)
         late = self.min_delay_s is not None
         return Treatment(

@@ -186,3 +186,20 @@ def _with_ci(
     axes.errorbar(
         x.to_numpy(), table["mean"], errors, color=color, marker="o", ms=4, capsize=2, label=label
     )
+
+
+def power_curve(table: "pd.DataFrame") -> "Figure":
+    """Return the power over the size of the cohort, beside the rate of findings in nothing."""
+    figure, (axes,) = new_figure()
+    for name, words in (("power", "with the effect"), ("null", "labels permuted")):
+        low, high = table[name] - table[f"{name}_low"], table[f"{name}_high"] - table[name]
+        axes.errorbar(
+            table["participants"], table[name], [low, high], marker="o", capsize=3, label=words
+        )
+    axes.axhline(0.8, color="0.6", linestyle="--", linewidth=1)
+    axes.axhline(0.05, color="0.6", linestyle=":", linewidth=1)
+    axes.set(xlabel="participants", ylabel="share of cohorts with p < 0.05", ylim=(-0.03, 1.03))
+    axes.set_title("simulated operators", fontsize="medium")
+    axes.set_xticks(table["participants"])
+    axes.legend(loc="center right")
+    return figure

@@ -1,70 +1,40 @@
 """All commands, and how an error reaches the user.
 
-Importing this must stay instant: a command imports what it needs when it runs.
+Importing this must stay instant: a command's module is imported when the command line begins with
+its name, and a command imports what it needs when it runs. The list of all commands takes their
+names and their help only.
 """
 
 import os
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Sequence
+from importlib import import_module
 
 import typer
-from rich.console import Console
 
-from labcrane.cli import (
-    approval,
-    doctor,
-    extension,
-    feedback,
-    inspect,
-    people,
-    plugins,
-    recording,
-    results,
-    running,
-    scoring,
-    simulating,
-    upkeep,
-)
+from labcrane.cli import extension
 from labcrane.errors import LabcraneError, ProtocolError
 
-app = typer.Typer(
-    help="Studies of people operating cranes and manipulators.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-)
-app.command("demo")(running.demo)
-app.command("run")(running.run)
-app.command("resume")(running.resume)
-app.command("check")(inspect.check)
-app.command("plan")(inspect.plan)
-app.command("doctor")(doctor.doctor)
-app.add_typer(plugins.app, name="plugins")
-app.command("schema")(plugins.schema)
-app.command("new-plugin")(plugins.new_plugin)
-app.command("streams")(recording.streams)
-app.command("record")(recording.record)
-app.command("recover")(recording.recover)
-app.command("resync")(recording.resync)
-app.command("score")(scoring.score)
-app.command("export")(results.export)
-app.command("report")(results.report)
-app.command("simulate")(simulating.simulate)
-app.command("replay")(results.replay)
-app.command("approve")(approval.approve)
-app.command("amend")(approval.amend)
-app.command("methods")(approval.methods)
-app.command("participants")(people.participants)
-app.command("consent")(people.consent)
-app.command("exclude")(people.exclude)
-app.command("note")(people.note)
-app.command("waive")(people.waive)
-app.command("deviations")(people.deviations)
-app.command("erase")(upkeep.erase)
-app.command("relabel")(upkeep.relabel)
-app.command("transfer")(upkeep.transfer)
+MODULES = {
+    "running": ("demo", "run", "resume"),
+    "inspect": ("check", "plan"),
+    "doctor": ("doctor",),
+    "plugins": ("schema", "new_plugin"),
+    "recording": ("streams", "record", "recover", "resync"),
+    "scoring": ("score",),
+    "results": ("export", "report", "replay"),
+    "simulating": ("simulate", "power"),
+    "approval": ("approve", "amend", "methods"),
+    "people": ("participants", "consent", "exclude", "note", "waive", "deviations"),
+    "upkeep": ("erase", "relabel", "transfer"),
+}
+"""Where commands are: a module, and its functions."""
 
-feedback_app = typer.Typer(help="Views and sounds.", no_args_is_help=True)
-feedback_app.command("preview")(feedback.preview)
-app.add_typer(feedback_app, name="feedback")
+FEEDBACK, PLUGINS = "feedback", "plugins"
+"""Groups, and the modules they are in."""
+
+COMPLETING = "_LABCRANE_COMPLETE"
+"""Set by a shell that wants to know what can follow."""
 
 PRIVATE = 0o077
 """What labcrane writes is about people: nobody but the user may read it."""
@@ -74,11 +44,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit status: 2 for what cannot be run as written."""
     before = os.umask(PRIVATE)
     try:
-        extension.extend(app)
-        app(args=None if arguments is None else list(arguments))
+        words = sys.argv[1:] if arguments is None else list(arguments)
+        commands(words)(args=words, prog_name="labcrane")
     except SystemExit as leaving:
         return leaving.code if isinstance(leaving.code, int) else 0
     except LabcraneError as error:
+        from rich.console import Console
+
         complaint = Console(stderr=True, soft_wrap=True)
         for line in (f"labcrane: {error}", *getattr(error, "__notes__", ())):
             complaint.print(line, markup=False, highlight=False)
@@ -86,3 +58,52 @@ def main(arguments: Sequence[str] | None = None) -> int:
     finally:
         os.umask(before)
     return 0
+
+
+def commands(words: Sequence[str]) -> typer.Typer:
+    """Return the command line as far as ``words`` ask for it."""
+    app = typer.Typer(
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,  # what draws boxes round the help takes longer than all the rest
+    )
+    app.callback()(_labcrane)
+    first = words[0] if words else ""
+    everything = COMPLETING in os.environ
+    known = {name.replace("_", "-"): module for module, names in MODULES.items() for name in names}
+    if first in known:
+        app.command(first)(_function(known[first], first))
+        return app
+    for name, module in known.items():
+        run = _function(module, name)
+        about = extension.first_line(run)
+        app.command(name, short_help=about)(run if everything else _stub(run))
+    if first == PLUGINS or everything:
+        app.add_typer(import_module(f"labcrane.cli.{PLUGINS}").app, name=PLUGINS)
+    else:
+        extension.add(app, PLUGINS, "What installed plugins offer.")
+    extension.add(app, FEEDBACK, "Views and sounds.")
+    if first == FEEDBACK or everything:
+        extension.fill(app, FEEDBACK, {"preview": _function(FEEDBACK, "preview")})
+    extension.extend(app, first)
+    return app
+
+
+def _function(module: str, name: str) -> Callable[..., None]:
+    there = import_module(f"labcrane.cli.{module}")
+    found: Callable[..., None] = getattr(there, name.replace("-", "_"))
+    return found
+
+
+def _stub(run: Callable[..., None]) -> Callable[[], None]:
+    """Return what has the help of a command and nothing else: options take long to work out."""
+
+    def stub() -> None:
+        raise AssertionError("a command that is asked for is not a stub")
+
+    stub.__doc__ = run.__doc__
+    return stub
+
+
+def _labcrane() -> None:
+    """Studies of people operating cranes and manipulators."""

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from labcrane.cli.inspect import out
+from labcrane.cli.output import out
 from labcrane.errors import ProtocolError
 
 DISPLAY = (

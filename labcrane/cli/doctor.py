@@ -10,8 +10,8 @@ from rich.console import Console
 from rich.text import Text
 
 from labcrane.cli.delay import measure_audio, measure_display
-from labcrane.cli.inspect import out
 from labcrane.cli.network import Local, stay_on_this_computer
+from labcrane.cli.output import out
 from labcrane.cli.sync import STYLES
 from labcrane.errors import ProtocolError
 

@@ -1,29 +1,61 @@
-"""Commands of plugins, put beside labcrane's own."""
+"""Groups of commands: those of plugins, put beside labcrane's own."""
+
+from collections.abc import Callable, Mapping
+from importlib.metadata import EntryPoints, entry_points
 
 import typer
 
 from labcrane.errors import PluginError
-from labcrane.plugin_commands import plugin_commands
+
+GROUP = "labcrane.commands"
+"""Entry points that name a group of commands, and the module with its hook: known without importing
+any plugin (docs/decisions/0091-groups-by-entry-point.md)."""
 
 
-def extend(app: typer.Typer) -> None:
-    """Add what installed plugins offer; doing it again changes nothing."""
+def extend(app: typer.Typer, first: str) -> None:
+    """Add the groups of installed plugins, and fill the one that the command line begins with."""
     own = {command.name for command in app.registered_commands}
-    groups = {group.name: group.typer_instance for group in app.registered_groups}
-    for (group, name), offer in plugin_commands().items():
+    points = entry_points(group=GROUP)
+    for group in sorted(points.names):
         if group in own:
             raise PluginError(
-                f"a plugin offers {group} {name!r}, but {group!r} is a command of labcrane; "
+                f"a plugin offers commands {group!r}, but {group!r} is a command of labcrane; "
                 "uninstall it"
             )
-        if group not in groups:
-            made = typer.Typer(no_args_is_help=True, help=f"Commands about {group}.")
-            made.callback()(_nothing)  # a group stays a group, even with one command
-            app.add_typer(made, name=group)
-            groups[group] = made
-        holder = groups[group]
-        if holder and name not in {command.name for command in holder.registered_commands}:
-            holder.command(name)(offer.run)
+        if group not in {there.name for there in app.registered_groups}:
+            add(app, group, f"Commands about {group}.")
+        if group == first:
+            fill(app, group, _offered(group, points.select(name=group)))
+
+
+def add(app: typer.Typer, group: str, about: str) -> None:
+    """Add a group without commands."""
+    made = typer.Typer(no_args_is_help=True, help=about, rich_markup_mode=None)
+    made.callback()(_nothing)  # a group stays a group, even with one command
+    app.add_typer(made, name=group)
+
+
+def fill(app: typer.Typer, group: str, commands: Mapping[str, Callable[..., None]]) -> None:
+    """Add commands to a group."""
+    for there in app.registered_groups:
+        if there.name == group and there.typer_instance is not None:
+            for name, run in commands.items():
+                there.typer_instance.command(name, short_help=first_line(run))(run)
+
+
+def first_line(run: Callable[..., None]) -> str:
+    """Return a command's help for a list of commands, whole."""
+    return (run.__doc__ or "").partition("\n")[0]
+
+
+def _offered(group: str, points: EntryPoints) -> dict[str, Callable[..., None]]:
+    from labcrane.plugin_commands import plugin_commands
+
+    return {
+        name: offer.run
+        for (its_group, name), offer in plugin_commands(points).items()
+        if its_group == group
+    }
 
 
 def _nothing() -> None:

@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.table import Table
 
+from labcrane.cli.output import out, whole_table
 from labcrane.errors import ProtocolError
 
 if TYPE_CHECKING:
@@ -16,16 +15,6 @@ if TYPE_CHECKING:
 
 AsJson = Annotated[bool, typer.Option("--json", help="for programs")]
 ProtocolPath = Annotated[Path, typer.Argument(metavar="PROTOCOL", help="the study's YAML file")]
-
-out = Console(soft_wrap=True, highlight=False)
-
-
-def whole_table(*titles: str) -> Table:
-    """Return a table that breaks what does not fit, and cuts nothing off."""
-    table = Table()
-    for title in titles:
-        table.add_column(title, overflow="fold")
-    return table
 
 
 def check(protocol: ProtocolPath, as_json: AsJson = False) -> None:

@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from labcrane.cli.approval import today
-from labcrane.cli.inspect import ProtocolPath, out, whole_table
+from labcrane.cli.inspect import ProtocolPath
+from labcrane.cli.output import out, whole_table
 
 Someone = Annotated[str, typer.Argument(metavar="PARTICIPANT", help="pseudonym: P001")]
 Reason = Annotated[str, typer.Option(help="why; no names")]

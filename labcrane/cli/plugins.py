@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labcrane.cli.inspect import AsJson, out, whole_table
+from labcrane.cli.inspect import AsJson
+from labcrane.cli.output import out, whole_table
 from labcrane.errors import PluginError
 
 if TYPE_CHECKING:

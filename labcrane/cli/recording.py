@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.table import Table
 
-from labcrane.cli.inspect import out
 from labcrane.cli.network import Local, stay_on_this_computer
+from labcrane.cli.output import out
 from labcrane.errors import ProtocolError, RecordingError
 
 if TYPE_CHECKING:
@@ -21,6 +20,8 @@ def streams(
     local: Local = False,
 ) -> None:
     """List the streams on the network."""
+    from rich.table import Table
+
     if local:
         stay_on_this_computer()
     from labcrane.streams.discovery import discover

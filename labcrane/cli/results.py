@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from labcrane.cli.inspect import out
+from labcrane.cli.output import out
 from labcrane.errors import ProtocolError, RecordingError
 
 if TYPE_CHECKING:
@@ -170,13 +169,21 @@ def _keep_track(data: Path, to: str, folder: Path, cohort: "Cohort") -> None:
 
 @contextmanager
 def progress_bar(what: str, total: int) -> Iterator[Any]:
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+    )
+
     parts = (
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
     )
-    with Progress(*parts, console=out) as progress:
+    with Progress(*parts, console=out.console) as progress:
         task = progress.add_task(what, total=total)
         yield lambda: progress.advance(task)
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from labcrane.cli.consent import ask_for_consent, await_consent
-from labcrane.cli.inspect import ProtocolPath, out
+from labcrane.cli.inspect import ProtocolPath
 from labcrane.cli.network import Local, stay_on_this_computer
+from labcrane.cli.output import out
 from labcrane.errors import LabcraneError, ProtocolError
 
 if TYPE_CHECKING:
@@ -132,7 +133,7 @@ def _run_fast(order: "VisitOrder") -> Path:
     visit = replace(order.visit(), fast=True)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
-    with Terminal(console, out, _counted(plan), keys=False):
+    with Terminal(console, out.console, _counted(plan), keys=False):
         return run_session(visit, console)
 
 
@@ -149,7 +150,8 @@ def _launch(order: "VisitOrder", *, page: bool) -> None:
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
     keys, asked = not visit.simulated, visit.study.questionnaires
-    with Terminal(console, out, _counted(plan), keys=keys, questionnaires=asked) as terminal:
+    shown, count = out.console, _counted(plan)
+    with Terminal(console, shown, count, keys=keys, questionnaires=asked) as terminal:
         launcher = Launcher(order, console, terminal.say)
         with pages(visit, launcher, console, terminal.say) if page else nullcontext():
             if page:

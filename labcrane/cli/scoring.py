@@ -4,9 +4,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.table import Table
 
-from labcrane.cli.inspect import out
+from labcrane.cli.output import out
 from labcrane.cli.results import cohort_of
 
 if TYPE_CHECKING:
@@ -29,6 +28,8 @@ def score(
     ] = None,
 ) -> None:
     """Write the evaluation workbook: performance indicator, trend, what to practise next."""
+    from rich.table import Table
+
     from labcrane.analysis.operator_tests import operator_tests
     from labcrane.analysis.workbook import advice, write_workbook
 

@@ -2,9 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from rich.table import Table
-
-from labcrane.cli.inspect import out
+from labcrane.cli.output import out
 
 if TYPE_CHECKING:
     from labcrane.streams.sync_report import SyncReport
@@ -14,6 +12,8 @@ STYLES = {"PASS": "green", "WARN": "yellow", "FAIL": "red"}
 
 def print_report(report: "SyncReport") -> None:
     """Print a sync report: a row per stream, the loop, and what to do."""
+    from rich.table import Table
+
     from labcrane.streams.sync_report import COLUMNS
 
     verdict = report.verdict.value

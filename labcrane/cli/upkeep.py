@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labcrane.cli.approval import today
-from labcrane.cli.inspect import out
+from labcrane.cli.output import out
 from labcrane.cli.people import HERE, Data, Reason, Someone
 
 if TYPE_CHECKING:

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 
 from labcrane import InputDevice, Machine, Offer, hookimpl, offer
-from labcrane_operator.recorded import RecordedInput, RecordedSettings
-from labcrane_operator.settings import OperatorSettings
+from labcrane_operator.settings import OperatorSettings, RecordedSettings
 
 labcrane_api = 1
 
@@ -17,6 +16,8 @@ def labcrane_inputs() -> Sequence[Offer[InputDevice]]:
         return SimulatedOperator(settings)
 
     def recorded(settings: RecordedSettings, machine: Machine) -> InputDevice:
+        from labcrane_operator.recorded import RecordedInput
+
         return RecordedInput(settings)
 
     return (

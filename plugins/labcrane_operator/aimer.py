@@ -95,6 +95,8 @@ class Aimer:
         settings = self._settings
         self._doing, self._target = Doing.REACTING, target
         self._wait = self._noise.reaction(settings.reaction_s, settings.reaction_sd)
+        if self._noise.lapse(settings.lapse_rate):
+            self._wait += settings.lapse_s
         self._press = settings.press_s
 
     def _aim(self, tip: Point, target: Point, radius: float) -> None:

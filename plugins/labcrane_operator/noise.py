@@ -24,13 +24,17 @@ class Noise:
     """
 
     def __init__(self, seed: int, share: float) -> None:
-        self._once, self._motor = (
-            np.random.default_rng([seed, part]) for part in range(2)
+        self._once, self._motor, self._attention = (
+            np.random.default_rng([seed, part]) for part in range(3)
         )  # apart, so that a longer movement does not shift where the next one ends
         self._share = share
         self._fresh = math.sqrt(1.0 - share * share)
         self._values: Point = (0.0, 0.0, 0.0)
         self._drawn: list[list[float]] = []
+
+    def lapse(self, rate: float) -> bool:
+        """Say whether attention lapses in this trial, with this probability."""
+        return bool(self._attention.uniform() < rate)
 
     def reaction(self, median: float, spread: float) -> float:
         """Return a lognormal time in seconds."""

@@ -1,10 +1,8 @@
 """The axes of a recorded session, played again."""
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
-from pydantic import PositiveInt
 
 from labcrane import (
     FloatArray,
@@ -13,22 +11,12 @@ from labcrane import (
     ProtocolError,
     RecordingError,
     Run,
-    Settings,
     Tick,
     Value,
     open_recording,
     signals_of,
 )
-
-
-class RecordedSettings(Settings):
-    """Settings of :class:`RecordedInput`."""
-
-    file: Path
-    """A participant file; a relative path counts from the folder in which labcrane runs."""
-
-    session: PositiveInt = 1
-    """Which session of it."""
+from labcrane_operator.settings import RecordedSettings
 
 
 class RecordedInput(InputDevice):

@@ -1,6 +1,8 @@
 """How a simulated operator moves. Every default is invented, none is fitted to people."""
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pathlib import Path
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
 from labcrane import Settings
 
@@ -17,6 +19,12 @@ class OperatorSettings(Settings):
 
     reaction_sd: NonNegativeFloat = 0.2
     """Standard deviation of the logarithm of the reaction time."""
+
+    lapse_rate: float = Field(default=0.0, ge=0.0, le=1.0)
+    """Probability that the eyes are elsewhere when a trial's target appears."""
+
+    lapse_s: PositiveFloat = 2.0
+    """How much later the movement then begins, in seconds."""
 
     fitts_a_s: NonNegativeFloat = 1.0
     """Intercept of Fitts' law for one sub-movement, in seconds."""
@@ -62,3 +70,13 @@ class OperatorSettings(Settings):
 
     press_s: PositiveFloat = 0.1
     """How long the trigger of the right stick is pressed at rest inside the target, in seconds."""
+
+
+class RecordedSettings(Settings):
+    """Settings of :class:`RecordedInput`."""
+
+    file: Path
+    """A participant file; a relative path counts from the folder in which labcrane runs."""
+
+    session: PositiveInt = 1
+    """Which session of it."""

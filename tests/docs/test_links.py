@@ -4,11 +4,9 @@ import re
 from pathlib import Path
 
 import pytest
-import typer
 from docs.page import ROOT
 
-from labcrane.cli.app import app
-from labcrane.cli.extension import extend
+from labcrane.cli.app import commands
 
 PAGES = sorted([ROOT / "README.md", ROOT / "plugins" / "README.md", *(ROOT / "docs").rglob("*.md")])
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
@@ -52,10 +50,7 @@ COMMAND = re.compile(r"`(?:\.venv/bin/)?labcrane ([a-z][a-z-]*)")
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_commands_that_are_named_exist(page: Path) -> None:
-    whole = typer.Typer()
-    whole.registered_commands = list(app.registered_commands)
-    whole.registered_groups = list(app.registered_groups)
-    extend(whole)
+    whole = commands([])
     known = {command.name for command in whole.registered_commands}
     known |= {group.name for group in whole.registered_groups}
     named = set(COMMAND.findall(page.read_text()))

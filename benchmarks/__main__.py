@@ -1,0 +1,86 @@
+"""All benchmarks, and one table of their ratios.
+
+    python -m benchmarks [--only tick,start_up] [--quick]
+
+Writes ``benchmarks/RESULTS.md``, with the machine and the date; rows of benchmarks that were left
+out are kept as they were. Absolute figures of a shared computer are noise: every row has a bare
+reference that ran beside it, and the ratio is what counts. Takes half an hour; the computer should
+be idle.
+"""
+
+import argparse
+import os
+import platform
+from datetime import UTC, datetime
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+
+from benchmarks.table import Row
+
+SUBJECTS = ("tick", "recording", "sync", "view", "sound", "analysis", "cohort", "start_up")
+RESULTS = Path(__file__).with_name("RESULTS.md")
+HEAD = "| benchmark | figure | labcrane | reference | | ratio | at most | measured |"
+
+
+def main() -> None:
+    """Run what was asked for, and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--only", help=f"some of {','.join(SUBJECTS)}")
+    parser.add_argument("--quick", action="store_true", help="four participants in cohort")
+    asked = parser.parse_args()
+    chosen = asked.only.split(",") if asked.only else list(SUBJECTS)
+    if unknown := set(chosen) - set(SUBJECTS):
+        parser.error(f"there is no {', '.join(sorted(unknown))}; there is {', '.join(SUBJECTS)}")
+    lines = kept()
+    for subject in chosen:
+        print(f"== {subject}", flush=True)
+        few = {"participants": 4} if asked.quick and subject == "cohort" else {}
+        rows = import_module(f"benchmarks.{subject}").rows(**few)
+        lines[subject] = [line(subject, row) for row in rows]
+        print("\n".join(lines[subject]), flush=True)
+        write(lines)
+
+
+def line(subject: str, row: Row) -> str:
+    """Return a row of the table, with the machine and the date."""
+    goal = "" if row.goal is None else f"{row.goal:.2f}"
+    when = f"{datetime.now(UTC).date()}, {machine()}"
+    figures = f"{row.ours:.3g} | {row.reference} | {row.bare:.3g} | {row.ratio:.2f} | {goal}"
+    return f"| {subject} | {row.what} | {figures} | {when} |"
+
+
+def machine() -> str:
+    """Return what was measured on, in a few words."""
+    model = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        names = [part for part in info.read_text().splitlines() if part.startswith("model name")]
+        model = names[0].partition(":")[2].strip() if names else model
+    return f"{os.cpu_count()} cores {model}, Python {platform.python_version()}"
+
+
+def kept() -> dict[str, list[str]]:
+    """Return the lines of the last table, by benchmark."""
+    lines: dict[str, list[str]] = {subject: [] for subject in SUBJECTS}
+    for text in RESULTS.read_text(encoding="utf-8").splitlines() if RESULTS.exists() else ():
+        subject = text.split("|")[1].strip() if text.startswith("|") else ""
+        if subject in lines:
+            lines[subject].append(text)
+    return lines
+
+
+def write(lines: dict[str, list[str]]) -> None:
+    """Write the table."""
+    rows = "\n".join(text for subject in SUBJECTS for text in lines[subject])
+    RESULTS.write_text(
+        "# Benchmarks\n\n"
+        f"Made by `python -m benchmarks` with labcrane {version('labcrane')}. Each figure stands "
+        "beside a bare reference that\nran in the same minutes; the ratio is what counts.\n\n"
+        f"{HEAD}\n|{'---|' * (HEAD.count('|') - 1)}\n{rows}\n",
+        encoding="utf-8",
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,41 @@
+"""How long the command line takes to answer, beside the two libraries that it is made of.
+
+    python -m benchmarks.start_up
+
+Processes alternate; of each kind the fastest counts, which is the one that nothing disturbed.
+"""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from benchmarks.table import Row, show
+
+ROUNDS = 15
+AIMING = Path(__file__).parents[1] / "protocols" / "aiming" / "protocol.yaml"
+CASES = {
+    "bare": ["-c", "import typer, rich"],
+    "labcrane --help": ["-m", "labcrane", "--help"],
+    "labcrane check": ["-m", "labcrane", "check", str(AIMING)],
+}
+GOALS = {"labcrane --help": 1.5, "labcrane check": 4.0}
+
+
+def rows() -> list[Row]:
+    """Return both figures."""
+    took: dict[str, list[float]] = {name: [] for name in CASES}
+    for _ in range(ROUNDS):
+        for name, words in CASES.items():
+            began = time.perf_counter()
+            subprocess.run([sys.executable, *words], check=True, stdout=subprocess.DEVNULL)
+            took[name].append(time.perf_counter() - began)
+    bare = min(took["bare"])
+    return [
+        Row("start-up", f"{name}, s", min(took[name]), bare, "import typer, rich", goal)
+        for name, goal in GOALS.items()
+    ]
+
+
+if __name__ == "__main__":
+    show(rows())

@@ -1,0 +1,125 @@
+"""The public names, and the modules from which they are imported."""
+
+from .actuator import PRESETS, Actuator, ActuatorSettings
+from .analysis.cohort import Participant
+from .clock import Tick
+from .errors import (
+    DeviceError,
+    LabcraneError,
+    PluginError,
+    ProtocolError,
+    RecordingError,
+)
+from .finding import Finding, Verdict
+from .hookspecs import hookimpl
+from .kinematics import Arm, frames, jacobian
+from .machine import Body, Joint, Machine
+from .mesh_file import MeshFile
+from .offers import Ask, CommandOffer, Offer, Settings, StudyPath, offer
+from .questions import AnswerError, Answers, Item, Score, numbers
+from .reachability import reach
+from .recording.recording import SessionRecord, Stream, open_recording
+from .recording.stream_header import Channel, StreamHeader
+from .recording.xdf import XdfWriter
+from .records import (
+    Event,
+    Frame,
+    Judgement,
+    Phase,
+    Planned,
+    Run,
+    Situation,
+    Trial,
+    Value,
+)
+from .roles import (
+    Controller,
+    Cue,
+    Dynamics,
+    Exporter,
+    Feedback,
+    InputDevice,
+    Questionnaire,
+    Task,
+)
+from .scene import Form, Part, Placed, Scene, load_scene, place
+from .scene_text import SCENE_PLACED, read_placed, write_placed
+from .shapes import Ball, Beam, Shape, Targets
+from .signals import FloatArray, Layout, Signal, signals_of
+
+__version__: str
+
+__all__ = [
+    "PRESETS",
+    "SCENE_PLACED",
+    "Actuator",
+    "ActuatorSettings",
+    "AnswerError",
+    "Answers",
+    "Arm",
+    "Ask",
+    "Ball",
+    "Beam",
+    "Body",
+    "Channel",
+    "CommandOffer",
+    "Controller",
+    "Cue",
+    "DeviceError",
+    "Dynamics",
+    "Event",
+    "Exporter",
+    "Feedback",
+    "Finding",
+    "FloatArray",
+    "Form",
+    "Frame",
+    "InputDevice",
+    "Item",
+    "Joint",
+    "Judgement",
+    "LabcraneError",
+    "Layout",
+    "Machine",
+    "MeshFile",
+    "Offer",
+    "Part",
+    "Participant",
+    "Phase",
+    "Placed",
+    "Planned",
+    "PluginError",
+    "ProtocolError",
+    "Questionnaire",
+    "RecordingError",
+    "Run",
+    "Scene",
+    "Score",
+    "SessionRecord",
+    "Settings",
+    "Shape",
+    "Signal",
+    "Situation",
+    "Stream",
+    "StreamHeader",
+    "StudyPath",
+    "Targets",
+    "Task",
+    "Tick",
+    "Trial",
+    "Value",
+    "Verdict",
+    "XdfWriter",
+    "frames",
+    "hookimpl",
+    "jacobian",
+    "load_scene",
+    "numbers",
+    "offer",
+    "open_recording",
+    "place",
+    "reach",
+    "read_placed",
+    "signals_of",
+    "write_placed",
+]

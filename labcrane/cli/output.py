@@ -1,0 +1,43 @@
+"""Where commands print; rich is loaded when the first of them does."""
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console, RenderableType
+    from rich.style import StyleType
+    from rich.table import Table
+
+
+class Output:
+    """Standard output, which breaks no line by itself and colours no word."""
+
+    @cached_property
+    def console(self) -> "Console":
+        """The console, for what draws more than lines."""
+        from rich.console import Console
+
+        return Console(soft_wrap=True, highlight=False)
+
+    def print(
+        self,
+        *parts: "RenderableType",
+        markup: bool | None = None,
+        style: "StyleType | None" = None,
+        highlight: bool | None = None,
+    ) -> None:
+        """Print a line or a table."""
+        self.console.print(*parts, markup=markup, style=style, highlight=highlight)
+
+
+out = Output()
+
+
+def whole_table(*titles: str) -> "Table":
+    """Return a table that breaks what does not fit, and cuts nothing off."""
+    from rich.table import Table
+
+    table = Table()
+    for title in titles:
+        table.add_column(title, overflow="fold")
+    return table
