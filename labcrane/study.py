@@ -70,7 +70,8 @@ class Study:
         pattern = self.protocol.participants.pattern
         if not re.fullmatch(pattern, participant):
             raise ProtocolError(
-                f"participant {participant!r} does not match the protocol's pattern {pattern!r}"
+                # As it stands in the file, where a backslash is one backslash.
+                f"participant {participant!r} does not match the protocol's pattern '{pattern}'"
             )
 
     def check_session(self, number: int) -> None:

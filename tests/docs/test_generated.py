@@ -2,11 +2,15 @@
 
 import importlib.util
 import re
+from pathlib import Path
 from types import ModuleType
 
+import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 from docs.page import ROOT
 
+from labcrane.cli.app import main
 from labcrane.protocol import Protocol
 from labcrane.registry import ROLES, discover
 from labcrane.study import load
@@ -84,3 +88,15 @@ def test_the_picture_is_small_and_its_study_is_right() -> None:
     assert (ROOT / "docs" / "picture.png").stat().st_size < 150_000
     study = load(ROOT / "docs" / "picture.yaml", discover())
     assert list(study.views) == ["examiner"]
+
+
+@pytest.mark.long
+def test_the_picture_is_what_its_command_makes(tmp_path: Path) -> None:
+    study = str(ROOT / "docs" / "picture.yaml")
+    assert main(["feedback", "preview", study, "--to", str(tmp_path)]) == 0
+    shown = plt.imread(ROOT / "docs" / "picture.png")
+    made = plt.imread(tmp_path / "examiner-012.png")
+    # Renderers differ in the last bits; another moment or camera differs a lot.
+    assert np.abs(shown[..., :3] - made[..., :3]).mean() < 0.01
+    other = plt.imread(tmp_path / "examiner-000.png")
+    assert np.abs(shown[..., :3] - other[..., :3]).mean() > 0.01

@@ -63,3 +63,11 @@ def test_links_to_others_are_listed(record_property) -> None:
     for link in sorted(found):
         record_property("link", link)
         assert link.startswith("https://"), link
+
+
+def test_every_page_is_in_the_contents_of_the_site() -> None:
+    # mkdocs itself only mentions a page that nobody would find.
+    contents = (ROOT / "mkdocs.yml").read_text()
+    written = [*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "own").glob("*.md")]
+    names = {str(page.relative_to(ROOT / "docs")) for page in written}
+    assert not {name for name in names if f" {name}\n" not in contents}

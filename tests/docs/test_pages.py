@@ -9,7 +9,7 @@ from docs.page import PAGES, ROOT, Reader, blocks
 RUN = {"python", "sh", "r", "octave", "matlab", "yaml", "toml", "json", "xml", ""}
 """Languages of blocks; one without a language is for reading only."""
 
-MOST_NOT_RUN = 40
+MOST_NOT_RUN = 10
 """How many blocks may be marked as not run; each has its reason beside it."""
 
 
