@@ -3,6 +3,7 @@
 import copy
 
 import numpy as np
+from pydantic import BaseModel
 
 from labcrane.records import Frame, Run, Situation
 from labcrane.roles import Cue, Feedback
@@ -79,6 +80,10 @@ def _check_shape(shape: Shape) -> None:
     assert all(0.0 <= part <= 1.0 for part in shape.colour), shape
 
 
+class Foreign(BaseModel):
+    """Settings of no component."""
+
+
 class FeedbackContract:
     """What all feedback must do. Provide the fixture ``feedback``."""
 
@@ -104,6 +109,13 @@ class FeedbackContract:
             feedback.hear(Situation())
             feedback.present(a_frame(run))  # a frame without a target
             feedback.rest()
+
+    def test_feedback_adjusts_itself_to_no_settings_but_its_own(self, feedback: Feedback) -> None:
+        run = a_run(ch8(), task=TARGETS)
+        with opened(feedback, run):
+            before = feedback.present(a_target(run)).shape
+            assert feedback.adjust(Foreign()) is False
+            assert feedback.present(a_target(run)).shape == before
 
     def test_feedback_closes_without_having_been_opened(self, feedback: Feedback) -> None:
         feedback.close()
