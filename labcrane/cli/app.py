@@ -85,7 +85,7 @@ def commands(words: Sequence[str]) -> typer.Typer:
     extension.add(app, FEEDBACK, "Views and sounds.")
     if first == FEEDBACK or everything:
         extension.fill(app, FEEDBACK, {"preview": _function(FEEDBACK, "preview")})
-    extension.extend(app, first)
+    extension.extend(app, first, everything=everything)
     return app
 
 

@@ -12,8 +12,11 @@ GROUP = "labcrane.commands"
 any plugin (docs/decisions/0091-groups-by-entry-point.md)."""
 
 
-def extend(app: typer.Typer, first: str) -> None:
-    """Add the groups of installed plugins, and fill the one that the command line begins with."""
+def extend(app: typer.Typer, first: str, *, everything: bool) -> None:
+    """Add the groups of installed plugins, and fill the one that the command line begins with.
+
+    With ``everything``, as for a shell that completes what is typed, all of them are filled.
+    """
     own = {command.name for command in app.registered_commands}
     points = entry_points(group=GROUP)
     for group in sorted(points.names):
@@ -24,7 +27,7 @@ def extend(app: typer.Typer, first: str) -> None:
             )
         if group not in {there.name for there in app.registered_groups}:
             add(app, group, f"Commands about {group}.")
-        if group == first:
+        if group == first or everything:
             fill(app, group, _offered(group, points.select(name=group)))
 
 

@@ -102,7 +102,8 @@ def hints_of(function: object) -> dict[str, object]:
     """Return the types of a function's parameters and of what it returns."""
     import pandas  # as labcrane has it for type checkers only
 
-    return typing.get_type_hints(function, localns={"pd": pandas})
+    public = {name: getattr(labcrane, name) for name in labcrane.__all__}
+    return typing.get_type_hints(function, localns={"pd": pandas, **public})
 
 
 def has_float(hint: object) -> bool:
