@@ -213,8 +213,8 @@ class Situation:
     counts
         How often each event has happened.
     text
-        What the operator is to read as long as it is there: the instructions of the step, a
-        question; empty for nothing.
+        What the operator is to read as long as it is there: the instructions of the step, the
+        title of the questionnaire that is asked; empty for nothing.
     hint, hint_time
         The examiner's newest hint, empty before the first, and when it was given.
     scene

@@ -69,8 +69,12 @@ def missing_consent(visit: "Visit") -> Missing | None:
 
 
 def ask_for_consent(visit: "Visit", *, page: bool) -> None:
-    """Ask the examiner at the terminal for a consent that is not on record yet."""
-    if not sys.stdin.isatty() or (missing := missing_consent(visit)) is None:
+    """Ask the examiner at the terminal for a consent that is not on record yet.
+
+    Whether the study may be run at all is found out here, before any page is served.
+    """
+    missing = missing_consent(visit)
+    if missing is None or not sys.stdin.isatty():
         return
     file, version = missing.text
     other = "; n asks on the participant's page" if page else ""

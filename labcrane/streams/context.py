@@ -45,7 +45,9 @@ def situation_after(situation: Situation, event: Event) -> Situation:
             return replace(now, trial=0, active=())
         case "instructions.shown":
             return replace(now, text=data["text"])
-        case "step.end":
+        case "questionnaire.start":
+            return replace(now, text=data["title"])
+        case "step.end" | "questionnaire.end":
             return replace(now, text="")
         case "order.hint" if data["refused"] is None:
             return replace(now, hint=data["text"], hint_time=event.time)

@@ -238,6 +238,8 @@ def test_the_situation_says_what_the_operator_is_to_read() -> None:
         (Event("order.hint", 2.0, {"text": "slower", "refused": None, "by": "x"}), "go", "slower"),
         (Event("order.hint", 3.0, {"text": "", "refused": "words", "by": "x"}), "go", "slower"),
         (Event("step.end", 4.0, {"step": 1, "kind": "instructions"}), "", "slower"),
+        (Event("questionnaire.start", 5.0, {"title": "Workload"}), "Workload", "slower"),
+        (Event("questionnaire.end", 6.0, {"handed_in": True}), "", "slower"),
     ):
         now = situation_after(now, event)
         assert (now.text, now.hint) == (text, hint)
