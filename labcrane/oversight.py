@@ -119,7 +119,7 @@ class Oversight:
         if (
             type(values) is np.ndarray
             and values.dtype is FLOAT64
-            and values.shape == (layout.size,)
+            and values.shape == layout.shape
             # The product is a number when all are, and costs a third of looking at each.
             and (not finite or math.isfinite(values.dot(values)))
         ):

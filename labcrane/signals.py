@@ -69,6 +69,11 @@ class Layout:
         """One unit per number of the array."""
         return tuple(signal.unit for signal in self.signals for _ in signal.columns)
 
+    @cached_property
+    def shape(self) -> tuple[int]:
+        """Shape of the array."""
+        return (self.size,)
+
     @property
     def size(self) -> int:
         """How many numbers the array holds."""

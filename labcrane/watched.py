@@ -92,15 +92,22 @@ class WatchedController(_Watched, Controller):
 class WatchedDynamics(_Watched, Dynamics):
     """A machine."""
 
+    _stepped: FloatArray | None = None
+    """What the last step returned and was checked; as a state it need not be checked again."""
+
     def state(self) -> FloatArray:
         number = self._number["state"]
-        return self._checked(number, self._call(number, self._inner.state))
+        values: FloatArray = self._call(number, self._inner.state)
+        return values if values is self._stepped else self._checked(number, values)
 
     def step(self, command: FloatArray, dt: float) -> FloatArray:
         number = self._number["step"]
-        return self._checked(number, self._call(number, self._inner.step, command, dt))
+        values: FloatArray = self._call(number, self._inner.step, command, dt)
+        self._stepped = self._checked(number, values)
+        return values
 
     def reset(self, pose: Sequence[float]) -> None:
+        self._stepped = None
         self._call(self._number["reset"], self._inner.reset, pose)
 
     def bodies(self) -> Sequence[Body]:

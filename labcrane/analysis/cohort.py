@@ -88,6 +88,23 @@ class Participant:
         return measure_participant(self)
 
 
+@dataclass(frozen=True)
+class Measured(Participant):
+    """A participant whose measures have been worked out before.
+
+    Attributes
+    ----------
+    table
+        What :meth:`measures` returns.
+    """
+
+    table: "pd.DataFrame"
+
+    def measures(self) -> "pd.DataFrame":
+        """Return one row per counted movement of all sessions: condition, results, measures."""
+        return self.table
+
+
 @dataclass(frozen=True, slots=True)
 class Cohort:
     """The participants of a data folder, by what becomes of them.

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from labcrane.analysis.cohort import Participant
+from labcrane.analysis.cohort import Measured, Participant
 from labcrane.analysis.gaze import gaze_measures, looks
 from labcrane.analysis.movements import Groups, Movement, cut, groups, machine_of
 from labcrane.analysis.smoothness import ldlj, path_ratio, sparc, sub_movements
@@ -96,6 +96,12 @@ def measure_participant(
         table.insert(3, "session_name", str(session.attrs.get("session_name", "")))
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
+
+
+def measure_ahead(participant: Participant) -> Measured:
+    """Return a participant with the measures worked out; a worker's function."""
+    table = measure_participant(participant)
+    return Measured(participant.name, participant.path, participant.status, participant.why, table)
 
 
 def measure_session(

@@ -1,6 +1,7 @@
 """How often a planned test finds an effect: cohorts drawn from a pool of simulated participants."""
 
 import re
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -230,7 +231,11 @@ def _p(means: FloatArray, labels: npt.NDArray[np.intp] | None, pool: Pool) -> Fl
 
     numbers = means @ pool.weights
     if labels is None:
-        return np.asarray(ttest_1samp(numbers, 0.0, axis=1).pvalue)
+        with warnings.catch_warnings():
+            # A small cohort may be the same participant again and again; p is then no number, and
+            # nothing is found.
+            warnings.filterwarnings("ignore", "Precision loss", RuntimeWarning)
+            return np.asarray(ttest_1samp(numbers, 0.0, axis=1).pvalue)
     known: list[FloatArray] = []
     for group in (0, 1):
         own = np.where(labels == group, numbers, np.nan)

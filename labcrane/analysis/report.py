@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,7 @@ from labcrane.analysis.measures import DEFAULTS, MEASURES, MeasureSettings, meas
 from labcrane.analysis.pages import Page
 from labcrane.analysis.quality import exclusions, is_result, loop_quality, sync_quality
 from labcrane.analysis.trends import holm, linear_trend, mixed_model
+from labcrane.workers import work
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,29 +31,33 @@ def write_report(
     folder: Path,
     settings: MeasureSettings = DEFAULTS,
     progress: Callable[[int, int], None] | None = None,
+    workers: int = 1,
+    scheduler: str | None = None,
 ) -> Path:
     """Write the report of a cohort into ``folder``; return the page to open.
 
-    Participants are read one after the other; of each only movements and qualities are kept.
+    Each worker reads one participant after the other; of each only movements and qualities are
+    kept.
 
     Parameters
     ----------
     progress
         Told how many participants are done, of how many.
+    workers, scheduler
+        Who does it; see :func:`labcrane.workers.work`.
     """
     import pandas as pd
 
     folder.mkdir(parents=True, exist_ok=True)
-    movements, loops, syncs = [], [], []
-    for number, participant in enumerate(cohort.included, start=1):
-        own = measure_participant(participant, settings)
-        loop, sync = loop_quality(participant), sync_quality(participant)
-        _participant_page(participant, own, loop, sync, folder)
-        movements.append(own)
-        loops.append(loop)
-        syncs.append(sync)
+    (folder / "participants").mkdir(exist_ok=True)
+    one = partial(_one, settings=settings, folder=folder.resolve())
+    found = {}
+    for name, *tables in work(one, cohort.included, workers, scheduler):
+        found[name] = tables
         if progress is not None:
-            progress(number, len(cohort.included))
+            progress(len(found), len(cohort.included))
+    in_order = [found[participant.name] for participant in cohort.included]
+    movements, loops, syncs = zip(*in_order, strict=True)
     everything = pd.concat(movements, ignore_index=True)
     page = Page(_title(cohort.included[0]), folder / "report.html", folder)
     _stamp(page, [participant.status for participant in cohort.included])
@@ -69,6 +75,16 @@ def write_report(
     page.table("definitions", _definitions())
     everything.to_csv(folder / "tables" / "movements.csv", index=False)
     return page.write()
+
+
+def _one(
+    participant: Participant, settings: MeasureSettings, folder: Path
+) -> "tuple[str, pd.DataFrame, pd.DataFrame, pd.DataFrame]":
+    """Write one participant's page; return name, movements, and quality of loop and clocks."""
+    own = measure_participant(participant, settings)
+    loop, sync = loop_quality(participant), sync_quality(participant)
+    _participant_page(participant, own, loop, sync, folder)
+    return participant.name, own, loop, sync
 
 
 def _title(participant: Participant) -> str:

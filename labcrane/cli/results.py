@@ -18,6 +18,10 @@ Include = Annotated[
     list[str] | None,
     typer.Option(help="use also: simulated, pilot, half-finished; may be repeated"),
 ]
+Workers = Annotated[int, typer.Option(help="processes on this computer", min=1)]
+Scheduler = Annotated[
+    str | None, typer.Option(help="a Dask scheduler whose workers do it: tcp://host:8786")
+]
 MANIFEST = "labcrane_export.json"
 
 
@@ -31,6 +35,8 @@ def export(
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="NAME=VALUE of the exporter; may be repeated")
     ] = None,
+    workers: Workers = 1,
+    scheduler: Scheduler = None,
 ) -> None:
     """Export recordings for R, MATLAB, BIDS, Psych-DS or EEG programs."""
     from labcrane.analysis.movements import machine_of
@@ -47,15 +53,31 @@ def export(
     chosen = _settings(offer.settings, settings or [], to)
     if folder.exists() and any(folder.iterdir()):
         raise ProtocolError(f"{folder} is not empty, and nothing is overwritten; give a new folder")
-    cohort = cohort_of(data, include)
+    cohort = cohort_of(data.resolve() if scheduler else data, include)
     _, first = next(cohort.included[0].sessions())
     exporter = oversight.call(place, offer.build, chosen, machine_of(first))
     folder.mkdir(parents=True, exist_ok=True)
+    people = _measured(cohort, workers, scheduler)
     with progress_bar(f"export to {to}", len(cohort.included)) as advance:
-        oversight.call(place, exporter.export, _counted(cohort.included, advance), folder)
+        oversight.call(place, exporter.export, _counted(people, advance), folder)
     _write_manifest(folder, to, chosen.model_dump(mode="json"), cohort)
     _keep_track(data, to, folder, cohort)
     out.print(f"{to}: {folder}", markup=False)
+
+
+def _measured(cohort: "Cohort", workers: int, scheduler: str | None) -> "Sequence[Participant]":
+    """Return the participants; with many workers their measures, most of the work, are done."""
+    if workers == 1 and scheduler is None:
+        return cohort.included
+    from labcrane.analysis.measures import measure_ahead
+    from labcrane.workers import work
+
+    with progress_bar("measure", len(cohort.included)) as advance:
+        done = {}
+        for person in work(measure_ahead, cohort.included, workers, scheduler):
+            done[person.name] = person
+            advance()
+    return [done[person.name] for person in cohort.included]
 
 
 def report(
@@ -64,13 +86,21 @@ def report(
         "labcrane-report"
     ),
     include: Include = None,
+    workers: Workers = 1,
+    scheduler: Scheduler = None,
 ) -> None:
     """Write an HTML report of a study: figures, measures, statistics, quality."""
     from labcrane.analysis.report import write_report
 
-    cohort = cohort_of(data, include)
+    cohort = cohort_of(data.resolve() if scheduler else data, include)
     with progress_bar("report", len(cohort.included)) as advance:
-        page = write_report(cohort, folder, progress=lambda done, of: advance())
+        page = write_report(
+            cohort,
+            folder,
+            progress=lambda done, of: advance(),
+            workers=workers,
+            scheduler=scheduler,
+        )
     out.print(f"report: {page}", markup=False)
 
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from labcrane.cli.consent import ask_for_consent, await_consent
 from labcrane.cli.inspect import ProtocolPath
 from labcrane.cli.network import Local, stay_on_this_computer
 from labcrane.cli.output import out
@@ -138,6 +137,7 @@ def _run_fast(order: "VisitOrder") -> Path:
 
 
 def _launch(order: "VisitOrder", *, page: bool) -> None:
+    from labcrane.cli.consent import ask_for_consent, await_consent
     from labcrane.cli.pages import pages
     from labcrane.cli.sync import print_report
     from labcrane.cli.terminal import Terminal

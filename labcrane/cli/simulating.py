@@ -8,7 +8,7 @@ import typer
 from labcrane.cli.inspect import ProtocolPath
 from labcrane.cli.network import stay_on_this_computer
 from labcrane.cli.output import out
-from labcrane.cli.results import progress_bar
+from labcrane.cli.results import Scheduler, Workers, progress_bar
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,10 +20,6 @@ if TYPE_CHECKING:
 CohortPath = Annotated[
     Path | None,
     typer.Option(help="how operators differ; cohort.yaml beside the protocol if there is one"),
-]
-Workers = Annotated[int, typer.Option(help="processes on this computer", min=1)]
-Scheduler = Annotated[
-    str | None, typer.Option(help="a Dask scheduler whose workers do it: tcp://host:8786")
 ]
 
 

@@ -36,9 +36,10 @@ class JointVelocity(Controller):
         pushes, angles, out = axes.tolist(), state[self._angle].tolist(), self._out
         shape, factor = self._shaping.shape, self._stops.factor
         speeds, limited = [], []
+        free = self._stops.free(angles)
         for joint, (axis, sign) in enumerate(self._axes):
             speed = sign * shape(pushes[axis]) * self._full[joint]
-            left = factor(joint, angles[joint], speed)
+            left = 1.0 if free else factor(joint, angles[joint], speed)
             speeds.append(speed * left)
             limited.append(left)
         out[:] = (*speeds, 1.0, *limited)

@@ -68,7 +68,8 @@ class ResolvedRate:
         slew = tangential * radius / (radius2 + self._damp(radius2))
         weights = [1.0] * len(columns)
         pitch = self._pitch(columns, weights, radial, vertical)
-        if self._hold_pitch:  # a joint less would leave too few to keep the tip on its path
+        # A joint less would leave too few to keep the pitch and the tip on its path.
+        if self._hold_pitch or self._stops.free(angles):
             return slew, *pitch
         for _ in columns:  # each pass takes load off at least one more joint
             if not self._relieve(angles, pitch, weights):
@@ -84,11 +85,12 @@ class ResolvedRate:
         ``full`` are the largest joint speeds in rad/s. One scale for all joints keeps the tip's
         direction; cutting single joints would bend its path.
         """
-        scale, factors = 1.0, []
+        scale, factors = 1.0, [1.0] * len(speeds)
+        free = self._stops.free(angles)
         for joint, speed in enumerate(speeds):
-            factor = self._stops.factor(joint, angles[joint], speed)
-            factors.append(factor)
-            size, most = abs(speed), full[joint] * factor
+            if not free:
+                factors[joint] = self._stops.factor(joint, angles[joint], speed)
+            size, most = abs(speed), full[joint] * factors[joint]
             if size > NOTHING and size * scale > most:
                 scale = most / size
         return scale, factors

@@ -1,6 +1,7 @@
 """Slowing a joint to a stop before its limit, because no engine's own limit is soft."""
 
 import math
+from collections.abc import Sequence
 
 from labcrane import Machine
 
@@ -19,6 +20,14 @@ class SoftStops:
     def __init__(self, machine: Machine, width: float) -> None:
         self._width = max(width, 1e-9)  # no width is a wall, not a division by zero
         self._limits = machine.limits
+        self._free = tuple((low + self._width, high - self._width) for low, high in machine.limits)
+
+    def free(self, angles: Sequence[float]) -> bool:
+        """Say whether every joint is far from its limits, so that every factor is 1."""
+        for angle, (lowest, highest) in zip(angles, self._free, strict=True):
+            if not lowest < angle < highest:
+                return False
+        return True
 
     def factor(self, joint: int, angle: float, speed: float) -> float:
         """Return 1 far from the limit ahead, falling to 0 at it; leaving a limit is free."""

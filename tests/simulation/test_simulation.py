@@ -228,3 +228,21 @@ def test_a_cluster_makes_the_same_bits_even_when_a_worker_is_killed(
         assert workers[0].wait(10) == -signal.SIGKILL
     assert len(done) == len(NAMES) - 1
     assert digests(data) == local
+
+
+@pytest.mark.parametrize("words", [["report"], ["export", "--to", "tables"]], ids=" ".join)
+def test_two_cores_report_and_export_the_same(
+    study: Path, cohort: Path, tmp_path: Path, words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = tmp_path / "data"
+    list(simulate_study(orders(study, cohort, data, NAMES[:3])))
+    for workers in ("1", "2"):
+        where = ["--out", str(tmp_path / workers), "--include", "simulated", "--workers", workers]
+        assert main([words[0], str(data), *where, *words[1:]]) == 0
+    one, two = (
+        {name: each for name, each in digests(tmp_path / workers).items() if name.endswith(".csv")}
+        for workers in ("1", "2")
+    )
+    assert one == two
+    assert len(one) > 2
+    assert set(digests(tmp_path / "1")) == set(digests(tmp_path / "2"))
