@@ -43,6 +43,18 @@ def situation_after(situation: Situation, event: Event) -> Situation:
             return replace(now, trial=data["trial"], active=active)
         case "trial.end":
             return replace(now, trial=0, active=())
+        case "scene.placed":
+            return replace(now, scene=data["things"])
+        case "feedback.setting":
+            mine = {**situation.settings.get(data["feedback"], {}), data["key"]: data["value"]}
+            return replace(now, settings={**situation.settings, data["feedback"]: mine})
+    return _read_after(now, event)
+
+
+def _read_after(now: Situation, event: Event) -> Situation:
+    """Return the situation with what the operator is to read once ``event`` has happened."""
+    data: Mapping[str, Any] = event.data
+    match event.name:
         case "instructions.shown":
             return replace(now, text=data["text"])
         case "questionnaire.start":
@@ -51,11 +63,6 @@ def situation_after(situation: Situation, event: Event) -> Situation:
             return replace(now, text="")
         case "order.hint" if data["refused"] is None:
             return replace(now, hint=data["text"], hint_time=event.time)
-        case "scene.placed":
-            return replace(now, scene=data["things"])
-        case "feedback.setting":
-            mine = {**situation.settings.get(data["feedback"], {}), data["key"]: data["value"]}
-            return replace(now, settings={**situation.settings, data["feedback"]: mine})
     return now
 
 
