@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labcrane.cli.output import out, whole_table
+from labcrane.cli.output import out
 from labcrane.errors import ProtocolError
 
 if TYPE_CHECKING:
@@ -106,21 +106,20 @@ def _row(session: "SessionPlan") -> dict[str, object]:
 
 
 def _print(plans: "Sequence[SessionPlan]") -> None:
-    table = whole_table("participant", "slot", "seed", "block", "trials", "order", "minutes")
-    for plan in plans:
-        for block in plan.blocks:
-            counted = sum(trial.planned.counted for trial in block.trials)
-            table.add_row(
-                plan.participant,
-                f"{plan.slot}{f' {block.group}' if block.group else ''}",
-                str(plan.seed),
-                f"{block.number} {block.name}{' (practice)' if block.practice else ''}",
-                str(counted),
-                "; ".join(
-                    f"{factor}: {', '.join(levels)}" for factor, levels in block.levels.items()
-                ),
-                f"{block.expected_s / 60:.1f}",
-            )
+    from textwrap import fill
+
     whole = plans[0].expected_s / 60
     out.print(f"session {plans[0].number} {plans[0].name!r}: about {whole:.0f} minutes")
-    out.print(table)
+    for plan in plans:
+        groups = {block.group for block in plan.blocks if block.group}
+        group = f", group {', '.join(sorted(groups))}" if groups else ""
+        out.print(f"{plan.participant}: slot {plan.slot}{group}, seed {plan.seed}", markup=False)
+        for block in plan.blocks:
+            counted = sum(trial.planned.counted for trial in block.trials)
+            practice = " (practice)" if block.practice else ""
+            orders = [f"{factor}: {', '.join(levels)}" for factor, levels in block.levels.items()]
+            about = f"{counted} trials, {block.expected_s / 60:.1f} minutes"
+            line = f"block {block.number} {block.name}{practice}: {'; '.join([about, *orders])}"
+            width = out.console.width
+            whole_line = fill(line, width, initial_indent="  ", subsequent_indent="    ")
+            out.print(whole_line, markup=False)
