@@ -2,6 +2,7 @@
 
 from .actuator import PRESETS, Actuator, ActuatorSettings
 from .analysis.cohort import Participant
+from .boxes import link_boxes
 from .clock import Tick
 from .errors import (
     DeviceError,
@@ -113,6 +114,7 @@ __all__ = [
     "frames",
     "hookimpl",
     "jacobian",
+    "link_boxes",
     "load_scene",
     "numbers",
     "offer",

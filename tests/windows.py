@@ -10,9 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labcrane import Frame, Run
+from labcrane import Frame, Run, link_boxes
 from labcrane.testing import TARGETS, a_run, a_target, ch8, crane_at
-from labcrane_bullet.boxes import crane_boxes
 from labcrane_view.settings import CameraSettings, ViewSettings
 from labcrane_view.view import View
 
@@ -22,7 +21,7 @@ MACHINE = ch8()
 
 
 def a_scene() -> Run:
-    return replace(a_run(MACHINE, task=TARGETS), bodies=crane_boxes(MACHINE))
+    return replace(a_run(MACHINE, task=TARGETS), bodies=link_boxes(MACHINE))
 
 
 def a_frame(number: int = 0) -> Frame:

@@ -13,8 +13,8 @@ from labcrane import (
     ProtocolError,
     Run,
     Value,
+    link_boxes,
 )
-from labcrane_bullet.boxes import crane_boxes
 from labcrane_bullet.crane_state import CraneState, crane_signals
 from labcrane_bullet.pose import check_pose
 from labcrane_bullet.settings import CraneSettings
@@ -64,7 +64,7 @@ class Crane(Dynamics):
         self._state.fill(angles, [0.0] * len(angles))
 
     def bodies(self) -> Sequence[Body]:
-        return crane_boxes(self._machine)
+        return link_boxes(self._machine)
 
     def facts(self) -> Mapping[str, Value]:
         actuator = self._settings.actuator.model_dump()

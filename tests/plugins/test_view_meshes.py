@@ -21,6 +21,7 @@ from labcrane import (
     Signal,
     Situation,
     frames,
+    link_boxes,
     read_placed,
     write_placed,
 )
@@ -28,7 +29,6 @@ from labcrane.approval.materials import referred
 from labcrane.run_text import read_run, write_run
 from labcrane.scene import load_scene, place
 from labcrane.testing import TARGETS, a_run, crane_state
-from labcrane_bullet.boxes import crane_boxes
 from labcrane_bullet.urdf import urdf
 from labcrane_view.mesh_reader import read_mesh
 from labcrane_view.settings import CameraSettings, ViewSettings
@@ -191,7 +191,7 @@ def meshed(folder: Path, **settings: object) -> Machine:
 def test_a_mesh_changes_nothing_that_is_touched_and_is_sent_along(tmp_path: Path) -> None:
     machine = meshed(tmp_path)
     assert urdf(machine) == urdf(MACHINE)
-    run = replace(a_run(machine, task=TARGETS), bodies=crane_boxes(machine))
+    run = replace(a_run(machine, task=TARGETS), bodies=link_boxes(machine))
     again = read_run(write_run(run))
     assert again.bodies == run.bodies
     assert again.machine == machine
@@ -205,7 +205,7 @@ def spots(picture: np.ndarray) -> np.ndarray:
 
 def test_a_link_is_drawn_as_its_mesh(tmp_path: Path) -> None:
     machine = meshed(tmp_path, scale=0.3, position=(-0.5, 0.0, 0.0))
-    run = replace(a_run(machine, task=TARGETS), bodies=crane_boxes(machine))
+    run = replace(a_run(machine, task=TARGETS), bodies=link_boxes(machine))
     view = View(ViewSettings(display="hidden", size=(640, 360), camera="free", hud=()), machine)
     view.open(run)
     try:
@@ -249,7 +249,7 @@ def test_a_scene_is_drawn_where_its_things_stand_and_are_moved(tmp_path: Path) -
     crate = Signal("scene.crate.position", "m", ("x", "y", "z"))
     turn = Signal("scene.crate.orientation", "1", ("x", "y", "z", "w"))
     state = (*crane_state(MACHINE).signals, crate, turn)
-    run = replace(a_run(MACHINE, task=TARGETS, state=state), bodies=crane_boxes(MACHINE))
+    run = replace(a_run(MACHINE, task=TARGETS, state=state), bodies=link_boxes(MACHINE))
 
     def at(*where: float) -> Frame:
         frame = a_frame()

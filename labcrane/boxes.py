@@ -1,10 +1,10 @@
-"""What a crane looks like: a box for its foot and one along every link."""
+"""What a machine without meshes looks like: a box for its foot and one along every link."""
 
-from labcrane import Body, Machine
+from labcrane.machine import Body, Machine
 
 
-def crane_boxes(machine: Machine) -> tuple[Body, ...]:
-    """Return the boxes in DH frames; a link without length is a cube of its thickness.
+def link_boxes(machine: Machine) -> tuple[Body, ...]:
+    """Return the boxes in DH frames, in metres; a link without length is a cube of its thickness.
 
     Frame ``i`` sits at the far end of link ``i``, x along the link. Behind the slew joint its y
     axis points down, so the column reaches from there to ``d`` along y.
