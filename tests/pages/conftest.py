@@ -7,7 +7,7 @@ from pages.room import a_browser
 from selenium import webdriver
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chrome]:
     with a_browser(tmp_path_factory.mktemp("profile")) as browser:
         yield browser
