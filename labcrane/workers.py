@@ -55,6 +55,7 @@ def _on_cores(
     from loky import ProcessPoolExecutor  # noqa: PLC0415
 
     left = list(orders)
+    why: Exception | None = None
     for _ in range(1 + RETRIES):
         with ProcessPoolExecutor(max_workers=workers) as pool:
             given = {pool.submit(do, order): order for order in left}
@@ -63,7 +64,8 @@ def _on_cores(
                     result = future.result()
                     left.remove(given[future])
                     yield result
-            except BrokenProcessPool:
+            except BrokenProcessPool as error:
+                why = error
                 continue  # a worker was lost, and the whole pool with it
             finally:
                 for future in given:
@@ -72,7 +74,7 @@ def _on_cores(
     raise LabcraneError(
         f"worker processes died {1 + RETRIES} times, and {len(left)} of {len(orders)} pieces of "
         "work are not done; look for what kills them (memory?), or use fewer with --workers"
-    )
+    ) from why
 
 
 def _on_cluster(

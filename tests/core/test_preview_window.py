@@ -33,6 +33,7 @@ def a_protocol(folder: Path) -> tuple[Path, str]:
     return path, view
 
 
+@pytest.mark.long
 def test_a_movement_is_played_in_real_time_in_a_window(tmp_path: Path) -> None:
     protocol, view = a_protocol(tmp_path)
     with an_x_server() as display:

@@ -121,7 +121,7 @@ def test_lists_checks_and_plans_are_there_for_programs(
     )
     assert main(["check", str(wrong), "--json"]) == 2
     problems = json.loads(capsys.readouterr().out)["problems"]
-    assert any("feedback 'spere' is not installed" in each for each in problems)
+    assert any("cue 'spere' is not installed; did you mean 'sphere'" in each for each in problems)
     assert main(["plan", str(protocol), "--participants", "2", "--json"]) == 0
     plans = json.loads(capsys.readouterr().out)
     assert [each["participant"] for each in plans] == ["P001", "P002"]

@@ -94,9 +94,7 @@ def test_pilots_and_simulations_have_files_of_their_own(visit: Visit) -> None:
 
 
 def test_a_participant_who_does_not_match_the_pattern_is_refused(visit: Visit) -> None:
-    with pytest.raises(
-        ProtocolError, match=r"participant 'Anna' does not match .* 'P\\\\d\{3,4\}'"
-    ):
+    with pytest.raises(ProtocolError, match=r"participant 'Anna' does not match .* 'P\\d\{3,4\}'"):
         run(replace(visit, participant="Anna"), ScriptedConsole())
 
 

@@ -106,7 +106,7 @@ def test_killed_hanging_and_raising_feedback_leave_the_session_as_it_is(
         journal = data / "P001-SIMULATED" / "ses-01_run.xdf"
         wait_for(journal.exists, patience_s=60)
         wait_for(lambda: journal.stat().st_size > 1_000_000, patience_s=60)
-        first, second = sorted(hosts(launcher), key=lambda host: host.create_time())[:2]
+        first, second = sorted(hosts(launcher), key=lambda host: (host.create_time(), host.pid))[:2]
         first.send_signal(signal.SIGKILL)
         second.send_signal(signal.SIGSTOP)
         said, _ = launcher.communicate(timeout=120)

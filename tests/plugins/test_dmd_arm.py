@@ -109,6 +109,7 @@ def test_the_arm_moves_at_the_models_speed(name: str, signal: int) -> None:
             before = after[angle]
 
 
+@pytest.mark.long
 def test_the_arm_needs_the_recorded_time_to_its_far_end() -> None:
     machine = load_machine("ied_arm.yaml", RETRIEVAL)
     compared = 0

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from dying_work import die_once
 
 from labcrane.cli.app import main
 from labcrane.errors import LabcraneError, ProtocolError, RecordingError
@@ -113,6 +114,7 @@ def test_two_cores_make_the_same_bits_as_one(
     assert digests(tmp_path / "data") == local
 
 
+@pytest.mark.long
 def test_an_interrupted_simulation_goes_on_and_keeps_who_is_there(
     study: Path, cohort: Path, tmp_path: Path, local: dict[str, str]
 ) -> None:
@@ -160,15 +162,6 @@ def test_a_participant_who_leaves_has_no_later_session(study: Path, tmp_path: Pa
     assert ends.iloc[-1]["data"]["reason"] == "by order"
 
 
-def die_once(order: tuple[Path, int]) -> int:
-    """Kill the worker when this is tried for the first time."""
-    mark, number = order
-    if number == 1 and not mark.exists():
-        mark.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return number
-
-
 def test_work_of_a_core_that_was_lost_is_done_again(tmp_path: Path) -> None:
     from labcrane.workers import work
 
@@ -214,6 +207,7 @@ def cluster(folder: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]
             process.wait()
 
 
+@pytest.mark.long
 def test_a_cluster_makes_the_same_bits_even_when_a_worker_is_killed(
     study: Path, cohort: Path, tmp_path: Path, local: dict[str, str]
 ) -> None:
