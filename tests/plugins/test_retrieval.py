@@ -12,7 +12,7 @@ import labcrane
 from labcrane.machine_file import load_machine
 from labcrane.recording.recording import SessionRecord
 
-pytestmark = needs_bullet
+pytestmark = [needs_bullet, pytest.mark.long]
 
 RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"
 SCENES = {
