@@ -150,7 +150,20 @@ class WatchedDynamics(_Watched, Dynamics):
         self._call(self._number["reset"], self._inner.reset, pose)
 
     def brisk(self) -> Mapping[str, Callable[..., Any]]:
-        return {method: self._brisk(method, self._layout) for method in ("state", "step")}
+        step, state = self._brisk("step", self._layout), self._brisk("state")
+        number, checked = self._number["state"], self._checked
+        stepped: FloatArray | None = None
+
+        def step_on(command: FloatArray, dt: float) -> FloatArray:
+            nonlocal stepped
+            stepped = step(command, dt)
+            return stepped
+
+        def state_now() -> FloatArray:
+            values: FloatArray = state()
+            return values if values is stepped else checked(number, values)
+
+        return {"step": step_on, "state": state_now}
 
     def bodies(self) -> Sequence[Body]:
         bodies: Sequence[Body] = self._call(self._number["bodies"], self._inner.bodies)
