@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
@@ -95,9 +95,7 @@ class Oversight:
         except LabcraneError:
             raise
         except (Exception, SystemExit) as error:
-            raise PluginError(
-                self.complaint(number, f"raised {told(error, _module(function))}")
-            ) from error
+            raise self._failure(number, function, error) from error
         finally:
             self._inside = before
             self._number[0] = self._base + before
@@ -107,6 +105,37 @@ class Oversight:
             overrun.calls += 1
             overrun.worst_s = max(overrun.worst_s, took)
         return result
+
+    def brisk(
+        self,
+        number: int,
+        function: Callable[..., Any],  # returns an array where there is a layout
+        layout: Layout | None = None,
+    ) -> Callable[..., Any]:
+        """Return ``function`` watched as by :meth:`call`, but for its time and its place.
+
+        With ``layout``, what it returns is checked as by :meth:`check`: here, because a call of
+        Python's own costs as much as the check.
+        """
+        array, shape, isfinite = np.ndarray, layout.shape if layout else None, math.isfinite
+
+        def call(*args: object) -> Any:
+            try:
+                values = function(*args)
+            except LabcraneError:
+                raise
+            except (Exception, SystemExit) as error:
+                raise self._failure(number, function, error) from error
+            if layout is not None and not (
+                type(values) is array
+                and values.dtype is FLOAT64
+                and values.shape == shape
+                and isfinite(values.dot(values))
+            ):
+                self.check(number, values, layout, finite=True)
+            return values
+
+        return call
 
     def check(self, number: int, values: FloatArray, layout: Layout, *, finite: bool) -> None:
         """Check what a method returned against what the component's signals promise.
@@ -126,6 +155,11 @@ class Oversight:
             return
         if wrong := _wrong(values, layout, finite=finite):
             raise PluginError(self.complaint(number, f"returned {wrong}"))
+
+    def _failure(
+        self, number: int, function: Callable[..., object], error: BaseException
+    ) -> PluginError:
+        return PluginError(self.complaint(number, f"raised {told(error, _module(function))}"))
 
     def complaint(self, number: int, what: str) -> str:
         """Return what a method did wrong, with all that is known of it."""

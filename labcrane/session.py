@@ -1,7 +1,7 @@
 """Run one session: open the rig, lead it through its plan, leave a participant file."""
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from labcrane.records import Event, Frame, Phase, Run
 from labcrane.slowness import Slowness
 from labcrane.streams.sync_report import SyncReport
 from labcrane.study import Study
+from labcrane.watched import hurried
 from labcrane.whereabouts import Whereabouts, read_whereabouts, whereabouts_path
 
 RESERVE_S = 60.0
@@ -139,7 +140,7 @@ def record(visit: Visit, console: Console) -> None:
     clock: Clock = ManualClock() if visit.fast else SystemClock()
     died = read_whereabouts(visit.whereabouts) if visit.resumed else None
     with (
-        study.oversight.published(visit.whereabouts),
+        _watching(visit, the_rig),
         rig.opened(the_rig, study, plan.seed) as this_run,
     ):
         if so_far is not None and so_far.angles:
@@ -166,6 +167,13 @@ def record(visit: Visit, console: Console) -> None:
             raise
         finally:
             log.close()
+
+
+def _watching(visit: Visit, the_rig: rig.Rig) -> AbstractContextManager[None]:
+    if visit.fast:
+        visit.whereabouts.unlink(missing_ok=True)  # of a process that died, and was read
+        return hurried((*the_rig.components, *the_rig.tasks.values()))
+    return visit.study.oversight.published(visit.whereabouts)
 
 
 def _log(visit: Visit, this_run: Run, clock: Clock, reserve: int) -> FrameLog:

@@ -1,6 +1,7 @@
 """Components under oversight: the same methods, and every call is watched."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from labcrane.clock import Tick
@@ -19,6 +20,23 @@ def watched(component: Component, name: str, plugin: str, oversight: Oversight) 
         if isinstance(component, role):
             return made(component, f"{WORDS[role]} {name!r}", plugin, oversight)
     return component
+
+
+@contextmanager
+def hurried(components: Iterable[Component]) -> Iterator[None]:
+    """Watch what runs every tick less closely: whether it keeps its word, not when and where.
+
+    For simulations. Nobody waits for a tick of theirs, and one that dies is made again.
+    """
+    hasty = [component for component in components if isinstance(component, _Watched)]
+    for component in hasty:
+        vars(component).update(component.brisk())
+    try:
+        yield
+    finally:
+        for component in hasty:
+            for method in component.brisk():
+                delattr(component, method)
 
 
 class _Watched(Component):
@@ -54,6 +72,13 @@ class _Watched(Component):
         facts: Mapping[str, Value] = self._call(self._number["facts"], self._inner.facts)
         return facts
 
+    def brisk(self) -> Mapping[str, Callable[..., Any]]:
+        """Return the methods that run every tick, by name, watched less closely."""
+        return {}
+
+    def _brisk(self, method: str, layout: Layout | None = None) -> Callable[..., Any]:
+        return self._oversight.brisk(self._number[method], getattr(self._inner, method), layout)
+
     def _checked(self, number: int, values: FloatArray) -> FloatArray:
         self._oversight.check(number, values, self._layout, finite=True)
         return values
@@ -72,6 +97,16 @@ class WatchedInput(_Watched, InputDevice):
         number = self._number["read"]
         return self._checked(number, self._call(number, self._inner.read, tick, seen))
 
+    def brisk(self) -> Mapping[str, Callable[..., Any]]:
+        begin_tick, read = self._oversight.begin_tick, self._brisk("read", self._layout)
+
+        def begin(tick: Tick, seen: Frame) -> FloatArray:
+            begin_tick(tick.number)
+            values: FloatArray = read(tick, seen)
+            return values
+
+        return {"read": begin}
+
 
 class WatchedController(_Watched, Controller):
     """A controller."""
@@ -87,6 +122,10 @@ class WatchedController(_Watched, Controller):
     def steer(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
         axes: FloatArray = self._call(self._number["steer"], self._inner.steer, velocity, state)
         return axes
+
+    def brisk(self) -> Mapping[str, Callable[..., Any]]:
+        checked = {method: self._brisk(method, self._layout) for method in ("command", "rest")}
+        return {**checked, "steer": self._brisk("steer")}
 
 
 class WatchedDynamics(_Watched, Dynamics):
@@ -110,6 +149,22 @@ class WatchedDynamics(_Watched, Dynamics):
         self._stepped = None
         self._call(self._number["reset"], self._inner.reset, pose)
 
+    def brisk(self) -> Mapping[str, Callable[..., Any]]:
+        step, state = self._brisk("step", self._layout), self._brisk("state")
+        number, checked = self._number["state"], self._checked
+        stepped: FloatArray | None = None
+
+        def step_on(command: FloatArray, dt: float) -> FloatArray:
+            nonlocal stepped
+            stepped = step(command, dt)
+            return stepped
+
+        def state_now() -> FloatArray:
+            values: FloatArray = state()
+            return values if values is stepped else checked(number, values)
+
+        return {"step": step_on, "state": state_now}
+
     def bodies(self) -> Sequence[Body]:
         bodies: Sequence[Body] = self._call(self._number["bodies"], self._inner.bodies)
         return bodies
@@ -128,15 +183,30 @@ class WatchedTask(_Watched, Task):
         return planned
 
     def judge(self, frame: Frame) -> Judgement:
+        return self._sound(self._call(self._number["judge"], self._inner.judge, frame))
+
+    def overrule(self) -> None:
+        self._call(self._number["overrule"], self._inner.overrule)
+
+    def brisk(self) -> Mapping[str, Callable[..., Any]]:
+        judge, sound = self._brisk("judge"), self._sound
+        last: Judgement | None = None
+
+        def judged(frame: Frame) -> Judgement:
+            nonlocal last
+            judgement: Judgement = judge(frame)
+            if judgement is not last:  # while nothing happens, most tasks say the same again
+                last = sound(judgement)
+            return judgement
+
+        return {"judge": judged}
+
+    def _sound(self, judgement: Judgement) -> Judgement:
         number = self._number["judge"]
-        judgement: Judgement = self._call(number, self._inner.judge, frame)
         if not isinstance(judgement, Judgement):
             raise PluginError(self._oversight.complaint(number, f"returned {judgement!r}"))
         self._oversight.check(number, judgement.values, self._layout, finite=False)
         return judgement
-
-    def overrule(self) -> None:
-        self._call(self._number["overrule"], self._inner.overrule)
 
 
 class WatchedQuestionnaire(_Watched, Questionnaire):

@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.text import Text
 
 from labcrane.cli.delay import measure_audio, measure_display
 from labcrane.cli.network import Local, stay_on_this_computer
@@ -89,6 +87,8 @@ def _examine(
         for line in found.left_out:
             out.print(f"not looked at: {line}", markup=False, style="dim")
     if study:
+        from rich.console import Console
+
         kept = keep(found, folder)
         Console(stderr=True, soft_wrap=True).print(
             f"kept in {kept}: sessions within a day have it in their record", markup=False
@@ -98,6 +98,8 @@ def _examine(
 
 
 def _print(check: "Check") -> None:
+    from rich.text import Text
+
     found = check.finding
     line = Text(f"{found.verdict.value} ", style=STYLES[found.verdict.value])
     out.print(line.append(f"{check.area}: {found.text}", style="default"))

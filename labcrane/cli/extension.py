@@ -1,7 +1,8 @@
 """Groups of commands: those of plugins, put beside labcrane's own."""
 
-from collections.abc import Callable, Mapping
-from importlib.metadata import EntryPoints, entry_points
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 
 import typer
 
@@ -18,8 +19,7 @@ def extend(app: typer.Typer, first: str, *, everything: bool) -> None:
     With ``everything``, as for a shell that completes what is typed, all of them are filled.
     """
     own = {command.name for command in app.registered_commands}
-    points = entry_points(group=GROUP)
-    for group in sorted(points.names):
+    for group in sorted(set(declared(GROUP))):
         if group in own:
             raise PluginError(
                 f"a plugin offers commands {group!r}, but {group!r} is a command of labcrane; "
@@ -28,7 +28,7 @@ def extend(app: typer.Typer, first: str, *, everything: bool) -> None:
         if group not in {there.name for there in app.registered_groups}:
             add(app, group, f"Commands about {group}.")
         if group == first or everything:
-            fill(app, group, _offered(group, points.select(name=group)))
+            fill(app, group, _offered(group))
 
 
 def add(app: typer.Typer, group: str, about: str) -> None:
@@ -51,9 +51,31 @@ def first_line(run: Callable[..., None]) -> str:
     return (run.__doc__ or "").partition("\n")[0]
 
 
-def _offered(group: str, points: EntryPoints) -> dict[str, Callable[..., None]]:
+def declared(group: str) -> Iterator[str]:
+    """Yield the names of the entry points in a group, of all that is installed in folders.
+
+    Their files are read here, because ``importlib.metadata`` loads what reads mail, which would
+    take longer than all the rest of the help. What imports them goes through it all the same.
+    """
+    for folder in dict.fromkeys(sys.path):
+        for path in Path(folder).glob("*.*-info/entry_points.txt"):
+            text = path.read_text(encoding="utf-8")
+            if group not in text:
+                continue
+            section = ""
+            for line in map(str.strip, text.splitlines()):
+                if line.startswith("["):
+                    section = line.strip("[] ")
+                elif section == group and line and not line.startswith(("#", ";")):
+                    yield line.partition("=")[0].strip()
+
+
+def _offered(group: str) -> dict[str, Callable[..., None]]:
+    from importlib.metadata import entry_points
+
     from labcrane.plugin_commands import plugin_commands
 
+    points = entry_points(group=GROUP, name=group)
     return {
         name: offer.run
         for (its_group, name), offer in plugin_commands(points).items()

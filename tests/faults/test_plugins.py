@@ -73,8 +73,11 @@ def run_fast(protocol: Path) -> None:
 
 
 def run_through(protocol: Path) -> None:
-    """Run fast, and write each frame through as a session with people does, not in batches."""
+    """Run fast, but write frames through and say where it is, as a session with people does."""
     session_module.BatchLog = FrameLog
+    session_module._watching = lambda visit, the_rig: visit.study.oversight.published(
+        visit.whereabouts
+    )
     run_fast(protocol)
 
 
