@@ -131,20 +131,18 @@ def _duration(strokes: Strokes) -> dict[str, Estimate]:
             "several distances or widths"
         )
     law = _Curve(bits, strokes.trial - 1.0, np.log(strokes.duration))
-    slope, intercept = np.polyfit(bits, strokes.duration, 1)
-    start = [max(float(intercept), 0.01), max(float(slope), 0.01)]
-    plain = law.fit(start)
-    learnt = min(
-        (law.fit([*plain.values, 0.3, rate]) for rate in (0.02, 0.1, 0.4)),
-        key=lambda fit: fit.squares,
-    )
-    if learnt.aicc >= plain.aicc:  # no learning, or too little to be told from chance
-        return {**plain.estimates(), "learning_gain": Estimate(0.0, None)}
-    return learnt.estimates()
+    free = law.best(lowest_intercept=-np.inf)
+    if free.values[0] >= 0.0:
+        return free.estimates(free.values)
+    # An intercept below 0 is none that an operator can have. Intervals are those of the free fit:
+    # at a bound the curvature says nothing of the parameter that is held there.
+    return free.estimates(law.best(lowest_intercept=0.0, learning=free.learning).values)
 
 
 NAMES = ("fitts_a_s", "fitts_b_s", "learning_gain", "learning_rate")
-LOWEST = (0.0, 1e-6, 0.0, 1e-4)
+LOWEST = (1e-6, 0.0, 1e-4)
+"""Of all but the intercept."""
+
 HIGHEST = (np.inf, np.inf, 20.0, 5.0)
 
 
@@ -164,12 +162,29 @@ class _Curve:
             away = away + np.log1p(gain * np.exp(-rate * self.practice))
         return away
 
-    def fit(self, start: list[float]) -> "_Fit":
+    def best(self, *, lowest_intercept: float, learning: bool | None = None) -> "_Fit":
+        """Fit with and without learning, and return the better one, or the one that is asked for.
+
+        A learning curve that is no better than none cannot be told from chance.
+        """
+        slope, intercept = np.polyfit(self.bits, np.exp(self.logs), 1)
+        start = [max(float(intercept), 0.01), max(float(slope), 0.01)]
+        plain = self._fit(start, lowest_intercept)
+        tries = [self._fit([*start, 0.3, rate], lowest_intercept) for rate in (0.02, 0.1, 0.4)]
+        learnt = min(tries, key=lambda fit: fit.squares)
+        if learning is None:
+            learning = learnt.aicc < plain.aicc
+        return learnt if learning else plain
+
+    def _fit(self, start: list[float], lowest_intercept: float) -> "_Fit":
         from scipy.optimize import least_squares  # noqa: PLC0415 - loaded when it is used
 
         k = len(start)
         found = least_squares(
-            self.off, start, bounds=(LOWEST[:k], HIGHEST[:k]), x_scale=np.maximum(start, 0.01)
+            self.off,
+            start,
+            bounds=((lowest_intercept, *LOWEST)[:k], HIGHEST[:k]),
+            x_scale=np.maximum(start, 0.01),
         )
         return _Fit(list(map(float, found.x)), 2.0 * float(found.cost), found.jac, len(self.logs))
 
@@ -190,18 +205,30 @@ class _Fit:
         likelihood = self.n * math.log(max(self.squares, 1e-300) / self.n)
         return likelihood + 2 * k + 2 * k * (k + 1) / (self.n - k - 1)
 
-    def estimates(self) -> dict[str, Estimate]:
-        """Return values with Student's intervals; those of gain and rate of their logarithms."""
+    @property
+    def learning(self) -> bool:
+        """Whether a learning curve is among the values."""
+        return len(self.values) == len(NAMES)
+
+    def estimates(self, values: list[float]) -> dict[str, Estimate]:
+        """Return the values with Student's intervals about this fit's own.
+
+        Those of gain and rate are intervals of their logarithms.
+        """
         from scipy.stats import t  # noqa: PLC0415 - loaded when it is used
 
         free = self.n - len(self.values)
         covariance = np.linalg.pinv(self.jacobian.T @ self.jacobian) * self.squares / free
         reaches = float(t.ppf(0.975, free)) * np.sqrt(np.diag(covariance))
         found = {}
-        for name, value, reach in zip(NAMES, self.values, reaches.tolist(), strict=False):
+        for name, value, own, reach in zip(
+            NAMES, values, self.values, reaches.tolist(), strict=False
+        ):
             if name.startswith("learning"):
-                share = math.exp(min(reach / value, 50.0)) if value > 0.0 else math.inf
-                found[name] = Estimate(value, (value / share, value * share))
+                share = math.exp(min(reach / own, 50.0)) if own > 0.0 else math.inf
+                found[name] = Estimate(value, (own / share, own * share))
             else:
-                found[name] = Estimate(value, (value - reach, value + reach))
+                found[name] = Estimate(value, (own - reach, own + reach))
+        if not self.learning:
+            found["learning_gain"] = Estimate(0.0, None)
         return found
