@@ -2,10 +2,17 @@
 
 from collections.abc import Sequence
 
-from labcrane import InputDevice, Machine, Offer, hookimpl, offer
+from labcrane import CommandOffer, InputDevice, Machine, Offer, hookimpl, offer
 from labcrane_operator.settings import OperatorSettings, RecordedSettings
 
 labcrane_api = 1
+
+
+@hookimpl
+def labcrane_commands() -> list[CommandOffer]:
+    from labcrane_operator import commands
+
+    return [CommandOffer(("operator", "fit"), commands.fit)]
 
 
 @hookimpl
