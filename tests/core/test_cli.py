@@ -125,3 +125,11 @@ def test_lines_of_a_pipe_are_orders(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 def test_every_command_has_help(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([command, "--help"]) == 0
     assert "Usage" in capsys.readouterr().out
+
+
+def test_the_help_lists_the_groups_that_the_installed_packages_declare() -> None:
+    from importlib.metadata import entry_points
+
+    from labcrane.cli.extension import GROUP, declared
+
+    assert sorted(declared(GROUP)) == sorted(entry_points(group=GROUP).names)
