@@ -2,6 +2,7 @@
 
 from .actuator import PRESETS, Actuator, ActuatorSettings
 from .analysis.cohort import Participant
+from .analysis.movements import Movement, movements
 from .boxes import link_boxes
 from .clock import Tick
 from .errors import (
@@ -83,6 +84,7 @@ __all__ = [
     "Layout",
     "Machine",
     "MeshFile",
+    "Movement",
     "Offer",
     "Part",
     "Participant",
@@ -116,6 +118,7 @@ __all__ = [
     "jacobian",
     "link_boxes",
     "load_scene",
+    "movements",
     "numbers",
     "offer",
     "open_recording",

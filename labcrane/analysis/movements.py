@@ -69,7 +69,7 @@ class Movement:
         return slice(first, last + 1)
 
     def result(self, name: str) -> float:
-        """Return a number of the trial table; NaN when it was not measured."""
+        """Return a number of the trial table, in s, m or what its column is in; NaN for none."""
         value = self.row.get(name, np.nan)
         return float(value) if isinstance(value, int | float) else np.nan
 
@@ -90,6 +90,11 @@ def machine_of(session: SessionRecord) -> Machine:
     from ruamel.yaml import YAML
 
     return Machine.model_validate(YAML(typ="safe").load(session.context["machine"]))
+
+
+def movements(session: SessionRecord) -> Iterator[Movement]:
+    """Yield the movement of each row of a session's trial table."""
+    return cut(groups(session), session.trials, float(session.attrs["rate_hz"]))
 
 
 def cut(frames: Groups, trials: "pd.DataFrame", rate_hz: float) -> Iterator[Movement]:

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane import FloatArray, RecordingError, open_recording
+from labcrane import FloatArray, RecordingError, movements, open_recording
 
 if TYPE_CHECKING:
-    from labcrane import SessionRecord
-    from labcrane.analysis.movements import Movement
+    from labcrane import Movement, SessionRecord
 
 NEEDED = ("command_onset", "width", "target_x", "target_y", "target_z")
 """Columns of the trial table without which there is no stroke."""
@@ -89,9 +88,7 @@ def _check(session: "SessionRecord", where: str) -> None:
 
 
 def _strokes(session: "SessionRecord") -> Iterator[tuple[float, ...]]:
-    from labcrane.analysis.movements import cut, groups  # noqa: PLC0415 - pandas, when it is used
-
-    for movement in cut(groups(session), session.trials, float(session.attrs["rate_hz"])):
+    for movement in movements(session):
         stroke = main_stroke(movement)
         if stroke is not None:
             yield stroke
