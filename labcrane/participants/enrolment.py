@@ -12,19 +12,6 @@ from labcrane.privacy import personal
 from labcrane.study import Study
 
 
-def enrol(places: Places, study: Study, participant: str, today: date) -> Entry:
-    """Give a participant a slot in the design; return the entry, the old one if there is one.
-
-    Raises
-    ------
-    ProtocolError
-        The pseudonym is not possible, was erased, or the register is of another study.
-    """
-    study.check_participant(participant)
-    with changed(places) as register:
-        return _entry(register, study, participant, today)
-
-
 def _entry(register: Register, study: Study, participant: str, today: date) -> Entry:
     register.check_finished()
     name = study.protocol.study

@@ -115,7 +115,7 @@ class Station(InputDevice):
     def _take(self, inlet: "pylsl.StreamInlet") -> None:
         try:
             labels = inlet.info(timeout=2.0).get_channel_labels() or []
-        except Exception as error:  # noqa: BLE001 - pylsl raises its own for a stream gone again
+        except RuntimeError as error:  # pylsl: the stream is gone again
             self._complaint = f"it was there and is gone again ({error})"
             return
         if missing := [joint for joint in self._joints if joint not in labels]:
