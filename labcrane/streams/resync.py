@@ -1,15 +1,13 @@
 """Corrected times of recorded streams, as often as one likes."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict
 
 from labcrane.errors import RecordingError
-from labcrane.recording.foreign_streams import Correct, Correction, RecordedStream
+from labcrane.recording.foreign_streams import Correction, RecordedStream
 from labcrane.recording.stream_header import Description, StreamHeader
 from labcrane.streams.companions import raw_of
 from labcrane.streams.correction import Corrected, Treatment, correct
-
-Choose = Callable[[StreamHeader], Treatment]
 
 
 def treatment_of(header: StreamHeader) -> Treatment:
@@ -29,19 +27,6 @@ def treatment_of(header: StreamHeader) -> Treatment:
 def resync(recorded: RecordedStream, treatment: Treatment | None = None) -> Corrected:
     """Correct a recorded stream, by its header unless told otherwise."""
     return correct(raw_of(recorded), treatment or treatment_of(recorded.header))
-
-
-def corrector(choose: Choose = treatment_of) -> Correct:
-    """Return what consolidation calls for every stream.
-
-    ``choose`` returns a stream's treatment: a protocol knows more of it than its header says.
-    """
-
-    def apply(recorded: RecordedStream) -> Correction:
-        treatment = choose(recorded.header)
-        return correction_of(resync(recorded, treatment), treatment)
-
-    return apply
 
 
 def correction_of(corrected: Corrected, treatment: Treatment) -> Correction:

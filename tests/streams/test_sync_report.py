@@ -13,7 +13,7 @@ from labcrane.finding import Verdict
 from labcrane.recording.foreign_streams import Note, RecordedStream
 from labcrane.recording.stream_header import Channel, StreamHeader
 from labcrane.streams.quality import Quality
-from labcrane.streams.resync import corrector, resync, treatment_of
+from labcrane.streams.resync import correction_of, resync, treatment_of
 from labcrane.streams.stream_report import judge_stream
 from labcrane.streams.sync_report import COLUMNS, SyncReport, judge_loop, never_came
 from labcrane.streams.verdict import Limit, Limits
@@ -115,7 +115,8 @@ def test_resets_in_a_later_part_count_from_its_first_sample():
 
 
 def test_consolidation_gets_times_and_flat_figures():
-    correction = corrector()(recorded())
+    stream = recorded()
+    correction = correction_of(resync(stream), treatment_of(stream.header))
     assert len(correction.time) == 30_000
     assert correction.quality["drift_ppm"] == pytest.approx(100.0, abs=0.5)
     assert correction.quality["dejitter"] == "least_squares"
