@@ -26,10 +26,15 @@ class Order(StrEnum):
     CONSENT = "consent"  # to the text of this version, given before the session begins
     DENIED = "denied"  # said by a page: somebody without the right asked for something
     SETTING = "setting"  # change a setting of a cue or sound: tone.far=3
-    FAILED = "failed"  # said by the launcher of a feedback process: tone: why
-    MENDED = "mended"  # and of one that runs again
-    LOST = "lost"  # said by the launcher, not by people: something outside the session failed
+    FAILED = "failed"  # said by the launcher of a view or sound: tone: why
+    LEFT_OUT = "left out"  # and of one that is not started again
+    MENDED = "mended"  # and of one that presents
+    LOST = "lost"  # said by the launcher: a stream or the recorder failed
     BACK = "back"  # and works again
+
+
+FAULTS = frozenset({Order.LOST, Order.BACK, Order.FAILED, Order.LEFT_OUT, Order.MENDED})
+"""What the launcher says, not people."""
 
 
 @dataclass(frozen=True, slots=True)

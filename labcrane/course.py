@@ -4,11 +4,11 @@ The steps are read like a script: every ``yield`` in a generator below is one ti
 the frame that came of it.
 """
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 
 from labcrane.asking import Asking
 from labcrane.attempt import Attempt
-from labcrane.console import Command, Order, by_whom
+from labcrane.console import FAULTS, Command, Order, by_whom
 from labcrane.feedback_settings import FeedbackSettings
 from labcrane.holding import DISK, EXAMINER, INPUT, STOP, Holding
 from labcrane.plan import PlannedBlock, PlannedStep, SessionPlan, next_attempt
@@ -19,9 +19,6 @@ from labcrane.study import Study
 from labcrane.warm_up import WarmUp
 
 Ticks = Generator[None, Frame, None]
-
-FAULTS = frozenset({Order.LOST, Order.BACK, Order.FAILED, Order.MENDED})
-"""What the launcher says, not people."""
 
 NOT_ASKED = {
     Order.ANSWER: "no questionnaire is asked",
@@ -40,6 +37,8 @@ class Course:
     waits
         Whether instructions and blocks wait for the order to start. A simulated operator needs
         no telling.
+    awaits
+        The views and sounds that must present before the first step begins.
 
     Attributes
     ----------
@@ -47,7 +46,15 @@ class Course:
         Whether the session has ended.
     """
 
-    def __init__(self, study: Study, plan: SessionPlan, rig: Rig, *, waits: bool) -> None:
+    def __init__(
+        self,
+        study: Study,
+        plan: SessionPlan,
+        rig: Rig,
+        *,
+        waits: bool,
+        awaits: Iterable[str] = (),
+    ) -> None:
         self._study = study
         self._plan = plan
         self._rig = rig
@@ -55,7 +62,9 @@ class Course:
         self._rate_hz = study.protocol.rate_hz
         self._settings = FeedbackSettings({**study.cues, **study.sounds})
         self._notes: list[tuple[str, dict[str, Value]]] = []  # stamped with the tick they fall in
-        self._held = Holding(study.protocol.on_fault, lambda *note: self._notes.append(note))
+        self._held = Holding(
+            study.protocol.on_fault, lambda *note: self._notes.append(note), awaits
+        )
         self._attempt: Attempt | None = None
         self._stage = ""
         self._step = 0
@@ -100,30 +109,35 @@ class Course:
     # The script
 
     def _session(self) -> Ticks:
+        while self._held.awaited and not self._held.ending:
+            yield
         for step in self._plan.steps:
-            self._step = step.number
-            self._note("step.start", step=step.number, kind=step.kind)
-            if step.block and not self._warm_up.begin(step.block):
-                pass  # practice has been enough; the step is done, also for who goes on later
-            elif step.block:
-                yield from self._block(step.block)
-            elif step.kind == "break":
-                yield from self._break(step)
-            elif step.kind == "consent":
-                self._note("consent.asked")  # what was confirmed is in the session's context
-                yield from self._gate("consent")
-            elif step.kind == "questionnaire":
-                for name in step.questionnaires:
-                    yield from self._ask(name, step.answered.get(name, {}))
-            else:
-                self._note("instructions.shown", text=step.text)
-                yield from self._gate("instructions")
-            self._note("step.end", step=step.number, kind=step.kind)
             if self._held.ending:
                 break
+            self._step = step.number
+            self._note("step.start", step=step.number, kind=step.kind)
+            yield from self._run(step)
+            self._note("step.end", step=step.number, kind=step.kind)
         if STOP in self._held:
             self._note("participant.dropout", why="ended while a stop rule was met")
         self._note("session.end", reason=", ".join(self._held.ending) or "complete")
+
+    def _run(self, step: PlannedStep) -> Ticks:
+        if step.block and not self._warm_up.begin(step.block):
+            pass  # practice has been enough; the step is done, also for who goes on later
+        elif step.block:
+            yield from self._block(step.block)
+        elif step.kind == "break":
+            yield from self._break(step)
+        elif step.kind == "consent":
+            self._note("consent.asked")  # what was confirmed is in the session's context
+            yield from self._gate("consent")
+        elif step.kind == "questionnaire":
+            for name in step.questionnaires:
+                yield from self._ask(name, step.answered.get(name, {}))
+        else:
+            self._note("instructions.shown", text=step.text)
+            yield from self._gate("instructions")
 
     def _gate(self, what: str) -> Ticks:
         if not self._waits:

@@ -28,6 +28,7 @@ class FeedbackCrew:
         policy = visit.study.protocol.on_fault.feedback_lost
         self._required = policy != "continue"
         self.keepers = [FeedbackKeeper(order, policy) for order in _orders_of(visit)]
+        self._news: list[Command] = []
 
     def wait(self, say: Callable[[str], None], ended: Callable[[], bool]) -> bool:
         """Wait until all are ready or left out; whether the session may start.
@@ -46,7 +47,8 @@ class FeedbackCrew:
                         f"feedback {keeper.name!r} cannot be started: {why} (on_fault: "
                         "{feedback_lost: continue} would go on without it)"
                     )
-                for command in keeper.watch():
+                self._news += (news := keeper.watch())
+                for command in news:
                     say(f"feedback {command.text}")
             if ended():
                 return False
@@ -54,13 +56,14 @@ class FeedbackCrew:
         return True
 
     def watch(self, say: Callable[[str], None]) -> list[Command]:
-        """Look after all processes; return what the session is to be told."""
+        """Look after all processes; return what the session is to be told, also of its start."""
         news = [command for keeper in self.keepers for command in keeper.watch()]
         for command in news:
-            word = "failed" if command.order is Order.FAILED else "is ready"
+            word = "is ready" if command.order is Order.MENDED else "failed"
             name, _, text = command.text.partition(": ")
             say(f"feedback {name} {word}" + (f": {text}" if text else ""))
-        return news
+        before, self._news = self._news, []
+        return before + news
 
     def stop(self) -> None:
         """Stop all processes."""

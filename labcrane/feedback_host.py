@@ -2,7 +2,8 @@
 
 ``python -m labcrane.feedback_host`` reads its order, one line of JSON, from the standard input and
 ends when that is closed or says ``stop``. It reports on its standard output, a line of JSON each
-time: ``ready`` with the component's facts, ``beat`` while it lives, ``failed`` with the reason.
+time: ``ready`` with the component's facts, ``presents`` from the first frame on, ``beat`` while it
+lives, ``failed`` with the reason.
 """
 
 import json
@@ -23,7 +24,9 @@ from labcrane.registry import discover
 if TYPE_CHECKING:
     import pylsl
 
+    from labcrane.streams.context import ContextInlet
     from labcrane.streams.feedback_log import FeedbackLog
+    from labcrane.streams.frames import FrameInlet
 
 WAIT_S = 0.05
 BEAT_S = 0.2
@@ -38,6 +41,8 @@ class FeedbackProcess:
         self._stop = threading.Event()
         self._beaten = 0.0
         self._presented = 0
+        self._presents = False
+        self._resolver: pylsl.ContinuousResolver | None = None
 
     def stop(self) -> None:
         """Stop after the frame under way."""
@@ -54,21 +59,41 @@ class FeedbackProcess:
             presenter.open()
             log = FeedbackLog(self._order.name, self._order.source, presenter)
             self._say({"ready": True, "facts": presenter.facts})
-            if (info := self._found(CONTEXT)) is None:
+            found = self._found(CONTEXT, FRAME)
+            if not found:
                 return
-            context = ContextInlet(info)
-            if (info := self._found(FRAME)) is None:
-                return
-            frames = FrameInlet(info, self._order.run)
-            while not self._stop.is_set():
-                if context.changed():
-                    presenter.hear(context.situation)
-                if (frame := frames.newest(WAIT_S)) is not None:
-                    self._present(presenter, frame, log, frames.skipped)
-                self._beat(frames.skipped)
+            context = ContextInlet(found[CONTEXT])
+            frames = FrameInlet(found[FRAME], self._order.run)
+            self._join(context, log)
+            presenter.hear(context.situation)
+            self._follow(presenter, context, frames, log)
             log.close()
         finally:
             presenter.close()
+
+    def _join(self, context: "ContextInlet", log: "FeedbackLog") -> None:
+        """Wait for what belongs to the first frame: what it is about, and who records it."""
+        while not (self._stop.is_set() or (context.text and log.taken)):
+            context.changed(WAIT_S)
+            self._beat(0)
+
+    def _follow(
+        self,
+        presenter: Presenter,
+        context: "ContextInlet",
+        frames: "FrameInlet",
+        log: "FeedbackLog",
+    ) -> None:
+        """Present until stopped."""
+        while not self._stop.is_set():
+            if context.changed():
+                presenter.hear(context.situation)
+            if (frame := frames.newest(WAIT_S)) is not None:
+                self._present(presenter, frame, log, frames.skipped)
+                if not self._presents:
+                    self._presents = True
+                    self._say({"presents": True})
+            self._beat(frames.skipped)
 
     def _present(
         self, presenter: Presenter, frame: Frame, log: "FeedbackLog", skipped: int
@@ -79,18 +104,24 @@ class FeedbackProcess:
         log.push(frame, values, skipped, presenter.feedback.samples())
         self._presented += 1
 
-    def _found(self, name: str) -> "pylsl.StreamInfo | None":
-        """Wait for one of the session's streams; None when stopped first."""
+    def _found(self, *names: str) -> "dict[str, pylsl.StreamInfo]":
+        """Wait for the session's streams of these names; none when stopped first.
+
+        A search in the background: one that waits may take seconds longer than it was told, and
+        what is not heard of for so long is killed.
+        """
         import pylsl  # noqa: PLC0415
 
         from labcrane.streams.outlets import source_id  # noqa: PLC0415
 
-        wanted = source_id(self._order.source, name)
-        while not self._stop.is_set():
+        ours = source_id(self._order.source, "")
+        self._resolver = pylsl.ContinuousResolver(pred=f"starts-with(source_id, '{ours}')")
+        while not self._stop.wait(WAIT_S):
             self._beat(0)
-            if found := pylsl.resolve_byprop("source_id", wanted, 1, timeout=0.5):
-                return found[0]
-        return None
+            found = {info.name(): info for info in self._resolver.results()}
+            if all(name in found for name in names):
+                return found
+        return {}
 
     def _beat(self, skipped: int) -> None:
         now = time.monotonic()

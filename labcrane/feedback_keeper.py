@@ -23,7 +23,7 @@ STOP_S = 5.0
 """How long it may take to stop when told to."""
 
 ATTEMPTS = 3
-"""After so many starts in a row that never became ready, it is left out."""
+"""After so many starts in a row without one frame presented, it is left out."""
 
 
 @dataclass
@@ -33,6 +33,7 @@ class Life:
     process: "subprocess.Popen[str]"
     heard: float
     ready: bool = False
+    presents: bool = False
     facts: str = ""
     failed: str | None = None
     presented: int = 0
@@ -75,8 +76,13 @@ class FeedbackKeeper:
 
     @property
     def ready(self) -> bool:
-        """Whether it can present."""
+        """Whether it could present: its windows and devices are open."""
         return self._life.ready
+
+    @property
+    def facts(self) -> str:
+        """What it has said of itself since it is ready: renderer, device, delay."""
+        return self._life.facts
 
     @property
     def presented(self) -> int:
@@ -101,10 +107,10 @@ class FeedbackKeeper:
             return []
         if (why := self.failure) is not None:
             return self._replace(why)
-        if self._life.ready and not self._told:
+        if self._life.presents and not self._told:
             self._told = True
             self._fruitless = 0
-            return [Command(Order.MENDED, f"{self.name}: {self._life.facts}")]
+            return [Command(Order.MENDED, f"{self.name}: {self.facts}")]
         return []
 
     def stop(self) -> None:
@@ -123,13 +129,12 @@ class FeedbackKeeper:
         life.process.kill()
         life.process.wait()
         life.hang_up()
-        self._fruitless = 0 if life.ready else self._fruitless + 1
+        self._fruitless = 0 if life.presents else self._fruitless + 1
         if self._policy == "continue" or self._fruitless >= ATTEMPTS:
             self.given_up = True
-            why = f"{why}; it is left out"
-        else:
-            self._told = False
-            self._life = self._start()
+            return [Command(Order.LEFT_OUT, f"{self.name}: {why}; it is left out")]
+        self._told = False
+        self._life = self._start()
         return [Command(Order.FAILED, f"{self.name}: {why}")]
 
     def _start(self) -> Life:
@@ -169,3 +174,5 @@ def _take(life: Life, message: Mapping[str, Any]) -> None:
     if message.get("ready"):
         life.facts = ", ".join(f"{name} {value}" for name, value in message["facts"].items())
         life.ready = True
+    if message.get("presents"):
+        life.presents = True

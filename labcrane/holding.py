@@ -1,6 +1,6 @@
 """What holds a session: the examiner, a part in trouble, a stop rule."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from labcrane.console import Command, Order
 from labcrane.protocol import OnFault
@@ -19,18 +19,30 @@ class Holding:
         What the protocol wants done about each fault.
     note
         Takes an event's name and data; every reason that comes or goes is one.
+    awaits
+        Names of the views and sounds that are still to present their first frame.
 
     Attributes
     ----------
+    awaited
+        Those of them that have neither presented nor been left out.
     ending
         Why the session must end, reason by reason; empty while it may go on.
     """
 
-    def __init__(self, on_fault: OnFault, note: Callable[[str, dict[str, Value]], None]) -> None:
+    def __init__(
+        self,
+        on_fault: OnFault,
+        note: Callable[[str, dict[str, Value]], None],
+        awaits: Iterable[str] = (),
+    ) -> None:
         self._on_fault = on_fault
         self._note = note
         self._by: set[str] = set()
         self.ending: list[str] = []
+        self.awaited = set(awaits)
+        for name in sorted(self.awaited):
+            note("feedback.awaited", {"what": name})
 
     def __contains__(self, who: str) -> bool:
         return who in self._by
@@ -76,10 +88,14 @@ class Holding:
     def _feedback(self, command: Command) -> None:
         name, _, why = command.text.partition(": ")
         who = f"feedback {name}"
-        if command.order is Order.FAILED:
-            self._note("feedback.lost", {"what": name, "why": why})
-            if self._on_fault.feedback_lost == "pause" and who not in self._by:
-                self.hold(who)
-        else:
+        if command.order is Order.MENDED:
             self._note("feedback.ready", {"what": name, "facts": why})
+            self.awaited.discard(name)
             self.release(who)
+            return
+        left_out = command.order is Order.LEFT_OUT
+        self._note("feedback.lost", {"what": name, "why": why, "left_out": left_out})
+        if left_out:
+            self.awaited.discard(name)
+        if self._on_fault.feedback_lost == "pause" and who not in self._by:
+            self.hold(who)

@@ -146,7 +146,8 @@ def _run(
     with ExitStack() as closing:
         this_run = closing.enter_context(rig.opened(the_rig, study, plan.seed))
         log = _Log(this_run, script)
-        course = Course(study, plan, the_rig, waits=not bool(record.context["simulated"]))
+        waits = not bool(record.context["simulated"])
+        course = Course(study, plan, the_rig, waits=waits, awaits=script.awaited)
         shown: list[Callable[[Frame], None]] = []
         if speed is not None:
             show = _Show(this_run, f"replay/{participant}/ses-{session:02}", speed)

@@ -46,6 +46,7 @@ class Script:
         self.ticks = len(axes)
         self.start = float(record.streams["loop"].data["due"].iloc[0])
         self.disk_trouble: str | None = None
+        self.awaited: set[str] = set()
         self._disk: dict[int, str | None] = {}
         self._orders: dict[int, list[Command]] = {}
         self._tick = -1
@@ -65,7 +66,10 @@ class Script:
         elif part == "stream" and what in {"lost", "back"}:
             self._order(tick, Command(Order(what), data["what"]))
         elif part == "feedback" and what == "lost":
-            self._order(tick, Command(Order.FAILED, f"{data['what']}: {data['why']}"))
+            order = Order.LEFT_OUT if data.get("left_out") else Order.FAILED
+            self._order(tick, Command(order, f"{data['what']}: {data['why']}"))
+        elif part == "feedback" and what == "awaited":
+            self.awaited.add(data["what"])
         elif part == "feedback" and what == "ready":
             self._order(tick, Command(Order.MENDED, f"{data['what']}: {data['facts']}"))
         elif part == "input" and what in {"lost", "back"}:

@@ -54,6 +54,8 @@ class Visit:
         Whether the session goes on after its process died.
     policy
         Where it goes on; what the protocol says by default.
+    feedback
+        Whether the launcher starts the views and sounds, so that the session waits for them.
     """
 
     study: Study
@@ -65,6 +67,7 @@ class Visit:
     pilot: bool = False
     resumed: bool = False
     policy: Policy | None = None
+    feedback: bool = False
 
     @property
     def folder(self) -> DataFolder:
@@ -148,7 +151,8 @@ def record(visit: Visit, console: Console) -> None:
         second = frame_bytes(this_run) * this_run.rate_hz
         visit.folder.check_space(plan.expected_s, second, RESERVE_S)
         about = context(visit, plan, the_rig, this_run) | admission.context
-        course = Course(study, plan, the_rig, waits=not visit.simulated)
+        awaits = (*study.views, *study.sounds) if visit.feedback else ()
+        course = Course(study, plan, the_rig, waits=not visit.simulated, awaits=awaits)
         log = _log(visit, this_run, clock, reserve=round(RESERVE_S * second))
         try:
             for event in _opening(about, so_far, died, clock.now()):

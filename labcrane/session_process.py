@@ -51,6 +51,7 @@ class VisitOrder:
             pilot=self.pilot,
             resumed=self.resumed,
             policy=self.policy,
+            feedback=self.feedback,
         )
 
 

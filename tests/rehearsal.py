@@ -88,13 +88,14 @@ def rehearse(
     orders: Mapping[int, Sequence[Command]] | None = None,
     *,
     waits: bool = False,
+    awaits: Sequence[str] = (),
     the_rig: rig.Rig | None = None,
 ) -> Rehearsal:
     """Run the first session of P001 and keep every frame."""
     plan = plan_session(study, "P001", 1)
     the_rig = the_rig or rig.build(study, simulated=True)
     with rig.opened(the_rig, study, plan.seed) as run:
-        course = Course(study, plan, the_rig, waits=waits)
+        course = Course(study, plan, the_rig, waits=waits, awaits=awaits)
         seen = Rehearsal(run)
         console = ScriptedConsole(orders)
         keep = [lambda frame: seen.frames.append(copy.deepcopy(frame))]

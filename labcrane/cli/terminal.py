@@ -237,8 +237,8 @@ def _event_line(event: Event) -> str | None:
             return f"block {data['block']}: {data['block_name']}"
         case "input.lost" | "disk.lost" | "plugin.slow":
             return f"{event.name.upper().replace('.', ' ')}: {data['why']}"
-        case "stream.lost":
-            return f"STREAM LOST: {data['what']}"
+        case "stream.lost" | "feedback.awaited":
+            return f"{event.name.upper().replace('.', ' ')}: {data['what']}"
         case "input.back" | "disk.back" | "stream.back":
             return f"{data.get('what', event.name.partition('.')[0])} is back"
         case "pause.start" | "pause.end":

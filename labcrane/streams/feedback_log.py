@@ -52,6 +52,11 @@ class FeedbackLog:
             for stream, layout in {"": presenter.layout, **extra}.items()
         }
 
+    @property
+    def taken(self) -> bool:
+        """Whether somebody receives all of its streams: what is sent to nobody is lost."""
+        return all(samples.taken for samples in self._samples.values())
+
     def push(
         self, frame: Frame, values: FloatArray, skipped: int, more: Mapping[str, FloatArray]
     ) -> float:

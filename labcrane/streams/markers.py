@@ -59,5 +59,6 @@ CODES: Mapping[str, int] = {
     "input.back": 91,
     "feedback.ready": 94,
     "feedback.lost": 95,
+    "feedback.awaited": 96,
 }
 """A number, once given, never changes its meaning."""

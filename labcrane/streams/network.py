@@ -18,7 +18,9 @@ VARIABLE = "LSLAPICFG"
 
 # KnownPeers makes streams of other processes visible to liblsl before 1.18, which sees only one of
 # them by multicast on loopback. PortRange 32, the default, hides outlets beyond the 32nd. Clock
-# probes each second, not each two, halve the time a step of a clock goes unseen.
+# probes each second, not each two, halve the time a step of a clock goes unseen. A search that
+# ends in the very moment when another wave of it begins lasts as long as that wave waits for its
+# answers, 5 s by default.
 LOOPBACK = """\
 ; LSL on this computer only: no multicast, no broadcast, nothing beyond loopback.
 [ports]
@@ -36,6 +38,8 @@ KnownPeers = {127.0.0.1}
 [tuning]
 MulticastMinRTT = 0.05
 UnicastMinRTT = 0.1
+MulticastMaxRTT = 1
+UnicastMaxRTT = 1
 ContinuousResolveInterval = 0.25
 TimeUpdateInterval = 1
 [log]

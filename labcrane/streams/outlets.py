@@ -119,6 +119,11 @@ class Samples:
         if status := self._send(self._outlet.obj, self._pointer, ctypes.c_double(stamp), 1):
             raise StreamError(f"liblsl refused a sample with error {status}")
 
+    @property
+    def taken(self) -> bool:
+        """Whether somebody receives them."""
+        return self._outlet is not None and bool(self._outlet.have_consumers())
+
     def close(self) -> None:
         self._outlet = None
 

@@ -80,7 +80,7 @@ class Live:
         inlet = pylsl.StreamInlet(found[0], max_buflen=1, recover=True)
         try:
             channel = inlet.info(PATIENCE_S).desc().child("channels").child("channel")
-        except TimeoutError:  # a busy computer, or a session that has just ended: once more
+        except (TimeoutError, RuntimeError):  # a busy computer, or the session has just ended
             return None
         columns = []
         while not channel.empty():

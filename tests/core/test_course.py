@@ -131,6 +131,31 @@ def test_people_are_waited_for(tmp_path: Path) -> None:
     assert seen.frames[92].trial == 1
 
 
+def test_no_step_begins_before_all_feedback_presents_or_is_left_out(study: Study) -> None:
+    orders = {
+        20: give(Order.FAILED, "tone: it hangs"),
+        40: give(Order.MENDED, "screen: renderer software"),
+        60: give(Order.LEFT_OUT, "tone: it hangs; it is left out"),
+    }
+    seen = rehearse(study, orders, awaits=("screen", "tone"))
+    assert [event.data["what"] for event in seen.events("feedback.awaited")] == ["screen", "tone"]
+    assert {event.name for frame in seen.frames[:60] for event in frame.events} == {
+        "feedback.awaited",
+        "feedback.lost",
+        "feedback.ready",
+    }
+    (started,) = seen.events("step.start")
+    assert started.time == pytest.approx(seen.frames[61].tick.due)
+    assert [lost.data["left_out"] for lost in seen.events("feedback.lost")] == [False, True]
+    assert len(seen.trials()) == 2
+
+
+def test_a_session_ended_while_it_waits_for_feedback_begins_no_step(study: Study) -> None:
+    seen = rehearse(study, {20: give(Order.END)}, awaits=("screen",))
+    assert not seen.events("step.start")
+    assert seen.names[-1] == "session.end"
+
+
 def test_a_break_lasts_as_written_or_until_it_is_skipped(tmp_path: Path) -> None:
     text = SHORT.replace("- block:", "- break: {seconds: 2}\n      - block:")
     study = a_study(tmp_path, text)

@@ -160,10 +160,10 @@ def the_record_says_it(protocol: Path) -> None:
     crew = FeedbackCrew(Visit(study, "P001", 1, protocol.parent, simulated=True))
     try:
         assert crew.wait(lambda said: None, lambda: False)
-        (ready,) = crew.watch(lambda said: None)
+        (keeper,) = crew.keepers
     finally:
         crew.stop()
-    assert re.search(r"delay 4\d\.\d ms \(sd 0\.\d ms, 6 changes, \d+-\d+-\d+\)$", ready.text)
+    assert re.search(r"delay 4\d\.\d ms \(sd 0\.\d ms, 6 changes, \d+-\d+-\d+\)$", keeper.facts)
 
 
 def test_without_a_sensor_delays_are_not_measured(

@@ -1,17 +1,20 @@
 """Views and sounds that are killed, hang or raise: the session goes on as if nothing had been."""
 
-import os
 import signal
-import subprocess
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import psutil
 import pytest
-from faults.sessions import kill_all, labcrane, unique, wait_for
+from faults.sessions import unique, wait_for
 
 import labcrane as lab
+from labcrane.console import Command, Order, QueueConsole
+from labcrane.launcher import Launcher
 from labcrane.recording.recording import SessionRecord
+from labcrane.records import Event
+from labcrane.session_process import VisitOrder
 
 STUDY = """\
 labcrane: 1
@@ -73,19 +76,23 @@ def labcrane_feedback():
 '''
 
 
-def install(folder: Path) -> dict[str, str]:
-    """Return an environment in which a plugin that raises is installed."""
+def install(folder: Path) -> None:
+    """Install a plugin that raises for those who look for modules in ``folder``."""
     (folder / "raising_plugin.py").write_text(PLUGIN)
     about = folder / "raising_plugin-1.dist-info"
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: raising-plugin\nVersion: 1\n")
     (about / "entry_points.txt").write_text("[labcrane]\nraising = raising_plugin\n")
-    return {**os.environ, "PYTHONPATH": str(folder)}
 
 
-def hosts(launcher: "subprocess.Popen[str]") -> list[psutil.Process]:
-    found = psutil.Process(launcher.pid).children()
-    return [child for child in found if "labcrane.feedback_host" in child.cmdline()]
+def hosts() -> list[psutil.Process]:
+    """Return the feedback processes of this process's session, oldest first."""
+    found = [child for child in psutil.Process().children() if runs_feedback(child)]
+    return sorted(found, key=lambda host: (host.create_time(), host.pid))
+
+
+def runs_feedback(process: psutil.Process) -> bool:
+    return "labcrane.feedback_host" in process.cmdline()
 
 
 @pytest.fixture
@@ -95,25 +102,50 @@ def protocol(tmp_path: Path) -> Path:
     return path
 
 
+class Told:
+    """What a session has told of itself so far."""
+
+    def __init__(self, console: QueueConsole) -> None:
+        self._events: list[Event] = []
+        console.listeners.append(self._events.append)
+
+    def count(self, name: str) -> int:
+        return sum(event.name == name for event in self._events)
+
+    def back(self) -> set[str]:
+        """Return what feedback was lost and presents again."""
+        lost: dict[str, bool] = {}
+        for event in list(self._events):
+            if event.name == "feedback.lost":
+                lost[event.data["what"]] = False
+            elif event.name == "feedback.ready" and event.data["what"] in lost:
+                lost[event.data["what"]] = True
+        return {name for name, ready in lost.items() if ready}
+
+
 def test_killed_hanging_and_raising_feedback_leave_the_session_as_it_is(
-    protocol: Path, tmp_path: Path
+    protocol: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    data = tmp_path / "data"
-    arguments = ["--participant", "P001", "--simulate", "--feedback", "--data", data]
-    environment = install(tmp_path)
-    launcher = labcrane("run", protocol, *arguments, env=environment)
-    try:
-        journal = data / "P001-SIMULATED" / "ses-01_run.xdf"
-        wait_for(journal.exists, patience_s=60)
-        wait_for(lambda: journal.stat().st_size > 1_000_000, patience_s=60)
-        first, second = sorted(hosts(launcher), key=lambda host: (host.create_time(), host.pid))[:2]
-        first.send_signal(signal.SIGKILL)
-        second.send_signal(signal.SIGSTOP)
-        said, _ = launcher.communicate(timeout=120)
-    finally:
-        if launcher.poll() is None:
-            kill_all(launcher)
-    assert launcher.returncode == 0, said
+    install(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    data, console, said = tmp_path / "data", QueueConsole(), []
+    told = Told(console)
+    order = VisitOrder(protocol, "P001", 1, data, simulated=True)
+    with ThreadPoolExecutor(1) as elsewhere:
+        outcome = elsewhere.submit(Launcher(order, console, said.append).run)
+        try:
+            wait_for(lambda: told.count("block.end") == 1, patience_s=120)
+            first, second = hosts()[:2]
+            first.send_signal(signal.SIGKILL)
+            second.send_signal(signal.SIGSTOP)
+            wait_for(lambda: told.back() == {"killed", "hanging", "raising"}, patience_s=120)
+            wait_for(lambda: told.count("break.start") == 2, patience_s=60)
+            console.give(Command(Order.SKIP))
+        except BaseException:
+            console.give(Command(Order.END))
+            raise
+    assert outcome.result().died is None, said
     session = lab.open_recording(data / "P001-SIMULATED" / "P001-SIMULATED.h5").session(1)
     events = session.events
     lost = events[events["name"] == "feedback.lost"]
@@ -132,8 +164,10 @@ def test_killed_hanging_and_raising_feedback_leave_the_session_as_it_is(
     difference = np.median(lateness[troubled]) - np.median(lateness[~troubled])
     assert abs(difference) < 0.0005
 
+    first_trial = loop.loc[loop["due"] >= session.trials["started"].min(), "tick"].iloc[0]
     for name in ("killed", "hanging", "raising"):
         shown = session.streams[f"labcrane.feedback.{name}"].data
+        assert shown["frame.tick"].iloc[0] < first_trial  # nobody begins without feedback
         assert shown["frame.tick"].max() > loop["tick"].max() - 240  # it went on to the end
         assert (np.diff(shown["frame.tick"]) >= 0).all()
     what_was_shown_can_be_rebuilt(session)

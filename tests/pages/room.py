@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import subprocess
 import threading
 import time
 from collections.abc import Iterator
@@ -83,6 +84,14 @@ class Room:
     def port(self) -> int:
         return int(re.search(r":(\d+)/", self.links()["supervisor"])[1])
 
+    def ended(self, patience_s: float = 120.0) -> None:
+        """See that the run ends by itself, and well."""
+        try:
+            code = self.launcher.wait(patience_s)
+        except subprocess.TimeoutExpired:
+            pytest.fail(f"the run has not ended after {patience_s:g} s: {''.join(self.said)}")
+        assert code == 0, "".join(self.said)
+
     def end(self) -> None:
         if self.launcher.poll() is None:
             processes = [psutil.Process(self.launcher.pid)]
@@ -135,10 +144,21 @@ def text(browser: webdriver.Chrome, ident: str) -> str:
     return found[0].text if found else ""
 
 
+STILL = """
+const [element, done] = arguments, before = element.getBoundingClientRect();
+requestAnimationFrame(() => requestAnimationFrame(() => {
+    const now = element.getBoundingClientRect();
+    done(['x', 'y', 'width', 'height'].every(of => before[of] === now[of]));
+}));
+"""
+"""Whether an element stays where it is: a click on one that still moves can miss it."""
+
+
 def press(browser: webdriver.Chrome, ident: str) -> None:
     wait_for(lambda: any(e.is_displayed() for e in browser.find_elements(By.ID, ident)))
     element = browser.find_element(By.ID, ident)
     browser.execute_script("arguments[0].scrollIntoView({block: 'center'})", element)
+    wait_for(lambda: browser.execute_async_script(STILL, element))
     element.click()
 
 

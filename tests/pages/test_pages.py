@@ -110,7 +110,7 @@ def test_a_session_is_led_and_answered_from_a_browser(  # noqa: PLR0915 - one vi
         press(browser, "order-end")
         press(browser, "order-end-sure")
         browser.switch_to.window(participant)
-        assert room.launcher.wait(60) == 0, "".join(room.said)
+        room.ended()
         assert addresses(browser) == {"127.0.0.1"}
     check_record(data)
 

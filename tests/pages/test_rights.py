@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from faults.sessions import labcrane, unique, wait_for
 from pages.room import STUDY, Room, a_room
 
 from labcrane import open_recording
+from labcrane.console import FAULTS
 from labcrane.recording.recording import SessionRecord
 
 RATE_HZ = 240
@@ -140,13 +142,16 @@ def visited(tmp_path_factory: pytest.TempPathFactory):
         answers["participant's page"] = ask(room, "GET", "/participant", participant)
         answers["supervisor's note"] = ask(room, "POST", "/orders/note", supervisor, "seen")
         answers["no order"] = ask(room, "POST", "/orders/dance", supervisor)
-        answers["said by the launcher only"] = ask(room, "POST", "/orders/lost", supervisor, "x")
+        for word in sorted(FAULTS):
+            answers[f"said by the launcher only: {word}"] = ask(
+                room, "POST", f"/orders/{quote(word)}", supervisor, "x"
+            )
         spells = taking_turns(room, supervisor)
         with socket.create_connection(("127.0.0.1", room.port)) as link:
             link.sendall(socket_request("labcrane-supervisor=guess"))
             answers["a socket without token"] = (int(link.recv(64).split()[1]), "", "")
         assert ask(room, "POST", "/orders/end", supervisor)[0] == 202
-        assert room.launcher.wait(60) == 0, "".join(room.said)
+        room.ended()
     session = open_recording(room.folder / "P001-PILOT.h5").session(1)
     return answers, session, spells
 
@@ -154,7 +159,7 @@ def visited(tmp_path_factory: pytest.TempPathFactory):
 REFUSED = (
     "no token", "no token, a file", "wrong token", "used token", "participant's page token",
     "participant on supervisor page", "participant's order", "no order",
-    "said by the launcher only", "a socket without token",
+    *(f"said by the launcher only: {word}" for word in sorted(FAULTS)), "a socket without token",
 )  # fmt: skip
 
 
@@ -181,7 +186,7 @@ def test_every_refusal_is_in_the_record(visited) -> None:
         "127.0.0.1 asked for /supervisor: a wrong or used token",
         "127.0.0.1 asked for /supervisor: no right to see it",
         "the participant page asked for end: no right to order it",
-        "the supervisor page asked for lost: no right to order it",
+        *(f"the supervisor page asked for {word}: no right to order it" for word in FAULTS),
         "127.0.0.1 asked for /_nicegui_ws/socket.io/: no token",
     ):
         assert why in denied
