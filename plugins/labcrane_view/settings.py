@@ -152,7 +152,8 @@ class ViewSettings(Settings):
     """Square for a photodiode; none by default."""
 
     areas: tuple[str, ...] = ("tip", "target", "other", "sphere")
-    """What has a box for eye tracking: tip, targets, shapes of cues; links and things by name."""
+    """What has a box for eye tracking: tip, targets, shapes of cues; links, the grapple and things
+    by name, around what is drawn of them, wherever it moves."""
 
     shadow: NonNegativeInt = Field(default=2048, le=8192)
     """Edge of the shadow map in pixels; 0 for no shadows."""
