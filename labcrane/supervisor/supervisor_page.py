@@ -8,6 +8,7 @@ from labcrane.records import Event
 from labcrane.supervisor.consent import ConsentCard
 from labcrane.supervisor.desk import PRIMARY, Desk
 from labcrane.supervisor.form import Form
+from labcrane.supervisor.loads import Loads
 from labcrane.supervisor.rights import SUPERVISOR
 from labcrane.supervisor.scene import Scene
 
@@ -38,6 +39,7 @@ def supervisor_page(desk: Desk) -> None:
         with ui.element("div").classes("grid grid-cols-1 lg:grid-cols-2 gap-3 w-full"):
             with ui.card().classes("w-full"):
                 Scene(desk).build()
+                Loads(desk).build()
             with ui.card().classes("w-full"):
                 _chart(desk)
             with ui.card().classes("w-full"):
