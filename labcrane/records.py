@@ -4,6 +4,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+import numpy as np
+import numpy.typing as npt
+
 from labcrane.clock import Tick
 from labcrane.machine import Body, Machine
 from labcrane.shapes import Shape
@@ -235,3 +238,23 @@ class Situation:
     hint: str = ""
     hint_time: float = 0.0
     scene: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """What a camera shows, for the supervisor's page.
+
+    Attributes
+    ----------
+    pixels
+        From the top: greys, shape ``(height, width)``, or red, green and blue, shape
+        ``(height, width, 3)``.
+    due
+        When what it shows happened: the time at which that frame was due, in seconds.
+    legend
+        What its greys mean, in words; empty when they need none.
+    """
+
+    pixels: npt.NDArray[np.uint8]
+    due: float
+    legend: str = ""

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 
 from labcrane.console import Order
 from labcrane.records import Event
+from labcrane.supervisor.cameras import Cameras
 from labcrane.supervisor.consent import ConsentCard
 from labcrane.supervisor.desk import PRIMARY, Desk
 from labcrane.supervisor.form import Form
@@ -42,6 +43,7 @@ def supervisor_page(desk: Desk) -> None:
                 Loads(desk).build()
             with ui.card().classes("w-full"):
                 _chart(desk)
+            Cameras(desk).build()
             with ui.card().classes("w-full"):
                 _log(desk)
             with ui.card().classes("w-full"):

@@ -35,7 +35,9 @@ class TestView(FeedbackContract):
 
     @pytest.fixture
     def feedback(self) -> Feedback:
-        settings = ViewSettings(display="hidden", renderer="software", size=(160, 90))
+        settings = ViewSettings(
+            display="hidden", renderer="software", size=(160, 90), supervisor={}
+        )
         return View(settings, MACHINE)
 
 
