@@ -6,7 +6,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from windows import SIZE, a_frame, a_view
+from windows import SIZE, a_frame, a_view, an_x_server
 
 from labcrane.streams.pictures import png
 from labcrane_view.settings import ViewSettings
@@ -67,3 +67,21 @@ def test_a_png_file_is_read_as_it_was(shape: tuple[int, ...]) -> None:
     pixels = np.random.default_rng(1).integers(0, 256, shape, dtype=np.uint8)
     read = matplotlib.image.imread(BytesIO(png(pixels)))
     np.testing.assert_array_equal(np.round(255 * read).astype(np.uint8), pixels)
+
+
+@pytest.mark.parametrize("renderer", ["auto", "software"])
+def test_what_is_sent_of_a_window_is_what_is_drawn_in_it(
+    renderer: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = {"camera": STILL, "renderer": renderer, "shadow": 0, "supervisor": {"width": 640}}
+    sent = []
+    with an_x_server() as display:
+        monkeypatch.setenv("DISPLAY", display)
+        for where in ("hidden", "window"):
+            with a_view(display=where, **settings) as view:
+                for number in (0, 120):
+                    view.present(a_frame(number))
+                sent.append(view.pictures()["still"].pixels.astype(int))
+    assert sent[0].shape == (*SIZE[::-1], 3)
+    assert np.ptp(sent[0]) > 100
+    np.testing.assert_allclose(sent[1], sent[0], atol=2)
