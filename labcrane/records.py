@@ -216,8 +216,10 @@ class Situation:
     counts
         How often each event has happened.
     text
-        What the operator is to read as long as it is there: the instructions of the step, the
-        title of the questionnaire that is asked; empty for nothing.
+        What the operator is to read as long as it is there: the instructions of the step; empty
+        for nothing.
+    questionnaire
+        The title of the questionnaire that is asked; empty for none.
     hint, hint_time
         The examiner's newest hint, empty before the first, and when it was given.
     scene
@@ -235,6 +237,7 @@ class Situation:
     settings: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
     counts: Mapping[str, int] = field(default_factory=dict)
     text: str = ""
+    questionnaire: str = ""
     hint: str = ""
     hint_time: float = 0.0
     scene: str = ""

@@ -253,7 +253,9 @@ class View(Feedback):
         if self._text is not None:
             self._text.show(self._hud.lines(frame, self._situation))
         if self._notice is not None:
-            self._notice.show(notice(frame, self._situation, self._settings.hint_s))
+            self._notice.show(
+                notice(frame, self._situation, self._settings.hint_s, self._settings.language)
+            )
         if self._patch is None or self._settings.patch is None:
             return math.nan
         counts = self._situation.counts
