@@ -80,7 +80,8 @@ class FeedbackProcess:
 
     def _join(self, context: "ContextInlet", log: "FeedbackLog") -> None:
         """Wait for what belongs to the first frame: what it is about, and who records it."""
-        while not (self._stop.is_set() or (context.text and log.taken)):
+        recorded = self._order.recorded
+        while not (self._stop.is_set() or (context.text and (log.taken or not recorded))):
             context.changed(WAIT_S)
             self._beat(0)
 
