@@ -6,6 +6,8 @@ The bare scene is the same stage, its shader and shadows, drawn again without an
 changed. The view besides places machine and cues, writes text, and computes areas of interest.
 Rounds alternate, so that a wandering machine moves both figures together. The delay is counted in
 frames: every frame has a colour of its own, and the colour that the window has after each is read.
+A view that sends pictures to the supervisor's page does so a few times a second; what is measured
+is a picture that is sent, beside one that is not. A thread of its own codes it, in the time shown.
 """
 
 import time
@@ -16,6 +18,7 @@ import numpy as np
 from benchmarks.table import Row
 from labcrane import Ball, Run, Situation
 from labcrane.machine import Body
+from labcrane.streams.pictures import png
 from labcrane.testing import TARGETS, a_run, a_target, ch8
 from labcrane_view.settings import ViewSettings
 from labcrane_view.view import View
@@ -42,7 +45,8 @@ def main() -> list[Row]:
     """Print both figures for either renderer."""
     run, found = a_scene(), []
     for renderer in ("auto", "software"):
-        view = View(ViewSettings(display="hidden", renderer=renderer), run.machine)
+        settings = ViewSettings(display="hidden", renderer=renderer, supervisor={"rate_hz": 10})
+        view = View(settings, run.machine)
         view.open(run)
         view.hear(Situation(block=1, block_name="benchmark", trial=1, trials=1))
         print(f"{view.facts()['renderer']}, {view.facts()['size']}")
@@ -55,10 +59,16 @@ def main() -> list[Row]:
         print(f"  view       {1000 * np.median(shown):6.2f} ms a picture")
         print(f"  bare scene {1000 * np.median(bare):6.2f} ms a picture; ratio {ratio:.2f}")
         print(f"  delay      {_delay(view, run)} frames")
+        sent, unsent, coded = (1000 * figure for figure in _sent(view, run))
+        print(
+            f"  sent       {sent:6.2f} ms a picture, else {unsent:.2f} ms; coded in {coded:.2f} ms"
+        )
         view.close()
         what = f"a picture, {renderer} renderer, ms"
         ours, least = 1000 * float(np.median(shown)), 1000 * float(np.median(bare))
         found.append(Row("view", what, ours, least, "the bare scene"))
+        what = f"a picture that is sent, {renderer} renderer, ms"
+        found.append(Row("view", what, sent, unsent, "one that is not"))
     return found
 
 
@@ -70,6 +80,24 @@ def _seconds(view: View, run: Run, *, whole: bool) -> float:
         else:
             view.redraw()
     return (time.perf_counter() - began) / PICTURES
+
+
+def _sent(view: View, run: Run) -> tuple[float, float, float]:
+    """Return how long a picture takes that is sent, one that is not, and the coding, in s."""
+    seconds = []
+    for number in range(PICTURES):
+        frame = a_target(run, 24 * number)  # a tenth of a second each: every one is due
+        moments = [time.perf_counter()]
+        view.present(frame)
+        moments.append(time.perf_counter())
+        view.present(frame)
+        (picture,) = view.pictures().values()
+        moments.append(time.perf_counter())
+        png(picture.pixels)
+        moments.append(time.perf_counter())
+        seconds.append(np.diff(moments))
+    unsent, sent, coded = np.median(seconds, axis=0).tolist()
+    return sent, unsent, coded
 
 
 def _delay(view: View, run: Run) -> int:

@@ -111,5 +111,13 @@ def log_requests(visit: Visit) -> list[StreamRequest]:
     return found
 
 
+def cameras_of(study: Study) -> dict[str, tuple[str, ...]]:
+    """Return the names of the cameras whose pictures the supervisor is sent, by feedback."""
+    chosen = {**study.views, **study.sounds}
+    built = {name: choice.build(study.machine) for name, choice in chosen.items()}
+    named = {name: getattr(feedback, "cameras", ()) for name, feedback in built.items()}
+    return {name: cameras for name, cameras in named.items() if cameras}
+
+
 def _part(choice: Choice) -> Part:
     return Part(choice.name, choice.settings.model_dump(mode="json"))

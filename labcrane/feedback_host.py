@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from labcrane.streams.context import ContextInlet
     from labcrane.streams.feedback_log import FeedbackLog
     from labcrane.streams.frames import FrameInlet
+    from labcrane.streams.pictures import PictureOutlet
 
 WAIT_S = 0.05
 BEAT_S = 0.2
@@ -43,6 +44,7 @@ class FeedbackProcess:
         self._presented = 0
         self._presents = False
         self._resolver: pylsl.ContinuousResolver | None = None
+        self._pictures: PictureOutlet | None = None
 
     def stop(self) -> None:
         """Stop after the frame under way."""
@@ -53,11 +55,14 @@ class FeedbackProcess:
         from labcrane.streams.context import CONTEXT, ContextInlet  # noqa: PLC0415 - liblsl
         from labcrane.streams.feedback_log import FeedbackLog  # noqa: PLC0415
         from labcrane.streams.frames import FRAME, FrameInlet  # noqa: PLC0415
+        from labcrane.streams.pictures import PictureOutlet  # noqa: PLC0415
 
         presenter = Presenter(self._order, discover(study=self._order.study))
         try:
             presenter.open()
             log = FeedbackLog(self._order.name, self._order.source, presenter)
+            if presenter.feedback.cameras:
+                self._pictures = PictureOutlet(self._order.name, self._order.source)
             self._say({"ready": True, "facts": presenter.facts})
             found = self._found(CONTEXT, FRAME)
             if not found:
@@ -68,12 +73,15 @@ class FeedbackProcess:
             presenter.hear(context.situation)
             self._follow(presenter, context, frames, log)
             log.close()
+            if self._pictures:
+                self._pictures.close()
         finally:
             presenter.close()
 
     def _join(self, context: "ContextInlet", log: "FeedbackLog") -> None:
         """Wait for what belongs to the first frame: what it is about, and who records it."""
-        while not (self._stop.is_set() or (context.text and log.taken)):
+        recorded = self._order.recorded
+        while not (self._stop.is_set() or (context.text and (log.taken or not recorded))):
             context.changed(WAIT_S)
             self._beat(0)
 
@@ -103,6 +111,8 @@ class FeedbackProcess:
             return
         log.push(frame, values, skipped, presenter.feedback.samples())
         self._presented += 1
+        if self._pictures and self._pictures.wanted:
+            self._pictures.push(presenter.feedback.pictures(), frame.tick.due)
 
     def _found(self, *names: str) -> "dict[str, pylsl.StreamInfo]":
         """Wait for the session's streams of these names; none when stopped first.

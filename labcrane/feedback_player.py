@@ -42,7 +42,8 @@ def play(study: Study, frames: Sequence[Frame], scene: str, say: Callable[[str],
     """
     run = rig.describe(rig.build(study, simulated=True), study, participant_seed=0)
     source = f"{study.protocol.study}/preview-{os.getpid()}"
-    keepers = [FeedbackKeeper(order, "continue") for order in host_orders(study, run, source)]
+    orders = [replace(order, recorded=False) for order in host_orders(study, run, source)]
+    keepers = [FeedbackKeeper(order, "continue") for order in orders]
     try:
         _wait(keepers, say)
         _present(run, source, frames, scene, [*study.cues, *study.sounds], keepers)

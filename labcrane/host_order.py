@@ -39,6 +39,8 @@ class HostOrder:
         Whether it presents every frame, or only those of trials in which it is switched on.
     measured
         What was measured of its delay, if anything was.
+    recorded
+        Whether there is a recorder, without which it presents nothing; a preview has none.
     """
 
     name: str
@@ -49,6 +51,7 @@ class HostOrder:
     always: bool
     cues: Mapping[str, Part] = field(default_factory=dict)
     measured: Measured | None = None
+    recorded: bool = True
 
     def as_json(self) -> str:
         """Return the order as one line."""
@@ -61,6 +64,7 @@ class HostOrder:
             "always": self.always,
             "cues": {name: asdict(part) for name, part in self.cues.items()},
             "measured": asdict(self.measured) if self.measured else None,
+            "recorded": self.recorded,
         }
         return json.dumps(fields)
 
@@ -77,4 +81,5 @@ class HostOrder:
             found["always"],
             {name: Part(**part) for name, part in found["cues"].items()},
             measured_of(found["measured"]) if found["measured"] else None,
+            found["recorded"],
         )

@@ -4,6 +4,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+import numpy as np
+import numpy.typing as npt
+
 from labcrane.clock import Tick
 from labcrane.machine import Body, Machine
 from labcrane.shapes import Shape
@@ -213,8 +216,10 @@ class Situation:
     counts
         How often each event has happened.
     text
-        What the operator is to read as long as it is there: the instructions of the step, the
-        title of the questionnaire that is asked; empty for nothing.
+        What the operator is to read as long as it is there: the instructions of the step; empty
+        for nothing.
+    questionnaire
+        The title of the questionnaire that is asked; empty for none.
     hint, hint_time
         The examiner's newest hint, empty before the first, and when it was given.
     scene
@@ -232,6 +237,27 @@ class Situation:
     settings: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
     counts: Mapping[str, int] = field(default_factory=dict)
     text: str = ""
+    questionnaire: str = ""
     hint: str = ""
     hint_time: float = 0.0
     scene: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """What a camera shows, for the supervisor's page.
+
+    Attributes
+    ----------
+    pixels
+        From the top: greys, shape ``(height, width)``, or red, green and blue, shape
+        ``(height, width, 3)``.
+    due
+        When what it shows happened: the time at which that frame was due, in seconds.
+    legend
+        What its greys mean, in words; empty when they need none.
+    """
+
+    pixels: npt.NDArray[np.uint8]
+    due: float
+    legend: str = ""

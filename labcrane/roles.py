@@ -21,7 +21,7 @@ from pydantic import BaseModel
 from labcrane.clock import Tick
 from labcrane.machine import Body
 from labcrane.questions import Answers, Item, Score
-from labcrane.records import Frame, Judgement, Planned, Run, Situation, Trial, Value
+from labcrane.records import Frame, Judgement, Picture, Planned, Run, Situation, Trial, Value
 from labcrane.shapes import Shape
 from labcrane.signals import FloatArray, Signal
 
@@ -207,6 +207,9 @@ class Feedback(Component):
     streams: Mapping[str, tuple[Signal, ...]] = {}
     """Further streams it fills, by name, beside its signals; see ``samples``."""
 
+    cameras: tuple[str, ...] = ()
+    """Names of the cameras whose pictures the supervisor's page shows; see ``pictures``."""
+
     def hear(self, situation: Situation) -> None:
         """Be told what the session is about, before the first frame and whenever it changes."""
 
@@ -241,5 +244,12 @@ class Feedback(Component):
         """Return a sample for each of ``streams``; asked for after every ``present``.
 
         Several samples of one stream are rows, in their order: what changed between two frames.
+        """
+        return {}
+
+    def pictures(self) -> Mapping[str, Picture]:
+        """Return what ``cameras`` show, as of the last ``present``; none while none is due.
+
+        Asked for after a ``present`` while somebody watches.
         """
         return {}

@@ -13,9 +13,18 @@ if TYPE_CHECKING:
 
 @contextmanager
 def pages(
-    visit: "Visit", launcher: "Launcher", console: QueueConsole, say: Callable[[str], None]
+    visit: "Visit",
+    launcher: "Launcher",
+    console: QueueConsole,
+    say: Callable[[str], None],
+    *,
+    feedback: bool,
 ) -> Iterator[None]:
-    """Serve both pages while a run lasts; their links are printed once."""
+    """Serve both pages while a run lasts; their links are printed once.
+
+    ``feedback`` is whether views and sounds are started.
+    """
+    from labcrane.feedback_crew import cameras_of
     from labcrane.supervisor.keeper import PageKeeper, free_port
     from labcrane.supervisor.service import PageOrder
 
@@ -28,6 +37,7 @@ def pages(
         f"{visit.study.protocol.study}/{visit.folder.name}/ses-{visit.session:02}",
         where.host,
         free_port(where.host, where.port),
+        cameras_of(visit.study) if feedback else {},
     )
     keeper = PageKeeper(order, console.give, say, lambda: launcher.streams_status)
     console.listeners.append(keeper.tell)

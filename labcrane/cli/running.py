@@ -153,7 +153,11 @@ def _launch(order: "VisitOrder", *, page: bool) -> None:
     shown, count = out.console, _counted(plan)
     with Terminal(console, shown, count, keys=keys, questionnaires=asked) as terminal:
         launcher = Launcher(order, console, terminal.say)
-        with pages(visit, launcher, console, terminal.say) if page else nullcontext():
+        with (
+            pages(visit, launcher, console, terminal.say, feedback=order.feedback)
+            if page
+            else nullcontext()
+        ):
             if page:
                 await_consent(visit, console, terminal.say)
             outcome = launcher.run()

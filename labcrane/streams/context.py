@@ -58,9 +58,9 @@ def _read_after(now: Situation, event: Event) -> Situation:
         case "instructions.shown":
             return replace(now, text=data["text"])
         case "questionnaire.start":
-            return replace(now, text=data["title"])
+            return replace(now, questionnaire=data["title"])
         case "step.end" | "questionnaire.end":
-            return replace(now, text="")
+            return replace(now, text="", questionnaire="")
         case "order.hint" if data["refused"] is None:
             return replace(now, hint=data["text"], hint_time=event.time)
     return now

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 FRAME = "labcrane.frame"
 
 HEAD = ("tick", "due", "woke", "elapsed", "trial", "phase", "paused")
+HEAD_UNITS = ("1", "s", "s", "s", "1", "1", "1")
 PHASES = tuple(Phase)
 """What the numbers in the phase column stand for."""
 
@@ -43,8 +44,9 @@ class FrameOutlet:
         info = stream_info(
             FRAME, "Frame", len(columns), "double64", rate_hz=run.rate_hz, source=source
         )
-        for column in columns:
-            channel(info, label=column, unit="none", type="Frame")
+        units = (*HEAD_UNITS, *(unit for layout in layouts(run) for unit in layout.units))
+        for column, unit in zip(columns, units, strict=True):
+            channel(info, label=column, unit=unit, type="Frame")
         self._row = np.zeros(len(columns))
         self._samples = Samples(info, len(columns))
 

@@ -10,6 +10,9 @@ From the bottom up::
     surroundings
                 what stands around the machine
     scene       the machine in three dimensions
+    pictures, cameras
+                what the views' cameras show, from LSL
+    loads       how hard the joints work
     participant_page, supervisor_page
     service     the process: one pipe to the launcher, and the web server
     keeper      the launcher's side: starts it, starts it again, passes on

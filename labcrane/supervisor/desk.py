@@ -8,6 +8,7 @@ from labcrane.plan import SessionPlan
 from labcrane.study import Study
 from labcrane.supervisor.board import Board
 from labcrane.supervisor.live import Live
+from labcrane.supervisor.pictures import Pictures
 from labcrane.supervisor.rights import PARTICIPANT, RIGHTS
 from labcrane.supervisor.words import WORDS, Words
 
@@ -32,6 +33,7 @@ class Desk:
     participant: str
     board: Board
     live: Live
+    pictures: Pictures
     send: Callable[[Command], None]
 
     def words(self, page: str) -> Words:

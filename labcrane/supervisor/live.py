@@ -26,12 +26,15 @@ class Live:
     ----------
     newest
         The newest value of each column of a frame: ``state.joint.angle.slew``.
+    units
+        The unit of each column.
     age_s
         How old the newest frame was when it came, in seconds.
     """
 
     def __init__(self, source: str) -> None:
         self.newest: dict[str, float] = {}
+        self.units: dict[str, str] = {}
         self.age_s: float | None = None
         self._source = source
         self._late: deque[tuple[float, float]] = deque()  # due and lateness of late ticks, in s
@@ -82,11 +85,12 @@ class Live:
             channel = inlet.info(PATIENCE_S).desc().child("channels").child("channel")
         except (TimeoutError, RuntimeError):  # a busy computer, or the session has just ended
             return None
-        columns = []
+        units = {}
         while not channel.empty():
-            columns.append(channel.child_value("label"))
+            units[channel.child_value("label")] = channel.child_value("unit")
             channel = channel.next_sibling("channel")
-        return inlet, columns
+        self.units = units
+        return inlet, list(units)
 
     def _take(self, columns: Sequence[str], samples: Sequence[Sequence[float]]) -> None:
         due, woke = columns.index("due"), columns.index("woke")

@@ -4,7 +4,7 @@ import mimetypes
 import os
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -19,6 +19,7 @@ from labcrane.study import load
 from labcrane.supervisor.board import Board
 from labcrane.supervisor.desk import Desk
 from labcrane.supervisor.live import Live
+from labcrane.supervisor.pictures import Pictures
 from labcrane.supervisor.rights import SCOPE, SUPERVISOR, Gate, Keys
 
 FORBIDDEN, NOT_FOUND = 403, 404
@@ -36,6 +37,8 @@ class PageOrder:
         The participant's pseudonym with its stamps.
     source
         Which session's LSL streams are shown: ``"aiming/P001/ses-01"``.
+    cameras
+        Names of the cameras whose pictures are shown, by the view that sends them.
     """
 
     protocol: Path
@@ -45,6 +48,7 @@ class PageOrder:
     source: str
     host: str
     port: int
+    cameras: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     keys: Keys = field(default_factory=Keys)
 
 
@@ -89,7 +93,8 @@ def serve(order: PageOrder, pipe: Connection) -> None:
             except OSError:
                 return  # the launcher is gone, and this process is about to end
 
-    desk = Desk(study, plan, order.folder_name, Board(), Live(order.source), send)
+    live, pictures = Live(order.source), Pictures(order.source, order.cameras)
+    desk = Desk(study, plan, order.folder_name, Board(), live, pictures, send)
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     _routes(app, desk)
     ui.run_with(app, title="labcrane", show_welcome_message=False)

@@ -5,9 +5,11 @@ from collections.abc import Callable, Mapping
 
 from labcrane.console import Order
 from labcrane.records import Event
+from labcrane.supervisor.cameras import Cameras
 from labcrane.supervisor.consent import ConsentCard
 from labcrane.supervisor.desk import PRIMARY, Desk
 from labcrane.supervisor.form import Form
+from labcrane.supervisor.loads import Loads
 from labcrane.supervisor.rights import SUPERVISOR
 from labcrane.supervisor.scene import Scene
 
@@ -38,8 +40,10 @@ def supervisor_page(desk: Desk) -> None:
         with ui.element("div").classes("grid grid-cols-1 lg:grid-cols-2 gap-3 w-full"):
             with ui.card().classes("w-full"):
                 Scene(desk).build()
+                Loads(desk).build()
             with ui.card().classes("w-full"):
                 _chart(desk)
+            Cameras(desk).build()
             with ui.card().classes("w-full"):
                 _log(desk)
             with ui.card().classes("w-full"):

@@ -103,6 +103,17 @@ class FeedbackContract:
                     rows = np.atleast_2d(samples[name])
                     assert rows.shape[1:] == (Layout(name, signals).size,), name
 
+    def test_feedback_has_pictures_of_its_cameras_only(self, feedback: Feedback) -> None:
+        run = a_run(ch8(), task=TARGETS)
+        with opened(feedback, run):
+            feedback.present(a_target(run))
+            pictures = feedback.pictures()
+            assert set(pictures) <= set(feedback.cameras)
+            for name, picture in pictures.items():
+                assert picture.pixels.dtype == np.uint8, name
+                assert picture.pixels.shape[2:] in {(), (3,)}, name
+                assert np.isfinite(picture.due), name
+
     def test_feedback_rests_between_trials(self, feedback: Feedback) -> None:
         run = a_run(ch8(), task=TARGETS)
         with opened(feedback, run):

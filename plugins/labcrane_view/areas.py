@@ -1,12 +1,12 @@
 """Where things are in the picture, in pixels: areas of interest for eye tracking."""
 
-import itertools
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from labcrane import Ball, FloatArray, Frame, Placed, Run, Shape, read_placed
+from labcrane_view.outline import of_body, of_thing
 
 TIP = 0.12
 """Radius in metres of the tip's area of interest."""
@@ -114,16 +114,21 @@ class Areas:
     def __init__(self, names: Sequence[str], run: Run, size: tuple[int, int], flip: str) -> None:
         self._names, self._size, self._flip = names, size, flip
         self._tip = run.state.find("tip.position")
-        self._bodies = [body for body in run.bodies if body.name in names]
         self._state = run.state
+        self._said = {signal.name for signal in run.state.signals}
+        self._bodies = [(body, of_body(body)) for body in run.bodies if body.name in names]
         self._scene = ""
-        self._things: list[Placed] = []
+        self._things: list[tuple[Placed, FloatArray]] = []
 
     def hear(self, scene: str) -> None:
         """Take up what stands around, as of :func:`labcrane.read_placed`."""
         if scene != self._scene:
             self._scene = scene
-            self._things = [thing for thing in read_placed(scene) if thing.name in self._names]
+            self._things = [
+                (thing, of_thing(thing))
+                for thing in read_placed(scene)
+                if thing.name in self._names
+            ]
 
     def of(
         self, projection: Projection, frame: Frame, shapes: Sequence[Shape], poses: FloatArray
@@ -132,47 +137,44 @@ class Areas:
         balls = {shape.name: shape for shape in shapes if isinstance(shape, Ball)}
         x, y, z = frame.state[self._tip].tolist()
         balls["tip"] = Ball("tip", (x, y, z), TIP, (0.0, 0.0, 0.0, 0.0))
-        corners = {
-            body.name: _corners(body.size, body.centre, poses[body.frame]) for body in self._bodies
-        }
-        corners |= {thing.name: self._extent(thing, frame.state) for thing in self._things}
+        outlines = self._outlines(frame.state, poses)
         boxes: list[float] = []
         for name in self._names:
             if name in balls:
                 ball = balls[name]
                 box = projection.ball(np.array(ball.centre), ball.radius)
-            elif name in corners:
-                box = projection.points(corners[name])
+            elif name in outlines:
+                box = projection.points(outlines[name])
             else:
                 box = NOWHERE
             boxes += turned(box, self._size, self._flip)
         return boxes
 
-    def _extent(self, thing: Placed, state: FloatArray) -> FloatArray:
-        """Return the corners of all parts of a thing where it is now, shape ``(n, 3)``."""
-        pose = np.eye(4)
-        moving = f"scene.{thing.name}.position"
-        if any(signal.name == moving for signal in self._state.signals):
-            pose[:3, 3] = state[self._state.find(moving)]
-            turn = state[self._state.find(f"scene.{thing.name}.orientation")]
-            pose[:3, :3] = rotation(turn)
-        else:
-            pose[:3, 3] = thing.position
-            pose[:3, :3] = _turned(thing.yaw)
-        found = []
-        for part in thing.parts:  # a thing moves with the centre of its first part
-            own = np.eye(4)
-            own[:3, 3] = np.subtract(part.centre, thing.parts[0].centre)
-            own[:3, :3] = _turned(part.yaw)
-            found.append(_corners(part.size, (0.0, 0.0, 0.0), pose @ own))
-        return np.vstack(found)
+    def _outlines(self, state: FloatArray, poses: FloatArray) -> dict[str, FloatArray]:
+        """Return points around links and things where they are now, shape ``(n, 3)`` each."""
+        found = {}
+        for body, points in self._bodies:
+            pose = self._moved(body.moves, state) if body.moves else poses[body.frame]
+            found[body.name] = points @ pose[:3, :3].T + pose[:3, 3]
+        for thing, points in self._things:
+            moves = f"scene.{thing.name}"
+            if f"{moves}.position" in self._said:
+                pose = self._moved(moves, state)
+            else:
+                pose = _pose(thing.position, _turned(thing.yaw))
+            found[thing.name] = points @ pose[:3, :3].T + pose[:3, 3]
+        return found
+
+    def _moved(self, name: str, state: FloatArray) -> FloatArray:
+        """Return the pose that the state says, shape ``(4, 4)``."""
+        turn = rotation(state[self._state.find(f"{name}.orientation")])
+        return _pose(state[self._state.find(f"{name}.position")].tolist(), turn)
 
 
-def _corners(size: Sequence[float], centre: Sequence[float], pose: FloatArray) -> FloatArray:
-    """Return the corners of a box in a frame with ``pose``, shape ``(8, 3)``."""
-    signs = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
-    inside = np.array(centre) + signs * np.array(size)
-    return np.asarray(inside @ pose[:3, :3].T + pose[:3, 3])
+def _pose(position: Sequence[float], turn: FloatArray) -> FloatArray:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turn, position
+    return pose
 
 
 def _turned(yaw: float) -> FloatArray:

@@ -62,6 +62,10 @@ class Camera:
     ----------
     boxes
         The areas of interest in its picture.
+    part
+        Where its picture is in the window, once it is open.
+    seen
+        When what its picture shows happened, in seconds.
     """
 
     def __init__(self, settings: CameraSettings, machine: Machine) -> None:
@@ -75,6 +79,7 @@ class Camera:
         self._delay = Delay(settings.delay_s)
         self._due = -math.inf
         self.boxes: list[float] = []
+        self.seen = math.nan
 
     @property
     def demands(self) -> str | None:
@@ -95,7 +100,7 @@ class Camera:
     ) -> Any:
         """Make its region in ``target``; return its picture if it has one of its own."""
         deep = self.settings.shows == "depth"
-        self._stage, self._part = stage, part
+        self._stage, self.part = stage, part
         lens = core.PerspectiveLens()
         lens.set_aspect_ratio(part.width / part.height)
         lens.set_fov(self.settings.fov_deg)
@@ -143,7 +148,7 @@ class Camera:
         right, forward, up = axes_of(eye, look)
         rows = [*right, 0.0, *forward, 0.0, *up, 0.0, *eye, 1.0]
         self._node.set_mat(core.LMatrix4f(*(float(value) for value in rows)))
-        part = self._part
+        part = self.part
         return Projection(eye, look, self.settings.fov_deg, part.left, part.width, part.height)
 
     def see(self) -> None:

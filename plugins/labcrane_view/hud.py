@@ -1,11 +1,13 @@
 """The text in the corner, in the operator's language."""
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 
 from labcrane import Frame, Run, Situation, Targets
 
 LOAD = "joint.load"
+ITEM = re.compile(r"([-*+•]|\d+[.)])\s")
 
 WORDS: Mapping[str, Mapping[str, str]] = {
     "en": {
@@ -18,6 +20,7 @@ WORDS: Mapping[str, Mapping[str, str]] = {
         "lateness": "Late",
         "paused": "PAUSED",
         "practice": "practice",
+        "questions": "Please answer the questions now:",
     },
     "de": {
         "block": "Block",
@@ -29,6 +32,7 @@ WORDS: Mapping[str, Mapping[str, str]] = {
         "lateness": "Verspätung",
         "paused": "PAUSE",
         "practice": "Übung",
+        "questions": "Bitte jetzt die Fragen beantworten:",
     },
     "pl": {
         "block": "Blok",
@@ -40,6 +44,7 @@ WORDS: Mapping[str, Mapping[str, str]] = {
         "lateness": "Opóźnienie",
         "paused": "PAUZA",
         "practice": "trening",
+        "questions": "Proszę teraz odpowiedzieć na pytania:",
     },
 }
 
@@ -87,7 +92,24 @@ class Hud:
         return [*shown, words["paused"]] if frame.paused and self._wanted else shown
 
 
-def notice(frame: Frame, situation: Situation, hint_s: float) -> list[str]:
+def notice(frame: Frame, situation: Situation, hint_s: float, language: str) -> list[str]:
     """Return what the operator is to read now: the step's text, and a hint that is still new."""
     fresh = 0.0 <= frame.tick.due - situation.hint_time < hint_s
-    return [text for text in (situation.text, situation.hint if fresh else "") if text]
+    asked = situation.questionnaire
+    text = f"{WORDS[language]['questions']}\n{asked}" if asked else unwrapped(situation.text)
+    return [text for text in (text, situation.hint if fresh else "") if text]
+
+
+def unwrapped(text: str) -> str:
+    """Return text whose lines may be broken anew: a file breaks them where its author's screen did.
+
+    Paragraphs stay apart, and items of a list have lines of their own.
+    """
+    kept: list[str] = []
+    for line in map(str.strip, text.strip().splitlines()):
+        goes_on = kept and kept[-1] and line and not ITEM.match(line)
+        if goes_on:
+            kept[-1] += f" {line}"
+        else:
+            kept.append(line)
+    return "\n".join(kept)

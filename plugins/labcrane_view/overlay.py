@@ -13,8 +13,11 @@ LINE = 0.034
 NOTICE = 0.05
 """Height of a line of what is to be read now, which nobody must miss."""
 
-WIDE = 0.8
-"""Longest line of it, as a share of the window's width."""
+WIDE, TALL = 0.8, 0.9
+"""Longest line of it, and most that all lines take, as shares of the window's width and height."""
+
+SMALLER = 0.95
+"""Each time that text does not fit."""
 
 
 class Overlay:
@@ -91,7 +94,6 @@ class Text:
         self._place.set_pos(1.0 * line, 0.0, size[1] - 1.6 * line)
         if notice:
             self._node.set_align(core.TextNode.A_center)
-            self._node.set_wordwrap(WIDE * size[0] / line)
         self._notice = notice
         self._size, self._line = size, line
         self._shown = ""
@@ -102,6 +104,16 @@ class Text:
         if text != self._shown:  # laying out text takes longer than drawing it
             self._shown = text
             self._node.set_text(text)
-            if self._notice:  # its last line stands above the lower edge, however many there are
-                rise = self._line * (1.5 - self._node.get_bottom())
-                self._place.set_pos(0.5 * self._size[0], 0.0, rise)
+            if self._notice:
+                self._fit()
+
+    def _fit(self) -> None:
+        """Set it above the lower edge, smaller when it would reach beyond the upper one."""
+        width, height = self._size
+        line = self._line
+        self._node.set_wordwrap(WIDE * width / line)
+        while line * self._node.get_height() > TALL * height:
+            line *= SMALLER
+            self._node.set_wordwrap(WIDE * width / line)
+        self._place.set_scale(line)
+        self._place.set_pos(0.5 * width, 0.0, line * (1.5 - self._node.get_bottom()))

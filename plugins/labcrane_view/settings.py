@@ -94,6 +94,20 @@ class PatchSettings(Settings):
     """Edge length, in pixels."""
 
 
+class SupervisorSettings(Settings):
+    """Which pictures the supervisor's page shows."""
+
+    cameras: tuple[str, ...] = ()
+    """Names of the cameras; all by default."""
+
+    rate_hz: float = Field(default=4.0, ge=1.0, le=10.0)
+    """Pictures per second of the session's time."""
+
+    width: Pixels = 480
+    """Largest width of a picture, in pixels; of a wider one only every second, third, ... pixel is
+    sent."""
+
+
 class ViewSettings(Settings):
     """A window, what is seen in it, and from where."""
 
@@ -148,11 +162,15 @@ class ViewSettings(Settings):
     """Keys whose state is sent while the window has the focus, for the input ``keyboard``: letters,
     digits, ``arrow_left``, ``space``, ``lshift`` ..."""
 
+    supervisor: SupervisorSettings | None = None
+    """Sends what cameras show to the supervisor's page; ``{}`` for all of them, none by default."""
+
     patch: PatchSettings | None = None
     """Square for a photodiode; none by default."""
 
     areas: tuple[str, ...] = ("tip", "target", "other", "sphere")
-    """What has a box for eye tracking: tip, targets, shapes of cues; links and things by name."""
+    """What has a box for eye tracking: tip, targets, shapes of cues; links, the grapple and things
+    by name, around what is drawn of them, wherever it moves."""
 
     shadow: NonNegativeInt = Field(default=2048, le=8192)
     """Edge of the shadow map in pixels; 0 for no shadows."""
@@ -162,3 +180,13 @@ class ViewSettings(Settings):
 
     renderer: Literal["auto", "software"] = "auto"
     """``software`` draws without any graphics driver, and without shadows."""
+
+    @model_validator(mode="after")
+    def _sends_what_it_has(self) -> "ViewSettings":
+        has = [camera.name for camera in (self.camera, *self.beside)]
+        for name in self.supervisor.cameras if self.supervisor else ():
+            if name not in has:
+                raise ValueError(
+                    f"supervisor: there is no camera {name!r}; there is {', '.join(has)}"
+                )
+        return self

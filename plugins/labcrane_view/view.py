@@ -17,6 +17,7 @@ from labcrane import (
     FloatArray,
     Frame,
     Machine,
+    Picture,
     PluginError,
     Run,
     Shape,
@@ -32,6 +33,7 @@ from labcrane_view.hud import Hud, notice
 from labcrane_view.keys import Keys
 from labcrane_view.overlay import Overlay
 from labcrane_view.settings import ViewSettings
+from labcrane_view.shots import Shots
 from labcrane_view.stage import HAZE, Stage
 from labcrane_view.window import Window, font, open_window
 
@@ -61,6 +63,8 @@ class View(Feedback):
                 for name in settings.areas
             )
         }
+        self._shots = Shots(settings)
+        self.cameras = self._shots.names
         self._keys = Keys(settings.keys) if settings.keys else None
         if self._keys:
             self.streams = {**self.streams, "keys": (Signal("key", "1", settings.keys),)}
@@ -69,7 +73,7 @@ class View(Feedback):
         self._window: Window | None = None
         self._situation = Situation()
         self._delay = Delay(settings.delay_s)
-        self._due = 0.0
+        self._due = self._now = 0.0
         self._samples: dict[str, FloatArray] = {}
         # Made before there is a window: a camera on a link that does not exist is refused at once.
         self._cameras = [Camera(camera, machine) for camera in cameras]
@@ -138,7 +142,7 @@ class View(Feedback):
         if self._settings.rate_hz is not None:
             time.sleep(max(0.0, self._due - time.perf_counter()))
             self._due = time.perf_counter() + 1.0 / self._settings.rate_hz
-        shown = self._delay.of(frame)
+        shown, self._now = self._delay.of(frame), frame.tick.due
         began = time.perf_counter()
         for camera in self._cameras:
             if camera.apart and (past := camera.take(shown)) is not None:
@@ -159,6 +163,10 @@ class View(Feedback):
 
     def samples(self) -> Mapping[str, FloatArray]:
         return self._samples
+
+    def pictures(self) -> Mapping[str, Picture]:
+        due = self._shots.are_due(self._now)
+        return self._shots.cut(self.picture(), self._cameras) if due else {}
 
     def facts(self) -> Mapping[str, Value]:
         window = self._window
@@ -215,6 +223,7 @@ class View(Feedback):
         self, camera: Camera, frame: Frame, shapes: Sequence[Shape], poses: FloatArray
     ) -> None:
         """Turn a camera to where it looks now, and find what is where in its picture."""
+        camera.seen = frame.tick.due
         camera.boxes = self._areas.of(camera.aim(poses), frame, shapes, poses)
         camera.see()
 
@@ -244,7 +253,9 @@ class View(Feedback):
         if self._text is not None:
             self._text.show(self._hud.lines(frame, self._situation))
         if self._notice is not None:
-            self._notice.show(notice(frame, self._situation, self._settings.hint_s))
+            self._notice.show(
+                notice(frame, self._situation, self._settings.hint_s, self._settings.language)
+            )
         if self._patch is None or self._settings.patch is None:
             return math.nan
         counts = self._situation.counts

@@ -233,16 +233,17 @@ def test_the_situation_follows_from_events() -> None:
 
 def test_the_situation_says_what_the_operator_is_to_read() -> None:
     now = Situation()
-    for event, text, hint in (
-        (Event("instructions.shown", 1.0, {"text": "go"}), "go", ""),
-        (Event("order.hint", 2.0, {"text": "slower", "refused": None, "by": "x"}), "go", "slower"),
-        (Event("order.hint", 3.0, {"text": "", "refused": "words", "by": "x"}), "go", "slower"),
-        (Event("step.end", 4.0, {"step": 1, "kind": "instructions"}), "", "slower"),
-        (Event("questionnaire.start", 5.0, {"title": "Workload"}), "Workload", "slower"),
-        (Event("questionnaire.end", 6.0, {"handed_in": True}), "", "slower"),
+    hint = {"text": "slower", "refused": None, "by": "x"}
+    for event, text, asked, said in (
+        (Event("instructions.shown", 1.0, {"text": "go"}), "go", "", ""),
+        (Event("order.hint", 2.0, hint), "go", "", "slower"),
+        (Event("order.hint", 3.0, {**hint, "refused": "words"}), "go", "", "slower"),
+        (Event("step.end", 4.0, {"step": 1, "kind": "instructions"}), "", "", "slower"),
+        (Event("questionnaire.start", 5.0, {"title": "Workload"}), "", "Workload", "slower"),
+        (Event("questionnaire.end", 6.0, {"handed_in": True}), "", "", "slower"),
     ):
         now = situation_after(now, event)
-        assert (now.text, now.hint) == (text, hint)
+        assert (now.text, now.questionnaire, now.hint) == (text, asked, said)
     assert now.hint_time == 2.0
 
 

@@ -6,6 +6,7 @@ from pydantic import ValidationError
 from windows import MACHINE, SIZE, a_frame, a_view, projected, shown
 
 from labcrane import Ball, DeviceError, Frame, Situation
+from labcrane_view.hud import notice
 from labcrane_view.settings import CAMERAS, CameraSettings
 
 STILL = {"name": "still", "eye": (0.0, 0.0, 1.0), "look": (5.0, 0.0, 1.0)}
@@ -130,6 +131,41 @@ def test_instructions_stay_until_they_are_taken_away() -> None:
     assert rows.sum() > 3 * 0.05 * SIZE[1]  # several lines
     assert not rows[-5:].any()
     np.testing.assert_array_equal(after, without)
+
+
+@pytest.mark.parametrize("size", [(640, 360), (400, 640)])
+def test_long_instructions_fit_into_the_window(size: tuple[int, int]) -> None:
+    text = "\n\n".join(
+        ["Bring the tip to the red ball and hold it there until it is grey. " * 4] * 5
+    )
+    with a_view(renderer="software", size=size) as view:
+        view.present(a_frame())
+        without = view.picture().astype(int)
+        view.hear(Situation(text=text))
+        view.present(a_frame())
+        changed = (np.abs(view.picture() - without) > 8).any(axis=-1)
+    rows, columns = (np.flatnonzero(changed.any(axis=axis)) for axis in (1, 0))
+    assert rows.min() > 0
+    assert rows.max() < size[1] - 1
+    assert np.ptp(rows) > 0.7 * size[1]
+    assert columns.min() > 0
+    assert columns.max() < size[0] - 1
+
+
+def test_a_paragraph_of_a_text_file_is_broken_where_the_window_ends() -> None:
+    text = "You steer a crane\nwith two joysticks.\n\nPlease:\n- go fast,\n  but\n- look.\n"
+    (shown,) = notice(a_frame(), Situation(text=text), 8.0, "en")
+    assert shown == "You steer a crane with two joysticks.\n\nPlease:\n- go fast, but\n- look."
+
+
+def test_whoever_is_asked_is_told_to_answer() -> None:
+    asked = Situation(questionnaire="NASA-TLX")
+    said = [notice(a_frame(), asked, 8.0, language)[0] for language in ("en", "de", "pl")]
+    assert said == [
+        "Please answer the questions now:\nNASA-TLX",
+        "Bitte jetzt die Fragen beantworten:\nNASA-TLX",
+        "Proszę teraz odpowiedzieć na pytania:\nNASA-TLX",
+    ]
 
 
 def test_the_joints_load_is_in_the_corner() -> None:

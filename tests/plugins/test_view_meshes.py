@@ -270,12 +270,8 @@ def test_a_scene_is_drawn_where_its_things_stand_and_are_moved(tmp_path: Path) -
             view.present(at(*where))
             boxes.append(view.samples()["areas"].reshape(3, 4))
             seen = (np.abs(view.picture().astype(int) - empty) > 8).any(axis=-1)
-            corners = [
-                (where[0] + sx * 0.2, where[1] + sy * 0.2, where[2] + sz * 0.2)
-                for sx in (-1, 1)
-                for sy in (-1, 1)
-                for sz in (-1, 1)
-            ]
+            pyramid = 0.2 * POINTS[:, [1, 0, 2]] * [-1, 1, 1]  # turned to the left by a quarter
+            corners = [tuple(corner) for corner in pyramid + where]
             x, y = np.array([projected(each, CameraSettings(**CAMERA)) for each in corners]).T
             expected = (x.min(), y.min(), x.max(), y.max())
             np.testing.assert_allclose(boxes[-1][0], expected, atol=0.01)

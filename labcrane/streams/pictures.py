@@ -1,0 +1,124 @@
+"""What cameras show, as a stream of strings for whoever watches; the recorder does not take it.
+
+A sample of ``labcrane.pictures.<name>`` is a JSON object: ``camera``, its name; ``due``, when what
+it shows happened; ``legend``, what its greys mean; ``png``, the picture in base 64. Its time is
+that of the newest frame when the picture was made. Nothing is made while nobody watches.
+"""
+
+import base64
+import json
+import queue
+import struct
+import threading
+import zlib
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from labcrane.records import Picture
+from labcrane.streams.outlets import channel, source_id, stream_info
+
+if TYPE_CHECKING:
+    import pylsl
+
+KIND = "Picture"
+KEPT_S = 1
+"""Of a stream without a rate liblsl keeps a hundred samples for each second: some megabytes."""
+
+QUICKLY = 1
+"""zlib's level: twice the bytes of the best one in a tenth of the time."""
+
+
+def pictures_source(source: str, name: str) -> str:
+    """Return the source id of the pictures of feedback ``name``."""
+    return source_id(source, f"labcrane.pictures.{name}")
+
+
+class PictureOutlet:
+    """Sends pictures from a thread of its own: whoever shows them does not wait."""
+
+    def __init__(self, name: str, source: str) -> None:
+        import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
+
+        info = stream_info(
+            f"labcrane.pictures.{name}", KIND, 1, "string", rate_hz=0.0, source=source
+        )
+        channel(info, label="picture", unit="none", type="JSON")
+        self._outlet: pylsl.StreamOutlet = pylsl.StreamOutlet(info, max_buffered=KEPT_S)
+        self._waiting: queue.SimpleQueue[tuple[Mapping[str, Picture], float] | None]
+        self._waiting = queue.SimpleQueue()
+        self._free = threading.Event()
+        self._free.set()
+        self._thread = threading.Thread(target=self._send, name="pictures", daemon=True)
+        self._thread.start()
+
+    @property
+    def wanted(self) -> bool:
+        """Whether somebody watches, and the pictures before are on their way."""
+        return self._free.is_set() and bool(self._outlet.have_consumers())
+
+    def push(self, pictures: Mapping[str, Picture], stamp: float) -> None:
+        """Send pictures of cameras by name; ``stamp`` is when the newest frame was due."""
+        if pictures:
+            self._free.clear()
+            self._waiting.put((pictures, stamp))
+
+    def close(self) -> None:
+        """End the stream."""
+        self._waiting.put(None)
+        self._thread.join()
+
+    def _send(self) -> None:
+        while (job := self._waiting.get()) is not None:
+            pictures, stamp = job
+            for camera, picture in pictures.items():
+                self._outlet.push_sample([_written(camera, picture)], stamp)
+            self._free.set()
+
+
+class PictureInlet:
+    """Receives pictures."""
+
+    def __init__(self, info: "pylsl.StreamInfo") -> None:
+        import pylsl  # noqa: PLC0415
+
+        self._inlet = pylsl.StreamInlet(info, max_buflen=KEPT_S, recover=True, processing_flags=0)
+
+    def newest(self, wait_s: float) -> Iterator[tuple[dict[str, Any], float]]:
+        """Yield what has come, waiting up to ``wait_s``: samples, and their times in seconds."""
+        sample, stamp = self._inlet.pull_sample(timeout=wait_s)
+        while sample is not None:
+            yield json.loads(sample[0]), stamp
+            sample, stamp = self._inlet.pull_sample(timeout=0.0)
+
+
+def _written(camera: str, picture: Picture) -> str:
+    coded = base64.b64encode(png(picture.pixels)).decode()
+    return json.dumps(
+        {"camera": camera, "due": picture.due, "legend": picture.legend, "png": coded}
+    )
+
+
+def png(pixels: npt.NDArray[np.uint8]) -> bytes:
+    """Return a picture as a PNG file, without loss.
+
+    Parameters
+    ----------
+    pixels
+        From the top; greys of shape ``(height, width)``, or red, green and blue of shape
+        ``(height, width, 3)``.
+    """
+    height, width = pixels.shape[:2]
+    colour = 2 if pixels.ndim > 2 else 0  # noqa: PLR2004 - height and width
+    rows = np.zeros((height, 1 + pixels[0].size), np.uint8)  # each begins with a 0: as it is
+    rows[:, 1:] = pixels.reshape(height, -1)
+    head = struct.pack(">IIBBBBB", width, height, 8, colour, 0, 0, 0)
+    parts = ((b"IHDR", head), (b"IDAT", zlib.compress(rows.tobytes(), QUICKLY)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(kind, content) for kind, content in parts)
+
+
+def _chunk(kind: bytes, content: bytes) -> bytes:
+    whole = kind + content
+    return struct.pack(">I", len(content)) + whole + struct.pack(">I", zlib.crc32(whole))

@@ -1,0 +1,77 @@
+"""Pictures of cameras, from the LSL streams of the views."""
+
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from labcrane.streams.pictures import PictureInlet, pictures_source
+
+WAIT_S = 1.0
+STALE_S = 3.0
+"""A picture that nobody has renewed for so long is not shown: it could be taken for what is now."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """A picture as the page shows it.
+
+    Attributes
+    ----------
+    source
+        What a browser takes as the address of an image.
+    legend
+        What its greys mean; empty for colours.
+    due, made
+        When what it shows happened, and when the picture was made, in seconds.
+    """
+
+    source: str
+    legend: str
+    due: float
+    made: float
+
+
+class Pictures:
+    """Keeps the newest picture of every camera. A thread for each view pulls; pages read.
+
+    Parameters
+    ----------
+    cameras
+        Names of the cameras of each view.
+    """
+
+    def __init__(self, source: str, cameras: Mapping[str, tuple[str, ...]]) -> None:
+        self.cameras = cameras
+        self._newest: dict[tuple[str, str], Shot] = {}
+        for view in cameras:
+            wanted = pictures_source(source, view)
+            threading.Thread(
+                target=self._pull, args=(view, wanted), name=f"pictures of {view}", daemon=True
+            ).start()
+
+    def of(self, view: str, camera: str) -> tuple[Shot | None, str]:
+        """Return the picture that may be shown now, if there is one, and what to say of it."""
+        import pylsl  # noqa: PLC0415
+
+        shot = self._newest.get((view, camera))
+        if shot is None:
+            return None, "no picture yet"
+        now = pylsl.local_clock()
+        if now - shot.made > STALE_S:
+            return None, f"no picture for {now - shot.made:.0f} s"
+        return shot, " · ".join(filter(None, [f"{now - shot.due:.1f} s old", shot.legend]))
+
+    def _pull(self, view: str, wanted: str) -> None:
+        import pylsl  # noqa: PLC0415
+
+        while not (found := pylsl.resolve_byprop("source_id", wanted, 1, timeout=WAIT_S)):
+            pass
+        inlet = PictureInlet(found[0])  # it finds a view that is started again by itself
+        while True:
+            for sample, stamp in inlet.newest(WAIT_S):
+                self._newest[view, sample["camera"]] = Shot(
+                    f"data:image/png;base64,{sample['png']}",
+                    sample["legend"],
+                    sample["due"],
+                    stamp,
+                )

@@ -1,0 +1,67 @@
+"""Pictures of cameras on their way to the supervisor's page."""
+
+import base64
+from collections.abc import Iterator
+from io import BytesIO
+
+import matplotlib.image
+import numpy as np
+import pylsl
+import pytest
+from faults.sessions import unique, wait_for
+
+from labcrane import Picture
+from labcrane.streams.pictures import PictureOutlet
+from labcrane.supervisor.pictures import Pictures
+
+GREYS = np.arange(60, dtype=np.uint8).reshape(6, 10)
+
+
+@pytest.fixture
+def source() -> str:
+    return unique("pictures")
+
+
+@pytest.fixture
+def outlet(source: str) -> Iterator[PictureOutlet]:
+    made = PictureOutlet("watch", source)
+    yield made
+    made.close()
+
+
+def test_pictures_are_wanted_only_while_somebody_watches(
+    outlet: PictureOutlet, source: str
+) -> None:
+    assert not outlet.wanted
+    Pictures(source, {"watch": ("depth",)})
+    wait_for(lambda: outlet.wanted, 60)
+
+
+def test_a_picture_arrives_as_it_was_with_its_age(outlet: PictureOutlet, source: str) -> None:
+    page = Pictures(source, {"watch": ("depth", "cab")})
+    assert page.of("watch", "depth") == (None, "no picture yet")
+    wait_for(lambda: outlet.wanted, 60)
+    now = pylsl.local_clock()
+    made = now + 60.0  # or it would be out of date on a computer that is held up
+    outlet.push({"depth": Picture(GREYS, now - 100.0, "white 2 m, black 14 m")}, made)
+    wait_for(lambda: page.of("watch", "depth")[1] != "no picture yet", 60)
+    shot, said = page.of("watch", "depth")
+    assert shot is not None
+    assert said.startswith("10")
+    assert said.endswith(" s old · white 2 m, black 14 m")
+    head, _, coded = shot.source.partition(",")
+    assert head == "data:image/png;base64"
+    read = matplotlib.image.imread(BytesIO(base64.b64decode(coded)))
+    np.testing.assert_array_equal(np.round(255 * read), GREYS)
+    assert page.of("watch", "cab") == (None, "no picture yet")
+
+
+def test_a_picture_that_is_out_of_date_is_not_shown(outlet: PictureOutlet, source: str) -> None:
+    page = Pictures(source, {"watch": ("depth",)})
+    wait_for(lambda: outlet.wanted, 60)
+    made = pylsl.local_clock() - 100.0
+    outlet.push({"depth": Picture(GREYS, made)}, made)
+    wait_for(lambda: page.of("watch", "depth")[1] != "no picture yet", 60)
+    shot, said = page.of("watch", "depth")
+    assert shot is None
+    assert said.startswith("no picture for 10")
