@@ -28,7 +28,11 @@ from labcrane.recording.recover import recover
 from labcrane.recording.xdf_reader import read_xdf
 
 
-@pytest.fixture(scope="module", params=[18, pytest.param(60, marks=pytest.mark.long)])
+SIXTY = [pytest.mark.long, pytest.mark.timeout(1500)]
+"""The first of these tests waits for all sessions to be killed and recovered."""
+
+
+@pytest.fixture(scope="module", params=[18, pytest.param(60, marks=SIXTY)])
 def killed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory):
     """Kill a session at many moments, with a witness; return what became of it."""
     folder = tmp_path_factory.mktemp("killed")
