@@ -27,7 +27,6 @@ from labcrane.progress import progress
 from labcrane.recording.recover import recover
 from labcrane.recording.xdf_reader import read_xdf
 
-
 SIXTY = [pytest.mark.long, pytest.mark.timeout(1500)]
 """The first of these tests waits for all sessions to be killed and recovered."""
 
