@@ -126,7 +126,7 @@ def contents(path: Path, group: str) -> dict[str, str]:
     return found
 
 
-def wait_for(condition: object, patience_s: float = 20.0) -> None:
+def wait_for(condition: object, patience_s: float = 120.0) -> None:
     """Wait until something has come about in another process; fail when it does not."""
     deadline = time.monotonic() + patience_s
     while not condition():

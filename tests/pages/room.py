@@ -170,7 +170,7 @@ def write(browser: webdriver.Chrome, ident: str, words: str) -> None:
 
 
 def shown(browser: webdriver.Chrome, ident: str, words: str) -> None:
-    wait_for(lambda: words in text(browser, ident), 30)
+    wait_for(lambda: words in text(browser, ident))
 
 
 SCREENS = os.environ.get("LABCRANE_SCREENS")
