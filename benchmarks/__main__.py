@@ -18,7 +18,9 @@ from pathlib import Path
 
 from benchmarks.table import Row
 
-SUBJECTS = ("tick", "recording", "sync", "view", "sound", "analysis", "cohort", "start_up")
+SUBJECTS = (
+    "tick", "oversight", "recording", "sync", "view", "sound", "analysis", "cohort", "start_up",
+)  # fmt: skip
 RESULTS = Path(__file__).with_name("RESULTS.md")
 HEAD = "| benchmark | figure | labcrane | reference | | ratio | at most | measured |"
 
@@ -46,7 +48,8 @@ def line(subject: str, row: Row) -> str:
     """Return a row of the table, with the machine and the date."""
     goal = "" if row.goal is None else f"{row.goal:.2f}"
     when = f"{datetime.now(UTC).date()}, {machine()}"
-    figures = f"{row.ours:.3g} | {row.reference} | {row.bare:.3g} | {row.ratio:.2f} | {goal}"
+    ratio = f"{row.ratio:.2f}" if row.ratio >= 0.01 else f"{row.ratio:.1g}"
+    figures = f"{row.ours:.3g} | {row.reference} | {row.bare:.3g} | {ratio} | {goal}"
     return f"| {subject} | {row.what} | {figures} | {when} |"
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.table import Row
 from labcrane import Dynamics
 from labcrane.oversight import Oversight
 from labcrane.registry import discover
@@ -33,8 +34,8 @@ def fastest(step: Callable[[], object]) -> float:
     return best
 
 
-def main() -> None:
-    """Print the cost of a call, bare and watched, and of all calls of a tick."""
+def steps() -> tuple[float, float]:
+    """Return how long a step of a crane takes, bare and watched, in seconds."""
     machine, oversight = ch8(), Oversight()
     offer = discover().find(Dynamics, "kinematic_crane")
     bare = offer.build(offer.settings(), machine)
@@ -49,6 +50,18 @@ def main() -> None:
     ):
         alone = fastest(lambda: bare.step(command, 1 / RATE_HZ))
         seen = fastest(lambda: kept.step(command, 1 / RATE_HZ))
+    return alone, seen
+
+
+def rows() -> list[Row]:
+    """Return what a watched step costs beside a bare one."""
+    alone, seen = steps()
+    return [Row("oversight", "a watched step of a crane, us", 1e6 * seen, 1e6 * alone, "unwatched")]
+
+
+def main() -> None:
+    """Print the cost of a call, bare and watched, and of all calls of a tick."""
+    alone, seen = steps()
     cost = seen - alone
     print(f"a step {1e6 * alone:.2f} us, watched {1e6 * seen:.2f} us: {1e6 * cost:.2f} us more")
     share = 100 * CALLS_PER_TICK * cost * RATE_HZ

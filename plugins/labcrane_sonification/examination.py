@@ -1,6 +1,9 @@
 """Whether the sound device is there, and takes the rate and the block that are asked for."""
 
+import sys
+
 from labcrane import Ask, DeviceError, Finding, Verdict
+from labcrane_sonification import real_time
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sonification.synth import server
 
@@ -17,6 +20,7 @@ def examine(settings: SonificationSettings, ask: Ask | None) -> list[Finding]:
         said, _, fix = str(error).partition("; ")
         return [Finding(Verdict.FAIL, said, fix)]
     block, rate = int(made.getBufferSize()), float(made.getSamplingRate())
+    found = _scheduling() if settings.driver == "jack" and sys.platform == "linux" else []
     made.stop()
     made.shutdown()
     text = (
@@ -24,8 +28,17 @@ def examine(settings: SonificationSettings, ask: Ask | None) -> list[Finding]:
         f"{1e3 * block / rate:.1f} ms each"
     )
     if block / rate > LONG_S:
-        return [Finding(Verdict.WARN, text, "set block: 256 or less, or use driver: jack")]
-    return [Finding(Verdict.PASS, text)]
+        return [Finding(Verdict.WARN, text, "set block: 256 or less, or use driver: jack"), *found]
+    return [Finding(Verdict.PASS, text), *found]
+
+
+def _scheduling() -> list[Finding]:
+    """Return whether an open JACK server has given its thread in this process a priority."""
+    if real_time.others_are_real_time():
+        return [Finding(Verdict.PASS, "the JACK server runs in real time")]
+    fix = "start it as jackd --realtime, by a user who is allowed real-time priorities"
+    text = "the JACK server does not run in real time: it misses blocks on a busy computer"
+    return [Finding(Verdict.WARN, text, fix)]
 
 
 def _name(settings: SonificationSettings) -> str:

@@ -10,9 +10,11 @@ import numpy.typing as npt
 from pydantic import BaseModel
 
 from labcrane import Feedback, FloatArray, Frame, Run, Signal, Situation, Value
+from labcrane_sonification import real_time
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sonification.synth import Maker, Synth, offline_server, server
 from labcrane_sonification.tone import Tone, tone
+from labcrane_sonification.underruns import Underruns
 
 LIVE = ("far", "pitch_hz", "level", "aside", "pan", "silent_after_s", "ramp_s")
 """Settings that can change while the sound server runs: a server that is closed and opened again is
@@ -34,12 +36,15 @@ class Sonification(Feedback):
         Signal("tone.level", "1"),
         Signal("tone.pan", "1"),
         Signal("tone.sample", "1"),  # made by the server when the change was given
+        Signal("tone.missed", "1"),  # blocks that JACK was not given in time, since it is open
     )
 
     def __init__(self, settings: SonificationSettings, make_server: Maker = server) -> None:
         self._settings = settings
         self._make_server = make_server
         self._synth: Synth | None = None
+        self._underruns: Underruns | None = None
+        self._scheduling = "ordinary"
         self._trial = 0
         self._entered: float | None = None
 
@@ -54,12 +59,22 @@ class Sonification(Feedback):
         self._tip = run.state.find("tip.position")
         self._target = run.task.find("target.position")
         self._radius = run.task.find("target.radius")
-        self._synth = Synth(self._make_server(self._settings), self._settings)
+        made, by_jack = self._make_server(self._settings), self._settings.driver == "jack"
+        live = by_jack and self._make_server is server
+        self._scheduling = real_time.follow() if live else "ordinary"
+        self._synth = Synth(made, self._settings)
+        # Other drivers ask for several blocks at a time, which does not say when each is due.
+        self._underruns = Underruns(self._settings.block / self._settings.rate_hz) if live else None
+        if self._underruns is not None:
+            self._synth.at_every_block(self._underruns.begun)
 
     def close(self) -> None:
         if self._synth is not None:
             self._synth.close()
             self._synth = None
+        if self._scheduling == "real time":  # until here: closing keeps Python's lock for a while
+            real_time.unfollow()
+            self._scheduling = "ordinary"
 
     def adjust(self, settings: BaseModel) -> bool:
         if not isinstance(settings, SonificationSettings) or self._synth is None:
@@ -79,9 +94,9 @@ class Sonification(Feedback):
         now = self.tone(frame)
         if now is None:
             self.rest()
-            return np.array([math.nan, math.nan, 0.0, math.nan, self._sample()])
+            return np.array([math.nan, math.nan, 0.0, math.nan, *self._counts()])
         self.synth.sound(now)
-        return np.array([*now.values, self._sample()])
+        return np.array([*now.values, *self._counts()])
 
     def tone(self, frame: Frame) -> Tone | None:
         """Return the tone for a frame that follows those presented; None without a target."""
@@ -133,11 +148,14 @@ class Sonification(Feedback):
             "driver": self._settings.driver,
             "rate_hz": self._settings.rate_hz,
             "block": self._settings.block,
+            "scheduling": self._scheduling,
             "delay": "not measured",
         }
 
-    def _sample(self) -> float:
-        return float(self.synth.server.getCurrentTimeInSamples())
+    def _counts(self) -> tuple[float, float]:
+        """Return how many samples were made, and how many blocks were missed."""
+        missed = math.nan if self._underruns is None else float(self._underruns.missed)
+        return float(self.synth.server.getCurrentTimeInSamples()), missed
 
 
 def write_wav(path: Path, sound: npt.NDArray[np.float32], rate_hz: int) -> None:

@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -109,6 +110,10 @@ class Synth:
             self._set(level, wanted.level / number if heard else 0.0)
         for side, gain in zip(self._sides, gains(wanted.pan), strict=True):
             self._set(side, gain)
+
+    def at_every_block(self, begun: Callable[[float], None]) -> None:
+        """Let ``begun`` be told the time, in seconds, whenever the server begins a block."""
+        self.server.setCallback(lambda: begun(time.perf_counter()))
 
     def ramp(self, seconds: float) -> None:
         """Let every change from now on take so long."""

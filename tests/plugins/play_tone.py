@@ -1,40 +1,44 @@
-"""Plays a moving tone, or silence, on the JACK server; prints samples played and changes given."""
+"""Plays a moving tone on the JACK server; argument: seconds, and ``holding`` to hold pyo up.
 
+Holding keeps Python's global lock, without which pyo cannot compute, for five and a half blocks.
+Prints as JSON what it has come to.
+"""
+
+import ctypes
+import json
 import os
 import sys
 import time
-
-os.environ.setdefault("PYO_GUI_WX", "0")
-import pyo
 
 from labcrane.testing import TARGETS, a_run, a_target, ch8
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sonification.sonification import Sonification
 
+BLOCK, RATE = 1024, 48000
 run = a_run(ch8(), task=TARGETS)
-silent = sys.argv[2:] == ["silent"]
-if silent:
-    server = pyo.Server(
-        sr=48000, nchnls=2, buffersize=1024, duplex=0, audio="jack", jackname="silent"
-    )
-    server.deactivateMidi()
-    server.boot().start()
-else:
-    sonification = Sonification(SonificationSettings(driver="jack", block=1024))
-    sonification.open(run)
+seconds, holding = float(sys.argv[1]), sys.argv[2:] == ["holding"]
+with_lock = ctypes.PyDLL(None)
+sonification = Sonification(SonificationSettings(driver="jack", block=BLOCK, rate_hz=RATE))
+sonification.open(run)
+facts, policy = sonification.facts(), os.sched_getscheduler(0)
 began = time.perf_counter()
-first = last = changes = 0.0
-while time.perf_counter() - began < float(sys.argv[1]):
-    if silent:
-        last = float(server.getCurrentTimeInSamples())
-    else:
-        last = sonification.present(a_target(run, int(changes) % 200))[4]
-    first = first or last
+first = values = sonification.present(a_target(run))
+changes = holds = 0
+while (passed := time.perf_counter() - began) < seconds:
     changes += 1
+    values = sonification.present(a_target(run, changes % 200))
+    if holding and passed > 0.5 * (1 + holds):
+        with_lock.usleep(round(5.5e6 * BLOCK / RATE))
+        holds += 1
     time.sleep(0.008)
-if silent:
-    server.stop()
-    server.shutdown()
-else:
-    sonification.close()
-sys.stdout.write(f"{last - first} {changes}\n")
+sonification.close()
+result = {
+    "played": values[4] - first[4],
+    "missed": values[5],
+    "changes": changes,
+    "holds": holds,
+    "scheduling": facts["scheduling"],
+    "real time": policy == os.SCHED_FIFO | os.SCHED_RESET_ON_FORK,
+    "ordinary again": os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK == os.SCHED_OTHER,
+}
+sys.stdout.write(json.dumps(result) + "\n")

@@ -1,0 +1,57 @@
+"""Programs that keep every core busy, and one per core that sees whether it stood still.
+
+On a computer that is shared with others, all its cores, or one, may stand still for a while. What
+is due then is late, whatever its priority. Run with a core's number, this tells for how long its
+core did nothing though a program with a higher real-time priority than any sound wanted to run.
+"""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+PRIORITY = 90
+STEP_S = 0.001
+
+
+@dataclass
+class Stillness:
+    """For how long a core stood still at most, in seconds; known when all is over."""
+
+    most_s: float = 0.0
+
+
+@contextmanager
+def a_busy_computer() -> Iterator[Stillness]:
+    """Keep every core busy with ordinary programs, and watch whether it stands still."""
+    found, cores = Stillness(), os.sched_getaffinity(0)
+    idle = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in cores]
+    watching = [subprocess.Popen([sys.executable, __file__, str(core)], **idle) for core in cores]
+    try:
+        yield found
+        found.most_s = max(float(each.communicate("")[0]) for each in watching)
+    finally:
+        for each in busy + watching:
+            each.kill()
+            each.communicate()
+
+
+def watch(core: int) -> float:
+    """Return the longest time that ``core`` stood still, until the input is closed."""
+    os.sched_setaffinity(0, {core})
+    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+    os.set_blocking(0, False)
+    most, before = 0.0, time.perf_counter()
+    while sys.stdin.buffer.read() is None:
+        time.sleep(STEP_S)
+        now = time.perf_counter()
+        most, before = max(most, now - before - STEP_S), now
+    return most
+
+
+if __name__ == "__main__":
+    sys.stdout.write(f"{watch(int(sys.argv[1]))}\n")

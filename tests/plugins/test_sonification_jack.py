@@ -1,0 +1,144 @@
+"""The tone on a JACK server: missed blocks are counted, and in real time there are none."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from busy_computer import a_busy_computer
+from jack_server import a_jack_server, real_time_is_allowed, underruns
+
+from labcrane_sonification import real_time
+from labcrane_sonification.underruns import WINDOW, Underruns
+
+PERIOD_S = 1024 / 48000
+ATTEMPTS = 3
+needs_jack = pytest.mark.skipif(
+    shutil.which("jackd") is None and not os.environ.get("CI"), reason="needs jackd"
+)
+needs_real_time = pytest.mark.skipif(
+    not real_time_is_allowed() and not os.environ.get("CI"),
+    reason="needs real-time priorities: docs/lab.md says how a user is allowed them",
+)
+
+
+def counted(begun: np.ndarray) -> int:
+    """Return how many blocks were missed when blocks were begun at these times, in periods."""
+    found = Underruns(PERIOD_S)
+    for moment in begun:
+        found.begun(1000.0 + PERIOD_S * moment)
+    return found.missed
+
+
+@pytest.mark.parametrize("late", [0.0, 0.5, 0.9])
+def test_a_block_that_is_late_by_less_than_a_period_is_not_missed(late: float) -> None:
+    generator = np.random.default_rng(1)
+    assert counted(np.arange(5000) + generator.uniform(0.0, late, 5000)) == 0
+
+
+@pytest.mark.parametrize("ppm", [-500.0, 500.0])
+def test_a_server_with_another_clock_misses_nothing(ppm: float) -> None:
+    generator = np.random.default_rng(2)
+    moments = np.arange(200_000) * (1.0 + 1e-6 * ppm)
+    assert counted(moments + generator.uniform(0.0, 0.5, 200_000)) == 0
+
+
+@pytest.mark.parametrize("catching_up", [0, 1, 2])
+def test_every_whole_period_of_waiting_is_a_missed_block(catching_up: int) -> None:
+    # Held up by 5.5 periods, a server may begin one or two blocks at once before the next is due.
+    moments = [float(number) for number in range(200)]
+    for hold in range(3):
+        after = 205.5 + 100 * hold
+        moments += [after, *(after + 0.01 * (n + 1) for n in range(catching_up))]
+        moments += [float(number) for number in range(206 + 100 * hold, 300 + 100 * hold)]
+    assert counted(np.array(moments)) == 3 * 5
+
+
+def test_a_chain_that_takes_longer_than_a_block_misses_every_block_it_falls_behind() -> None:
+    seconds = 2000
+    made = counted(np.arange(round(seconds / 1.25)) * 1.25)
+    # The clock of the server is found anew in every window, and what was late by then is forgiven.
+    assert 0.25 - 1.0 / WINDOW <= made / (seconds / 1.25) <= 0.25
+
+
+def played(folder: Path, seconds: float, *how: str, real_time: bool) -> dict[str, float]:
+    """Play a tone on a server of its own; return what came of it."""
+    program = Path(__file__).with_name("play_tone.py")
+    with a_jack_server(folder, real_time=real_time) as (name, log):
+        done = subprocess.run(
+            [sys.executable, str(program), str(seconds), *how],
+            env={**os.environ, "JACK_DEFAULT_SERVER": name},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    assert done.returncode == 0, done.stderr
+    return {**json.loads(done.stdout.splitlines()[-1]), "underruns": len(underruns(log))}
+
+
+@needs_jack
+def test_blocks_that_nobody_could_compute_are_counted_here_and_by_the_server(
+    tmp_path: Path,
+) -> None:
+    result = played(tmp_path, 2.5, "holding", real_time=False)
+    assert result["holds"] >= 2
+    assert result["missed"] >= 4 * result["holds"]
+    assert result["underruns"] >= result["holds"]
+    assert result["scheduling"] == "ordinary"
+    assert not result["real time"]
+
+
+@needs_jack
+@needs_real_time
+def test_in_real_time_no_block_is_missed_on_a_busy_computer(tmp_path: Path) -> None:
+    for _ in range(ATTEMPTS):
+        with a_busy_computer() as stillness:
+            result = played(tmp_path, 3.0, real_time=True)
+        if not result["underruns"] or stillness.most_s < PERIOD_S / 2:
+            break
+    assert (result["missed"], result["underruns"]) == (0, 0), f"{stillness}: {result}"
+    assert result["played"] == pytest.approx(3.0 * 48000, rel=0.05)
+    assert result["scheduling"] == "real time"
+    assert result["real time"]
+    assert result["ordinary again"]
+
+
+def test_a_user_who_may_not_follow_jack_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise PermissionError
+
+    monkeypatch.setattr(real_time, "others_are_real_time", lambda: True)
+    monkeypatch.setattr(os, "sched_setscheduler", refuse)
+    assert real_time.follow() == "ordinary, only JACK's is real time"
+
+
+LOOK = """
+from labcrane_sonification.examination import examine
+from labcrane_sonification.settings import SonificationSettings
+for finding in examine(SonificationSettings(driver="jack", block=1024), None):
+    print(finding.verdict, finding.text)
+"""
+
+
+@needs_jack
+@pytest.mark.parametrize("how", ["ordinary", pytest.param("real time", marks=needs_real_time)])
+def test_the_doctor_says_whether_jack_runs_in_real_time(tmp_path: Path, how: str) -> None:
+    with a_jack_server(tmp_path, real_time=how == "real time") as (name, _):
+        done = subprocess.run(
+            [sys.executable, "-c", LOOK],
+            env={**os.environ, "JACK_DEFAULT_SERVER": name},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    assert done.returncode == 0, done.stderr
+    block, scheduling = done.stdout.splitlines()[-2:]
+    assert block == "WARN the JACK server takes 48000 Hz in blocks of 1024 samples: 21.3 ms each"
+    if how == "real time":
+        assert scheduling == "PASS the JACK server runs in real time"
+    else:
+        assert scheduling.startswith("WARN the JACK server does not run in real time: it misses")
