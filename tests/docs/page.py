@@ -34,6 +34,7 @@ from xml.etree import ElementTree
 import pytest
 from fresh_environment import environment
 from ruamel.yaml import YAML
+from simple_crane import CRANE
 
 from labcrane.cli.app import main
 from labcrane.registry import discover
@@ -56,17 +57,15 @@ RUNS_S = 2.0
 COMMANDS = re.compile(r"(?:labcrane [^|&;<>$`]+\n)+")
 """Lines that need no shell."""
 
-BASE = """\
+BASE = (
+    """\
 labcrane: 1
 study: page
 title: A page's study
 rate_hz: 240
-machine: ch8
-input: {use: dual_joystick}
-scheme:
-  use: joint_velocity
-  map: {slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}
-dynamics: {use: kinematic_crane}
+"""
+    + CRANE
+    + """\
 tasks:
   aiming: {use: aiming, distances: [2], movements: 2}
   retrieval: {use: aiming, distances: [2], movements: 2}
@@ -77,6 +76,7 @@ sessions:
     steps:
       - block: {task: aiming, pairs: 1}
 """
+)
 """What a page's parts of a protocol are put into."""
 
 
