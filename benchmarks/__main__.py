@@ -18,7 +18,17 @@ from pathlib import Path
 
 from benchmarks.table import Row
 
-SUBJECTS = ("tick", "recording", "sync", "view", "sound", "analysis", "cohort", "start_up")
+SUBJECTS = (
+    "tick",
+    "recording",
+    "sync",
+    "view",
+    "sound",
+    "analysis",
+    "cohort",
+    "start_up",
+    "oversight",
+)
 RESULTS = Path(__file__).with_name("RESULTS.md")
 HEAD = "| benchmark | figure | labcrane | reference | | ratio | at most | measured |"
 

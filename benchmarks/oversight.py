@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.table import Row, show
 from labcrane import Dynamics
 from labcrane.oversight import Oversight
 from labcrane.registry import discover
@@ -33,8 +34,8 @@ def fastest(step: Callable[[], object]) -> float:
     return best
 
 
-def main() -> None:
-    """Print the cost of a call, bare and watched, and of all calls of a tick."""
+def rows() -> list[Row]:
+    """Return what a watched step costs beside a bare one, and print its share of a tick."""
     machine, oversight = ch8(), Oversight()
     offer = discover().find(Dynamics, "kinematic_crane")
     bare = offer.build(offer.settings(), machine)
@@ -49,11 +50,10 @@ def main() -> None:
     ):
         alone = fastest(lambda: bare.step(command, 1 / RATE_HZ))
         seen = fastest(lambda: kept.step(command, 1 / RATE_HZ))
-    cost = seen - alone
-    print(f"a step {1e6 * alone:.2f} us, watched {1e6 * seen:.2f} us: {1e6 * cost:.2f} us more")
-    share = 100 * CALLS_PER_TICK * cost * RATE_HZ
-    print(f"{CALLS_PER_TICK} calls are {share:.2f} % of a tick at {RATE_HZ:g} Hz")
+    share = 100 * CALLS_PER_TICK * (seen - alone) * RATE_HZ
+    print(f"{CALLS_PER_TICK} watched calls are {share:.2f} % of a tick at {RATE_HZ:g} Hz")
+    return [Row("oversight", "a watched step, us", 1e6 * seen, 1e6 * alone, "a bare step")]
 
 
 if __name__ == "__main__":
-    main()
+    show(rows())
