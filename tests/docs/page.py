@@ -11,6 +11,7 @@ A comment on the line above a block says what else is to be known of it:
     <!-- fails: STATUS -->    a command that is to end with that status
     <!-- runs: on and on -->  a program without an end; it is stopped after two seconds
     <!-- long: REASON -->     run by pytest -m long only
+    <!-- desk: WHAT -->       on a terminal with a screen, where a person has two sticks (person.py)
     <!-- environment: one of its own -->  what is installed there is seen nowhere else
     <!-- rehearsed: HOW -->   as root, by a program that only says what it would do (REHEARSED)
     <!-- bare machine: WHY -->  run by .ci/run, which begins with such a machine
@@ -32,9 +33,11 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from docs.person import Person
 from fresh_environment import environment
 from ruamel.yaml import YAML
 from simple_crane import CRANE
+from windows import an_x_server
 
 from labcrane.cli.app import main
 from labcrane.registry import discover
@@ -49,7 +52,9 @@ BLOCK = re.compile(
     r"^(?P<indent> *)```(?P<language>\w*)[^\n]*\n(?P<text>.*?)^(?P=indent)```$",
     re.MULTILINE | re.DOTALL,
 )
-NAMES = "file|first|then|with|installed|fails|runs|long|environment|rehearsed|bare machine|not run"
+NAMES = (
+    "file|first|then|with|installed|fails|runs|long|desk|environment|rehearsed|bare machine|not run"
+)
 MARK = re.compile(rf"<!-- ({NAMES}): (.+?) -->")
 
 RUNS_S = 2.0
@@ -133,6 +138,8 @@ class Reader:
         language = marks.get("with", block.language)
         if "runs" in marks:
             self._runs_on(text)
+        elif "desk" in marks:
+            self._sit_down(text)
         elif language == "sh":
             self._shell(text, int(marks.get("fails", "0")))
         elif language in PROGRAMS:
@@ -204,6 +211,17 @@ class Reader:
             check=False,
         )
         assert done.returncode == status, f"{text}\n{done.stdout}\n{done.stderr}"
+
+    def _sit_down(self, text: str) -> None:
+        """Run one command after the other on a terminal, with a person before it."""
+        with an_x_server() as display:
+            for command in text.splitlines():
+                person = Person(command, self._folder, {**self._environment, "DISPLAY": display})
+                status = person.sit()
+                # What a doctor finds wrong with this computer is no fault of the page.
+                bad = status != 0 and not (status == 1 and "labcrane doctor" in command)
+                assert not bad, f"{command}: ended with {status}\n{person.read}"
+                assert "Traceback" not in person.read, person.read
 
     def _runs_on(self, text: str) -> None:
         """Start a program that has no end, and stop it when it has run a while."""
