@@ -29,22 +29,9 @@ def record(folder: Path, movements: int) -> Path:
     folder.mkdir(parents=True)
     (folder / "instructions.md").write_text("Move.", encoding="utf-8")
     (folder / "protocol.yaml").write_text(text, encoding="utf-8")
-    command = [
-        "run",
-        "protocol.yaml",
-        "--participant",
-        "P001",
-        "--simulate",
-        "--fast",
-        "--data",
-        "data",
-    ]
-    subprocess.run(
-        [sys.executable, "-m", "labcrane", *command],
-        cwd=folder,
-        check=True,
-        stdout=subprocess.DEVNULL,
-    )
+    session = ["protocol.yaml", "--participant", "P001", "--simulate", "--fast", "--data", "data"]
+    command = [sys.executable, "-m", "labcrane", "run", *session]
+    subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
     return folder / "data" / "P001-SIMULATED" / "P001-SIMULATED.h5"
 
 

@@ -16,6 +16,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from benchmarks.bare_engine import BareEngine
 from benchmarks.table import Row, show
 from labcrane.registry import discover
 from labcrane.simulation import SimulationOrder, simulate
@@ -48,7 +49,7 @@ def one_core(folder: Path, participants: int) -> list[Row]:
         count = recorded(order.folder.participant_file)
         ticks += count
         for passes in PASSES:
-            bare[passes] += bare_s(study, folder, passes, count)
+            bare[passes] += bare_s(study, passes, count)
     goals = {200: 1.5, 400: None}
     return [
         Row(
@@ -71,42 +72,13 @@ def recorded(path: Path) -> int:
         return len(file["ses-01/time"])
 
 
-def bare_s(study: Study, folder: Path, passes: int, count: int) -> float:
+def bare_s(study: Study, passes: int, count: int) -> float:
     """Return the processor's seconds for so many ticks of the engine alone."""
-    from labcrane_bullet.engine import pybullet  # noqa: PLC0415
-    from labcrane_bullet.urdf import urdf  # noqa: PLC0415
-
-    client = pybullet.connect(pybullet.DIRECT)
-    pybullet.setPhysicsEngineParameter(
-        fixedTimeStep=1.0 / study.protocol.rate_hz,
-        numSolverIterations=passes,
-        solverResidualThreshold=0,
-        deterministicOverlappingPairs=1,
-        physicsClientId=client,
-    )
-    pybullet.setGravity(0, 0, -9.81, physicsClientId=client)
-    path = folder / "crane.urdf"
-    path.write_text(urdf(study.machine))
-    flags = pybullet.URDF_USE_INERTIA_FROM_FILE
-    body = pybullet.loadURDF(str(path), useFixedBase=True, flags=flags, physicsClientId=client)
-    dampings = dict.fromkeys(("linearDamping", "angularDamping", "jointDamping"), 0.0)
-    for joint, angle in enumerate(study.machine.rest):
-        pybullet.changeDynamics(body, joint, **dampings, physicsClientId=client)
-        pybullet.changeDynamics(body, joint, jointLimitForce=1e7, physicsClientId=client)
-        pybullet.resetJointState(body, joint, angle, 0.0, physicsClientId=client)
-    efforts, joints = [joint.effort for joint in study.machine.joints], [0, 1, 2, 3]
-    began = time.process_time()
-    for number in range(count):
-        speeds = [0.1 if number // 480 % 2 else -0.1] * 4
-        pybullet.setJointMotorControlArray(
-            body, joints, pybullet.VELOCITY_CONTROL, targetVelocities=speeds, forces=efforts,
-            physicsClientId=client,
-        )  # fmt: skip
-        pybullet.stepSimulation(physicsClientId=client)
-        pybullet.getJointStates(body, joints, physicsClientId=client)
-    took = time.process_time() - began
-    pybullet.disconnect(client)
-    return took
+    with BareEngine(study.machine, study.protocol.rate_hz, passes) as engine:
+        began = time.process_time()
+        for _ in range(count):
+            engine.tick()
+        return time.process_time() - began
 
 
 COMMAND = """

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.bare_engine import BareEngine
 from benchmarks.table import Row
 from labcrane import Frame, InputDevice, Signal, Tick, loop, rig
 from labcrane.clock import Clock, ManualClock, SystemClock, ticks
@@ -152,53 +153,13 @@ while True:
 """
 
 
-class Bare:
-    """The engine alone, with the crane's own settings."""
-
-    def __init__(self, study: Study, folder: Path) -> None:
-        from labcrane_bullet import bullet_crane as crane  # noqa: PLC0415
-        from labcrane_bullet.engine import pybullet  # noqa: PLC0415
-        from labcrane_bullet.urdf import urdf  # noqa: PLC0415
-
-        self._engine = pybullet
-        self._client = client = pybullet.connect(pybullet.DIRECT)
-        pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=1.0 / study.protocol.rate_hz,
-            numSolverIterations=crane.ITERATIONS,
-            solverResidualThreshold=crane.RESIDUAL,
-            physicsClientId=client,
-        )
-        pybullet.setGravity(0, 0, -crane.GRAVITY, physicsClientId=client)
-        path = folder / "crane.urdf"
-        path.write_text(urdf(study.machine))
-        self._body = pybullet.loadURDF(
-            str(path),
-            useFixedBase=True,
-            flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
-            physicsClientId=client,
-        )
-        self._efforts = [joint.effort for joint in study.machine.joints]
-        for joint, angle in enumerate(study.machine.rest):
-            pybullet.changeDynamics(
-                self._body, joint, linearDamping=0, angularDamping=0, jointDamping=0,
-                physicsClientId=client,
-            )  # fmt: skip
-            pybullet.resetJointState(self._body, joint, angle, 0.0, physicsClientId=client)
-
-    def times(self, count: int) -> np.ndarray:
-        """Return the seconds that each of ``count`` ticks took."""
-        engine, client, joints = self._engine, self._client, [0, 1, 2, 3]
-        ends = []
-        for number in range(count):
-            speeds = [0.1 if number // 480 % 2 else -0.1] * 4
-            engine.setJointMotorControlArray(
-                self._body, joints, engine.VELOCITY_CONTROL, targetVelocities=speeds,
-                forces=self._efforts, physicsClientId=client,
-            )  # fmt: skip
-            engine.stepSimulation(physicsClientId=client)
-            engine.getJointStates(self._body, joints, physicsClientId=client)
-            ends.append(time.perf_counter())
-        return np.diff(ends)
+def bare_times(engine: BareEngine, count: int) -> np.ndarray:
+    """Return the seconds that each of ``count`` ticks of the engine alone took."""
+    ends = []
+    for _ in range(count):
+        engine.tick()
+        ends.append(time.perf_counter())
+    return np.diff(ends)
 
 
 def rows() -> list[Row]:
@@ -215,16 +176,18 @@ def rows() -> list[Row]:
 
 def cost(folder: Path) -> dict[str, list[np.ndarray]]:
     """Print the cost of a tick, bare and whole; return all times in s."""
+    from labcrane_bullet import bullet_crane as crane  # noqa: PLC0415
+
     study = study_at(240.0, folder)
-    bare = Bare(study, folder)
     found: dict[str, list[np.ndarray]] = {"bare": [], "whole": [], "whole, LSL": []}
-    for _ in range(ROUNDS):
-        gc.collect()
-        found["bare"].append(bare.times(TICKS)[WARM_UP:])
-        for name, lsl in (("whole", False), ("whole, LSL", True)):
-            clock = ManualClock(time.perf_counter())  # LSL takes only times of the computer
-            ends = [frame.elapsed for frame in whole(study, folder, clock, TICKS, lsl=lsl)]
-            found[name].append(np.diff(ends)[WARM_UP:])
+    with BareEngine(study.machine, study.protocol.rate_hz, crane.ITERATIONS) as engine:
+        for _ in range(ROUNDS):
+            gc.collect()
+            found["bare"].append(bare_times(engine, TICKS)[WARM_UP:])
+            for name, lsl in (("whole", False), ("whole, LSL", True)):
+                clock = ManualClock(time.perf_counter())  # LSL takes only times of the computer
+                ends = [frame.elapsed for frame in whole(study, folder, clock, TICKS, lsl=lsl)]
+                found[name].append(np.diff(ends)[WARM_UP:])
     print(f"cost of a tick, {ROUNDS} rounds of {TICKS} ticks, unpaced")
     print(f"{'':12} {'p50 us':>8} {'p99 us':>8} {'ratio p50':>18} {'ratio p99':>18}")
     bare_p50, bare_p99 = (np.array([np.quantile(r, q) for r in found["bare"]]) for q in (0.5, 0.99))

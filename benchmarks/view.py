@@ -37,12 +37,7 @@ def a_scene() -> Run:
 
 
 def rows() -> list[Row]:
-    """Return both figures as a table."""
-    return main()
-
-
-def main() -> list[Row]:
-    """Print both figures for either renderer."""
+    """Print and return both figures for either renderer."""
     run, found = a_scene(), []
     for renderer in ("auto", "software"):
         settings = ViewSettings(display="hidden", renderer=renderer, supervisor={"rate_hz": 10})
@@ -120,4 +115,4 @@ def _delay(view: View, run: Run) -> int:
 
 
 if __name__ == "__main__":
-    main()
+    rows()

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Self
 
 
 class Verdict(StrEnum):
@@ -30,6 +31,12 @@ class Finding:
     verdict: Verdict
     text: str
     advice: str = ""
+
+    @classmethod
+    def failed(cls, error: Exception) -> Self:
+        """Return an error as a finding: what to do is what it says after its last semicolon."""
+        said, _, fix = str(error).rpartition("; ")
+        return cls(Verdict.FAIL, said or fix, fix if said else "")
 
 
 def worst(verdicts: Iterable[Verdict]) -> Verdict:

@@ -22,6 +22,15 @@ def run(*command: object, cwd: Path | None = None) -> "subprocess.CompletedProce
 
 def environment_with(projects: Iterable[Path], folder: Path) -> Path:
     """Install projects without downloading anything; return the environment's Python."""
+    python = environment(folder)
+    options = ["--no-deps", "--no-build-isolation", "--no-index", "-q"]
+    done = run(python, "-m", "pip", "install", *options, *projects)
+    assert done.returncode == 0, done.stderr
+    return python
+
+
+def environment(folder: Path) -> Path:
+    """Make an environment that sees what this one has; return its Python."""
     venv.create(folder, with_pip=True)
     python = folder / "bin" / "python"
     (here,) = folder.glob("lib/python*/site-packages")
@@ -29,7 +38,8 @@ def environment_with(projects: Iterable[Path], folder: Path) -> Path:
     # addsitedir also reads the .pth files of what is installed as editable.
     lines = [f"import site; site.addsitedir({path!r})\n" for path in outer]
     (here / "outer.pth").write_text("".join(lines))
-    options = ["--no-deps", "--no-build-isolation", "--no-index", "-q"]
-    done = run(python, "-m", "pip", "install", *options, *projects)
-    assert done.returncode == 0, done.stderr
+    for program in ("labcrane", "pytest"):
+        path = folder / "bin" / program
+        path.write_text(f'#!/bin/sh\nexec "{python}" -m {program} "$@"\n')
+        path.chmod(0o755)
     return python

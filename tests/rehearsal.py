@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from simple_crane import CRANE
+
 from labcrane import loop, rig
 from labcrane.clock import ManualClock
 from labcrane.console import Command
@@ -14,17 +16,15 @@ from labcrane.records import Event, Frame, Run
 from labcrane.registry import discover
 from labcrane.study import Study, load
 
-SHORT = """\
+SHORT = (
+    """\
 labcrane: 1
 study: rehearsal
 title: A short study
 rate_hz: 240
-machine: ch8
-input: {use: dual_joystick}
-scheme:
-  use: joint_velocity
-  map: {slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}
-dynamics: {use: kinematic_crane}
+"""
+    + CRANE
+    + """\
 tasks:
   aiming: {use: aiming, distances: [2], movements: 2}
 sessions:
@@ -32,6 +32,7 @@ sessions:
     steps:
       - block: {task: aiming, pairs: 1}
 """
+)
 
 
 def a_study(folder: Path, text: str = SHORT) -> Study:

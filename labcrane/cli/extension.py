@@ -1,7 +1,9 @@
 """Groups of commands: those of plugins, put beside labcrane's own."""
 
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 
 import typer
@@ -12,6 +14,9 @@ GROUP = "labcrane.commands"
 """Entry points that name a group of commands, and the module with its hook: known without importing
 any plugin (docs/decisions/0091-groups-by-entry-point.md)."""
 
+DOCSTRING = re.compile(r"(?:\s|#.*\n)*(?P<quote>\"{3}|'{3}|\"|')(?P<line>.+?)(?:(?P=quote)|\n)")
+"""How a module begins that says what it is for."""
+
 
 def extend(app: typer.Typer, first: str, *, everything: bool) -> None:
     """Add the groups of installed plugins, and fill the one that the command line begins with.
@@ -19,14 +24,16 @@ def extend(app: typer.Typer, first: str, *, everything: bool) -> None:
     With ``everything``, as for a shell that completes what is typed, all of them are filled.
     """
     own = {command.name for command in app.registered_commands}
-    for group in sorted(set(declared(GROUP))):
+    # Two plugins can share a group; its help is by the one that is found first.
+    modules = dict(reversed(list(declared(GROUP))))
+    for group, module in sorted(modules.items()):
         if group in own:
             raise PluginError(
                 f"a plugin offers commands {group!r}, but {group!r} is a command of labcrane; "
                 "uninstall it"
             )
         if group not in {there.name for there in app.registered_groups}:
-            add(app, group, f"Commands about {group}.")
+            add(app, group, description(module))
         if group == first or everything:
             fill(app, group, _offered(group))
 
@@ -35,7 +42,7 @@ def add(app: typer.Typer, group: str, about: str) -> None:
     """Add a group without commands."""
     made = typer.Typer(no_args_is_help=True, help=about, rich_markup_mode=None)
     made.callback()(_nothing)  # a group stays a group, even with one command
-    app.add_typer(made, name=group)
+    app.add_typer(made, name=group, short_help=about)  # or it would be cut off
 
 
 def fill(app: typer.Typer, group: str, commands: Mapping[str, Callable[..., None]]) -> None:
@@ -51,8 +58,25 @@ def first_line(run: Callable[..., None]) -> str:
     return (run.__doc__ or "").partition("\n")[0]
 
 
-def declared(group: str) -> Iterator[str]:
-    """Yield the names of the entry points in a group, of all that is installed in folders.
+def description(module: str) -> str:
+    """Return the first line of a module's docstring, without importing the module."""
+    place: list[str] | None = None
+    spec: ModuleSpec | None = None
+    whole = ""
+    for part in module.split("."):
+        whole = f"{whole}.{part}".lstrip(".")
+        found = (finder.find_spec(whole, place) for finder in sys.meta_path)
+        spec = next((each for each in found if each), None)
+        if spec is None:
+            return "Not there any more: labcrane plugins says what is missing."
+        place = spec.submodule_search_locations
+    get_source = getattr(spec and spec.loader, "get_source", lambda name: None)
+    said = DOCSTRING.match(get_source(whole) or "")
+    return said["line"] if said else f"Commands of {module}."
+
+
+def declared(group: str) -> Iterator[tuple[str, str]]:
+    """Yield the names of the entry points in a group and their modules, of what is in folders.
 
     Their files are read here, because ``importlib.metadata`` loads what reads mail, which would
     take longer than all the rest of the help. What imports them goes through it all the same.
@@ -67,7 +91,8 @@ def declared(group: str) -> Iterator[str]:
                 if line.startswith("["):
                     section = line.strip("[] ")
                 elif section == group and line and not line.startswith(("#", ";")):
-                    yield line.partition("=")[0].strip()
+                    name, _, value = line.partition("=")
+                    yield name.strip(), value.partition(":")[0].strip()
 
 
 def _offered(group: str) -> dict[str, Callable[..., None]]:

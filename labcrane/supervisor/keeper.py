@@ -15,6 +15,9 @@ from labcrane.supervisor.service import PageOrder, Report, Streams, Used, serve
 
 LOOK_S = 0.2
 MOST_RESTARTS = 5
+END_S = 3.0
+"""How long the process may take to end by itself."""
+
 LAST_LOOK_S = 0.5
 """How long a page has to show the end before its process ends."""
 
@@ -93,7 +96,8 @@ class PageKeeper:
                     self._news.put(event)
             sender.start()
             self._receive(ours, process.sentinel)
-            ours.close()
+            ours.close()  # which the process takes for the end
+            process.join(END_S)  # a killed one leaves semaphores, and Python complains of them
             process.kill()
             process.join()
             if self._over.is_set():

@@ -110,7 +110,7 @@ def serve(order: PageOrder, pipe: Connection) -> None:
     server = uvicorn.Server(config)
 
     def end() -> None:
-        server.should_exit = server.force_exit = True
+        server.should_exit = True
 
     threading.Thread(target=_listen, args=(pipe, desk.board, end), daemon=True).start()
     server.run()

@@ -7,9 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from labcrane import FloatArray, Value
+from labcrane_aiming.pairs import Point
 from labcrane_aiming.settings import AimingSettings
 
-Point = tuple[float, float, float]
+ROUNDING_S = 1e-9
+"""Elapsed times are sums of whole ticks."""
 
 
 @dataclass
@@ -68,8 +70,7 @@ class Movement:
     @property
     def rested(self) -> bool:
         """Whether the tip has been at rest, where it must be, for long enough."""
-        # Half a tick of slack: elapsed times are sums of whole ticks.
-        return self.elapsed[-1] - self.rest_since >= self.settings.rest_s - 1e-9
+        return self.elapsed[-1] - self.rest_since >= self.settings.rest_s - ROUNDING_S
 
     @property
     def done(self) -> float:
@@ -94,11 +95,11 @@ class Movement:
         if speed[peak] <= threshold:
             return None
         held = self.elapsed[last] - self.elapsed[first]
-        return first if held >= self.settings.onset_hold_s - 1e-9 else None
+        return first if held >= self.settings.onset_hold_s - ROUNDING_S else None
 
     def tick_at(self, elapsed: float) -> int:
         """Return the tick at a trial time."""
-        return int(np.searchsorted(self.elapsed, elapsed - 1e-9))
+        return int(np.searchsorted(self.elapsed, elapsed - ROUNDING_S))
 
     def measures(self, end: int | None) -> dict[str, Value]:
         """Return the results, ``end`` being the tick of the movement's offset.

@@ -19,6 +19,7 @@ from labcrane_bids.motion import TrackingSystem, tracking_systems
 from labcrane_bids.settings import BidsSettings
 
 FIRST_DAY = datetime(1925, 1, 1, tzinfo=UTC)
+PERSON = ("age", "sex", "handedness", "group")
 
 
 class Bids(Exporter):
@@ -114,9 +115,6 @@ class Bids(Exporter):
             "Description": system.description,
         }
         write_json(path.with_name(f"{path.name}.json"), about)
-
-
-PERSON = ("age", "sex", "handedness", "group")
 
 
 def _counts(system: TrackingSystem) -> dict[str, int]:

@@ -4,15 +4,12 @@ import csv
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from labcrane import ProtocolError
 from labcrane_bids.events import HED_VERSION
 from labcrane_bids.files import MISSING, label, write_json, write_tsv
 from labcrane_bids.settings import BidsSettings
-
-if TYPE_CHECKING:
-    pass
 
 BIDS_VERSION = "1.11.1"
 
@@ -93,11 +90,18 @@ def people_table(path: Path | None) -> dict[str, dict[str, str]]:
     if path is None:
         return {}
     if not path.is_file():
-        raise ProtocolError(f"there is no file {path} with age, sex, handedness and group")
+        raise ProtocolError(
+            f"there is no file {path} with age, sex, handedness and group; name one with --set "
+            "people=FILE, or leave it out"
+        )
     with path.open(encoding="utf-8", newline="") as file:
         reader = csv.DictReader(file)
         if "participant" not in (reader.fieldnames or ()):
-            raise ProtocolError(f"{path} has no column participant; it has {reader.fieldnames}")
+            there = ", ".join(reader.fieldnames or ()) or "none"
+            raise ProtocolError(
+                f"{path} has no column 'participant'; its columns are {there}: add one with the "
+                "pseudonyms"
+            )
         return {row["participant"]: {k: v for k, v in row.items() if v} for row in reader}
 
 
@@ -109,15 +113,36 @@ def copy_phenotype(source: Path | None, folder: Path) -> None:
 
     tables = sorted(source.glob("*.csv"))
     if not tables:
-        raise ProtocolError(f"there is no CSV file in {source}; one per questionnaire is needed")
+        raise ProtocolError(
+            f"there is no CSV file in {source}; put one there for each questionnaire, or leave "
+            "phenotype out"
+        )
     (folder / "phenotype").mkdir()
     for path in tables:
         described = path.with_suffix(".json")
         if not described.is_file():
             raise ProtocolError(f"{path} has no description; write {described} beside it")
-        table: pd.DataFrame = pd.read_csv(path)
+        table = pd.read_csv(path)
+        if "participant" not in table:
+            raise ProtocolError(
+                f"{path} has no column 'participant'; its columns are "
+                f"{', '.join(map(str, table))}: add one with the pseudonyms"
+            )
         names = [f"sub-{label(str(name))}" for name in table.pop("participant")]
         table.insert(0, "participant_id", names)
         write_tsv(folder / "phenotype" / f"{path.stem}.tsv", table)
-        content = json.loads(described.read_text(encoding="utf-8"))
+        content = _description(described)
         write_json(folder / "phenotype" / f"{path.stem}.json", content)
+
+
+def _description(path: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ProtocolError(f"{path} is no JSON: {error}; correct it there") from error
+    if not isinstance(content, dict):
+        raise ProtocolError(
+            f"{path} holds {type(content).__name__}; it must hold an object with a key for each "
+            "column"
+        )
+    return content

@@ -91,7 +91,7 @@ class Bridge:
             inlet = pylsl.StreamInlet(found[0], max_buflen=1, recover=True)
             try:
                 labels = inlet.info(timeout=2.0).get_channel_labels() or []
-            except RuntimeError:  # pylsl: the stream is gone again, so look for the next
+            except (pylsl.util.TimeoutError, pylsl.util.LostError):  # gone again: look for the next
                 continue
             valves = self._settings.valves
             numbers = [valves.get(str(label)) for label in labels]

@@ -1,10 +1,13 @@
 """The command ``labcrane gateway can``: from a panel's bus to the open gateway protocol."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
 
 out = Console(soft_wrap=True, highlight=False)
 
@@ -28,14 +31,26 @@ def can(
     seconds: Annotated[float | None, typer.Option(help="stop after this time")] = None,
 ) -> None:
     """Bridge a control panel on a CAN bus to the open gateway protocol (docs/gateway.md)."""
+    from pydantic import ValidationError
+
     from labcrane_can.bridge import Bridge
     from labcrane_can.settings import CanSettings
 
     valves = _valves(valve or [], map_)
-    settings = CanSettings(bus=bus, bitrate=bitrate, valves=valves, map=map_, full=full)
+    try:
+        settings = CanSettings(bus=bus, bitrate=bitrate, valves=valves, map=map_, full=full)
+    except ValidationError as error:
+        raise typer.BadParameter(_said(error.errors()[0])) from None
     out.print(f"{bus} -> LSL stream {name!r}: {', '.join(valves)}; Ctrl-C ends", markup=False)
     with Bridge(settings, name) as bridge:
         bridge.run(seconds, lambda text: out.print(text, markup=False))
+
+
+def _said(error: "ErrorDetails") -> str:
+    """Return in words what is wrong with an option."""
+    where = ".".join(map(str, error["loc"]))
+    text = error["msg"].removeprefix("Value error, ")
+    return f"{where}: {text}" if where else text
 
 
 def _valves(written: list[str], map_: Path | None) -> dict[str, int | str]:

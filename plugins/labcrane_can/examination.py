@@ -19,8 +19,7 @@ def examine(settings: CanSettings, ask: Ask | None) -> list[Finding]:
         commands = PanelCommands(settings)
         bus = open_bus(settings)
     except (DeviceError, ProtocolError) as error:
-        said, _, fix = str(error).rpartition("; ")
-        return [Finding(Verdict.FAIL, said or fix, fix if said else "")]
+        return [Finding.failed(error)]
     sources: Counter[int] = Counter()
     try:
         began = now = time.perf_counter()

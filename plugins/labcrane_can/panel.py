@@ -2,41 +2,15 @@
 
 from collections.abc import Mapping
 
-import numpy as np
-
-from labcrane import (
-    FloatArray,
-    Frame,
-    InputDevice,
-    Machine,
-    ProtocolError,
-    Run,
-    Signal,
-    Tick,
-    Value,
-)
+from labcrane import FloatArray, Frame, InputDevice, Machine, Run, Tick, Value
 from labcrane_can.asked import PanelCommands
 from labcrane_can.avc import ESTIMATED, FULL, MEASURED, encode_flow
+from labcrane_can.axes import PanelAxes
 from labcrane_can.listener import Listener
-from labcrane_can.settings import CanSettings, ValveMap
+from labcrane_can.settings import CanSettings
 
 FEEDBACK_HZ = 10.0
 PERCENT = 100.0
-
-
-def panel_signals(settings: ValveMap, machine: Machine) -> tuple[Signal, ...]:
-    """Return what a panel gives: each joint's signal as a share of full, and whether it floats."""
-    for joint in settings.valves:
-        if joint not in machine.names:
-            raise ProtocolError(
-                f"valves names joint {joint!r}; the machine has {', '.join(machine.names)}"
-            )
-    joints = tuple(settings.valves)
-    return (
-        Signal("valve", "1", joints),
-        Signal("float", "1", joints),
-        Signal("panel.connected", "1"),
-    )
 
 
 class CanPanel(InputDevice):
@@ -46,35 +20,29 @@ class CanPanel(InputDevice):
     """
 
     def __init__(self, settings: CanSettings, machine: Machine) -> None:
-        self.signals = panel_signals(settings, machine)
+        self._axes = PanelAxes(settings, machine)
+        self.signals = self._axes.signals
         self._settings = settings
         self._machine = machine
         self._commands = PanelCommands(settings)
         self._listener: Listener | None = None
-        self._joints = tuple(settings.valves)
-        self._out = np.zeros(2 * len(self._joints) + 1)
 
     def open(self, run: Run) -> None:
         names = [signal.name for signal in run.state.signals]
         self._opening = run.state.find("valve.opening") if "valve.opening" in names else None
         self._speed = run.state.find("joint.velocity")
-        self._places = [self._machine.names.index(joint) for joint in self._joints]
+        self._places = {joint: self._machine.names.index(joint) for joint in self._settings.valves}
         self._every = max(1, round(run.rate_hz / FEEDBACK_HZ))
         self._listener = Listener(self._settings, self._commands)
 
     def read(self, tick: Tick, seen: Frame) -> FloatArray:
         signals, floats, there = self._commands.signals(tick.woke)
         self.fault = self._trouble(tick.woke, there=there)
-        out, joints = self._out, len(self._joints)
         if self.fault is not None:
-            out[:] = 0.0
-            return out
-        out[:joints] = [signal / FULL for signal in signals]
-        out[joints:-1] = floats
-        out[-1] = 1.0
+            return self._axes.lost()
         if self._settings.feedback and tick.number % self._every == 0:
             self._send_back(seen.state)
-        return out
+        return self._axes.given(signals, floats)
 
     def close(self) -> None:
         if self._listener is not None:
@@ -101,7 +69,7 @@ class CanPanel(InputDevice):
         if listener is None or self._opening is None:
             return
         openings, speeds = state[self._opening].tolist(), state[self._speed].tolist()
-        for joint, place in zip(self._joints, self._places, strict=True):
+        for joint, place in self._places.items():
             valve = self._settings.valves[joint]
             if isinstance(valve, str):
                 return  # a DBC map says nothing of what the panel wants to hear

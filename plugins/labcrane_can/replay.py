@@ -2,22 +2,9 @@
 
 from collections.abc import Mapping
 
-import numpy as np
-
-from labcrane import (
-    FloatArray,
-    Frame,
-    InputDevice,
-    Machine,
-    ProtocolError,
-    Run,
-    Signal,
-    Tick,
-    Value,
-)
+from labcrane import FloatArray, Frame, InputDevice, Machine, ProtocolError, Run, Tick, Value
 from labcrane_can.asked import PanelCommands
-from labcrane_can.avc import FULL
-from labcrane_can.panel import panel_signals
+from labcrane_can.axes import PanelAxes
 from labcrane_can.settings import ReplaySettings
 
 MICROSECONDS = 6
@@ -34,7 +21,8 @@ class CanReplay(InputDevice):
     def __init__(self, settings: ReplaySettings, machine: Machine) -> None:
         import can  # noqa: PLC0415 - loads for a moment
 
-        self.signals: tuple[Signal, ...] = panel_signals(settings, machine)
+        self._axes = PanelAxes(settings, machine)
+        self.signals = self._axes.signals
         self._settings = settings
         try:
             with can.LogReader(settings.file) as log:
@@ -46,7 +34,6 @@ class CanReplay(InputDevice):
         if not self._frames:
             raise ProtocolError(f"{settings.file} holds no frames, so there is nothing to replay")
         self._start = self._frames[0].timestamp
-        self._out = np.zeros(2 * len(settings.valves) + 1)
 
     def open(self, run: Run) -> None:
         self._rate_hz = run.rate_hz
@@ -63,7 +50,6 @@ class CanReplay(InputDevice):
             self._commands.take(frame, at)
             self._next += 1
         signals, floats, there = self._commands.signals(now)
-        out, joints = self._out, len(signals)
         if not there:
             ended = self._next == len(self._frames)
             self.fault = (
@@ -74,12 +60,8 @@ class CanReplay(InputDevice):
         else:
             self.fault = self._commands.silent(now)
         if self.fault is not None:
-            out[:] = 0.0
-            return out
-        out[:joints] = [signal / FULL for signal in signals]
-        out[joints:-1] = floats
-        out[-1] = 1.0
-        return out
+            return self._axes.lost()
+        return self._axes.given(signals, floats)
 
     def facts(self) -> Mapping[str, Value]:
         return {"file": self._settings.file.name, "frames": len(self._frames)}

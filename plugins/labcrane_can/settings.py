@@ -1,13 +1,16 @@
 """What a protocol may say about a panel on a CAN bus."""
 
+import re
 from typing import Annotated
 
-from pydantic import Field, PositiveFloat, PositiveInt, model_validator
+from pydantic import Field, PositiveFloat, PositiveInt, field_validator, model_validator
 
 from labcrane import Settings, StudyPath
 
 Node = Annotated[int, Field(ge=0, le=253)]
 """Source address on the bus; 254 and 255 are no node."""
+
+BUS = r"^[a-z_]+:.+$"
 
 Valve = Annotated[int, Field(ge=1, le=15)]
 """Number of an auxiliary valve; 0 is "power beyond" and moves no joint."""
@@ -56,7 +59,7 @@ class ValveMap(Settings):
 class CanSettings(ValveMap):
     """A panel on a live bus."""
 
-    bus: str = Field(pattern=r"^[a-z_]+:.+$")
+    bus: str = Field(json_schema_extra={"pattern": BUS})
     """Interface and channel of python-can: ``slcan:/dev/ttyACM0``, ``socketcan:can0``,
     ``socketcand:can0@192.168.1.5:29536``, ``pcan:PCAN_USBBUS1``."""
 
@@ -72,6 +75,21 @@ class CanSettings(ValveMap):
     most_frames_s: PositiveInt = 4000
     """Frames a second beyond which the bus counts as flooded: about twice what 250 kbit/s
     carry."""
+
+    @field_validator("bus")
+    @classmethod
+    def _can_be_looked_for(cls, bus: str) -> str:
+        if not re.match(BUS, bus):
+            raise ValueError(
+                f"{bus!r} is no bus; write interface:channel, as slcan:/dev/ttyACM0 or "
+                "socketcan:can0"
+            )
+        port = bus.partition("@")[2].partition(":")[2]
+        if bus.startswith("socketcand:") and port and not port.isdecimal():
+            raise ValueError(
+                f"{port!r} is no port; write socketcand:channel@host:port, or leave the port out"
+            )
+        return bus
 
 
 class ReplaySettings(ValveMap):

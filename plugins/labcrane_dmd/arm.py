@@ -29,6 +29,9 @@ from labcrane_dmd.world import World
 
 ROUNDING_S = 1e-9
 
+SLACK_RAD = 2e-3
+"""How far beyond its limit the engine lets a joint stand; more is a mistake."""
+
 
 class DmdArm(Dynamics):
     """Joints whose valves give the speeds of a model, with drives of limited force behind them.
@@ -185,7 +188,6 @@ class DmdArm(Dynamics):
             )
         for number, (joint, angle) in enumerate(zip(self._machine.joints, angles, strict=True)):
             lowest, highest = joint.limits
-            # An engine lets a joint stand a bit beyond its limit; more is a mistake.
             if not lowest - SLACK_RAD <= angle <= highest + SLACK_RAD:
                 raise ProtocolError(
                     f"a pose with {joint.name} at {angle:.4f} rad was asked for; it goes from "
@@ -203,6 +205,3 @@ class DmdArm(Dynamics):
         if self._world is not None:
             self._world.close()
             self._world = None
-
-
-SLACK_RAD = 2e-3

@@ -17,6 +17,10 @@ Parts = Mapping[str, tuple[str, ...]]
 LIMIT_RAD = 1e-3
 """A joint this close to the end of its range stands there."""
 
+GRIP = (("thing", "1"), ("force", "N"), ("drops", "1"))
+"""Which thing is held, counted from 1 in the order of the state, what pulls at it, and how often
+something slipped out."""
+
 
 def scene_parts(scenes: Iterable[Scene]) -> Parts:
     """Return what can move in any of the scenes; a thing of the same name shares its columns."""
@@ -58,11 +62,6 @@ def arm_signals(machine: Machine, parts: Parts) -> tuple[Signal, ...]:
         *scene,
         *grip,
     )
-
-
-GRIP = (("thing", "1"), ("force", "N"), ("drops", "1"))
-"""Which thing is held, counted from 1 in the order of the state, what pulls at it, and how often
-something slipped out."""
 
 
 class ArmState:

@@ -78,13 +78,15 @@ def validate(
     """
     from labcrane_dmd.figures import draw_validation
     from labcrane_dmd.model_file import load
+    from labcrane_dmd.output import written
     from labcrane_dmd.recordings import read_recordings
     from labcrane_dmd.validation import summary, write_table
     from labcrane_dmd.validation import validate as compare
 
     loaded = load(model, between)
     folder = to or model.with_suffix("").with_name(f"{model.stem}-validation")
-    folder.mkdir(parents=True, exist_ok=True)
+    with written(folder):
+        folder.mkdir(parents=True, exist_ok=True)
     read = read_recordings(recordings)
     own = loaded.settings.between
     for rule in ("linear", "pchip"):

@@ -9,7 +9,7 @@ from labcrane_dmd.scene_bodies import Standing
 Key = tuple[str, str]
 """A thing and one of its parts."""
 
-NORMAL_FORCE, LINK_A, LINK_B = 9, 3, 4
+BODY_B, LINK_A, LINK_B, NORMAL_FORCE = 2, 3, 4, 9
 """Places in the engine's contact points."""
 
 
@@ -53,8 +53,8 @@ class Contacts:
     ) -> None:
         self._client = client
         self._things = [each for each in standing if each.placed.kind != "obstacle"]
-        still = {each.body for each in standing if each.placed.kind == "obstacle"} | {ground}
-        self._still = still
+        obstacles = {each.body for each in standing if each.placed.kind == "obstacle"}
+        self._still = obstacles | {ground}
         self._arm = arm
         keys = [(each.placed.name, part) for each in self._things for part in _names(each)]
         self._pressed = {key: Window(ticks) for key in keys}
@@ -73,7 +73,7 @@ class Contacts:
         for each in self._things:
             name = each.placed.name
             for point in pybullet.getContactPoints(bodyA=each.body, physicsClientId=self._client):
-                force, other = point[NORMAL_FORCE], point[2]
+                force, other = point[NORMAL_FORCE], point[BODY_B]
                 if force <= 0.0 or other == each.body:
                     continue
                 if other in self._still:

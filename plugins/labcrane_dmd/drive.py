@@ -8,6 +8,9 @@ from labcrane import Joint, Machine, ProtocolError
 from labcrane_dmd.model import Model, Segment
 from labcrane_dmd.recordings import FULL
 
+SHUT = 0.25
+"""Opening, in steps of 0.4 %, that is none: a lag never quite gets there."""
+
 
 class SegmentDrive:
     """One joint's valve.
@@ -51,10 +54,6 @@ class SegmentDrive:
             return 0.0
         size = abs(opening) + self._segment.direction(opening).dead_band
         return math.copysign(min(size, FULL), opening)
-
-
-SHUT = 0.25
-"""Opening, in steps of 0.4 %, that is none: a lag never quite gets there."""
 
 
 class ProportionalDrive:

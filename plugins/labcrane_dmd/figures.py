@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from labcrane_dmd.model import Model, Segment
+from labcrane_dmd.output import written
 from labcrane_dmd.recordings import FULL
 from labcrane_dmd.validation import Level
 
@@ -16,10 +17,7 @@ if TYPE_CHECKING:
 
 
 def _figure(width: float, height: float) -> "Figure":
-    import matplotlib as mpl  # noqa: PLC0415 - loads for a second
-
-    mpl.use("agg")
-    from matplotlib.figure import Figure  # noqa: PLC0415
+    from matplotlib.figure import Figure  # noqa: PLC0415 - loads for a second
 
     return Figure(figsize=(width, height), layout="constrained")
 
@@ -32,7 +30,8 @@ def draw_model(model: Model, path: Path) -> None:
         _draw_layers(segment, axes[0, column])
         _draw_signals(segment, axes[1, column])
     figure.suptitle(f"between layers: {model.settings.between}")
-    figure.savefig(path, dpi=110)
+    with written(path):
+        figure.savefig(path, dpi=110)
 
 
 def _draw_layers(segment: Segment, axes: "Axes") -> None:
@@ -74,4 +73,5 @@ def draw_validation(levels: Sequence[Level], between: str, path: Path) -> None:
         speed.grid(alpha=0.3)
         error.grid(alpha=0.3)
     figure.suptitle(f"signals that the model has not seen; between layers: {between}")
-    figure.savefig(path, dpi=110)
+    with written(path):
+        figure.savefig(path, dpi=110)

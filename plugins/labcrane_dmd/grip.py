@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from labcrane_dmd.contacts import Contacts, Window
+from labcrane_dmd.contacts import LINK_B, Contacts, Window
 from labcrane_dmd.engine import pybullet
 from labcrane_dmd.scene_bodies import Standing
 
@@ -90,7 +90,7 @@ class Grip:
         """Hold a body at one point: a limb turns in the hand that has hold of it."""
         client, hand = self._client, self._jaws[1]
         touching = pybullet.getContactPoints(self._arm, each.body, hand, physicsClientId=client)
-        link = touching[0][4] if touching else -1
+        link = touching[0][LINK_B] if touching else -1
         grabbed = pybullet.getLinkState(self._arm, hand, physicsClientId=client)[0]
         place = (
             pybullet.getBasePositionAndOrientation(each.body, physicsClientId=client)

@@ -10,9 +10,10 @@ from pydantic import Field, NonNegativeFloat, ValidationError, model_validator
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from labcrane import ProtocolError, RecordingError, Settings
+from labcrane import ProtocolError, Settings
 from labcrane_dmd.layer import Layer
 from labcrane_dmd.model import Direction, Model, Segment, Source
+from labcrane_dmd.output import written
 from labcrane_dmd.recordings import FULL
 from labcrane_dmd.settings import Between, FitSettings
 
@@ -168,12 +169,8 @@ def save(model: Model, path: Path) -> None:
     yaml.width = 100
     out = io.StringIO()
     yaml.dump(text, out)
-    try:
+    with written(path):
         path.write_text(HEADER + out.getvalue(), encoding="utf-8")
-    except OSError as error:
-        raise RecordingError(
-            f"the model cannot be written to {path}: {error.strerror}; give --out another place"
-        ) from error
 
 
 def _segment(name: str, text: SegmentText, between: Between) -> Segment:

@@ -91,7 +91,7 @@ def _files(place: Path) -> Iterator[Path]:
     elif place.exists():
         yield place
     else:
-        raise RecordingError(f"{place} does not exist")
+        raise RecordingError(f"{place} does not exist; give a file like boom.csv.gz, or its folder")
 
 
 def _read(path: Path) -> SegmentRecording:

@@ -1,5 +1,6 @@
 """A scene's things in the engine."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -10,9 +11,14 @@ from labcrane_dmd.engine import pybullet
 OVERLAP_M = 0.002
 """Depth, in metres, to which two things may stand in each other at the start."""
 
-GROUND = "ground"
 ROLLING = 0.002
 """Rolling friction in metres: without it a ball never comes to rest."""
+
+LYING = [0.0, math.pi / 2.0, 0.0]
+"""The engine's capsules stand along z; ours lie along x."""
+
+DISTANCE = 8
+"""Place of the distance in the engine's closest points; below 0 inside each other."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +89,7 @@ def check_apart(standing: list[Standing], arm: int, client: int) -> None:
             near: tuple[Any, ...] = pybullet.getClosestPoints(
                 first, second, 0.0, physicsClientId=client
             )
-            deep = -min((point[8] for point in near), default=0.0)
+            deep = -min((point[DISTANCE] for point in near), default=0.0)
             if deep > OVERLAP_M:
                 raise ProtocolError(
                     f"{other!r} stands {deep:.3f} m deep in {one!r} at the start of the trial; "
@@ -110,14 +116,10 @@ def _shape(shape: Form, size: tuple[float, float, float], client: int) -> int:
             pybullet.GEOM_CAPSULE,
             radius=y / 2,
             height=max(x - y, 0.01),
-            collisionFrameOrientation=pybullet.getQuaternionFromEuler([0.0, HALF_TURN, 0.0]),
+            collisionFrameOrientation=pybullet.getQuaternionFromEuler(LYING),
             physicsClientId=client,
         )
     return int(made)
-
-
-HALF_TURN = 1.5707963267948966
-"""The engine's capsules stand along z; ours lie along x."""
 
 
 def _turned(

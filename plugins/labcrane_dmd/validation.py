@@ -10,6 +10,7 @@ import numpy as np
 from labcrane import FloatArray, RecordingError
 from labcrane_dmd.fitting import LAGS, curve_at
 from labcrane_dmd.model import Model, Segment
+from labcrane_dmd.output import written
 from labcrane_dmd.recordings import SegmentRecording
 
 
@@ -82,7 +83,8 @@ def _levels(model: Model, segment: Segment, recording: SegmentRecording) -> Iter
     for signal in (*(-size for size in reversed(sizes)), *sizes):
         if not recording.at(signal):
             raise RecordingError(
-                f"{recording.file} has no run at signal {signal}, at which the model is validated"
+                f"{recording.file} has no run at signal {signal}, at which the model is validated; "
+                "record it"
             )
         yield _level(segment, recording, signal)
 
@@ -111,7 +113,7 @@ def _level(segment: Segment, recording: SegmentRecording, signal: int) -> Level:
 def write_table(rows: Iterable[dict[str, str | float]], path: Path) -> None:
     """Write rows of levels as CSV."""
     lines = list(rows)
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with written(path), path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, list(lines[0]))
         writer.writeheader()
         for line in lines:

@@ -12,7 +12,13 @@ DAMPING_M = 0.05
 """Beside metre-long links: keeps a practised hand calm where the arm is stretched out."""
 
 HALVINGS = 12
-"""Bisections of 250 steps; one more than there are steps."""
+"""Of the way from the dead band to full flow: to a sixteenth of a step."""
+
+STILL = 1e-3
+"""Joint speed in rad/s below which a hand does not push through the dead band."""
+
+END_RAD = 0.01
+"""A practised hand stops a joint this far from its end."""
 
 
 class Valve(Controller):
@@ -109,14 +115,6 @@ class Valve(Controller):
             else:
                 high = middle
         return sign * high / FULL
-
-
-STILL = 1e-3
-"""Joint speed in rad/s below which a hand does not push through the dead band."""
-
-
-END_RAD = 0.01
-"""A practised hand stops a joint this far from its end."""
 
 
 def _model(settings: ValveSettings) -> Model | None:

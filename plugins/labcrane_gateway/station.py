@@ -113,9 +113,15 @@ class Station(InputDevice):
             self._over.wait(LOOK_S)
 
     def _take(self, inlet: "pylsl.StreamInlet") -> None:
+        import pylsl  # noqa: PLC0415
+
         try:
             labels = inlet.info(timeout=2.0).get_channel_labels() or []
-        except RuntimeError as error:  # pylsl: the stream is gone again
+            inlet.open_stream(timeout=2.0)
+        except (
+            pylsl.util.TimeoutError,
+            pylsl.util.LostError,
+        ) as error:
             self._complaint = f"it was there and is gone again ({error})"
             return
         if missing := [joint for joint in self._joints if joint not in labels]:
@@ -125,5 +131,4 @@ class Station(InputDevice):
             )
             return
         self._order = [labels.index(joint) for joint in self._joints]
-        inlet.open_stream(timeout=2.0)
         self._inlet = inlet

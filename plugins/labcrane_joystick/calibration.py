@@ -12,6 +12,7 @@ from ruamel.yaml.error import YAMLError
 from labcrane import DeviceError, Settings
 
 RUN_AGAIN = "run 'python -m labcrane_joystick' to identify and calibrate the sticks"
+REMOVE = f"remove it and {RUN_AGAIN}"
 
 
 class AxisRange(Settings):
@@ -100,17 +101,28 @@ def load(path: Path, model: str) -> Calibrations | None:
 
 
 def save(path: Path, model: str, found: Calibrations) -> None:
-    """Keep ``found`` in ``path``, and what it holds for other models."""
+    """Keep ``found`` in ``path``, and what it holds for other models.
+
+    Raises
+    ------
+    DeviceError
+        The file cannot be written, or what it holds cannot be read.
+    """
     content = {**_read(path), model: found.model_dump()}
-    path.parent.mkdir(parents=True, exist_ok=True)
     # Written beside and renamed, so that a crash leaves the old file or the new one.
     beside = path.with_name(path.name + ".new")
-    with beside.open("w", encoding="utf-8") as file:
-        file.write("# Written by python -m labcrane_joystick; raw SDL numbers.\n")
-        YAML().dump(content, file)
-        file.flush()
-        os.fsync(file.fileno())
-    beside.replace(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with beside.open("w", encoding="utf-8") as file:
+            file.write("# Written by python -m labcrane_joystick; raw SDL numbers.\n")
+            YAML().dump(content, file)
+            file.flush()
+            os.fsync(file.fileno())
+        beside.replace(path)
+    except OSError as error:
+        raise DeviceError(
+            f"{path} cannot be written: {error.strerror}; set LABCRANE_CONFIG to a folder that can"
+        ) from error
 
 
 def _read(path: Path) -> Mapping[str, Any]:
@@ -119,14 +131,10 @@ def _read(path: Path) -> Mapping[str, Any]:
     except FileNotFoundError:
         return {}
     except (OSError, UnicodeDecodeError, YAMLError) as error:
-        raise DeviceError(f"{path} cannot be read: {error}; {_remove(path)}") from error
+        raise DeviceError(f"{path} cannot be read: {error}; {REMOVE}") from error
     if not isinstance(content, dict):
-        raise DeviceError(f"{path} must hold a mapping of joystick models; {_remove(path)}")
+        raise DeviceError(f"{path} must hold a mapping of joystick models; {REMOVE}")
     return content
-
-
-def _remove(path: Path) -> str:
-    return f"remove it and {RUN_AGAIN}"
 
 
 def _why(error: ValidationError) -> str:

@@ -58,7 +58,7 @@ def examine(
         stored = load(where, settings.stick)
         sticks = tell_apart(pair(attached(), settings.stick), stored)
     except DeviceError as error:
-        return [Finding(Verdict.FAIL, *_split(error))]
+        return [Finding.failed(error)]
     else:
         return list(_examined(sticks, stored, ask, look))
     finally:
@@ -206,9 +206,3 @@ def _rounds(hand: Hand, ask: Ask, look: Look) -> Iterator[Finding]:
     else:
         fix = "keep it moving all the time; then try another socket, without a hub"
         yield Finding(Verdict.WARN, text, fix)
-
-
-def _split(error: DeviceError) -> tuple[str, str]:
-    """Return what is wrong and what to do about it, which errors say after the last semicolon."""
-    said, _, fix = str(error).rpartition("; ")
-    return (said, fix) if said else (fix, "")

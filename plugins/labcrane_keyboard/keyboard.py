@@ -119,7 +119,7 @@ class Keyboard(InputDevice):
         try:
             labels = inlet.info(timeout=2.0).get_channel_labels() or []
             inlet.open_stream(timeout=2.0)
-        except (pylsl.util.TimeoutError, pylsl.LostError):
+        except (pylsl.util.TimeoutError, pylsl.util.LostError):
             return  # gone again; it is looked for once more
         sent = [label.removeprefix("key.") for label in labels if label.startswith("key.")]
         missing = [key for pair in self._settings.axes.values() for key in pair if key not in sent]

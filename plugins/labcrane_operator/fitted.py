@@ -50,7 +50,9 @@ def save(text: str, path: Path) -> None:
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise RecordingError(f"cannot write {path}: {error.strerror}") from error
+        raise RecordingError(
+            f"{path} cannot be written: {error.strerror}; give --out another place"
+        ) from error
 
 
 def protocol_part(fitted: Mapping[str, Estimate], source: str) -> str:

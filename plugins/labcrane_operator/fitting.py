@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labcrane import FloatArray, RecordingError
+from labcrane_operator.noise import SIDE_SHARE
 from labcrane_operator.strokes import Strokes
 
 FEWEST = 8
@@ -15,12 +16,15 @@ FEWEST = 8
 LEAST_SPREAD_BIT = 0.5
 """Spread of difficulties below which slope and intercept cannot be told apart."""
 
-SIDE_SHARE = 0.5
-"""Scatter across the way over that along it, as the model has it."""
-
 LAPSE_SD, LAPSE_S = 4.0, 0.5
 """A reaction is a lapse when it is later than the median by so many standard deviations of the
 logarithm, and by so many seconds."""
+
+NAMES = ("fitts_a_s", "fitts_b_s", "learning_gain", "learning_rate")
+LOWEST = (1e-6, 0.0, 1e-4)
+"""Of all but the intercept."""
+
+HIGHEST = (np.inf, np.inf, 20.0, 5.0)
 
 Interval = tuple[float, float]
 
@@ -137,13 +141,6 @@ def _duration(strokes: Strokes) -> dict[str, Estimate]:
     # An intercept below 0 is none that an operator can have. Intervals are those of the free fit:
     # at a bound the curvature says nothing of the parameter that is held there.
     return free.estimates(law.best(lowest_intercept=0.0, learning=free.learning).values)
-
-
-NAMES = ("fitts_a_s", "fitts_b_s", "learning_gain", "learning_rate")
-LOWEST = (1e-6, 0.0, 1e-4)
-"""Of all but the intercept."""
-
-HIGHEST = (np.inf, np.inf, 20.0, 5.0)
 
 
 @dataclass(frozen=True, slots=True)

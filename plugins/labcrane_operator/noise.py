@@ -9,6 +9,9 @@ from labcrane_operator.sub_movement import Point
 BLOCK = 512
 """Ticks of motor noise drawn at once; one call a tick would cost more than the plan."""
 
+SIDE_SHARE = 0.5
+"""Scatter of a movement's end across the way, over that along it."""
+
 
 class Noise:
     """Motor noise and scatter of one trial.
@@ -49,7 +52,7 @@ class Noise:
             return end
         along = way / length
         side = draw - (draw @ along) * along
-        x, y, z = (end + share * length * ((draw @ along) * along + 0.5 * side)).tolist()
+        x, y, z = (end + share * length * ((draw @ along) * along + SIDE_SHARE * side)).tolist()
         return x, y, z
 
     def motor(self) -> Point:

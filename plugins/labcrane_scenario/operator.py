@@ -21,6 +21,9 @@ from labcrane_scenario.settings import OperatorSettings
 NEAR = 0.6
 """Share of a goal's radius within which the tip is left alone while the jaws move."""
 
+CLOSE_RAD = 0.02
+"""The jaws are as far open as they should be when they come this close to it."""
+
 
 class ScenarioOperator(InputDevice):
     """Hands that take the tip to the task's target, and then open or shut the jaws as it asks.
@@ -86,6 +89,3 @@ class ScenarioOperator(InputDevice):
         away = lowest + wanted * (highest - lowest) - seen.state.item(self._angle)
         if abs(away) > CLOSE_RAD:
             out[self._joint] = math.copysign(self._settings.signal, away)
-
-
-CLOSE_RAD = 0.02

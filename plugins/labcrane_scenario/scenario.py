@@ -56,9 +56,7 @@ class Scenario(Task):
         Signal("peak_force.object", "N"),
         Signal("peak_force.body", "N"),
         Signal("deformity_found", "s"),  # from the start; NaN when it was not, or there is none
-        Signal(
-            "k", "1"
-        ),  # completion as far as the run itself can tell; the supervisor's overrides
+        Signal("k", "1"),  # completion, as far as the run can tell; the supervisor's overrides it
     )
 
     def __init__(self, settings: ScenarioSettings, machine: Machine) -> None:
@@ -85,7 +83,6 @@ class Scenario(Task):
 
     def open(self, run: Run) -> None:
         self._run = run
-        self._tip = run.state.find("tip.position")
         self._button = (
             run.axes.index(self._settings.find_axis) if self._settings.find_axis else None
         )
@@ -97,6 +94,7 @@ class Scenario(Task):
         self._watch = Observation(settings, self._run, placed)
         self._way = Way(scene, placed, self._run)
         self._deformed = next((each for each in placed if each.deformed is not None), None)
+        self._limb = (self._deformed and self._deformed.deformed) or ""
         self._limit = settings.limit_s or scene.limit_s
         self._most: float = settings.mistakes
         self._found = math.nan
@@ -141,12 +139,12 @@ class Scenario(Task):
             if event.name == "order.note" and text.lower().startswith("found"):
                 by = "supervisor"
         if self._button is not None and frame.axes.item(self._button) > PRESSED:
-            chest = self._way.position(frame.state, self._deformed.name)
-            if math.dist(frame.state[self._tip].tolist(), chest) <= 1.0 + self._settings.find_m:
+            away = self._way.nearest(frame.state, self._deformed.name, self._limb)
+            if away <= self._settings.find_m:
                 by = "operator"
         if by is not None:
             self._found = frame.elapsed
-            about = {"by": by, "limb": self._deformed.deformed}
+            about = {"by": by, "limb": self._limb}
             yield Event("deformity.found", frame.tick.due, about)
 
     def _results(self, frame: Frame, phase: Phase) -> dict[str, Value]:

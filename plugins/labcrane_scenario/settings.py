@@ -30,7 +30,7 @@ class ScenarioSettings(Settings):
     default. The supervisor reports one with a note that begins with "found"."""
 
     find_m: PositiveFloat = 0.5
-    """How near the tip must be then, in metres."""
+    """How near the tip must be then to the middle of the limb, in metres."""
 
 
 class OperatorSettings(Settings):

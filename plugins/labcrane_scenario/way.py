@@ -3,6 +3,8 @@
 import math
 from collections.abc import Iterator
 
+import numpy as np
+
 from labcrane import Event, FloatArray, Placed, Run, Scene
 
 Point = tuple[float, float, float]
@@ -24,6 +26,11 @@ class Way:
             for signal in run.state.signals
             if signal.name.startswith("scene.") and signal.name.endswith(".position")
         }
+        self._turns = {
+            signal.name: run.state.find(signal.name)
+            for signal in run.state.signals
+            if signal.name.startswith("scene.") and signal.name.endswith(".orientation")
+        }
         self._tip = run.state.find("tip.position")
         self._jaws = run.state.find("joint.angle").stop - 1
         self._opening = run.machine.limits[-1]
@@ -44,6 +51,23 @@ class Way:
             return self._placed[what].position  # an obstacle does not move
         x, y, z = state[self._tip if what == "tip" else self._positions[what]].tolist()
         return x, y, z
+
+    def nearest(self, state: FloatArray, what: str, part: str) -> float:
+        """Return how far the tip is from the middle of a thing's part, in m."""
+        thing, columns = self._placed[what], f"scene.{what}.orientation"
+        if columns in self._turns:
+            x, y, z, w = state[self._turns[columns]].tolist()
+        else:
+            x, y, z, w = 0.0, 0.0, math.sin(thing.yaw / 2.0), math.cos(thing.yaw / 2.0)
+        axis, at = np.array([x, y, z]), np.array(self.position(state, what))
+        tip = np.array(self.position(state, "tip"))
+        found = []
+        for each in thing.parts:  # a thing moves with the centre of its first part
+            if each.name == part:
+                away = np.subtract(each.centre, thing.parts[0].centre)
+                turned = away + 2.0 * np.cross(axis, np.cross(axis, away) + w * away)
+                found.append(float(np.linalg.norm(tip - at - turned)))
+        return min(found)
 
     def see(self, state: FloatArray, due: float) -> Iterator[Event]:
         """Take a tick; yield the goal that was reached in it, if one was."""

@@ -28,9 +28,11 @@ class PsychDs(Exporter):
             title, study = str(context.get("title", "")), str(context.get("study", ""))
             measures = participant.measures()
             book = participant.codebook(measures)
-            for row in book[book["table"] == "trials"].itertuples(index=False):
-                variables.setdefault(str(row.column), _variable(*map(str, row[1:])))
             table = snake(measures)
+            written = dict(zip(map(str, measures), map(str, table), strict=True))
+            for row in book[book["table"] == "trials"].itertuples(index=False):
+                name = written[str(row.column)]
+                variables.setdefault(name, _variable(name, *map(str, row[2:])))
             for number, own in table.groupby("session"):
                 subject = _key(participant.name)
                 name = f"study-{_key(study)}_subject-{subject}_session-{number}_data.csv"

@@ -132,4 +132,46 @@ def test_the_help_lists_the_groups_that_the_installed_packages_declare() -> None
 
     from labcrane.cli.extension import GROUP, declared
 
-    assert sorted(declared(GROUP)) == sorted(entry_points(group=GROUP).names)
+    installed = sorted((point.name, point.module) for point in entry_points(group=GROUP))
+    assert sorted(declared(GROUP)) == installed
+
+
+def test_groups_of_plugins_have_the_plugins_own_words(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import labcrane_can
+    import labcrane_dmd
+    import labcrane_operator
+
+    monkeypatch.setenv("COLUMNS", "120")
+    assert main(["--help"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    for group, module in (
+        ("dmd", labcrane_dmd),
+        ("gateway", labcrane_can),
+        ("operator", labcrane_operator),
+    ):
+        assert f" {group} {(module.__doc__ or '').splitlines()[0]}" in said
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        ('"""Lamps.\n\nAnd more."""', "Lamps."),
+        ("raise SystemExit", "Commands of lamps.group."),
+        ("# A licence\n\n'Lamps.'\n", "Lamps."),
+        (None, "Not there any more: labcrane plugins says what is missing."),
+    ],
+)
+def test_what_describes_a_group_is_read_without_running_it(
+    source: str | None, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from labcrane.cli.extension import description
+
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "lamps").mkdir()
+    (tmp_path / "lamps" / "__init__.py").write_text("raise SystemExit")
+    if source is not None:
+        (tmp_path / "lamps" / "group.py").write_text(source)
+    assert description("lamps.group") == said
+    assert "lamps" not in sys.modules

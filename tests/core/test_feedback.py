@@ -1,51 +1,32 @@
 """Who is given which feedback, what may be changed of it, and what its processes are told."""
 
-import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from core.fed_study import FED
 from rehearsal import SHORT, ScriptedConsole, a_study, rehearse
 
 import labcrane
 from labcrane import (
-    Ball,
-    Beam,
     DeviceError,
     Event,
-    Feedback,
     Layout,
     ProtocolError,
-    Settings,
     Signal,
     Situation,
     Targets,
-    offer,
 )
 from labcrane.console import Command, Order
 from labcrane.design.fading import faded
 from labcrane.feedback_crew import FeedbackCrew
-from labcrane.feedback_preview import movement, write_preview
-from labcrane.host_order import HostOrder, Part
 from labcrane.plan import plan_session
-from labcrane.presenter import Presenter
-from labcrane.registry import Registry, discover
 from labcrane.run_text import read_run, write_run
 from labcrane.session import Visit, run
 from labcrane.streams.context import situation_after
 from labcrane.study import Study
-from labcrane.testing import TARGETS, a_run, a_target, ch8
-
-FED = SHORT.replace(
-    "sessions:",
-    """feedback:
-  ball: {use: sphere}
-  tone: {use: sonification, far: 3.0}
-design:
-  groups: {none: [], visual: [ball], auditory: [tone], both: [ball, tone]}
-sessions:""",
-)
+from labcrane.testing import TARGETS, a_run, ch8
 
 
 def blocks(*written: str) -> str:
@@ -59,9 +40,6 @@ def given(study: Study, slot: int = 1) -> list[list[tuple[str, ...]]]:
         [block.feedback[t.number] for t in block.trials if t.planned.counted]
         for block in plan.blocks
     ]
-
-
-# Who is given what
 
 
 @pytest.mark.parametrize(
@@ -132,9 +110,6 @@ def test_a_protocol_that_asks_for_the_impossible_is_refused(
         a_study(tmp_path, written)
 
 
-# What the examiner changes
-
-
 def test_a_changed_setting_is_an_event(tmp_path: Path) -> None:
     study = a_study(tmp_path, FED)
     seen = rehearse(study, {5: [Command(Order.SETTING, "ball.at=tip")]})
@@ -157,9 +132,6 @@ def test_a_setting_that_cannot_be_is_refused(text: str, why: str, tmp_path: Path
     (order,) = seen.events("order.setting")
     assert str(order.data["refused"]).startswith(why)
     assert not seen.events("feedback.setting")
-
-
-# What happens when a process fails
 
 
 def test_a_failed_process_pauses_the_session_if_the_protocol_says_so(tmp_path: Path) -> None:
@@ -200,9 +172,6 @@ def test_feedback_that_cannot_start_refuses_the_session_or_is_left_out(
                 assert said[0].endswith("it is left out")
         finally:
             crew.stop()
-
-
-# What feedback processes are told
 
 
 def test_a_scene_comes_through_as_it_was() -> None:
@@ -255,134 +224,3 @@ def test_targets_are_found_among_a_tasks_signals() -> None:
         ("other", (4.0, 5.0, 6.0), 0.5),
     ]
     assert not list(Targets(task).find(np.full(8, np.nan)))
-
-
-class Plain(Settings):
-    """No settings."""
-
-    gain: float = 1.0
-    """Multiplies what is presented."""
-
-
-class Notebook(Feedback):
-    """Writes down what it is given."""
-
-    signals = (Signal("gained", "1"),)
-    rested = 0
-
-    def __init__(self, settings: Plain) -> None:
-        self.gain = settings.gain
-        self.shapes: list[Ball | Beam] = []
-
-    def present(self, frame: labcrane.Frame) -> labcrane.FloatArray:
-        self.shapes = list(frame.shapes)
-        return np.array([self.gain])
-
-    def rest(self) -> None:
-        self.rested += 1
-
-
-def presenter(*, always: bool) -> Presenter:
-    found = discover()
-    book = offer("notebook", Plain, lambda settings, machine: Notebook(settings))
-    registry = Registry({**found.offers, Feedback: {"notebook": book}}, found.plugins, {})
-    order = HostOrder(
-        "book",
-        Part("notebook", {}),
-        a_run(ch8(), task=TARGETS),
-        "test",
-        Path("study.yaml"),
-        always=always,
-        cues={"ball": Part("sphere", {"at": "tip"})},
-    )
-    again = HostOrder.from_json(order.as_json())
-    assert json.loads(again.as_json()) == json.loads(order.as_json())
-    made = Presenter(again, registry)
-    made.open()
-    return made
-
-
-def test_a_cue_is_drawn_only_while_it_is_switched_on() -> None:
-    made = presenter(always=True)
-    frame = a_target(a_run(ch8(), task=TARGETS))
-    off = made.present(frame)
-    assert off is not None
-    assert not made.feedback.shapes
-    assert np.isnan(off[1:]).all()
-    made.hear(Situation(trial=1, active=("ball",)))
-    on = made.present(frame)
-    assert [shape.name for shape in made.feedback.shapes] == ["sphere"]
-    assert on is not None
-    assert made.layout.columns[1:] == tuple(
-        f"cue.ball.{name}" for name in ("distance", "radius", "brightness")
-    )
-    assert np.isfinite(on).all()
-
-
-def test_a_sound_rests_once_when_it_is_switched_off() -> None:
-    made = presenter(always=False)
-    frame = a_target(a_run(ch8(), task=TARGETS))
-    assert made.present(frame) is None
-    made.hear(Situation(trial=1, active=("book",)))
-    assert made.present(frame) is not None
-    made.hear(Situation())
-    for _ in range(3):
-        assert made.present(frame) is None
-    assert made.feedback.rested == 1
-
-
-def test_a_changed_setting_takes_effect() -> None:
-    made = presenter(always=True)
-    frame = a_target(a_run(ch8(), task=TARGETS))
-    tip = Situation(trial=1, active=("ball",))
-    made.hear(tip)
-    made.present(frame)
-    np.testing.assert_array_equal(made.feedback.shapes[0].centre, frame.state[8:11])
-    made.hear(replace(tip, settings={"ball": {"at": "target"}, "book": {"gain": 3.0}}))
-    values = made.present(frame)
-    assert values is not None
-    assert values[0] == 3.0
-    np.testing.assert_array_equal(made.feedback.shapes[0].centre, frame.task[:3])
-
-
-# Previews
-
-PREVIEWED = FED.replace("distances: [2]", "distances: [2], limit_s: 1") + (
-    "views: {operator: {use: view, renderer: software, size: [160, 90]}}\n"
-)
-
-
-def test_a_preview_has_pictures_and_sound_of_a_movement(tmp_path: Path) -> None:
-    import wave
-
-    study = a_study(tmp_path, PREVIEWED)
-    files = write_preview(study, tmp_path / "out")
-    pictures = [path for path in files if path.suffix == ".png"]
-    assert len(pictures) == 3  # one each half second of a movement that ends after one
-    assert all(path.read_bytes().startswith(b"\x89PNG") for path in pictures)
-    (sound,) = (path for path in files if path.suffix == ".wav")
-    with wave.open(str(sound)) as file:
-        assert file.getframerate() == 48000
-        assert file.getnframes() == pytest.approx(48000, rel=0.02)
-        samples = np.frombuffer(file.readframes(48000), "<i2")
-    assert np.abs(samples).max() > 1000
-
-
-def test_a_preview_shows_a_recorded_trial(tmp_path: Path) -> None:
-    study = a_study(tmp_path, PREVIEWED)
-    visit = Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=True)
-    path = run(visit, ScriptedConsole())
-    assert write_preview(study, tmp_path / "out", path, trial=3)
-    session = labcrane.open_recording(path).session(1)
-    frames = movement(session, 3)
-    rows = session.streams["loop"].data["trial"] == 3
-    np.testing.assert_array_equal(
-        [frame.state for frame in frames], session.streams["state"].data[rows]
-    )
-    with pytest.raises(ProtocolError, match="there is no trial 99 in the recording; there is 2, 3"):
-        movement(session, 99)
-
-
-def test_a_study_without_feedback_has_no_preview(tmp_path: Path) -> None:
-    with pytest.raises(ProtocolError, match="has neither views nor sounds; add views: or feedba"):
-        write_preview(a_study(tmp_path), tmp_path / "out")

@@ -5,12 +5,19 @@ A comment on the line above a block says what else is to be known of it:
     <!-- file: NAME -->       the block is the content of that file
     <!-- first: COMMAND -->   run before it, and not shown to readers; $STUDY, $DATA, $RECORDING and
                               $REPOSITORY are what conftest.py has made
+    <!-- then: TEXT -->       run after it in the same program, and not shown to readers
     <!-- with: octave -->     what runs it, where the language is not what its name says
     <!-- installed: NAME=MODULE -->  a plugin that is installed from here on
     <!-- fails: STATUS -->    a command that is to end with that status
     <!-- runs: on and on -->  a program without an end; it is stopped after two seconds
     <!-- long: REASON -->     run by pytest -m long only
+    <!-- desk: WHAT -->       on a terminal with a screen, where a person has two sticks (person.py)
+    <!-- environment: one of its own -->  what is installed there is seen nowhere else
+    <!-- rehearsed: HOW -->   as root, by a program that only says what it would do (REHEARSED)
+    <!-- bare machine: WHY -->  run by .ci/run, which begins with such a machine
     <!-- not run: REASON -->  it cannot be run in a test, and why
+
+A block without a language lists files that are there.
 """
 
 import json
@@ -25,7 +32,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
+import pytest
+from docs.person import Person
+from fresh_environment import environment
 from ruamel.yaml import YAML
+from simple_crane import CRANE
+from windows import an_x_server
 
 from labcrane.cli.app import main
 from labcrane.registry import discover
@@ -40,24 +52,25 @@ BLOCK = re.compile(
     r"^(?P<indent> *)```(?P<language>\w*)[^\n]*\n(?P<text>.*?)^(?P=indent)```$",
     re.MULTILINE | re.DOTALL,
 )
-MARK = re.compile(r"<!-- (file|first|with|installed|fails|runs|long|not run): (.+?) -->")
+NAMES = (
+    "file|first|then|with|installed|fails|runs|long|desk|environment|rehearsed|bare machine|not run"
+)
+MARK = re.compile(rf"<!-- ({NAMES}): (.+?) -->")
 
 RUNS_S = 2.0
 
 COMMANDS = re.compile(r"(?:labcrane [^|&;<>$`]+\n)+")
 """Lines that need no shell."""
 
-BASE = """\
+BASE = (
+    """\
 labcrane: 1
 study: page
 title: A page's study
 rate_hz: 240
-machine: ch8
-input: {use: dual_joystick}
-scheme:
-  use: joint_velocity
-  map: {slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}
-dynamics: {use: kinematic_crane}
+"""
+    + CRANE
+    + """\
 tasks:
   aiming: {use: aiming, distances: [2], movements: 2}
   retrieval: {use: aiming, distances: [2], movements: 2}
@@ -68,6 +81,7 @@ sessions:
     steps:
       - block: {task: aiming, pairs: 1}
 """
+)
 """What a page's parts of a protocol are put into."""
 
 
@@ -105,17 +119,39 @@ class Reader:
     def __init__(self, folder: Path, recorded: Mapping[str, str]) -> None:
         self._folder = folder
         self._names: dict[str, object] = {"__name__": "page"}
+        self._alone = False
         self._environment = {
             **os.environ,
             **recorded,
             "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
             "PYTHONPATH": str(folder),
+            "PYTHON": sys.executable,
+            "OCTAVE_PATH": str(Path(__file__).with_name("matlab")),
             "MPLBACKEND": "agg",
             "COLUMNS": "100",
         }
 
     def follow(self, block: Block) -> None:
         """Do what a block says; whatever goes wrong is raised."""
+        self._prepare(block)
+        marks, text = block.marks, block.text + block.marks.get("then", "")
+        language = marks.get("with", block.language)
+        if "runs" in marks:
+            self._runs_on(text)
+        elif "desk" in marks:
+            self._sit_down(text)
+        elif language == "sh":
+            self._shell(text, int(marks.get("fails", "0")))
+        elif language in PROGRAMS:
+            self._program(language, text)
+        elif not language:
+            for line in text.splitlines():
+                assert (self._folder / line).exists(), f"there is no {line}"
+        elif "file" not in marks or language in PARSERS:
+            self._read(language, text, block.line)
+
+    def _prepare(self, block: Block) -> None:
+        """Do what marks ask for before the block itself."""
         marks = block.marks
         if command := marks.get("first"):
             self._shell(command)
@@ -125,24 +161,43 @@ class Reader:
             path = self._folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(block.text)
-        language = marks.get("with", block.language)
-        if "runs" in marks:
-            self._runs_on(block.text)
-        elif language == "python" and "file" not in marks:
-            exec(compile(block.text, f"block at line {block.line}", "exec"), self._names)
-        elif language == "sh":
-            self._shell(block.text, int(marks.get("fails", "0")))
-        elif language == "r":
-            self._program("Rscript", "page.R", block.text)
-        elif language == "octave":
-            self._program("octave", "page.m", block.text, "--no-gui", "--norc", "-q")
-        elif language == "yaml" and "file" not in marks:
-            self._check(block.text)
+        if "environment" in marks:
+            self._make_environment()
+        if "rehearsed" in marks:
+            self._stand_in(REHEARSED)
+
+    def _read(self, language: str, text: str, line: int) -> None:
+        """Run Python here, check a protocol, parse anything else."""
+        if language == "python":
+            exec(compile(text, f"block at line {line}", "exec"), self._names)
+        elif language == "yaml":
+            self._check(text)
         else:
-            PARSERS.get(language, lambda text: None)(block.text)
+            PARSERS[language](text)
+
+    def _make_environment(self) -> None:
+        """Let commands from here on be those of a new environment, with no package index."""
+        python = environment(self._folder / ".venv")
+        self._environment |= {
+            "PATH": f"{python.parent}:{self._environment['PATH']}",
+            "PIP_NO_INDEX": "1",
+            "PIP_NO_BUILD_ISOLATION": "0",  # as pip wants it: 0 for no isolation
+        }
+        self._alone = True
+
+    def _stand_in(self, programs: Mapping[str, str]) -> None:
+        """Let other programs answer to these names from here on."""
+        if os.geteuid() != 0 and not os.environ.get("CI"):
+            pytest.skip("only root may ask what a firewall would do")
+        bin_ = self._folder / "stand-ins"
+        bin_.mkdir()
+        for name, does in programs.items():
+            (bin_ / name).write_text(f"#!/bin/sh\n{does}\n")
+            (bin_ / name).chmod(0o755)
+        self._environment["PATH"] = f"{bin_}:{self._environment['PATH']}"
 
     def _shell(self, text: str, status: int = 0) -> None:
-        if COMMANDS.fullmatch(text):
+        if COMMANDS.fullmatch(text) and not self._alone:
             # Each as a process of its own would load the same libraries again and again.
             found = [main(shlex.split(line)[1:]) for line in text.splitlines()]
             assert found == [0] * (len(found) - 1) + [status], f"{text}: ended with {found}"
@@ -156,6 +211,17 @@ class Reader:
             check=False,
         )
         assert done.returncode == status, f"{text}\n{done.stdout}\n{done.stderr}"
+
+    def _sit_down(self, text: str) -> None:
+        """Run one command after the other on a terminal, with a person before it."""
+        with an_x_server() as display:
+            for command in text.splitlines():
+                person = Person(command, self._folder, {**self._environment, "DISPLAY": display})
+                status = person.sit()
+                # What a doctor finds wrong with this computer is no fault of the page.
+                bad = status != 0 and not (status == 1 and "labcrane doctor" in command)
+                assert not bad, f"{command}: ended with {status}\n{person.read}"
+                assert "Traceback" not in person.read, person.read
 
     def _runs_on(self, text: str) -> None:
         """Start a program that has no end, and stop it when it has run a while."""
@@ -171,9 +237,10 @@ class Reader:
             program.wait()
         raise AssertionError(f"it ended by itself, with exit code {status}")
 
-    def _program(self, program: str, name: str, text: str, *options: str) -> None:
+    def _program(self, language: str, text: str) -> None:
+        command, name = PROGRAMS[language]
         (self._folder / name).write_text(text)
-        self._shell(" ".join([program, *options, name]))
+        self._shell(f"{command} {name}")
 
     def _install(self, point: str) -> None:
         """Leave in the folder what pip would leave of a plugin."""
@@ -196,6 +263,12 @@ class Reader:
         for choice in (*study.views.values(), *study.sounds.values(), *study.cues.values()):
             choice.build(study.machine)
 
+
+REHEARSED = {"sudo": 'exec "$@"', "ufw": 'exec /usr/sbin/ufw --dry-run "$@"'}
+"""What a page says that would change the computer, and what is done instead."""
+
+PROGRAMS = {"r": ("Rscript", "page.R"), "octave": ("octave --no-gui --norc -q", "page.m")}
+"""What runs a language, and the file it is put into."""
 
 PARSERS = {
     "toml": tomllib.loads,

@@ -11,18 +11,17 @@ from pathlib import Path
 
 import h5py
 import psutil
+from simple_crane import FORM
 
-STUDY = """\
+STUDY = (
+    """\
 labcrane: 1
 study: {study}
 title: A study that is killed
 rate_hz: 240
-machine: ch8
-input: {{use: dual_joystick}}
-scheme:
-  use: joint_velocity
-  map: {{slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}}
-dynamics: {{use: kinematic_crane}}
+"""
+    + FORM
+    + """\
 tasks:
   aiming: {{use: aiming, distances: [2], movements: 1, limit_s: 0.3}}
 sessions:
@@ -36,6 +35,7 @@ sessions:
       - block: {{task: aiming}}
 on_fault: {{session_died: redo_trial}}
 """
+)
 
 
 def labcrane(*arguments: object, **options: object) -> "subprocess.Popen[str]":

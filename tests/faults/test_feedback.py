@@ -8,6 +8,7 @@ import numpy as np
 import psutil
 import pytest
 from faults.sessions import unique, wait_for
+from simple_crane import FORM
 
 import labcrane as lab
 from labcrane.console import Command, Order, QueueConsole
@@ -16,17 +17,15 @@ from labcrane.recording.recording import SessionRecord
 from labcrane.records import Event
 from labcrane.session_process import VisitOrder
 
-STUDY = """\
+STUDY = (
+    """\
 labcrane: 1
 study: {study}
 title: A study whose feedback fails
 rate_hz: 240
-machine: ch8
-input: {{use: dual_joystick}}
-scheme:
-  use: joint_velocity
-  map: {{slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}}
-dynamics: {{use: kinematic_crane}}
+"""
+    + FORM
+    + """\
 tasks:
   aiming: {{use: aiming, distances: [2], movements: 1, limit_s: 0.5}}
 feedback:
@@ -44,6 +43,7 @@ sessions:
       - break: {{seconds: 8}}
       - block: {{task: aiming}}
 """
+)
 
 PLUGIN = '''
 from pathlib import Path

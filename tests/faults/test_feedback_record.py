@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 from faults.sessions import unique
 from jack_server import a_jack_server
+from simple_crane import FORM
 
 import labcrane as lab
 from labcrane.console import Command, Order, QueueConsole
@@ -17,17 +18,15 @@ from labcrane.launcher import Launcher
 from labcrane.records import Event
 from labcrane.session_process import VisitOrder
 
-STUDY = """\
+STUDY = (
+    """\
 labcrane: 1
 study: {study}
 title: A study whose examiner changes settings
 rate_hz: 240
-machine: ch8
-input: {{use: dual_joystick}}
-scheme:
-  use: joint_velocity
-  map: {{slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}}
-dynamics: {{use: kinematic_crane}}
+"""
+    + FORM
+    + """\
 tasks:
   aiming: {{use: aiming, distances: [2], movements: 20, limit_s: 1.2}}
 feedback:
@@ -40,6 +39,7 @@ sessions:
     steps:
       - block: {{task: aiming}}
 """
+)
 
 CHANGES = ("tone.far=2.5", "ball.far=2.5", "tone.pan=away", "tone.fat=1")
 """Given in the middle of the session; the last one is refused."""

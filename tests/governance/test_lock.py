@@ -4,16 +4,15 @@ import json
 import shutil
 import subprocess
 import sys
-from datetime import date, timedelta
+from datetime import timedelta
 from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
+from governance.approved_lab import approved_lab, refusal
 from governed import GROUPED, TODAY, Lab, edit
 
-from labcrane import ProtocolError
-from labcrane.admission import gate
-from labcrane.approval.decision import Grant, amend, approve, verify
+from labcrane.approval.decision import Grant, approve, verify
 from labcrane.approval.difference import differences
 from labcrane.approval.lock import lock_path, read_lock
 from labcrane.approval.materials import materials, referred
@@ -21,35 +20,10 @@ from labcrane.approval.source_tree import hashes
 from labcrane.registry import discover
 from labcrane.yaml_file import YamlFile
 
-MACHINE = (Path(__file__).parents[2] / "labcrane" / "machines" / "ch8.yaml").read_text()
-
 
 @pytest.fixture
 def lab(tmp_path: Path) -> Lab:
-    """Return a study that names files of all kinds, approved, with P001's consent."""
-    lab = Lab(tmp_path)
-    (tmp_path / "mine.yaml").write_text(MACHINE)
-    (tmp_path / "hello.md").write_text("Hello.\nPlease hold both sticks.\n")
-    lab.protocol.write_text(
-        lab.text.replace("machine: ch8", "machine: mine.yaml").replace(
-            "steps:", "steps:\n      - consent\n      - instructions: hello.md"
-        )
-    )
-    lab.approve()
-    lab.consent("P001")
-    return lab
-
-
-def refusal(lab: Lab) -> list[str]:
-    """Return the differences for which P001 is refused; nothing when P001 may be run."""
-    try:
-        gate(lab.visit("P001"))
-    except ProtocolError as error:
-        first, *lines, last = str(error).splitlines()
-        assert first.endswith("is not the study that was approved under 'KB-12/2026':")
-        assert "labcrane amend" in last
-        return [line.strip() for line in lines]
-    return []
+    return approved_lab(tmp_path)
 
 
 def test_the_approved_study_may_be_run(lab: Lab) -> None:
@@ -242,109 +216,6 @@ def test_the_lock_holds_on_another_computer_under_another_path(lab: Lab, tmp_pat
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == read_lock(lab.protocol).seal
     assert str(tmp_path) not in lock_path(lab.protocol).read_text()
-
-
-def test_an_expired_approval_is_refused(lab: Lab) -> None:
-    last = date.fromisoformat(read_lock(lab.protocol).approval["valid_until"])
-    gate(lab.visit("P001"), last)
-    with pytest.raises(
-        ProtocolError,
-        match=rf"the approval 'KB-12/2026' was valid until {last}, today is .*labcrane amend",
-    ):
-        gate(lab.visit("P001"), last + timedelta(1))
-
-
-def test_a_lock_that_was_edited_by_hand_is_refused(lab: Lab) -> None:
-    edit(lock_path(lab.protocol), "KB-12/2026", "KB-13/2026")
-    with pytest.raises(
-        ProtocolError, match="was edited by hand or is damaged: its content does not match its seal"
-    ):
-        gate(lab.visit("P001"))
-    lock_path(lab.protocol).write_text("{")
-    with pytest.raises(ProtocolError, match="was edited by hand or is damaged: it cannot be read"):
-        gate(lab.visit("P001"))
-
-
-def test_a_study_that_was_never_approved_is_refused_for_people_only(tmp_path: Path) -> None:
-    lab = Lab(tmp_path)
-    with pytest.raises(
-        ProtocolError, match=r"has not been approved: .* labcrane approve, or .* --pilot"
-    ):
-        gate(lab.visit("P001"))
-    assert gate(lab.visit("P001", pilot=True)).slot is None
-    assert gate(lab.visit("P001", simulated=True)).slot is None
-
-
-def test_pilots_run_whatever_has_drifted_and_stamp_it(lab: Lab) -> None:
-    from rehearsal import ScriptedConsole
-
-    import labcrane
-    from labcrane.session import run
-
-    edit(lab.protocol, "movements: 1", "movements: 2")
-    path = run(lab.visit("P001", pilot=True, simulated=True, fast=True), ScriptedConsole())
-    assert path.name == "P001-PILOT-SIMULATED.h5"
-    recording = labcrane.open_recording(path)
-    assert recording.participant == "P001-PILOT-SIMULATED"
-    assert recording.session(1).attrs["pilot"] == "yes"
-    assert recording.session(1).attrs["approval"] == "none"
-
-
-def test_a_study_is_approved_once(lab: Lab) -> None:
-    with pytest.raises(ProtocolError, match=r"approved already, under 'KB-12/2026'; .*amend"):
-        lab.approve()
-
-
-@pytest.mark.parametrize(
-    ("consent", "until", "said"),
-    [
-        ("nowhere.pdf", 9, r"there is no consent text .*nowhere\.pdf; give its file with"),
-        ("../consent.txt", 9, r"is not in the folder of the protocol"),
-        ("consent_v2.txt", -1, r"the approval ended on .*, today is"),
-    ],
-)  # fmt: skip
-def test_an_impossible_grant_is_refused(
-    tmp_path: Path, consent: str, until: int, said: str
-) -> None:
-    (tmp_path / "study").mkdir()
-    lab = Lab(tmp_path / "study")
-    (tmp_path / "consent.txt").write_text("x")
-    grant = Grant("B", "R", TODAY + timedelta(until), lab.folder / consent)
-    with pytest.raises(ProtocolError, match=said):
-        approve(lab.study, discover(), grant, TODAY)
-    assert not lock_path(lab.protocol).exists()
-
-
-def test_an_amendment_says_what_was_changed_and_keeps_the_history(lab: Lab) -> None:
-    first = read_lock(lab.protocol)
-    edit(lab.protocol, "movements: 1", "movements: 2")
-    grant = Grant("Ethics board", "KB-12/2026-A1", TODAY + timedelta(700), first.consent)
-    amended = amend(lab.study, discover(), grant, "more movements", TODAY)
-    (entry,) = read_lock(lab.protocol).amendments
-    assert entry["why"] == "more movements"
-    assert entry["reference"] == "KB-12/2026-A1"
-    assert entry["replaces"] == first.seal
-    assert entry["changes"][0] == "protocol: tasks.aiming.movements was 1, is 2"
-    assert refusal(lab) == []
-    kept = lab.folder / "study.lock.1.json"
-    assert json.loads(kept.read_text())["seal"] == first.seal
-    edit(lab.folder / "hello.md", "Hello", "Good morning")
-    again = amend(lab.study, discover(), grant, "friendlier", TODAY)
-    assert [entry["why"] for entry in again.amendments] == ["more movements", "friendlier"]
-    assert again.amendments[1]["replaces"] == amended.seal
-    with pytest.raises(ProtocolError, match="is as it was approved; there is nothing to amend"):
-        amend(lab.study, discover(), grant, "again", TODAY)
-
-
-def test_an_amended_consent_text_needs_a_new_consent(lab: Lab) -> None:
-    edit(lab.folder / "consent_v2.txt", "at any time", "whenever I like")
-    lock = read_lock(lab.protocol)
-    grant = Grant("Ethics board", "A1", TODAY + timedelta(99), lock.consent)
-    amend(lab.study, discover(), grant, "clearer", TODAY)
-    with pytest.raises(ProtocolError, match=r"has not consented to .*, only to version"):
-        gate(lab.visit("P001"))
-    lab.consent("P001")
-    gate(lab.visit("P001"))
 
 
 def test_the_hash_of_a_study_does_not_depend_on_when_it_was_approved(lab: Lab) -> None:

@@ -16,18 +16,17 @@ from faults.sessions import labcrane, wait_for
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
+from simple_crane import FORM
 
-STUDY = """\
+STUDY = (
+    """\
 labcrane: 1
 study: {study}
 title: Pages
 rate_hz: 240
-machine: ch8
-input: {{use: simulated_operator}}
-scheme:
-  use: joint_velocity
-  map: {{slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}}
-dynamics: {{use: kinematic_crane}}
+"""
+    + FORM.replace("dual_joystick", "simulated_operator")
+    + """\
 tasks:
   aiming: {{use: aiming, distances: [6], movements: 2, limit_s: 60}}
 sessions:
@@ -35,6 +34,7 @@ sessions:
     steps:
 {steps}
 """
+)
 
 
 class Room:

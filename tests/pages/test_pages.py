@@ -1,6 +1,7 @@
 """Both pages in a real browser: orders, answers, reloads, and processes that are killed."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -141,6 +142,18 @@ def check_record(data: Path) -> None:
     ends = session.events[session.events["name"] == "trial.end"]["data"]
     assert [data["outcome"] for data in ends][:2] == ["repeated", "skipped"]
     assert all(d["by"] == "supervisor" and d["refused"] is None for d in given.values())
+
+
+def test_the_pages_end_without_a_complaint_of_pythons(tmp_path: Path) -> None:
+    path = tmp_path / "study.yaml"
+    path.write_text(STUDY.format(study=unique("ends"), steps="      - break: {seconds: 300}\n"))
+    with a_room(path, tmp_path / "data") as room:
+        wait_for(lambda: room.process("pages"), 60)
+        room.process("session").kill()
+        assert room.launcher.wait(60) == 1
+    said = "".join(room.said)
+    assert "participant file: " in said
+    assert not re.search("leaked|Traceback", said), said
 
 
 @pytest.mark.long

@@ -56,3 +56,24 @@ def test_two_signals_of_one_name_and_no_map_at_all_are_refused(panel: Path, caps
     )
     assert main([*BRIDGE]) == 2
     assert "say which valve moves which joint" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--bus", "can0"], "bus: 'can0' is no bus; write interface:channel, as slcan:/dev"),
+        (
+            ["--bus", "socketcand:can0@host:abc"],
+            "bus: 'abc' is no port; write socketcand:channel@host:port, or leave the port out",
+        ),
+        (["--valve", "boom=Levers.Boom"], "which only a DBC file explains; give map, or the"),
+        (["--valve", "boom=16"], "valves.boom"),
+    ],
+)
+def test_options_that_cannot_be_are_refused_in_words(
+    options: list[str], words: str, capsys
+) -> None:
+    assert main([*BRIDGE, "--valve", "arm=2", *options]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert words in said
+    assert "Traceback" not in said

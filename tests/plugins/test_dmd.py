@@ -264,5 +264,20 @@ def test_the_commands_leave_model_tables_and_figures(tmp_path: Path, capsys) -> 
     assert (tmp_path / "arm.png").read_bytes().startswith(b"\x89PNG")
     assert main(["dmd", "validate", str(tmp_path / "no.yaml"), str(FOLDER)]) == 2
     assert "cannot be read" in capsys.readouterr().err
-    with pytest.raises(RecordingError, match=r"cannot be written to .*arm.yaml: No such file or"):
+    with pytest.raises(RecordingError, match=r"arm.yaml cannot be written: No such file or"):
         save(labcrane_dmd.load(Path(arm)), tmp_path / "no folder" / "arm.yaml")
+
+
+@pytest.mark.parametrize(
+    ("words", "refused"),
+    [
+        (("plot", "{model}", "--out", "{gone}/arm.png"), "arm.png cannot be written: No such file"),
+        (("validate", "{model}", "{folder}", "--out", "{model}"), "cannot be written: File exists"),
+    ],
+)
+def test_commands_say_where_else_their_files_can_go(words, refused, tmp_path, capsys) -> None:
+    places = {"model": FOLDER.parent / "arm.dmd.yaml", "gone": tmp_path / "gone", "folder": FOLDER}
+    assert main(["dmd", *(word.format(**places) for word in words)]) == 1
+    said = capsys.readouterr().err
+    assert refused in said
+    assert "give --out another place" in said

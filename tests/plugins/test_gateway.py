@@ -3,14 +3,17 @@
 import subprocess
 import sys
 import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+import pylsl
 import pytest
 from cranes import needs_bullet
+from gone_stream import goes_once
 from rehearsal import NoLog, ScriptedConsole
 
-from labcrane import InputDevice, Tick, loop, rig
+from labcrane import FloatArray, InputDevice, Run, Tick, loop, rig
 from labcrane.clock import SystemClock
 from labcrane.console import Command, Order
 from labcrane.course import Course
@@ -86,6 +89,32 @@ def test_a_program_written_from_the_documentation_drives_the_arm(tmp_path: Path)
     assert seen[-1][3] == [0.0] * 4
 
 
+def station_outlet(name: str, labels: Sequence[str]) -> pylsl.StreamOutlet:
+    info = pylsl.StreamInfo(name, "Control", len(labels), 0.0, "float32", name)
+    channels = info.desc().append_child("channels")
+    for label in labels:
+        channels.append_child("channel").append_child_value("label", label)
+    return pylsl.StreamOutlet(info)
+
+
+def heard(
+    device: Station,
+    run: Run,
+    outlet: pylsl.StreamOutlet,
+    sample: Sequence[float],
+    enough: Callable[[], bool],
+) -> FloatArray:
+    """Send a sample again and again until it is enough; return the last axes."""
+    end = time.perf_counter() + 20.0
+    while True:
+        outlet.push_sample(list(sample))
+        time.sleep(0.02)
+        now = time.perf_counter()
+        axes = device.read(Tick(1, now, now), a_frame(run))
+        if enough() or now > end:
+            return axes
+
+
 @pytest.mark.parametrize(
     ("labels", "sample", "complaint"),
     [
@@ -95,25 +124,27 @@ def test_a_program_written_from_the_documentation_drives_the_arm(tmp_path: Path)
     ],
 )
 def test_what_is_wrong_with_a_station_is_told(labels, sample, complaint: str) -> None:
-    import pylsl
-
     name = f"wrong.{len(labels)}.{sample[-3:][0]}"
-    info = pylsl.StreamInfo(name, "Control", len(labels), 0.0, "float32", name)
-    channels = info.desc().append_child("channels")
-    for label in labels:
-        channels.append_child("channel").append_child_value("label", label)
-    outlet = pylsl.StreamOutlet(info)
+    outlet = station_outlet(name, labels)
     device = Station(GatewaySettings(stream=name), ch8())
     run = a_run(ch8(), axes=device.signals)
     device.open(run)
     try:
-        end = time.perf_counter() + 8.0
-        while complaint not in (device.fault or "") and time.perf_counter() < end:
-            outlet.push_sample(list(sample))
-            time.sleep(0.02)
-            now = time.perf_counter()
-            axes = device.read(Tick(1, now, now), a_frame(run))
+        axes = heard(device, run, outlet, sample, lambda: complaint in (device.fault or ""))
         assert complaint in (device.fault or "")
         assert not axes.any()
+    finally:
+        device.close()
+
+
+def test_a_station_that_goes_while_it_is_found_is_found_again(monkeypatch) -> None:
+    goes_once(monkeypatch)
+    outlet = station_outlet("gone.once", ch8().names)
+    device = Station(GatewaySettings(stream="gone.once"), ch8())
+    run = a_run(ch8(), axes=device.signals)
+    device.open(run)
+    try:
+        axes = heard(device, run, outlet, [0.0, 125.0, 0.0, 0.0], lambda: device.fault is None)
+        assert axes.tolist() == [0.0, 0.5, 0.0, 0.0, 1.0]
     finally:
         device.close()

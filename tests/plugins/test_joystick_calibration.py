@@ -77,6 +77,15 @@ def test_a_file_that_cannot_be_read_is_an_error_with_its_path(config, text):
     assert str(config) in str(bad.value)
 
 
+def test_a_file_that_cannot_be_written_is_an_error_that_says_where_else(tmp_path):
+    (tmp_path / "full").mkdir()
+    path = tmp_path / "full" / "joysticks.yaml"
+    (tmp_path / "full" / "joysticks.yaml.new").mkdir()  # stands in for what nobody may write
+    with pytest.raises(DeviceError, match="set LABCRANE_CONFIG to a folder that can") as bad:
+        save(path, MODEL, both(Calibration(port="a"), Calibration(port="b")))
+    assert str(bad.value).startswith(f"{path} cannot be written: Is a directory")
+
+
 def test_what_is_kept_for_one_model_outlives_another(config):
     found = both(
         Calibration(port="a", x=AxisRange(minimum=-3, centre=1, maximum=2)), Calibration(port="b")

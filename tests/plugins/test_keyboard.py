@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pylsl
 import pytest
+from gone_stream import goes_once
 from pydantic import ValidationError
 from windows import an_x_server
 
@@ -145,6 +146,16 @@ def test_a_view_without_the_keys_is_told_apart_from_none() -> None:
     assert desk.keyboard.fault == (
         "no view 'nobody' sends keys; write keys: [a, d, arrow_down, arrow_up] under views: nobody"
     )
+
+
+def test_a_view_that_goes_while_it_is_found_is_found_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    goes_once(monkeypatch)
+    with a_view_that_sends(ORDER, timeout_s=9.0) as (desk, outlet):
+        desk.read_until(lambda row: row[2] == 1.0)
+        press(desk, outlet, 0, 0, 1, 0)
+        assert desk.read(240)[-1].tolist() == [1.0, 0.0, 1.0]
 
 
 def test_a_key_moves_one_axis_only() -> None:

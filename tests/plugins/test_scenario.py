@@ -175,16 +175,23 @@ goals: [{position: [30, 0, 0], radius: 0.1}]
 
 
 @pytest.mark.parametrize(
-    ("tip_x", "button", "notes", "by"),
+    ("ahead", "turn", "button", "notes", "by"),
     [
-        (1.6, 1.0, {}, "operator"),
-        (8.0, 1.0, {}, None),  # pressed far away, without having seen anything
-        (8.0, 0.0, {3: "found: the left leg"}, "supervisor"),
-        (1.6, 0.0, {3: "the left leg"}, None),
+        (1.2, 0.0, 1.0, {}, "operator"),  # the shank is about so far ahead of the chest
+        (1.2, 90.0, 1.0, {}, None),  # and to the left of it once the body has been turned
+        (-0.4, 0.0, 1.0, {}, None),  # at the head: nothing is found there
+        (6.4, 0.0, 1.0, {}, None),  # pressed far away, without having seen anything
+        (6.4, 0.0, 0.0, {3: "found: the left leg"}, "supervisor"),
+        (1.2, 0.0, 0.0, {3: "the left leg"}, None),
     ],
 )
 def test_a_deformity_is_found_by_the_operators_button_or_the_supervisors_note(
-    tip_x: float, button: float, notes: dict[int, str], by: str | None, tmp_path: Path
+    ahead: float,
+    turn: float,
+    button: float,
+    notes: dict[int, str],
+    by: str | None,
+    tmp_path: Path,
 ) -> None:
     (tmp_path / "lying.yaml").write_text(LYING)
     settings = ScenarioSettings(scenes=(tmp_path / "lying.yaml",), find_axis="button", limit_s=0.1)
@@ -193,6 +200,7 @@ def test_a_deformity_is_found_by_the_operators_button_or_the_supervisors_note(
         *crane_state(ch8()).signals,
         OVERLOAD,
         Signal("scene.figure.position", "m", ("x", "y", "z")),
+        Signal("scene.figure.orientation", "1", ("x", "y", "z", "w")),
     )
     run = a_run(ch8(), axes=(Signal("button", "1"),), state=state, task=task.signals)
     task.open(run)
@@ -200,8 +208,15 @@ def test_a_deformity_is_found_by_the_operators_button_or_the_supervisors_note(
     events, results = [], {}
     for number in range(30):
         values = np.zeros(run.state.size)
-        values[run.state.index("tip.position.x")] = tip_x
+        values[run.state.index("tip.position.x")] = 1.6 + ahead
         values[run.state.index("scene.figure.position.x")] = 1.6
+        half = math.radians(turn) / 2.0
+        values[run.state.find("scene.figure.orientation")] = (
+            0.0,
+            0.0,
+            math.sin(half),
+            math.cos(half),
+        )
         frame = a_frame(run, number, values)
         frame.axes = np.array([button])
         if number in notes:

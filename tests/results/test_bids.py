@@ -164,5 +164,32 @@ def test_missing_files_of_people_are_named(cohort: Cohort, tmp_path: Path) -> No
         Bids(gone, ch8()).export(cohort.included, tmp_path)
     (tmp_path / "out").mkdir()
     empty = BidsSettings(phenotype=tmp_path / "out")
-    with pytest.raises(ProtocolError, match=r"there is no CSV file in .*; one per questionnaire"):
+    with pytest.raises(ProtocolError, match=r"there is no CSV file in .*; put one there for each"):
         Bids(empty, ch8()).export(cohort.included[:1], tmp_path / "out")
+
+
+@pytest.mark.parametrize(
+    ("table", "description", "words"),
+    [
+        ("person,score\nP001,35\n", "{}", "has no column 'participant'; its columns are person, "),
+        ("participant,score\nP001,35\n", "{", "tlx.json is no JSON: .*; correct it there"),
+        ("participant,score\nP001,35\n", "[]", "tlx.json holds list; it must hold an object"),
+    ],
+)
+def test_questionnaires_that_cannot_be_taken_over_are_refused_in_words(
+    table: str, description: str, words: str, tmp_path: Path
+) -> None:
+    asked, out = tmp_path / "asked", tmp_path / "out"
+    asked.mkdir()
+    out.mkdir()
+    (asked / "tlx.csv").write_text(table)
+    (asked / "tlx.json").write_text(description)
+    with pytest.raises(ProtocolError, match=words):
+        Bids(BidsSettings(phenotype=asked), ch8()).export([], out)
+
+
+def test_a_table_of_people_without_pseudonyms_is_refused_in_words(tmp_path: Path) -> None:
+    (tmp_path / "people.csv").write_text("")
+    people = BidsSettings(people=tmp_path / "people.csv")
+    with pytest.raises(ProtocolError, match="has no column 'participant'; its columns are none"):
+        Bids(people, ch8()).export([], tmp_path)

@@ -9,7 +9,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from labcrane.analysis.cohort import Cohort
+from labcrane.analysis.cohort import Cohort, Measured
 from labcrane_tables.psychds import PsychDs
 from labcrane_tables.settings import PsychDsSettings, TableSettings
 from labcrane_tables.tables import Tables
@@ -98,6 +98,20 @@ def test_streams_are_written_as_asked(cohort: Cohort, tmp_path: Path) -> None:
         out.mkdir()
         Tables(TableSettings(streams=form)).export(cohort.included[:1], out)
         assert {path.suffix for path in (out / "streams").iterdir()} == endings
+
+
+def test_psych_ds_describes_columns_by_the_names_they_are_written_under(
+    cohort: Cohort, tmp_path: Path
+) -> None:
+    """A task may name its results with dots, as scenarios do; CSV files have underscores."""
+    person = cohort.included[0]
+    table = person.measures().rename(columns={"peak_speed": "Peak.Speed"})
+    measured = Measured(person.name, person.path, person.status, person.why, table)
+    PsychDs(PsychDsSettings()).export([measured], tmp_path)
+    about = json.loads((tmp_path / "dataset_description.json").read_text(encoding="utf-8"))
+    (path,) = (tmp_path / "data").iterdir()
+    assert set(pd.read_csv(path)) == {each["name"] for each in about["variableMeasured"]}
+    assert "peak_speed" in set(pd.read_csv(path))
 
 
 def test_psych_ds_describes_every_column_of_every_file(cohort: Cohort, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from simple_crane import CRANE
 
 from labcrane.cli.app import main
 from labcrane.errors import ProtocolError
@@ -13,16 +14,14 @@ from labcrane.registry import discover
 from labcrane.study import Study, load
 
 COUNT = 2000
-STUDY = """\
+STUDY = (
+    """\
 labcrane: 1
 study: population
 title: A population
-machine: ch8
-input: {use: dual_joystick}
-scheme:
-  use: joint_velocity
-  map: {slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}
-dynamics: {use: kinematic_crane}
+"""
+    + CRANE
+    + """\
 tasks:
   aiming: {use: aiming, distances: [2, 4], movements: 2}
 design:
@@ -30,6 +29,7 @@ design:
 sessions:
   - {name: one, steps: [{block: {task: aiming}}]}
 """
+)
 
 
 @pytest.fixture

@@ -13,24 +13,23 @@ from pathlib import Path
 
 import pytest
 from dying_work import die_once
+from simple_crane import CRANE
 
 from labcrane.cli.app import main
 from labcrane.errors import LabcraneError, ProtocolError, RecordingError
 from labcrane.recording.recording import open_recording
 from labcrane.simulation import SimulationOrder, simulate, simulate_study
 
-STUDY = """\
+STUDY = (
+    """\
 labcrane: 1
 study: rehearsal
 title: Few movements
 participants: {pattern: 'P\\d{3}', planned: 6}
 rate_hz: 60
-machine: ch8
-input: {use: dual_joystick}
-scheme:
-  use: joint_velocity
-  map: {slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}
-dynamics: {use: kinematic_crane}
+"""
+    + CRANE
+    + """\
 tasks:
   aiming: {use: aiming, distances: [2, 4], movements: 2}
 design:
@@ -40,6 +39,7 @@ sessions:
   - {name: one, steps: [{block: {task: aiming, pairs: 2}}]}
   - {name: two, steps: [{block: {task: aiming, pairs: 1}}]}
 """
+)
 COHORT = """\
 labcrane_cohort: 1
 operator:

@@ -1,0 +1,13 @@
+"""A short study that feeds back."""
+
+from rehearsal import SHORT
+
+FED = SHORT.replace(
+    "sessions:",
+    """feedback:
+  ball: {use: sphere}
+  tone: {use: sonification, far: 3.0}
+design:
+  groups: {none: [], visual: [ball], auditory: [tone], both: [ball, tone]}
+sessions:""",
+)

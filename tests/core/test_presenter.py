@@ -1,0 +1,110 @@
+"""What a presenter shows and sounds: while it is switched on, and as it is set."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import labcrane
+from labcrane import (
+    Ball,
+    Beam,
+    Feedback,
+    Settings,
+    Signal,
+    Situation,
+    offer,
+)
+from labcrane.host_order import HostOrder, Part
+from labcrane.presenter import Presenter
+from labcrane.registry import Registry, discover
+from labcrane.testing import TARGETS, a_run, a_target, ch8
+
+
+class Plain(Settings):
+    """No settings."""
+
+    gain: float = 1.0
+    """Multiplies what is presented."""
+
+
+class Notebook(Feedback):
+    """Writes down what it is given."""
+
+    signals = (Signal("gained", "1"),)
+    rested = 0
+
+    def __init__(self, settings: Plain) -> None:
+        self.gain = settings.gain
+        self.shapes: list[Ball | Beam] = []
+
+    def present(self, frame: labcrane.Frame) -> labcrane.FloatArray:
+        self.shapes = list(frame.shapes)
+        return np.array([self.gain])
+
+    def rest(self) -> None:
+        self.rested += 1
+
+
+def presenter(*, always: bool) -> Presenter:
+    found = discover()
+    book = offer("notebook", Plain, lambda settings, machine: Notebook(settings))
+    registry = Registry({**found.offers, Feedback: {"notebook": book}}, found.plugins, {})
+    order = HostOrder(
+        "book",
+        Part("notebook", {}),
+        a_run(ch8(), task=TARGETS),
+        "test",
+        Path("study.yaml"),
+        always=always,
+        cues={"ball": Part("sphere", {"at": "tip"})},
+    )
+    again = HostOrder.from_json(order.as_json())
+    assert json.loads(again.as_json()) == json.loads(order.as_json())
+    made = Presenter(again, registry)
+    made.open()
+    return made
+
+
+def test_a_cue_is_drawn_only_while_it_is_switched_on() -> None:
+    made = presenter(always=True)
+    frame = a_target(a_run(ch8(), task=TARGETS))
+    off = made.present(frame)
+    assert off is not None
+    assert not made.feedback.shapes
+    assert np.isnan(off[1:]).all()
+    made.hear(Situation(trial=1, active=("ball",)))
+    on = made.present(frame)
+    assert [shape.name for shape in made.feedback.shapes] == ["sphere"]
+    assert on is not None
+    assert made.layout.columns[1:] == tuple(
+        f"cue.ball.{name}" for name in ("distance", "radius", "brightness")
+    )
+    assert np.isfinite(on).all()
+
+
+def test_a_sound_rests_once_when_it_is_switched_off() -> None:
+    made = presenter(always=False)
+    frame = a_target(a_run(ch8(), task=TARGETS))
+    assert made.present(frame) is None
+    made.hear(Situation(trial=1, active=("book",)))
+    assert made.present(frame) is not None
+    made.hear(Situation())
+    for _ in range(3):
+        assert made.present(frame) is None
+    assert made.feedback.rested == 1
+
+
+def test_a_changed_setting_takes_effect() -> None:
+    made = presenter(always=True)
+    frame = a_target(a_run(ch8(), task=TARGETS))
+    tip = Situation(trial=1, active=("ball",))
+    made.hear(tip)
+    made.present(frame)
+    np.testing.assert_array_equal(made.feedback.shapes[0].centre, frame.state[8:11])
+    made.hear(replace(tip, settings={"ball": {"at": "target"}, "book": {"gain": 3.0}}))
+    values = made.present(frame)
+    assert values is not None
+    assert values[0] == 3.0
+    np.testing.assert_array_equal(made.feedback.shapes[0].centre, frame.task[:3])

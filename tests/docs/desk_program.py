@@ -1,0 +1,56 @@
+"""Runs ``labcrane`` or ``labcrane_joystick`` at a desk with two sticks, also in child processes.
+
+Arguments: the module and its own arguments. ``HANDS`` names a pipe; each line of it moves a stick:
+``left 0 32000`` an axis, ``right trigger 1`` the trigger. A process has sticks from when it first
+starts SDL, which only those do that look for some.
+"""
+
+import os
+import runpy
+import sys
+import threading
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from labcrane_joystick import sdl
+
+START = sdl.start
+SIDES = ("left", "right")
+
+
+def start() -> None:
+    """Start SDL, with two sticks plugged in."""
+    START()
+    if sdl.start is not start:
+        return
+    sdl.start = START  # once: sticks stay when the device that found them is closed
+    from virtual_sticks import SDL_INIT_JOYSTICK, VirtualStick, _mapped_sdl
+
+    library = _mapped_sdl()
+    library.SDL_InitSubSystem(SDL_INIT_JOYSTICK)
+    sticks = {side: VirtualStick(library) for side in SIDES}
+    threading.Thread(target=follow, args=(sticks,), daemon=True).start()
+
+
+def follow(sticks) -> None:
+    """Move the sticks as the pipe says, for ever."""
+    # For writing as well, so that the pipe does not end with the person's last movement.
+    with open(os.open(os.environ["HANDS"], os.O_RDWR), encoding="ascii") as pipe:  # noqa: PTH123
+        for line in pipe:
+            side, what, much = line.split()
+            if what == "trigger":
+                sticks[side].press(down=much == "1")
+            else:
+                sticks[side].move(int(what), int(much))
+
+
+sdl.start = start
+
+if __name__ == "__main__":
+    _, module, *sys.argv[1:] = sys.argv
+    if module == "labcrane":  # which must stay the program that child processes import
+        from labcrane.__main__ import main
+
+        sys.exit(main())
+    runpy.run_module(module, run_name="__main__")

@@ -1,0 +1,37 @@
+"""A study as it was approved, and what is refused once it has drifted."""
+
+from pathlib import Path
+
+from governed import Lab
+
+from labcrane import ProtocolError
+from labcrane.admission import gate
+
+MACHINE = (Path(__file__).parents[2] / "labcrane" / "machines" / "ch8.yaml").read_text()
+
+
+def approved_lab(folder: Path) -> Lab:
+    """Return a study that names files of all kinds, approved, with P001's consent."""
+    lab = Lab(folder)
+    (folder / "mine.yaml").write_text(MACHINE)
+    (folder / "hello.md").write_text("Hello.\nPlease hold both sticks.\n")
+    lab.protocol.write_text(
+        lab.text.replace("machine: ch8", "machine: mine.yaml").replace(
+            "steps:", "steps:\n      - consent\n      - instructions: hello.md"
+        )
+    )
+    lab.approve()
+    lab.consent("P001")
+    return lab
+
+
+def refusal(lab: Lab) -> list[str]:
+    """Return the differences for which P001 is refused; nothing when P001 may be run."""
+    try:
+        gate(lab.visit("P001"))
+    except ProtocolError as error:
+        first, *lines, last = str(error).splitlines()
+        assert first.endswith("is not the study that was approved under 'KB-12/2026':")
+        assert "labcrane amend" in last
+        return [line.strip() for line in lines]
+    return []

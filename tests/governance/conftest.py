@@ -1,0 +1,41 @@
+"""A lab with recorded people, made once, and a copy of it for each test."""
+
+import csv
+from pathlib import Path
+
+import pytest
+from governance.kept_people import copied
+from governed import GROUPED, TODAY, Lab
+
+from labcrane.participants.copies import record_export
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Lab:
+    """Return a study with the sessions of three participants, and an export of them."""
+    lab = Lab(tmp_path_factory.mktemp("lab"), GROUPED)
+    lab.approve()
+    for name in ("P001", "P002", "P007"):
+        lab.run(name)
+    tables = lab.places.exports / "tables"
+    tables.mkdir(parents=True)
+    rows = [["participant", "movement_time"], ["P001", "1.5"], ["P007", "2.5"], ["P002", "3.5"]]
+    with (tables / "trials.csv").open("w", newline="") as file:
+        csv.writer(file).writerows(rows)
+    (tables / "sub-P007_events.tsv").write_text("onset\tparticipant\n1.0\tP007\n")
+    (tables / "all.mat").write_bytes(b"binary P001 P007")
+    (tables / "P001.txt").write_text("P001 only")
+    files = {
+        Path("trials.csv"): ["P001", "P002", "P007"],
+        Path("sub-P007_events.tsv"): ["P007"],
+        Path("all.mat"): ["P001", "P007"],
+        Path("P001.txt"): ["P001"],
+    }
+    record_export(lab.places, "tables", tables, files, TODAY)
+    return lab
+
+
+@pytest.fixture
+def lab(recorded: Lab, tmp_path: Path) -> Lab:
+    """Return a copy of the study that may be changed, with a store beside it."""
+    return copied(recorded, tmp_path)

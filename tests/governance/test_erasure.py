@@ -1,0 +1,108 @@
+"""What erasing leaves, what it does not touch, and what a kill does to it."""
+
+from pathlib import Path
+
+import pytest
+from governance.kept_people import (
+    KILLS,
+    REASON,
+    at_every_write,
+    check_erased,
+    killed_at,
+    others,
+    store_of,
+)
+from governed import TODAY, Lab
+
+from labcrane import ProtocolError
+from labcrane.participants import unfinished
+from labcrane.participants.copies import record_export
+from labcrane.participants.register import read
+
+
+def test_after_erasing_nothing_but_the_tombstone_is_left(lab: Lab) -> None:
+    unfinished.move(lab.places, store_of(lab))
+    before = others(lab.folder), others(store_of(lab))
+    assert len(before[0]) == len(before[1]) == 4
+    done = unfinished.erase(lab.places, "P007", REASON, TODAY)
+    check_erased(lab)
+    assert (others(lab.folder), others(store_of(lab))) == before
+    assert done.mentions == []
+    tables = lab.places.exports / "tables"
+    assert (tables / "trials.csv").read_text().splitlines() == [
+        "participant,movement_time", "P001,1.5", "P002,3.5",
+    ]  # fmt: skip
+    assert sorted(path.name for path in tables.iterdir()) == ["P001.txt", "trials.csv"]
+
+
+def test_erasing_frees_the_slot_and_the_pseudonym_never_comes_back(lab: Lab) -> None:
+    slot = read(lab.places).participants["P007"].slot
+    unfinished.erase(lab.places, "P007", REASON, TODAY)
+    lab.consent("P008")
+    assert read(lab.places).participants["P008"].slot == slot
+    with pytest.raises(ProtocolError, match="P007 was erased; give the next participant a new"):
+        lab.consent("P007")
+    with pytest.raises(ProtocolError, match="participant P007 was erased on"):
+        unfinished.erase(lab.places, "P007", REASON, TODAY)
+
+
+def test_what_people_wrote_themselves_is_named(lab: Lab) -> None:
+    (lab.places.root / "todo.txt").write_text("ask P007 about the second session")
+    done = unfinished.erase(lab.places, "P007", REASON, TODAY)
+    assert done.mentions == [str(lab.places.root / "todo.txt")]
+
+
+def test_pilots_and_simulations_under_the_pseudonym_go_too(lab: Lab) -> None:
+    for name in ("P007-PILOT", "P007-SIMULATED"):
+        (lab.places.root / name).mkdir()
+        (lab.places.root / name / f"{name}.h5").write_text("P007")
+    unfinished.erase(lab.places, "P007", REASON, TODAY)
+    check_erased(lab)
+
+
+def test_a_store_that_is_not_plugged_in_is_told_and_reached_later(lab: Lab) -> None:
+    unfinished.move(lab.places, store_of(lab))
+    away = store_of(lab).with_name("unplugged")
+    store_of(lab).rename(away)
+    done = unfinished.erase(lab.places, "P007", REASON, TODAY)
+    assert [owed.folder for owed in done.reach.owed] == [str(store_of(lab))]
+    away.rename(store_of(lab))
+    unfinished.move(lab.places, store_of(lab))
+    check_erased(lab)
+
+
+def test_an_export_on_another_disk_is_reached_later(lab: Lab, tmp_path: Path) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    table = disk / "all.csv"
+    table.write_text("participant\nP001\nP007\n")
+    record_export(lab.places, "bids", disk, {Path("all.csv"): ["P001", "P007"]}, TODAY)
+    disk.rename(tmp_path / "away")
+    done = unfinished.erase(lab.places, "P007", REASON, TODAY)
+    assert [owed.folder for owed in done.reach.owed] == [str(disk)]
+    (tmp_path / "away").rename(disk)
+    unfinished.move(lab.places, store_of(lab))
+    assert table.read_text() == "participant\nP001\n"
+    check_erased(lab)
+
+
+@pytest.mark.parametrize("step", [*KILLS[:1], 2])
+def test_an_erasure_that_is_killed_anywhere_is_finished_by_the_next_call(
+    recorded: Lab, tmp_path: Path, step: int
+) -> None:
+    def erase(lab: Lab) -> None:
+        if read(lab.places).tombstones:  # it was killed after it was done
+            unfinished.move(lab.places, store_of(lab))
+        else:
+            unfinished.erase(lab.places, "P007", REASON, TODAY)
+
+    assert at_every_write(recorded, tmp_path, erase, check_erased, step) > 15
+
+
+def test_another_commands_call_finishes_an_erasure_as_well(lab: Lab) -> None:
+    assert killed_at(16, lambda: unfinished.erase(lab.places, "P007", REASON, TODAY))
+    assert read(lab.places).work is not None
+    with pytest.raises(ProtocolError, match="labcrane erase P007 was interrupted; any call of"):
+        lab.consent("P009")
+    unfinished.move(lab.places, store_of(lab))
+    check_erased(lab)
