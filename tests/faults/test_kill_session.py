@@ -71,11 +71,11 @@ def _kill(stage: str, launcher, data: Path, whole: int, chance: random.Random) -
         time.sleep(chance.uniform(0.0, 1.5))
     elif stage == "session":
         size = chance.uniform(0.0, whole)  # frames are written at an even pace
-        wait_for(lambda: launcher.poll() is not None or _size(journal) >= size, 60.0)
+        wait_for(lambda: launcher.poll() is not None or _size(journal) >= size)
         time.sleep(chance.uniform(0.0, 0.008))  # anywhere within a tick
     else:
-        wait_for(lambda: launcher.poll() is not None or _size(journal) >= 0.9 * whole, 60.0)
-        wait_for(lambda: launcher.poll() is not None or session_process(launcher) is None, 60.0)
+        wait_for(lambda: launcher.poll() is not None or _size(journal) >= 0.9 * whole)
+        wait_for(lambda: launcher.poll() is not None or session_process(launcher) is None)
         time.sleep(chance.uniform(0.0, 0.5))
     victim = session_process(launcher)
     if victim is not None:

@@ -53,7 +53,7 @@ class Room:
         self.said: list[str] = []
         self._reader = threading.Thread(target=self._read)
         self._reader.start()
-        wait_for(lambda: len(self.links()) == 2 or self.launcher.poll() is not None, 60)
+        wait_for(lambda: len(self.links()) == 2 or self.launcher.poll() is not None)
         assert self.launcher.poll() is None, "".join(self.said)
 
     def _read(self) -> None:

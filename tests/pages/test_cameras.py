@@ -100,7 +100,7 @@ def test_the_supervisor_sees_cameras_and_torques(tmp_path: Path, browser: webdri
         return text(browser, "camera-watch-depth-age")
 
     with a_room(protocol, tmp_path / "data") as room:
-        wait_for(lambda: room.process("pages"), 60)
+        wait_for(lambda: room.process("pages"))
         browser.get(room.links()["supervisor"])
         shown(browser, "stage", "waits to start")
         depth, colour = (seen(browser, f"camera-watch-{name}") for name in ("depth", "free"))

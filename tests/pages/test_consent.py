@@ -22,7 +22,7 @@ def test_the_session_begins_once_the_participant_has_consented_on_the_page(
     lab.approve()
     version = read_lock(lab.protocol).consent_version
     with a_room(lab.protocol, lab.places.root, pilot=False) as room:
-        wait_for(lambda: room.process("pages"), 60)
+        wait_for(lambda: room.process("pages"))
         browser.get(room.links()["participant"])
         shown(browser, "consent-version", f"consent_v2.txt, version {version}")
         assert "I can stop at any time." in text(browser, "consent")
@@ -33,7 +33,7 @@ def test_the_session_begins_once_the_participant_has_consented_on_the_page(
         assert not room.folder.exists()
         press(browser, "order-consent")
         shown(browser, "wait", "Please wait")
-        wait_for(lambda: "space to start" in "".join(room.said), 60)
+        wait_for(lambda: "space to start" in "".join(room.said))
         assert text(browser, "consent") == ""
         assert browser.execute_async_script(FETCH) == "no consent is asked for"
         room.launcher.send_signal(signal.SIGINT)
@@ -49,7 +49,7 @@ def test_a_run_that_is_ended_instead_leaves_nobody_in_the_register(tmp_path: Pat
     lab = Lab(tmp_path, GOVERNED.replace("rehearsal", unique("consent")))
     lab.approve()
     with a_room(lab.protocol, lab.places.root, pilot=False) as room:
-        wait_for(lambda: "waiting for P001's consent" in "".join(room.said), 60)
+        wait_for(lambda: "waiting for P001's consent" in "".join(room.said))
         room.launcher.send_signal(signal.SIGINT)
         assert room.launcher.wait(60) == 2
         wait_for(lambda: "P001 has not consented to consent_v2.txt" in "".join(room.said))

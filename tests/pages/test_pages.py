@@ -44,7 +44,7 @@ def test_a_session_is_led_and_answered_from_a_browser(  # noqa: PLR0915 - one vi
 ) -> None:
     data = tmp_path / "data"
     with a_room(protocol, data) as room:
-        wait_for(lambda: room.process("pages"), 60)
+        wait_for(lambda: room.process("pages"))
         links = room.links()
         browser.get(links["supervisor"])
         assert "token" not in browser.current_url
@@ -70,8 +70,8 @@ def test_a_session_is_led_and_answered_from_a_browser(  # noqa: PLR0915 - one vi
 
         # The pages' process is killed: it comes back, and so does every answer.
         room.process("pages").kill()
-        wait_for(lambda: "the page died and is started again" in "".join(room.said), 30)
-        wait_for(lambda: room.process("pages"), 60)
+        wait_for(lambda: "the page died and is started again" in "".join(room.said))
+        wait_for(lambda: room.process("pages"))
         browser.refresh()
         shown(browser, "status-age", "saved")
         shown(browser, "status-sex", "saved")
@@ -148,7 +148,7 @@ def test_the_pages_end_without_a_complaint_of_pythons(tmp_path: Path) -> None:
     path = tmp_path / "study.yaml"
     path.write_text(STUDY.format(study=unique("ends"), steps="      - break: {seconds: 300}\n"))
     with a_room(path, tmp_path / "data") as room:
-        wait_for(lambda: room.process("pages"), 60)
+        wait_for(lambda: room.process("pages"))
         room.process("session").kill()
         assert room.launcher.wait(60) == 1
     said = "".join(room.said)
@@ -162,7 +162,7 @@ def test_no_answer_is_lost_when_the_session_is_killed_in_the_middle(
 ) -> None:
     data = tmp_path / "data"
     with a_room(protocol, data) as room:
-        wait_for(lambda: room.process("pages"), 60)
+        wait_for(lambda: room.process("pages"))
         browser.get(room.links()["participant"])
         write(browser, "age-field", "44")
         shown(browser, "status-age", "saved")
@@ -171,7 +171,7 @@ def test_no_answer_is_lost_when_the_session_is_killed_in_the_middle(
     table = open_recording(data / "P001-PILOT" / "P001-PILOT.h5").session(1).questionnaires
     assert table[["item", "value"]].to_numpy().tolist() == [["age", 44.0]]
     with a_room(protocol, data, "resume") as room:
-        wait_for(lambda: room.process("pages"), 60)
+        wait_for(lambda: room.process("pages"))
         browser.get(room.links()["participant"])
         shown(browser, "status-age", "saved")
         assert browser.find_element(By.ID, "age-field").get_property("value") == "44"

@@ -57,7 +57,7 @@ def room(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Room]:
     protocol = folder / "study.yaml"
     protocol.write_text(STUDY.format(study=unique("reach"), steps=STEPS) + GERMAN)
     with a_room(protocol, folder / "data") as room:
-        wait_for(lambda: room.process("pages"), 60)
+        wait_for(lambda: room.process("pages"))
         yield room
 
 
@@ -111,7 +111,7 @@ def test_a_questionnaire_is_answered_in_german_and_by_keyboard_alone(
     room: Room, browser: webdriver.Chrome
 ) -> None:
     browser.get(room.links()["participant"])
-    wait_for(lambda: "Wie alt sind Sie" in text(browser, "item-age"), 30)
+    wait_for(lambda: "Wie alt sind Sie" in text(browser, "item-age"))
     photograph(browser, "german")
     check_reach_and_contrast(browser, at_least=15)
     go_to(browser, "age-field")

@@ -120,10 +120,10 @@ def visited(tmp_path_factory: pytest.TempPathFactory):
     protocol.write_text(STUDY.format(study=unique("rights"), steps=steps))
     answers = {}
     with a_room(protocol, folder / "data") as room:
-        wait_for(lambda: room.process("pages"), 60)
+        wait_for(lambda: room.process("pages"))
         supervisor, participant = cookie_of(room, "supervisor"), cookie_of(room, "participant")
         journal = room.folder / "ses-01_run.xdf"
-        wait_for(lambda: journal.exists() and journal.stat().st_size > 100_000, 60)
+        wait_for(lambda: journal.exists() and journal.stat().st_size > 100_000)
         answers["no token"] = ask(room, "GET", "/supervisor")
         answers["no token, a file"] = ask(room, "GET", "/_nicegui/3.0/static/nicegui.js")
         answers["wrong token"] = ask(room, "GET", "/supervisor?token=guess")

@@ -40,13 +40,13 @@ def test_what_stands_around_the_machine_is_drawn_where_the_session_has_it(
     protocol.write_text(text.replace("study: retrieval", f"study: {unique('rescue')}"))
     edit(protocol, r"pattern: 'R\d{3}'", r"pattern: 'P\d{3}'")
     with a_room(protocol, tmp_path / "data") as room:
-        wait_for(lambda: room.process("pages"), 60)
+        wait_for(lambda: room.process("pages"))
         browser.get(room.links()["supervisor"])
         for what in ("instructions", "retrieval"):
             shown(browser, "stage", f"waits to start: {what}")
             press(browser, "order-start")
         shown(browser, "stage", "trial")
-        wait_for(lambda: browser.execute_script(SEEN), 30)
+        wait_for(lambda: browser.execute_script(SEEN))
         shown(browser, "facts", "loop at most")
         seen = browser.execute_script(SEEN)
         photograph(browser, "scenario")

@@ -34,17 +34,17 @@ def test_pictures_are_wanted_only_while_somebody_watches(
 ) -> None:
     assert not outlet.wanted
     Pictures(source, {"watch": ("depth",)})
-    wait_for(lambda: outlet.wanted, 60)
+    wait_for(lambda: outlet.wanted)
 
 
 def test_a_picture_arrives_as_it_was_with_its_age(outlet: PictureOutlet, source: str) -> None:
     page = Pictures(source, {"watch": ("depth", "cab")})
     assert page.of("watch", "depth") == (None, "no picture yet")
-    wait_for(lambda: outlet.wanted, 60)
+    wait_for(lambda: outlet.wanted)
     now = pylsl.local_clock()
     made = now + 60.0  # or it would be out of date on a computer that is held up
     outlet.push({"depth": Picture(GREYS, now - 100.0, "white 2 m, black 14 m")}, made)
-    wait_for(lambda: page.of("watch", "depth")[1] != "no picture yet", 60)
+    wait_for(lambda: page.of("watch", "depth")[1] != "no picture yet")
     shot, said = page.of("watch", "depth")
     assert shot is not None
     assert said.startswith("10")
@@ -58,10 +58,10 @@ def test_a_picture_arrives_as_it_was_with_its_age(outlet: PictureOutlet, source:
 
 def test_a_picture_that_is_out_of_date_is_not_shown(outlet: PictureOutlet, source: str) -> None:
     page = Pictures(source, {"watch": ("depth",)})
-    wait_for(lambda: outlet.wanted, 60)
+    wait_for(lambda: outlet.wanted)
     made = pylsl.local_clock() - 100.0
     outlet.push({"depth": Picture(GREYS, made)}, made)
-    wait_for(lambda: page.of("watch", "depth")[1] != "no picture yet", 60)
+    wait_for(lambda: page.of("watch", "depth")[1] != "no picture yet")
     shot, said = page.of("watch", "depth")
     assert shot is None
     assert said.startswith("no picture for 10")
