@@ -16,7 +16,7 @@ from typing import IO, Any
 from labcrane.streams.request import StreamRequest
 
 PATIENCE_S = 15.0
-"""How long a recorder may take to close its journal when it is told to stop."""
+"""How long a recorder may take to close its journal when it is told to stop, or a spare to end."""
 
 
 class RecorderKeeper:
@@ -78,21 +78,17 @@ class RecorderKeeper:
 
     def stop(self) -> None:
         """Let the recorder write down what has come and close its journal."""
-        self._spare.stdin.close()  # it ends without having been told anything
-        self._spare.wait(PATIENCE_S)
-        self._spare.stdout.close()
         process = self._process
         try:
             process.stdin.write("stop\n")
             process.stdin.close()
         except BrokenPipeError:
             pass  # it died this very moment; its journal is as whole as it can be
-        try:
-            process.wait(PATIENCE_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+        process.end()
         self._listener.join()
+        self._spare.stdin.close()  # it ends without having been told anything
+        self._spare.end()
+        self._spare.stdout.close()
 
     def _start(self) -> "_Recorder":
         """Give the spare recorder its orders, and have another one ready."""
@@ -128,3 +124,11 @@ class _Recorder(subprocess.Popen[str]):
             # It closes its journal when told to, not when a key is pressed.
             start_new_session=True,
         )
+
+    def end(self) -> None:
+        """Wait until it has ended, as it was told to; one that hangs is killed."""
+        try:
+            self.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self.kill()
+            self.wait()

@@ -1,14 +1,17 @@
 """What people say before a session runs, and recorders that do not end as they should."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
-from faults.sessions import STUDY, unique
+from faults.sessions import STUDY, unique, wait_for
 
 from labcrane import launcher as launcher_module
-from labcrane import open_recording
+from labcrane import open_recording, recorder_keeper
 from labcrane.console import Command, Order, QueueConsole
 from labcrane.launcher import Launcher
+from labcrane.recorder_keeper import RecorderKeeper
 from labcrane.session_process import VisitOrder
 
 
@@ -59,3 +62,33 @@ def test_a_note_that_is_given_while_streams_are_waited_for_is_in_the_record(
     assert events["page.denied"]["why"] == "somebody asked for end"
     assert "order.start" not in events
     assert "start: the session has not begun; order it again when it has" in said
+
+
+STOPS_BUT_HANGS_AS_A_SPARE = """
+import sys, time
+if not sys.stdin.readline():
+    time.sleep(600)
+print('{"ready": true}', flush=True)
+open(sys.argv[1], "w").write(sys.stdin.readline())
+"""
+
+
+def test_a_spare_recorder_that_hangs_keeps_no_recorder_from_closing_its_journal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heard, started = tmp_path / "heard", []
+
+    class Stubborn(recorder_keeper._Recorder):
+        def __init__(self) -> None:
+            command = [sys.executable, "-c", STOPS_BUT_HANGS_AS_A_SPARE, str(heard)]
+            pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+            subprocess.Popen.__init__(self, command, **pipes)
+            started.append(self)
+
+    monkeypatch.setattr(recorder_keeper, "_Recorder", Stubborn)
+    keeper = RecorderKeeper(tmp_path / "ses-01_streams.xdf", [])
+    wait_for(lambda: keeper.ready, 60.0)
+    monkeypatch.setattr(recorder_keeper, "PATIENCE_S", 3.0)
+    keeper.stop()
+    assert heard.read_text() == "stop\n"
+    assert [process.returncode for process in started] == [0, -9]
