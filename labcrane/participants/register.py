@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from labcrane.durable_file import write_text
 from labcrane.errors import ProtocolError, RecordingError
-from labcrane.participants.exclusive import exclusive
+from labcrane.exclusive import exclusive
 from labcrane.participants.places import Places
 
 
