@@ -1,5 +1,6 @@
 """Files that are replaced whole: a kill leaves the old one or the new one, never a part."""
 
+import hashlib
 import os
 import shutil
 from collections.abc import Iterator
@@ -80,3 +81,9 @@ def sync_folder(path: Path) -> None:
         os.fsync(fd)
     finally:
         os.close(fd)
+
+
+def sha256(path: Path) -> str:
+    """Return the SHA-256 of a file, hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

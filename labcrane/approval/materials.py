@@ -11,7 +11,8 @@ from typing import Any
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from labcrane.approval.source_tree import digest, hashes
+from labcrane.approval.source_tree import hashes
+from labcrane.durable_file import sha256
 from labcrane.errors import ProtocolError
 from labcrane.hookspecs import PROJECT
 from labcrane.registry import Registry
@@ -203,7 +204,7 @@ def _plugins(
     found = {name: _plugin(points[name]) for name in sorted(used - registry.local.keys())}
     # Every file in the study's own folder runs when the study is read, whatever it offers.
     own = {
-        name: {"version": OWN, "files": {name: digest(path)}}
+        name: {"version": OWN, "files": {name: sha256(path)}}
         for name, path in registry.local.items()
     }
     return found | own
