@@ -244,7 +244,7 @@ def _event_line(event: Event) -> str | None:
         case "pause.start" | "pause.end":
             return f"{event.name.replace('.', ' ')} ({data['by']})"
         case name if name.startswith("order.") and data["refused"]:
-            return f"{name.removeprefix('command.')}: {data['refused']}"
+            return f"{name.removeprefix('order.')}: {data['refused']}"
         case _:
             return sheet_line(event)
 
