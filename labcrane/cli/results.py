@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from labcrane.cli.network import stay_on_this_computer
 from labcrane.cli.output import out
 from labcrane.errors import ProtocolError, RecordingError
 
@@ -124,9 +125,7 @@ def replay(
     from labcrane.replay import replay as run_again
 
     if speed is not None:
-        from labcrane.streams.network import use_loopback
-
-        use_loopback()
+        stay_on_this_computer()
     done = run_again(recording, session, protocol=protocol, machine=machine, speed=speed)
     for part in done.parts:
         out.print(f"differs: {part}", markup=False)
