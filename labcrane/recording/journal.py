@@ -94,7 +94,7 @@ class SessionJournal:
         Parameters
         ----------
         stamp
-            When the tick woke, in seconds on the session's clock.
+            When the tick was due, in seconds on the session's clock.
         row
             Shape ``(n_columns,)``.
 
