@@ -65,6 +65,22 @@ class Study:
         """Hash of the protocol's text, hexadecimal."""
         return hashlib.sha256(self.text.encode()).hexdigest()
 
+    @property
+    def choices(self) -> dict[str, Choice]:
+        """The components for people, by the part they play: ``scheme``, ``tasks.NAME``."""
+        named = {
+            "tasks": self.task_choices,
+            "questionnaires": self.questionnaire_choices,
+            "feedback": self.cues | self.sounds,
+            "views": self.views,
+        }
+        return {
+            "input": self.input,
+            "scheme": self.scheme,
+            "dynamics": self.dynamics,
+            **{f"{kind}.{name}": choice for kind in named for name, choice in named[kind].items()},
+        }
+
     def check_participant(self, participant: str) -> None:
         """Raise :class:`ProtocolError` unless ``participant`` matches the protocol's pattern."""
         pattern = self.protocol.participants.pattern

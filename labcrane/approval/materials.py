@@ -70,18 +70,10 @@ def settings(study: Study) -> dict[str, Any]:
     ProtocolError
         A setting names a file that would not move with the study, and be no part of the lock.
     """
-    choices = {"input": study.input, "scheme": study.scheme, "dynamics": study.dynamics}
-    for kind, named in (
-        ("tasks", study.task_choices),
-        ("questionnaires", study.questionnaire_choices),
-        ("feedback", {**study.cues, **study.sounds}),
-        ("views", study.views),
-    ):
-        choices |= {f"{kind}.{name}": choice for name, choice in named.items()}
     folder = study.path.parent
     return {
         part: _portable(choice.settings.model_dump(), folder, part)
-        for part, choice in choices.items()
+        for part, choice in study.choices.items()
     }
 
 
