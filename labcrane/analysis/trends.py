@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 LEAST_EIGENVALUE = 1e-4
 """Of the correlation of random effects; below it one of them follows from the other."""
 
+FIXED = ("sequence", "difficulty", "far_side")
+"""Fixed terms of the mixed model; one that does not vary is left out."""
+
 
 @dataclass(frozen=True, slots=True)
 class Trend:
@@ -131,21 +134,10 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel | None:
     """
     import pandas as pd
 
-    kept = [measure, "sequence", "difficulty", "far_side", "participant"]
-    table = movements[kept].dropna()
-    table = table[table[measure] > 0.0]
-    if table["participant"].nunique() < 3:  # noqa: PLR2004
+    data = _modelled(movements, measure)
+    if data["participant"].nunique() < 3:  # noqa: PLR2004
         return None
-    data = pd.DataFrame(
-        {
-            "y": np.log(table[measure]),
-            "sequence": table["sequence"] - table["sequence"].mean(),
-            "difficulty": table["difficulty"] - table["difficulty"].mean(),
-            "far_side": table["far_side"],
-            "participant": table["participant"],
-        }
-    )
-    varied = [name for name in kept[1:4] if data[name].nunique() > 1]
+    varied = [name for name in FIXED if data[name].nunique() > 1]
     formula = "y ~ " + (" + ".join(varied) or "1")
     for slopes in (True, False):
         found = _fit(formula, data, "~sequence" if slopes else "1")
@@ -172,6 +164,16 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel | None:
         n=len(data),
         participants=data["participant"].nunique(),
     )
+
+
+def _modelled(movements: "pd.DataFrame", measure: str) -> "pd.DataFrame":
+    """Return what the model is fitted to: the measure's logarithm, and centred terms."""
+    table = movements[[measure, *FIXED, "participant"]].dropna()
+    table = table[table[measure] > 0.0]
+    data = table[[*FIXED, "participant"]].assign(y=np.log(table[measure]))
+    for name in ("sequence", "difficulty"):
+        data[name] -= data[name].mean()
+    return data
 
 
 def _fit(formula: str, data: "pd.DataFrame", random: str) -> Any:

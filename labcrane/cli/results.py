@@ -13,6 +13,7 @@ from labcrane.errors import ProtocolError, RecordingError
 
 if TYPE_CHECKING:
     from labcrane.analysis.cohort import Cohort, Participant, Struck
+    from labcrane.analysis.movements import Groups
 
 DataFolder = Annotated[Path, typer.Argument(metavar="DATA", help="the study's data folder")]
 Include = Annotated[
@@ -130,12 +131,7 @@ def replay(
     for part in done.parts:
         out.print(f"differs: {part}", markup=False)
     if measures is not None:
-        from labcrane.analysis.measures import measure_session
-        from labcrane.recording.recording import open_recording
-
-        record = open_recording(recording).session(session)
-        measure_session(record, frames=done.frames).to_csv(measures, index=False)
-        out.print(f"measures: {measures}", markup=False)
+        _write_measures(recording, session, done.frames, measures)
     if done.difference is None:
         out.print(f"{done.ticks} ticks replayed, every number the same bit for bit", markup=False)
         return
@@ -145,6 +141,16 @@ def replay(
         f"is {first.replayed!r}"
         + ("" if done.parts else "; no part that is recorded differs, so look at the plugins")
     )
+
+
+def _write_measures(recording: Path, session: int, frames: "Groups", path: Path) -> None:
+    """Write the measures of a session's movements in the ``frames`` of its replay."""
+    from labcrane.analysis.measures import measure_session
+    from labcrane.recording.recording import open_recording
+
+    record = open_recording(recording).session(session)
+    measure_session(record, frames=frames).to_csv(path, index=False)
+    out.print(f"measures: {path}", markup=False)
 
 
 def cohort_of(data: Path, include: list[str] | None) -> "Cohort":
