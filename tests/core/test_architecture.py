@@ -58,6 +58,32 @@ def test_looking_loads_nothing_heavy(arguments: list[str]) -> None:
     assert not HEAVY & set(loaded)
 
 
+SCREEN = 40
+"""Lines that a reader has before their eyes at once; the docstring is read before."""
+
+
+def long_functions(module: Path) -> dict[str, int]:
+    """Return the functions that do not fit a screen, and their lines without the docstring."""
+    found = {}
+    for node in ast.walk(ast.parse(module.read_text())):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            first = node.body[0]
+            told = ast.get_docstring(node) is not None
+            docstring = 1 + first.end_lineno - first.lineno if told else 0
+            lines = 1 + node.end_lineno - node.lineno - docstring
+            if lines > SCREEN:
+                found[f"{module.relative_to(ROOT)}:{node.lineno} {node.name}"] = lines
+    return found
+
+
+def test_functions_fit_a_screen() -> None:
+    modules = [
+        module for folder in ("labcrane", "plugins") for module in (ROOT / folder).rglob("*.py")
+    ]
+    found = {name: lines for module in modules for name, lines in long_functions(module).items()}
+    assert not found, f"more than {SCREEN} lines: {found}"
+
+
 def test_files_stay_short() -> None:
     for folder in ("labcrane", "plugins"):
         for module in (ROOT / folder).rglob("*.py"):
