@@ -4,7 +4,6 @@ import hashlib
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from difflib import get_close_matches
 from importlib.machinery import SourceFileLoader
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import module_from_spec, spec_from_file_location
@@ -18,6 +17,7 @@ from labcrane.culprit import told
 from labcrane.errors import PluginError
 from labcrane.hookspecs import PROJECT
 from labcrane.offers import API
+from labcrane.suggestion import suggestion
 
 FOLDER = "plugins"
 """Where a study keeps plugins of its own, beside its protocol."""
@@ -118,6 +118,4 @@ def _check_hooks(manager: pluggy.PluginManager, module: ModuleType) -> None:
     known = [name for name in vars(hookspecs) if name.startswith("labcrane_")]
     for caller in manager.get_hookcallers(module) or ():
         if not caller.has_spec():
-            close = get_close_matches(caller.name, known, n=1)
-            hint = f"did you mean {close[0]!r}?" if close else f"there is {', '.join(known)}"
-            raise PluginError(f"unknown hook {caller.name!r}; {hint}")
+            raise PluginError(f"unknown hook {caller.name!r}; {suggestion(caller.name, known)}")

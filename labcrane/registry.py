@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import TypeVar, cast
@@ -24,6 +23,7 @@ from labcrane.roles import (
     Questionnaire,
     Task,
 )
+from labcrane.suggestion import suggestion
 
 RoleT = TypeVar("RoleT", bound=Component)
 
@@ -81,12 +81,10 @@ class Registry:
         """Return the offer called ``name``, or say what there is instead."""
         if name in (offers := self.offers[role]):
             return cast("Offer[RoleT]", offers[name])
-        message = f"{ROLES[role].word} {name!r} is not installed"
-        if close := get_close_matches(name, offers, n=1):
-            message += f"; did you mean {close[0]!r}?"
-        else:
-            message += f"; there is {', '.join(sorted(offers)) or 'none'}"
-        message += " (labcrane plugins lists all)"
+        message = (
+            f"{ROLES[role].word} {name!r} is not installed; {suggestion(name, sorted(offers))} "
+            "(labcrane plugins lists all)"
+        )
         for plugin, why in self.broken.items():
             message += f"; plugin {plugin!r} is broken: {why}"
         raise PluginError(message)

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,6 +12,7 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError
 
 from labcrane.errors import ProtocolError
+from labcrane.suggestion import suggestion
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 Place = tuple[str | int, ...]
@@ -108,9 +108,8 @@ def explain(error: ErrorDetails, place: Place, model: type[BaseModel]) -> str:
     key = loc[-1] if loc else _name(place)
     if error["type"] == "extra_forbidden":
         possible = _keys(model, loc[:-1])
-        close = get_close_matches(str(key), possible, n=1)
-        hint = f"did you mean {close[0]!r}?" if close else f"possible: {', '.join(possible)}"
-        return f"{str(key)!r} is not a key of {_name((*place, *loc[:-1]))}; {hint}"
+        instead = suggestion(str(key), possible, "possible:")
+        return f"{str(key)!r} is not a key of {_name((*place, *loc[:-1]))}; {instead}"
     if error["type"] == "missing":
         return f"{_name((*place, *loc[:-1]))} needs {str(key)!r}"
     what = error["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
