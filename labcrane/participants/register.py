@@ -156,6 +156,14 @@ class Register(Record):
                 "labcrane erase, relabel or transfer finishes it"
             )
 
+    def check_study(self, study: str) -> None:
+        """Raise :class:`ProtocolError` when this is the register of another study."""
+        if self.study not in {"", study}:
+            raise ProtocolError(
+                f"the register is of study {self.study!r}, the protocol of {study!r}; give the "
+                "study's own data folder with --data"
+            )
+
     def entry(self, participant: str) -> Entry:
         """Return a participant, or say who there is."""
         if participant in self.participants:
