@@ -59,10 +59,8 @@ class SyncReport:
 
     def as_json(self) -> dict[str, Any]:
         """Return what JSON can hold; what is not known is null."""
-        return {
-            "verdict": self.verdict.value,
-            **{key: finite(each) for key, each in asdict(self).items()},
-        }
+        plain = {name: finite(each) for name, each in asdict(self).items()}
+        return {"verdict": self.verdict.value, **plain}
 
     def table(self) -> list[tuple[str, ...]]:
         """Return a row of text per stream, in the order of ``COLUMNS``."""
