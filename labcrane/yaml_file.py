@@ -95,6 +95,14 @@ class YamlFile:
                 self.problem((*place, *_inside(value, each)), explain(each, place, model))
             return None
 
+    def checked(self, model: type[ModelT]) -> ModelT:
+        """Return the whole file as a ``model``, or raise all mistakes in it."""
+        found = self.check(model)
+        self.raise_problems()
+        if found is None:
+            raise AssertionError("what is wrong with a file is a problem, and problems were raised")
+        return found
+
     def raise_problems(self) -> None:
         """Raise :class:`ProtocolError` with one line for every mistake, in the file's order."""
         if self._problems:
