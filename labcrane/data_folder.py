@@ -10,6 +10,11 @@ from labcrane.durable_file import make_folder
 from labcrane.errors import ProtocolError, RecordingError
 
 
+def needed_bytes(expected_s: float, bytes_per_s: float, reserve_s: float) -> float:
+    """Return the space for a session of twice the expected length, and its reserve."""
+    return (2.0 * expected_s + reserve_s) * bytes_per_s
+
+
 @dataclass(frozen=True, slots=True)
 class DataFolder:
     """The recordings of one participant.
@@ -37,6 +42,11 @@ class DataFolder:
         """The participant's name with its stamps."""
         stamps = ["PILOT"] * self.pilot + ["SIMULATED"] * self.simulated
         return "-".join([self.participant, *stamps])
+
+    @staticmethod
+    def pseudonym(name: str) -> str:
+        """Return the pseudonym in a ``name`` with stamps."""
+        return name.removesuffix("-SIMULATED").removesuffix("-PILOT")
 
     @property
     def path(self) -> Path:
@@ -84,7 +94,7 @@ class DataFolder:
         RecordingError
             It does not; says how much there is, and how much is needed.
         """
-        needed = (2.0 * expected_s + reserve_s) * bytes_per_s
+        needed = needed_bytes(expected_s, bytes_per_s, reserve_s)
         free = shutil.disk_usage(self.path).free
         if free < needed:
             raise RecordingError(

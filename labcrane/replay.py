@@ -18,6 +18,7 @@ import numpy as np
 from labcrane import loop, rig
 from labcrane.clock import ManualClock, SystemClock, Tick
 from labcrane.course import Course
+from labcrane.data_folder import DataFolder
 from labcrane.errors import ProtocolError, RecordingError
 from labcrane.frame_log import PHASES, FrameLog, columns
 from labcrane.plan import plan_session
@@ -34,9 +35,6 @@ if TYPE_CHECKING:
 
 COMPARED = ("tick", "trial", "elapsed", "phase", "paused")
 """Of the loop's columns; when ticks woke is not the machine's doing."""
-
-STAMPS = ("-SIMULATED", "-PILOT")
-"""What is put behind a pseudonym, the last one first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,9 +134,7 @@ def _run(
     sinks: Sequence[Callable[[Frame], None]],
 ) -> Replayed:
     script = Script(record)
-    participant = str(record.context["participant"])
-    for stamp in STAMPS:
-        participant = participant.removesuffix(stamp)
+    participant = DataFolder.pseudonym(str(record.context["participant"]))
     plan = plan_session(study, participant, session)
     machine = study.machine
     controller, dynamics = study.scheme.build(machine), study.dynamics.build(machine)

@@ -110,6 +110,7 @@ def _print(check: "Check") -> None:
 def _session_bytes(study: "Study") -> float:
     """Return what the longest session takes, with the same margin as ``labcrane run`` asks for."""
     from labcrane import rig
+    from labcrane.data_folder import needed_bytes
     from labcrane.frame_log import frame_bytes
     from labcrane.plan import plan_session
     from labcrane.pseudonyms import pseudonyms
@@ -121,4 +122,4 @@ def _session_bytes(study: "Study") -> float:
         plan_session(study, name, number).expected_s
         for number in range(1, len(study.protocol.sessions) + 1)
     )
-    return (2.0 * longest + RESERVE_S) * frame_bytes(run) * run.rate_hz
+    return needed_bytes(longest, frame_bytes(run) * run.rate_hz, RESERVE_S)
