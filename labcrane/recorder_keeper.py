@@ -117,7 +117,7 @@ class _Recorder(subprocess.Popen[str]):
 
     def __init__(self) -> None:
         super().__init__(
-            [sys.executable, "-m", "labcrane.streams.recorder"],
+            [sys.executable, "-m", "labcrane.streams.recorder_process"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

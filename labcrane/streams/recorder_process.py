@@ -1,4 +1,17 @@
-"""The recorder as a process: whom it listens to, and when it ends."""
+"""The process that records the streams of others, and outlives the session.
+
+It is started with its orders as JSON, and finds whatever it was asked for, late or again after a
+restart. Its own journal is closed some seconds after its pipe or the session it watches ends, so
+that nothing of the end is lost; a recorder that was killed is started again and writes the next
+part.
+
+    python -m labcrane.streams.recorder_process '{"journal": "ses-01_streams.xdf", "streams": []}'
+
+Without the JSON it waits for it as the first line of its standard input.
+
+It reads ``stop`` on its standard input, and writes a line of JSON on its standard output every
+second: how each stream is, and whether all that is required flows.
+"""
 
 import contextlib
 import json
@@ -7,12 +20,16 @@ import select
 import signal
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from labcrane.errors import StreamError
 from labcrane.streams.network import use_loopback
 from labcrane.streams.outlets import check_clock
-from labcrane.streams.recorder import Orders, Recorder
+from labcrane.streams.recorder import Recorder, a_resolver
+from labcrane.streams.request import StreamRequest
 
 if TYPE_CHECKING:
     import pylsl
@@ -20,6 +37,56 @@ if TYPE_CHECKING:
 LOOK_S = 0.25
 STATUS_S = 1.0
 STATUS_FD = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Orders:
+    """What a recorder is to do.
+
+    Attributes
+    ----------
+    journal
+        The first part; a later recorder writes the next one.
+    streams
+        What to record.
+    session_pid
+        The session process, which it outlives by the grace; None watches the pipe alone.
+    grace_s
+        How long it goes on when the session has died.
+    local
+        Whether LSL is kept on this computer, unless ``LSLAPICFG`` says something.
+    """
+
+    journal: Path
+    streams: tuple[StreamRequest, ...]
+    session_pid: int | None = None
+    grace_s: float = 3.0
+    local: bool = False
+
+    @classmethod
+    def of(cls, fields: Mapping[str, Any]) -> "Orders":
+        """Return the orders that JSON holds."""
+        known = cls.__dataclass_fields__
+        if unknown := sorted(set(fields) - set(known)):
+            raise StreamError(
+                f"a recorder cannot be told {', '.join(unknown)}; it can be told {', '.join(known)}"
+            )
+        streams = tuple(StreamRequest.of(one) for one in fields.get("streams", ()))
+        rest = {key: value for key, value in fields.items() if key not in ("journal", "streams")}
+        return cls(Path(fields["journal"]), streams, **rest)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Record until told to stop; the process's exit status.
+
+    Without arguments the process loads what it needs, looks around for streams, and waits for its
+    orders, a line of JSON on the standard input: a spare recorder takes over at once.
+    """
+    if arguments:
+        return run(Orders.of(json.loads(arguments[0])))
+    resolver = a_resolver()
+    orders = await_orders()
+    return run(Orders.of(json.loads(orders)), resolver) if orders else 0
 
 
 def run(orders: Orders, resolver: "pylsl.ContinuousResolver | None" = None) -> int:
@@ -134,4 +201,4 @@ class _Teller:
 
 
 if __name__ == "__main__":
-    sys.exit(run(Orders.of(json.loads(sys.argv[1]))))
+    sys.exit(main(sys.argv[1:]))

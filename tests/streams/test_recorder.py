@@ -167,7 +167,7 @@ def test_discovery_tells_rate_units_and_clock(lab):
 def test_a_recorder_that_is_told_nonsense_says_what_it_understands():
     orders = json.dumps({"journal": "x.xdf", "streams": [], "colour": "red"})
     done = subprocess.run(
-        [sys.executable, "-m", "labcrane.streams.recorder", orders],
+        [sys.executable, "-m", "labcrane.streams.recorder_process", orders],
         capture_output=True,
         text=True,
         check=False,
