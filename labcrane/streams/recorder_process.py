@@ -1,9 +1,8 @@
 """The process that records the streams of others, and outlives the session.
 
 It is started with its orders as JSON, and finds whatever it was asked for, late or again after a
-restart. Its own journal is closed some seconds after its pipe or the session it watches ends, so
-that nothing of the end is lost; a recorder that was killed is started again and writes the next
-part.
+restart. Its own journal is closed some seconds after its pipe ends, so that nothing of the end is
+lost; a recorder that was killed is started again and writes the next part.
 
     python -m labcrane.streams.recorder_process '{"journal": "ses-01_streams.xdf", "streams": []}'
 
@@ -26,7 +25,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from labcrane.errors import StreamError
-from labcrane.streams.network import use_loopback
 from labcrane.streams.outlets import check_clock
 from labcrane.streams.recorder import Recorder, a_resolver
 from labcrane.streams.request import StreamRequest
@@ -49,19 +47,13 @@ class Orders:
         The first part; a later recorder writes the next one.
     streams
         What to record.
-    session_pid
-        The session process, which it outlives by the grace; None watches the pipe alone.
     grace_s
-        How long it goes on when the session has died.
-    local
-        Whether LSL is kept on this computer, unless ``LSLAPICFG`` says something.
+        How long it goes on when whoever started it has died.
     """
 
     journal: Path
     streams: tuple[StreamRequest, ...]
-    session_pid: int | None = None
     grace_s: float = 3.0
-    local: bool = False
 
     @classmethod
     def of(cls, fields: Mapping[str, Any]) -> "Orders":
@@ -94,8 +86,6 @@ def run(orders: Orders, resolver: "pylsl.ContinuousResolver | None" = None) -> i
 
     ``resolver`` is one that has looked around already.
     """
-    if orders.local:
-        use_loopback()
     check_clock()
     recorder = Recorder(orders.journal, orders.streams, resolver)
     teller = _Teller()
@@ -125,19 +115,14 @@ def await_orders() -> str:
 
 def _watch(orders: Orders) -> Iterator[bool]:
     """Yield several times a second until it is time to end; True when a status is due."""
-    stopped = _signals()
-    session = _open_session(orders.session_pid)
-    inputs = {0} if session is None else {0, session}
+    stopped, inputs = _signals(), {0}
     ends = float("inf")
     due = 0.0
     while time.monotonic() < ends:
         ready, _, _ = select.select([*inputs, stopped], [], [], LOOK_S)
         if stopped in ready or (0 in ready and _told_to_stop(inputs)):
             return
-        if session in ready:
-            inputs.discard(session)
-        # The pipe's end, or the session's: what its streams still send is recorded.
-        if ends == float("inf") and (0 not in inputs or (session and session not in inputs)):
+        if ends == float("inf") and not inputs:  # what the session's streams still send is recorded
             ends = time.monotonic() + orders.grace_s
         status = time.monotonic() >= due
         if status:
@@ -151,18 +136,6 @@ def _told_to_stop(inputs: set[int]) -> bool:
     if not text:
         inputs.discard(0)
     return b"stop" in text
-
-
-def _open_session(pid: int | None) -> int | None:
-    """Return a descriptor that becomes readable when the session process ends."""
-    if pid is None:
-        return None
-    try:
-        return os.pidfd_open(pid)
-    except ProcessLookupError:
-        ended, other = os.pipe()
-        os.close(other)
-        return ended
 
 
 def _signals() -> int:
