@@ -76,7 +76,6 @@ class Launcher:
         self._crew: FeedbackCrew | None = None
         self._lost: set[str] = set()
         self._kept: list[Command] = []
-        self.session_pid: int | None = None
         self.sync_report: SyncReport | None = None
 
     def run(self) -> Outcome:
@@ -153,7 +152,6 @@ class Launcher:
         process = context.Process(target=serve, args=(self._order, theirs), name="session")
         process.start()
         theirs.close()
-        self.session_pid = process.pid
         try:
             return self._watch(process, ours)
         finally:

@@ -40,11 +40,6 @@ class RecorderKeeper:
         self._process = self._start()
 
     @property
-    def pid(self) -> int:
-        """The recorder's process id."""
-        return self._process.pid
-
-    @property
     def ready(self) -> bool:
         """Whether everything that is required flows, and its clocks are sane."""
         return bool(self.status.get("ready"))
