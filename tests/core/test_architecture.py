@@ -2,6 +2,7 @@
 
 import ast
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,12 @@ ROOT = Path(__file__).parents[2]
 PLUGINS = sorted(path for path in (ROOT / "plugins").iterdir() if (path / "__init__.py").exists())
 HEAVY = {"pybullet", "pygame", "pyo", "panda3d", "pandas", "h5py", "nicegui", "pylsl", "matplotlib"}
 AIMING = str(ROOT / "protocols" / "aiming" / "protocol.yaml")
+
+
+def read_start(package: Path) -> str:
+    """Return what stands in a package's first file; nothing for what is no package."""
+    start = package / "__init__.py"
+    return start.read_text() if start.exists() else ""
 
 
 def imported_modules(source: str) -> set[str]:
@@ -56,6 +63,22 @@ def test_looking_loads_nothing_heavy(arguments: list[str]) -> None:
     status, loaded = json.loads(done.stdout.splitlines()[-1])
     assert status == 0, done.stdout + done.stderr
     assert not HEAVY & set(loaded)
+
+
+LISTING = re.compile(r"^ {4}([a-z_0-9]+(?:, [a-z_0-9]+)*)(?: {2,}\S|$)", re.M)
+"""Names of modules in a package's docstring, and what they are."""
+
+
+@pytest.mark.parametrize(
+    "package",
+    [path for path in (ROOT / "labcrane").iterdir() if "up::" in read_start(path)],
+    ids=lambda path: path.name,
+)
+def test_a_package_lists_its_modules_and_no_others(package: Path) -> None:
+    told = ast.get_docstring(ast.parse(read_start(package))) or ""
+    listed = [name for names in LISTING.findall(told) for name in names.split(", ")]
+    assert len(listed) == len(set(listed))
+    assert set(listed) == {path.stem for path in package.glob("*.py")} - {"__init__"}
 
 
 SCREEN = 40
