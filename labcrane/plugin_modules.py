@@ -9,6 +9,7 @@ from importlib.metadata import EntryPoint, entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import CodeType, ModuleType
+from typing import TypeVar
 
 import pluggy
 
@@ -18,6 +19,8 @@ from labcrane.errors import PluginError
 from labcrane.hookspecs import PROJECT
 from labcrane.offers import API
 from labcrane.suggestion import suggestion
+
+OfferT = TypeVar("OfferT")
 
 FOLDER = "plugins"
 """Where a study keeps plugins of its own, beside its protocol."""
@@ -72,6 +75,27 @@ def load_plugins(
             if manager.get_plugin(name):
                 manager.unregister(name=name)
     return Modules(manager, broken, local)
+
+
+def offered(implementation: pluggy.HookImpl, kind: type[OfferT], made_by: str) -> list[OfferT]:
+    """Return what one plugin's hook offers; ``made_by`` is how a plugin makes such an offer.
+
+    Raises
+    ------
+    PluginError
+        The hook raised something, or returned something else.
+    """
+    try:
+        offers = implementation.function()
+    except PluginError:
+        raise
+    except Exception as error:
+        raise PluginError(told(error)) from error
+    if isinstance(offers, list | tuple) and all(isinstance(each, kind) for each in offers):
+        return list(offers)
+    raise PluginError(
+        f"{implementation.function.__name__} must return a list of {made_by}, not {offers!r}"
+    )
 
 
 def own_plugins(study: Path) -> dict[str, Path]:

@@ -8,10 +8,9 @@ from typing import TypeVar, cast
 
 import pluggy
 
-from labcrane.culprit import told
 from labcrane.errors import PluginError
 from labcrane.offers import Offer
-from labcrane.plugin_modules import load_plugins
+from labcrane.plugin_modules import load_plugins, offered
 from labcrane.roles import (
     Component,
     Controller,
@@ -123,9 +122,9 @@ def _collect(
     for implementation in hook.get_hookimpls():
         plugin = implementation.plugin_name
         try:
-            offers = _offers(implementation)
-        except Exception as error:  # noqa: BLE001 - someone else's hook can raise anything
-            broken[plugin] = str(error) if isinstance(error, PluginError) else told(error)
+            offers = offered(implementation, Offer, "labcrane.offer(...)")
+        except PluginError as error:
+            broken[plugin] = str(error)
             continue
         for offer in offers:
             if offer.name in found:
@@ -136,13 +135,3 @@ def _collect(
             found[offer.name] = offer
             origins[offer.name] = plugin
     return found, origins
-
-
-def _offers(implementation: pluggy.HookImpl) -> list[Offer[Component]]:
-    offers: object = implementation.function()
-    if isinstance(offers, list | tuple) and all(isinstance(each, Offer) for each in offers):
-        return cast("list[Offer[Component]]", list(offers))
-    raise PluginError(
-        f"{implementation.function.__name__} must return a list of labcrane.offer(...), not "
-        f"{offers!r}"
-    )
