@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labcrane.cli.arguments import DataBeside, data_folder
 from labcrane.cli.delay import measure_audio, measure_display
 from labcrane.cli.network import Local, stay_on_this_computer
 from labcrane.cli.output import out
@@ -22,9 +23,7 @@ def doctor(
     protocol: Annotated[
         Path | None, typer.Option(help="look at what this study needs, and at nothing else")
     ] = None,
-    data: Annotated[
-        Path | None, typer.Option(help="data folder; data/ beside the protocol by default")
-    ] = None,
+    data: DataBeside = None,
     peer: Annotated[
         list[str] | None, typer.Option(help="computer that sends a stream; may be given again")
     ] = None,
@@ -73,7 +72,7 @@ def _examine(
 
     registry = discover(study=protocol)
     study = load(protocol, registry) if protocol else None
-    folder = data or (protocol.parent if protocol else Path()) / "data"
+    folder = data_folder(data, protocol)
     needed = _session_bytes(study) if study else disk.NEEDED_BYTES
     checks = []
     for check in examine(folder, registry, study, needed_bytes=needed, peers=peers, move=move):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labcrane.cli.inspect import AsJson
+from labcrane.cli.arguments import AsJson
 from labcrane.cli.output import out, whole_table
 from labcrane.errors import PluginError
 

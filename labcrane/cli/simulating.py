@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labcrane.cli.inspect import ProtocolPath
+from labcrane.cli.arguments import ProtocolPath
 from labcrane.cli.network import stay_on_this_computer
 from labcrane.cli.output import out
 from labcrane.cli.results import Scheduler, Workers, progress_bar
