@@ -94,8 +94,19 @@ class FrameLog:
         self._wrote = time.perf_counter() - began
 
     def note(self, event: Event, tick: int = 0) -> None:
-        """Write an event that is in no frame: before the first, or found out after ``tick``."""
+        """Write an event that is in no frame: before the first, or at the end.
+
+        Raises
+        ------
+        RecordingError
+            The disk refuses it.
+        """
         self._journal.write_event(event, tick)
+
+    def append(self, event: Event, tick: int) -> None:
+        """Write an event that was found out after ``tick``; it waits as frames do."""
+        self._waiting.append(partial(self._journal.write_event, event, tick))
+        self._catch_up()
 
     def close(self) -> None:
         """Write what waits, if the disk takes it now, and close the journal.
@@ -162,6 +173,9 @@ class FrameLog:
             except RecordingError as error:
                 self.trouble = str(error)
                 return
+            except Exception:
+                self._waiting.popleft()  # a plugin's mistake, which no later attempt makes good
+                raise
             self._waiting.popleft()
 
     def _nearly_full(self, free: int) -> str:
