@@ -135,6 +135,7 @@ class Terminal:
             if not select.select([descriptor], [], [], POLL_S)[0]:
                 continue
             if not (more := os.read(descriptor, 4096)):
+                self._line(text.decode(errors="replace").strip())  # the last one may have no end
                 return
             *lines, text = (text + more).split(b"\n")
             for line in lines:
