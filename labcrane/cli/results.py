@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from labcrane.cli.approval import today
 from labcrane.cli.network import stay_on_this_computer
 from labcrane.cli.output import out
 from labcrane.errors import ProtocolError, RecordingError
@@ -185,8 +186,6 @@ def _struck(data: Path) -> "dict[str, Struck]":
 
 def _keep_track(data: Path, to: str, folder: Path, cohort: "Cohort") -> None:
     """Note in the register where data of its participants went, for erasing and relabelling."""
-    from datetime import UTC, datetime
-
     from labcrane.participants.copies import record_export
     from labcrane.participants.places import Places
 
@@ -199,7 +198,7 @@ def _keep_track(data: Path, to: str, folder: Path, cohort: "Cohort") -> None:
         # A file that is named after somebody holds nobody else; a table may hold everybody.
         named = [name for name in names if name in str(inside)]
         files[inside] = named or names
-    record_export(Places(data), to, folder, files, datetime.now(UTC).date())
+    record_export(Places(data), to, folder, files, today())
 
 
 @contextmanager

@@ -63,7 +63,7 @@ def _recover(folder: Path, session: int, conclude: Conclude | None) -> Recovery:
             return Recovery(path, session, where=where)
         return Recovery(path, session, consolidate(path, journals, conclude), where=where)
     except RecordingError as error:
-        return Recovery(path, session, problem=str(error))
+        return Recovery(path, session, problem=str(error), where=where)
 
 
 def is_recovered(folder: Path, session: int) -> bool:
