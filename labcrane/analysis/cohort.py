@@ -1,6 +1,6 @@
 """Who is in a data folder, and who counts."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -139,7 +139,6 @@ class Cohort:
 def find_cohort(
     folder: Path,
     include: Iterable[str] = (),
-    progress: Callable[[int, int], None] | None = None,
     struck: Mapping[str, Struck] | None = None,
 ) -> Cohort:
     """Look at every participant below ``folder``.
@@ -152,8 +151,6 @@ def find_cohort(
         The study's data folder.
     include
         Of simulated, pilot and half-finished, those to be used as well.
-    progress
-        Told how many participants have been looked at, of how many.
     struck
         Whom the register says not to count, and why, by name: they are listed, never used.
 
@@ -168,13 +165,9 @@ def find_cohort(
     if not folder.is_dir():
         raise RecordingError(f"there is no data folder {folder}; give the study's data folder")
     folders = [entry for entry in sorted(folder.iterdir()) if _is_participant(entry)]
-    people = []
     struck = struck or {}
     gone = [name for name in struck if not any(entry.name == name for entry in folders)]
-    for number, entry in enumerate(folders, start=1):
-        people.append(_look(entry, struck.get(entry.name)))
-        if progress is not None:
-            progress(number, len(folders))
+    people = [_look(entry, struck.get(entry.name)) for entry in folders]
     people += [Participant(name, folder / name / f"{name}.h5", *struck[name]) for name in gone]
     people.sort(key=lambda person: person.name)
     included = tuple(person for person in people if person.status in wanted)

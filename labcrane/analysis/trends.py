@@ -50,8 +50,8 @@ class Trend:
     n: int
 
 
-def linear_trend(movements: "pd.DataFrame", measure: str, along: str = "sequence") -> Trend | None:
-    """Test for a linear trend; None with fewer than three participants that have a slope.
+def linear_trend(movements: "pd.DataFrame", measure: str) -> Trend | None:
+    """Test for a linear trend over the sequence; None with fewer than three slopes.
 
     An F test over all positions says that some differ; only this says in which direction.
     """
@@ -59,7 +59,7 @@ def linear_trend(movements: "pd.DataFrame", measure: str, along: str = "sequence
 
     slopes = []
     for _, own in movements.groupby("participant"):
-        means = own.groupby(along)[measure].mean().dropna()
+        means = own.groupby("sequence")[measure].mean().dropna()
         if len(means) > 1:
             slopes.append(float(np.polyfit(means.index.to_numpy(float), means.to_numpy(), 1)[0]))
     if len(slopes) < 3 or np.ptp(slopes) == 0.0:  # noqa: PLR2004 - no test with fewer
@@ -68,7 +68,7 @@ def linear_trend(movements: "pd.DataFrame", measure: str, along: str = "sequence
     low, high = found.confidence_interval(0.95)
     return Trend(
         measure,
-        along,
+        "sequence",
         slope=float(np.mean(slopes)),
         slope_ci=(float(low), float(high)),
         t=float(found.statistic),
