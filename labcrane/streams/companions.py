@@ -28,6 +28,10 @@ OPENED = "opened"
 """The first note of every part: counts of samples start anew with it."""
 
 RESET = "reset"
+"""A note of a source that was replaced."""
+
+COUNTER_GAP = "counter gap"
+"""A note of samples that the source's own counter left out; ``missing`` says how many."""
 
 
 class Companions:
