@@ -87,7 +87,8 @@ class Study:
         if not re.fullmatch(pattern, participant):
             raise ProtocolError(
                 # As it stands in the file, where a backslash is one backslash.
-                f"participant {participant!r} does not match the protocol's pattern '{pattern}'"
+                f"participant {participant!r} does not match the protocol's pattern '{pattern}'; "
+                "give the pseudonym as it was handed out, or correct participants: pattern:"
             )
 
     def check_session(self, number: int) -> None:

@@ -48,7 +48,9 @@ class YamlFile:
             text = path.read_text(encoding="utf-8")
             marked = YAML(typ="rt").load(text)
         except FileNotFoundError:
-            raise ProtocolError(f"{path} does not exist") from None
+            raise ProtocolError(
+                f"{path} does not exist; check its name, and the folder you are in"
+            ) from None
         except (OSError, UnicodeDecodeError) as error:
             raise ProtocolError(f"{path} cannot be read: {error}") from error
         except MarkedYAMLError as error:

@@ -92,7 +92,7 @@ def waive(places: Places, participant: str, session: int, reason: str, today: da
 def check_words(text: str, what: str) -> None:
     """Refuse words that lead to a person, or none at all."""
     if not text.strip():
-        raise ProtocolError(f"a {what} needs words")
+        raise ProtocolError(f"a {what} needs words; say it without names")
     if found := personal(text):
         raise ProtocolError(
             f"the {what} holds {found}, which would lead to a person; write it without"

@@ -170,7 +170,10 @@ class Register(Record):
             return self.participants[participant]
         for stone in self.tombstones:
             if stone.participant == participant:
-                raise ProtocolError(f"participant {participant} was erased on {stone.date}")
+                raise ProtocolError(
+                    f"participant {participant} was erased on {stone.date}; nothing can be said "
+                    "of them any more"
+                )
         known = ", ".join(sorted(self.participants)) or "nobody"
         raise ProtocolError(f"participant {participant} is not in the register; it has {known}")
 

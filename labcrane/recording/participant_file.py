@@ -214,7 +214,10 @@ def opened(path: Path) -> Iterator["h5py.File"]:
         raise RecordingError(f"cannot read {path}: {error}") from error
     with file:
         if file.attrs.get("format") != FORMAT:
-            raise RecordingError(f"{path} is an HDF5 file, but not a participant file of labcrane")
+            raise RecordingError(
+                f"{path} is an HDF5 file, but not a participant file of labcrane; give the .h5 "
+                "file in a participant's folder"
+            )
         if file.attrs["format_version"] != VERSION:
             raise RecordingError(
                 f"{path} has format version {file.attrs['format_version']!r}, this labcrane reads "
@@ -254,7 +257,10 @@ def _verify(beside: Path, path: Path, session: _Session) -> None:
         for column in session.log.columns:
             held = group[f"{column.group}/{column.label.replace('.', '/')}"]
             if held.shape != session.log.time.shape:
-                raise RecordingError(f"{held.name} of {beside} has lost samples")
+                raise RecordingError(
+                    f"{held.name} of {beside} has lost samples; {path} is left as it is: check the "
+                    "disk"
+                )
         if path.exists():
             _compare(new, path, session.group)
 

@@ -29,7 +29,9 @@ def part_number(path: Path) -> int:
     """Return which part a journal is, counted from 1."""
     found = _NAME.fullmatch(path.name)
     if found is None:
-        raise RecordingError(f"{path} is not named like a journal, ses-01_run.part2.xdf")
+        raise RecordingError(
+            f"{path} is not named like a journal; give it a name such as ses-01_run.part2.xdf"
+        )
     return int(found["number"] or 1)
 
 
