@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import IO, Any
@@ -66,6 +67,7 @@ class RecorderKeeper:
         """Start the recorder again if it has died; whether it had."""
         if self._process.poll() is None:
             return False
+        self._process.hang_up()
         self.restarts += 1
         self.status = {}
         self._process = self._start()
@@ -74,14 +76,12 @@ class RecorderKeeper:
     def stop(self) -> None:
         """Let the recorder write down what has come and close its journal."""
         process = self._process
-        try:
+        with suppress(BrokenPipeError):  # when it has died its journal is as whole as it can be
             process.stdin.write("stop\n")
-            process.stdin.close()
-        except BrokenPipeError:
-            pass  # it died this very moment; its journal is as whole as it can be
+        process.hang_up()
         process.end()
         self._listener.join()
-        self._spare.stdin.close()  # it ends without having been told anything
+        self._spare.hang_up()  # it ends without having been told anything
         self._spare.end()
         self._spare.stdout.close()
 
@@ -89,8 +89,9 @@ class RecorderKeeper:
         """Give the spare recorder its orders, and have another one ready."""
         ready = self._spare if self._spare.poll() is None else _Recorder()
         process, self._spare = ready, _Recorder()
-        process.stdin.write(self._orders + "\n")
-        process.stdin.flush()
+        with suppress(BrokenPipeError):  # it died this very moment: the next look replaces it
+            process.stdin.write(self._orders + "\n")
+            process.stdin.flush()
         self._listener = threading.Thread(
             target=self._listen, args=(process, self.restarts), daemon=True
         )
@@ -119,6 +120,11 @@ class _Recorder(subprocess.Popen[str]):
             # It closes its journal when told to, not when a key is pressed.
             start_new_session=True,
         )
+
+    def hang_up(self) -> None:
+        """Let it hear no more."""
+        with suppress(BrokenPipeError):
+            self.stdin.close()
 
     def end(self) -> None:
         """Wait until it has ended, as it was told to; one that hangs is killed."""

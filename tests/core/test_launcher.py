@@ -92,3 +92,24 @@ def test_a_spare_recorder_that_hangs_keeps_no_recorder_from_closing_its_journal(
     keeper.stop()
     assert heard.read_text() == "stop\n"
     assert [process.returncode for process in started] == [0, -9]
+
+
+def test_a_recorder_that_dies_as_it_is_given_its_orders_is_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Dying(recorder_keeper._Recorder):
+        def __init__(self) -> None:
+            pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+            subprocess.Popen.__init__(self, [sys.executable, "-c", ""], **pipes)
+            self.wait()
+            self.looks = 0
+
+        def poll(self) -> int | None:
+            self.looks += 1
+            return super().poll() if self.looks > 1 else None  # alive when it is chosen
+
+    monkeypatch.setattr(recorder_keeper, "_Recorder", Dying)
+    keeper = RecorderKeeper(tmp_path / "ses-01_streams.xdf", [])
+    assert keeper.watch()
+    assert keeper.restarts == 1
+    keeper.stop()
