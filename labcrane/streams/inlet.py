@@ -161,7 +161,7 @@ class Inlet:
         while True:
             stopping = self._stop.wait(PULL_S)
             came = self._pull(inlet, companions, counter)
-            silent = self._mark_silence(silent, came=came)
+            silent = self._mark_silence(silent=silent, came=came)
             if stopping:
                 break
         prober.join()
@@ -229,7 +229,7 @@ class Inlet:
             first = self.flow.samples - len(data)
             self.note(COUNTER_GAP, missing=missing, samples=[first, first + len(data)])
 
-    def _mark_silence(self, silent: bool, *, came: bool) -> bool:  # noqa: FBT001
+    def _mark_silence(self, *, silent: bool, came: bool) -> bool:
         """Note where a regular stream falls silent, and where it goes on."""
         if self.header is None or self.header.rate_hz <= 0.0:
             return False
