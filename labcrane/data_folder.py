@@ -8,6 +8,7 @@ from pathlib import Path
 
 from labcrane.durable_file import make_folder
 from labcrane.errors import ProtocolError, RecordingError
+from labcrane.recording.parts import participant_path
 
 
 def needed_bytes(expected_s: float, bytes_per_s: float, reserve_s: float) -> float:
@@ -56,7 +57,7 @@ class DataFolder:
     @property
     def participant_file(self) -> Path:
         """The HDF5 file with all sessions."""
-        return self.path / f"{self.name}.h5"
+        return participant_path(self.path)
 
     def sessions(self) -> list[int]:
         """Return the sessions that have been begun: those with a journal of their own."""

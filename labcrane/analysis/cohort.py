@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from labcrane.errors import ProtocolError, RecordingError
+from labcrane.recording.parts import participant_path
 from labcrane.recording.recording import Recording, SessionRecord, open_recording
 
 if TYPE_CHECKING:
@@ -168,7 +169,7 @@ def find_cohort(
     struck = struck or {}
     gone = [name for name in struck if not any(entry.name == name for entry in folders)]
     people = [_look(entry, struck.get(entry.name)) for entry in folders]
-    people += [Participant(name, folder / name / f"{name}.h5", *struck[name]) for name in gone]
+    people += [Participant(name, participant_path(folder / name), *struck[name]) for name in gone]
     people.sort(key=lambda person: person.name)
     included = tuple(person for person in people if person.status in wanted)
     left_out = tuple(person for person in people if person.status not in wanted)
@@ -201,11 +202,11 @@ def _nobody(folder: Path, left_out: Sequence[Participant]) -> str:
 def _is_participant(entry: Path) -> bool:
     if not entry.is_dir():
         return False
-    return (entry / f"{entry.name}.h5").exists() or any(entry.glob("ses-*.xdf"))
+    return participant_path(entry).exists() or any(entry.glob("ses-*.xdf"))
 
 
 def _look(folder: Path, struck: Struck | None) -> Participant:
-    path = folder / f"{folder.name}.h5"
+    path = participant_path(folder)
     if struck is not None:
         return Participant(folder.name, path, *struck)
     try:

@@ -1,4 +1,4 @@
-"""Names of journals.
+"""Names of journals, and of the participant file made of them.
 
 A session's journals are ``ses-01_run.xdf`` (frames and events) and ``ses-01_streams.xdf`` (the
 streams of others). A process never appends to a file of another one: after a crash the next
@@ -18,6 +18,11 @@ _JOURNAL = re.compile(r"ses-(?P<session>[0-9]+)_(?P<kind>run|streams)")
 def journal_path(folder: Path, session: int, kind: str) -> Path:
     """Return the path of the first part of a session's journal; ``kind`` is run or streams."""
     return folder / f"ses-{session:02d}_{kind}.xdf"
+
+
+def participant_path(folder: Path) -> Path:
+    """Return the path of the participant file in a participant's folder, whose name it has."""
+    return folder / f"{folder.absolute().name}.h5"
 
 
 def part_path(path: Path, number: int) -> Path:

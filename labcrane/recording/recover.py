@@ -7,7 +7,7 @@ from labcrane.errors import RecordingError
 from labcrane.recording.foreign_streams import Conclude
 from labcrane.recording.hdf5_columns import texts_of
 from labcrane.recording.participant_file import Consolidated, consolidate, group_name, opened
-from labcrane.recording.parts import journal_path, parts, session_of
+from labcrane.recording.parts import journal_path, participant_path, parts, session_of
 from labcrane.whereabouts import read_whereabouts, whereabouts_path
 
 
@@ -56,7 +56,7 @@ def recover(folder: Path, conclude: Conclude | None = None) -> list[Recovery]:
 
 
 def _recover(folder: Path, session: int, conclude: Conclude | None) -> Recovery:
-    path, journals = _file_of(folder), _journals_of(folder, session)
+    path, journals = participant_path(folder), _journals_of(folder, session)
     where = str(read_whereabouts(whereabouts_path(journal_path(folder, session, "run"))) or "")
     try:
         if is_recovered(folder, session):
@@ -74,7 +74,7 @@ def is_recovered(folder: Path, session: int) -> bool:
     RecordingError
         The participant file cannot be read.
     """
-    path = _file_of(folder)
+    path = participant_path(folder)
     if not path.exists():
         return False
     firsts = _journals_of(folder, session)
@@ -86,10 +86,6 @@ def is_recovered(folder: Path, session: int) -> bool:
         return on_disk == dict(
             zip(texts_of(made_of["name"]), made_of["size"][:].astype(int), strict=True)
         )
-
-
-def _file_of(folder: Path) -> Path:
-    return folder / f"{folder.resolve().name}.h5"
 
 
 def _journals_of(folder: Path, session: int) -> list[Path]:
