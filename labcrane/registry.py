@@ -37,21 +37,26 @@ class RoleEntry:
         The hook that collects its offers.
     word
         What a researcher calls it.
+    place
+        Where a protocol uses it; empty for what no protocol names.
     """
 
     hook: str
     word: str
+    place: tuple[str, ...] = ()
 
 
 ROLES: Mapping[type[Component], RoleEntry] = {
-    InputDevice: RoleEntry("labcrane_inputs", "input"),
-    Controller: RoleEntry("labcrane_controllers", "scheme"),
-    Dynamics: RoleEntry("labcrane_dynamics", "dynamics"),
-    Task: RoleEntry("labcrane_tasks", "task"),
+    InputDevice: RoleEntry("labcrane_inputs", "input", ("input",)),
+    Controller: RoleEntry("labcrane_controllers", "scheme", ("scheme",)),
+    Dynamics: RoleEntry("labcrane_dynamics", "dynamics", ("dynamics",)),
+    Task: RoleEntry("labcrane_tasks", "task", ("tasks", "NAME")),
     Exporter: RoleEntry("labcrane_exporters", "exporter"),
-    Questionnaire: RoleEntry("labcrane_questionnaires", "questionnaire"),
-    Cue: RoleEntry("labcrane_cues", "cue"),
-    Feedback: RoleEntry("labcrane_feedback", "feedback"),
+    Questionnaire: RoleEntry(
+        "labcrane_questionnaires", "questionnaire", ("questionnaires", "NAME")
+    ),
+    Cue: RoleEntry("labcrane_cues", "cue", ("feedback", "NAME")),
+    Feedback: RoleEntry("labcrane_feedback", "feedback", ("feedback", "NAME")),
 }
 
 
