@@ -10,7 +10,6 @@ from labcrane_dmd.engine import pybullet
 OVERLAP_M = 0.002
 """Depth, in metres, to which two things may stand in each other at the start."""
 
-GROUND = "ground"
 ROLLING = 0.002
 """Rolling friction in metres: without it a ball never comes to rest."""
 

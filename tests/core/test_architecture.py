@@ -5,6 +5,8 @@ import json
 import re
 import subprocess
 import sys
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -79,6 +81,44 @@ def test_a_package_lists_its_modules_and_no_others(package: Path) -> None:
     listed = [name for names in LISTING.findall(told) for name in names.split(", ")]
     assert len(listed) == len(set(listed))
     assert set(listed) == {path.stem for path in package.glob("*.py")} - {"__init__"}
+
+
+ASKED_FOR_BY_OTHERS = {"get_code"}  # by Python's import
+
+
+def defined(module: Path) -> Iterator[str]:
+    """Yield what a module defines, but for what a decorator hands to somebody else."""
+    for node in ast.walk(ast.parse(module.read_text())):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            given = [ast.unparse(decorator) for decorator in node.decorator_list]
+            if all("property" in name or "contextmanager" in name for name in given):
+                yield node.name
+        elif isinstance(node, ast.ClassDef):
+            yield node.name
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            yield from (target.id for target in targets if isinstance(target, ast.Name))
+            yield from (
+                target.attr
+                for target in targets
+                if isinstance(target, ast.Attribute) and ast.unparse(target.value) == "self"
+            )
+
+
+def test_nothing_is_defined_that_only_tests_use() -> None:
+    places = (("labcrane", "*.py*"), ("plugins", "*.py"), ("docs", "*.md"), ("benchmarks", "*.py"))
+    users = [path for folder, what in places for path in (ROOT / folder).rglob(what)]
+    texts = [path.read_text() for path in users if path.suffix in {".py", ".pyi", ".md"}]
+    used = Counter(word for text in texts for word in re.findall(r"\w+", text))
+    idle = {
+        f"{module.relative_to(ROOT)}: {name}"
+        for folder in ("labcrane", "plugins")
+        for module in (ROOT / folder).rglob("*.py")
+        if "templates" not in module.parts
+        for name in defined(module)
+        if used[name] == 1 and not name.startswith(("__", "test_", "labcrane_"))
+    }
+    assert {entry.partition(": ")[2] for entry in idle} <= ASKED_FOR_BY_OTHERS, idle
 
 
 SCREEN = 40
