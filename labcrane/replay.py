@@ -20,7 +20,7 @@ from labcrane.clock import ManualClock, SystemClock, Tick
 from labcrane.course import Course
 from labcrane.data_folder import DataFolder
 from labcrane.errors import ProtocolError, RecordingError
-from labcrane.frame_log import PHASES, FrameLog, columns
+from labcrane.frame_log import FrameLog, FrameRow, columns
 from labcrane.plan import plan_session
 from labcrane.recording.recording import SessionRecord, open_recording
 from labcrane.records import Frame, Run
@@ -161,6 +161,7 @@ class _Log(FrameLog):
     def __init__(self, run: Run, script: "Script") -> None:
         self._script = script
         self._columns = columns(run)
+        self._fill = FrameRow(run).fill
         self._rows = np.full((script.ticks, len(self._columns)), np.nan)
         self.ticks = 0
 
@@ -170,10 +171,7 @@ class _Log(FrameLog):
         return self._script.disk_trouble
 
     def write(self, frame: Frame) -> None:
-        phase, tick = PHASES[frame.phase], frame.tick
-        loop_row = (*tick, 0.0, frame.trial, frame.elapsed, phase, frame.paused)
-        parts = (loop_row, frame.axes, frame.command, frame.state, frame.task)
-        self._rows[self.ticks] = np.concatenate(parts)
+        self._fill(self._rows[self.ticks], frame, 0.0)
         self.ticks += 1
 
     def frames(self) -> dict[str, "pd.DataFrame"]:
