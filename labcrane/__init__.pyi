@@ -19,6 +19,7 @@ from .machine import Body, Joint, Machine
 from .mesh_file import MeshFile
 from .offers import Ask, CommandOffer, Offer, Settings, StudyPath, offer
 from .questions import AnswerError, Answers, Item, Score, numbers
+from .quiet_import import quietly_imported
 from .reachability import reach
 from .recording.recording import SessionRecord, Stream, open_recording
 from .recording.stream_header import Channel, StreamHeader
@@ -49,6 +50,7 @@ from .scene import Form, Part, Placed, Scene, load_scene, place
 from .scene_text import SCENE_PLACED, read_placed, write_placed
 from .shapes import Ball, Beam, Shape, Targets
 from .signals import FloatArray, Layout, Signal, signals_of
+from .urdf_text import urdf, urdf_joint, urdf_link
 
 __version__: str
 
@@ -125,8 +127,12 @@ __all__ = [
     "offer",
     "open_recording",
     "place",
+    "quietly_imported",
     "reach",
     "read_placed",
     "signals_of",
+    "urdf",
+    "urdf_joint",
+    "urdf_link",
     "write_placed",
 ]

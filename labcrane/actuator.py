@@ -3,7 +3,6 @@
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from typing import Any
 
 from pydantic import (
@@ -16,6 +15,8 @@ from pydantic import (
 )
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
+
+from labcrane.suggestion import suggestion
 
 
 class ActuatorSettings(BaseModel):
@@ -48,14 +49,11 @@ class ActuatorSettings(BaseModel):
             return value
         if isinstance(value, str) and value in PRESETS:
             return PRESETS[value].model_dump()
-        names = ", ".join(PRESETS)
         if isinstance(value, str):
-            close = get_close_matches(value, PRESETS, n=1)
-            hint = f"did you mean {close[0]!r}?" if close else f"there is {names}"
-            message = f"no actuator is called {value!r}; {hint}"
+            message = f"no actuator is called {value!r}; {suggestion(value, PRESETS)}"
             raise ValueError(message)  # noqa: TRY004 - pydantic reports no TypeError
         raise ValueError(
-            f"{value!r} is no actuator; write a name ({names}) or a mapping of "
+            f"{value!r} is no actuator; write a name ({', '.join(PRESETS)}) or a mapping of "
             f"{', '.join(cls.model_fields)}"
         )
 

@@ -27,7 +27,7 @@ class BatchLog(FrameLog):
     def write(self, frame: Frame) -> None:
         """Keep one frame and its events for the next chunk."""
         count, tick = self._count, frame.tick
-        self._fill(self._rows[count], frame)
+        self._fill(self._rows[count], frame, 0.0)
         self._stamps[count] = tick.due
         self._count = count + 1
         if frame.events:

@@ -3,7 +3,8 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from typing import TypeVar
+from pathlib import Path
+from typing import Any, TypeVar
 
 from labcrane.errors import PluginError, ProtocolError
 from labcrane.machine import Machine
@@ -13,6 +14,7 @@ from labcrane.oversight import Oversight
 from labcrane.protocol import Protocol, Use
 from labcrane.registry import Registry
 from labcrane.roles import Component, Cue, Feedback, Questionnaire, Task
+from labcrane.study_files import plain_settings
 from labcrane.watched import watched
 from labcrane.yaml_file import Place, YamlFile
 
@@ -28,6 +30,11 @@ class Choice:
     offer: Offer[Component]
     settings: Settings
     oversight: Oversight = field(default_factory=Oversight, compare=False)
+
+    def described(self, folder: Path) -> dict[str, Any]:
+        """Return it ready for JSON, with the study's files named from its ``folder``."""
+        settings = plain_settings(self.settings, folder)
+        return {"use": self.name, "plugin": self.plugin, "settings": settings}
 
     def build(self, machine: Machine) -> Component:
         """Build, but do not open, the component, under oversight."""
@@ -53,16 +60,7 @@ class Chooser:
             use = Use.model_validate(written)
         else:
             return None  # noted by the protocol's own check
-        try:
-            offer = self._registry.find(role, use.use)
-        except PluginError as error:
-            self._source.problem((*place, "use"), str(error))
-            return None
-        settings = self._source.check(offer.settings, place, use.settings)
-        plugin = self._registry.plugins[role][use.use]
-        if settings is None:
-            return None
-        return Choice(use.use, plugin, offer, settings, self.oversight)
+        return self._choice(role, use, place, (*place, "use"))
 
     def choose_tasks(self) -> dict[str, Choice]:
         """Return the tasks that can be chosen, by the protocol's names for them."""
@@ -79,7 +77,7 @@ class Chooser:
         }
         for place, name in self._asked(protocol):
             if name not in chosen:
-                chosen[name] = self._by_its_own_name(place, name)
+                chosen[name] = self._choice(Questionnaire, Use(use=name), place, place)
         return {name: choice for name, choice in chosen.items() if choice}
 
     def _asked(self, protocol: Protocol) -> Iterator[tuple[Place, str]]:
@@ -91,17 +89,18 @@ class Chooser:
         for number, rule in enumerate(protocol.stop_rules):
             yield ("stop_rules", number, "questionnaire"), rule.questionnaire
 
-    def _by_its_own_name(self, place: Place, name: str) -> Choice | None:
+    def _choice(self, role: type[RoleT], use: Use, place: Place, named: Place) -> Choice | None:
+        """Return what is used at ``place``; its name stands at ``named``."""
         try:
-            offer = self._registry.find(Questionnaire, name)
+            offer = self._registry.find(role, use.use)
         except PluginError as error:
-            self._source.problem(place, str(error))
+            self._source.problem(named, str(error))
             return None
-        settings = self._source.check(offer.settings, place, {})
-        plugin = self._registry.plugins[Questionnaire][name]
+        settings = self._source.check(offer.settings, place, use.settings)
         if settings is None:
             return None
-        return Choice(name, plugin, offer, settings, self.oversight)
+        plugin = self._registry.plugins[role][use.use]
+        return Choice(use.use, plugin, offer, settings, self.oversight)
 
     def choose_feedback(self) -> tuple[dict[str, Choice], dict[str, Choice], dict[str, Choice]]:
         """Return cues, sounds and views by the protocol's names for them."""

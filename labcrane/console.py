@@ -52,7 +52,7 @@ def by_whom(command: Command) -> str:
 
 
 class Console(Protocol):
-    """Whoever gives orders and looks on: a terminal now, a page as well later."""
+    """Whoever gives orders and looks on: the terminal and the pages, or a simulation."""
 
     def commands(self) -> list[Command]:
         """Return the orders given since the last call, without waiting."""

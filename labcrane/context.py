@@ -5,11 +5,9 @@ import platform
 from datetime import UTC, datetime
 from importlib.metadata import entry_points, version
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any, Protocol
 
 from labcrane.attempt import trial_units
-from labcrane.choices import Choice
 from labcrane.data_folder import DataFolder
 from labcrane.doctor.examination import at_start
 from labcrane.hookspecs import PROJECT
@@ -18,7 +16,7 @@ from labcrane.plugin_modules import own_plugins
 from labcrane.records import Run
 from labcrane.rig import Rig
 from labcrane.study import Study
-from labcrane.study_files import named_files, plain_settings
+from labcrane.study_files import named_files
 
 RECORDED_PACKAGES = (
     "labcrane",
@@ -53,19 +51,26 @@ class Recorded(Protocol):
 
 def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> dict[str, Any]:
     """Return everything that whoever reads the recording must know, ready for JSON."""
-    study, folder = visit.study, visit.study.path.parent
-    choices = {
-        "input": study.operator if visit.simulated else study.input,
-        "scheme": study.scheme,
-        "dynamics": study.dynamics,
-        **{f"tasks.{name}": choice for name, choice in study.task_choices.items()},
-        **{f"questionnaires.{name}": each for name, each in study.questionnaire_choices.items()},
-        **{f"feedback.{name}": choice for name, choice in (study.cues | study.sounds).items()},
-        **{f"views.{name}": choice for name, choice in study.views.items()},
-    }
     return {
-        "study": study.protocol.study,
-        "title": study.protocol.title,
+        **_of_visit(visit, plan),
+        "rate_hz": this_run.rate_hz,
+        **_of_study(visit.study, simulated=visit.simulated),
+        "facts": the_rig.facts(),
+        "versions": _versions(),
+        # What a simulation records does not depend on the computer that it is made on.
+        "doctor": None if visit.fast else at_start(visit.folder.root),
+        "plan": [
+            {"block": block.number, "name": block.name, "trials": len(block.trials)}
+            for block in plan.blocks
+        ],
+    }
+
+
+def _of_visit(visit: Recorded, plan: SessionPlan) -> dict[str, Any]:
+    """Return who and when this is, and whether it counts."""
+    return {
+        "study": visit.study.protocol.study,
+        "title": visit.study.protocol.title,
         "participant": visit.folder.name,
         "session": visit.session,
         "session_name": plan.name,
@@ -75,20 +80,23 @@ def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> 
         "pilot": visit.pilot,
         "resumed": visit.resumed,
         "clock": "manual" if visit.fast else "lsl",
-        "rate_hz": this_run.rate_hz,
         "seed": plan.seed,
         "slot": plan.slot,
         "group": plan.group,
+    }
+
+
+def _of_study(study: Study, *, simulated: bool) -> dict[str, Any]:
+    """Return the study as it is run: all that it is made of, and what it says of the data."""
+    folder = study.path.parent
+    choices = study.choices | ({"input": study.operator} if simulated else {})
+    return {
         "protocol": study.text,
         "protocol_sha256": study.sha256,
         "machine": study.machine_text,
         "machine_sha256": hashlib.sha256(study.machine_text.encode()).hexdigest(),
-        "components": {part: _choice(choice, folder) for part, choice in choices.items()},
+        "components": {part: choice.described(folder) for part, choice in choices.items()},
         "files": named_files((choice.settings for choice in choices.values()), folder),
-        "facts": the_rig.facts(),
-        "versions": _versions(),
-        # What a simulation records does not depend on the computer that it is made on.
-        "doctor": None if visit.fast else at_start(visit.folder.root),
         "own_plugins": {
             name: path.read_text(encoding="utf-8") for name, path in own_plugins(study.path).items()
         },
@@ -99,10 +107,6 @@ def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> 
         "rights": {name: each.rights for name, each in study.questionnaires.items()},
         "indicator": study.protocol.indicator.model_dump(mode="json"),
         "sync": study.protocol.sync.model_dump(mode="json"),
-        "plan": [
-            {"block": block.number, "name": block.name, "trials": len(block.trials)}
-            for block in plan.blocks
-        ],
         "trial_units": {
             column: unit
             for task in study.tasks.values()
@@ -114,14 +118,6 @@ def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> 
 def _started(visit: Recorded) -> datetime:
     """Return when the session begins: with --fast on the simulation's clock, which starts at 0."""
     return datetime.fromtimestamp(0.0, UTC) if visit.fast else datetime.now(UTC)
-
-
-def _choice(choice: Choice, folder: Path) -> dict[str, Any]:
-    return {
-        "use": choice.name,
-        "plugin": choice.plugin,
-        "settings": plain_settings(choice.settings, folder),
-    }
 
 
 def _versions() -> dict[str, str]:

@@ -8,6 +8,12 @@ from pathlib import Path
 
 from labcrane.durable_file import make_folder
 from labcrane.errors import ProtocolError, RecordingError
+from labcrane.recording.parts import participant_path
+
+
+def needed_bytes(expected_s: float, bytes_per_s: float, reserve_s: float) -> float:
+    """Return the space for a session of twice the expected length, and its reserve."""
+    return (2.0 * expected_s + reserve_s) * bytes_per_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +44,11 @@ class DataFolder:
         stamps = ["PILOT"] * self.pilot + ["SIMULATED"] * self.simulated
         return "-".join([self.participant, *stamps])
 
+    @staticmethod
+    def pseudonym(name: str) -> str:
+        """Return the pseudonym in a ``name`` with stamps."""
+        return name.removesuffix("-SIMULATED").removesuffix("-PILOT")
+
     @property
     def path(self) -> Path:
         """The participant's folder."""
@@ -46,7 +57,7 @@ class DataFolder:
     @property
     def participant_file(self) -> Path:
         """The HDF5 file with all sessions."""
-        return self.path / f"{self.name}.h5"
+        return participant_path(self.path)
 
     def sessions(self) -> list[int]:
         """Return the sessions that have been begun: those with a journal of their own."""
@@ -84,7 +95,7 @@ class DataFolder:
         RecordingError
             It does not; says how much there is, and how much is needed.
         """
-        needed = (2.0 * expected_s + reserve_s) * bytes_per_s
+        needed = needed_bytes(expected_s, bytes_per_s, reserve_s)
         free = shutil.disk_usage(self.path).free
         if free < needed:
             raise RecordingError(

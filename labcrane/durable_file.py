@@ -1,9 +1,10 @@
 """Files that are replaced whole: a kill leaves the old one or the new one, never a part."""
 
+import hashlib
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from labcrane.errors import RecordingError
@@ -35,6 +36,8 @@ def copy(source: Path, path: Path, mode: int = PRIVATE_FILE) -> None:
 def replacing(path: Path, mode: int = PRIVATE_FILE) -> Iterator[Path]:
     """Give a new file to be written; it takes the name ``path`` once it is on the disk.
 
+    Whatever keeps it from being written whole, nothing of it is left.
+
     Raises
     ------
     RecordingError
@@ -51,10 +54,13 @@ def replacing(path: Path, mode: int = PRIVATE_FILE) -> Iterator[Path]:
         beside.chmod(mode)
         beside.replace(path)
     except OSError as error:
-        beside.unlink(missing_ok=True)
         raise RecordingError(
-            f"cannot write {path}: {error.strerror or error}; it is as it was"
+            f"cannot write {path}: {error.strerror or error}; it is as it was: remove the cause, "
+            "and do it again"
         ) from error
+    finally:
+        with suppress(OSError):  # there is no such folder, or the disk is gone
+            beside.unlink(missing_ok=True)
     sync_folder(path.parent)
 
 
@@ -75,3 +81,9 @@ def sync_folder(path: Path) -> None:
         os.fsync(fd)
     finally:
         os.close(fd)
+
+
+def sha256(path: Path) -> str:
+    """Return the SHA-256 of a file, hexadecimal."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -83,7 +83,7 @@ class FeedbackProcess:
         recorded = self._order.recorded
         while not (self._stop.is_set() or (context.text and (log.taken or not recorded))):
             context.changed(WAIT_S)
-            self._beat(0)
+            self._beat()
 
     def _follow(
         self,
@@ -101,7 +101,7 @@ class FeedbackProcess:
                 if not self._presents:
                     self._presents = True
                     self._say({"presents": True})
-            self._beat(frames.skipped)
+            self._beat()
 
     def _present(
         self, presenter: Presenter, frame: Frame, log: "FeedbackLog", skipped: int
@@ -127,17 +127,17 @@ class FeedbackProcess:
         ours = source_id(self._order.source, "")
         self._resolver = pylsl.ContinuousResolver(pred=f"starts-with(source_id, '{ours}')")
         while not self._stop.wait(WAIT_S):
-            self._beat(0)
+            self._beat()
             found = {info.name(): info for info in self._resolver.results()}
             if all(name in found for name in names):
                 return found
         return {}
 
-    def _beat(self, skipped: int) -> None:
+    def _beat(self) -> None:
         now = time.monotonic()
         if now - self._beaten >= BEAT_S:
             self._beaten = now
-            self._say({"beat": self._presented, "skipped": skipped})
+            self._say({"beat": self._presented})
 
 
 def _reporter(status: TextIO) -> Callable[[dict[str, Any]], None]:

@@ -37,7 +37,6 @@ class Life:
     facts: str = ""
     failed: str | None = None
     presented: int = 0
-    skipped: int = 0
     listener: threading.Thread = field(default_factory=threading.Thread)
 
     def hang_up(self) -> None:
@@ -68,11 +67,6 @@ class FeedbackKeeper:
     def name(self) -> str:
         """The protocol's name for it."""
         return self._order.name
-
-    @property
-    def pid(self) -> int:
-        """The present process's id."""
-        return self._life.process.pid
 
     @property
     def ready(self) -> bool:
@@ -169,7 +163,6 @@ def _listen(life: Life) -> None:
 def _take(life: Life, message: Mapping[str, Any]) -> None:
     life.heard = time.monotonic()
     life.presented = message.get("beat", life.presented)
-    life.skipped = message.get("skipped", life.skipped)
     life.failed = message.get("failed", life.failed)
     if message.get("ready"):
         life.facts = ", ".join(f"{name} {value}" for name, value in message["facts"].items())

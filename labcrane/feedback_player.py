@@ -4,6 +4,7 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 from labcrane import rig
 from labcrane.clock import Tick
@@ -75,34 +76,40 @@ def _present(
     from labcrane.streams.frames import FrameOutlet  # noqa: PLC0415
 
     outlets = (FrameOutlet(run, source), ContextOutlet(run, source, 1))
-
-    def send(frame: Frame, *events: Event) -> None:
-        now = time.perf_counter()
-        sent = replace(frame, tick=Tick(frame.tick.number, now, now), events=events)
-        for outlet in outlets:
-            outlet.push(sent)
-
+    show = partial(_send, [outlet.push for outlet in outlets])
     try:
         first, now = frames[0], time.perf_counter()
         about: dict[str, Value] = {"trial": first.trial, "feedback": "+".join(active) or "none"}
-        send(
-            first,
-            Event(SCENE_PLACED, now, {"things": scene}),
-            Event("trial.start", now, about),
-        )
-        # Whoever finds the streams now is told what is switched on within the second.
-        while time.perf_counter() < now + HOLD_S or not (
-            all(keeper.presented or keeper.given_up for keeper in keepers)
-            or time.perf_counter() > now + PATIENCE_S
-        ):
-            send(first)
-            time.sleep(LOOK_S)
+        placed = Event(SCENE_PLACED, now, {"things": scene})
+        show(first, placed, Event("trial.start", now, about))
+        _hold(lambda: show(first), keepers)
         began = time.perf_counter()
         for frame in frames:
             due = began + frame.tick.due - first.tick.due
             time.sleep(max(0.0, due - time.perf_counter()))
-            send(frame)
+            show(frame)
         time.sleep(END_S)
     finally:
         for outlet in outlets:
             outlet.close()
+
+
+def _send(pushes: Sequence[Callable[[Frame], None]], frame: Frame, *events: Event) -> None:
+    """Send a frame as one of now."""
+    now = time.perf_counter()
+    sent = replace(frame, tick=Tick(frame.tick.number, now, now), events=events)
+    for push in pushes:
+        push(sent)
+
+
+def _hold(show: Callable[[], None], keepers: Sequence[FeedbackKeeper]) -> None:
+    """Show the first frame until all present it, and for a while.
+
+    Whoever finds the streams now is told what is switched on within the second.
+    """
+    began = time.perf_counter()
+    while (now := time.perf_counter()) < began + HOLD_S or not (
+        all(keeper.presented or keeper.given_up for keeper in keepers) or now > began + PATIENCE_S
+    ):
+        show()
+        time.sleep(LOOK_S)

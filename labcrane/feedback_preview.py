@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from labcrane import rig
-from labcrane.clock import Tick
 from labcrane.console import Command, Order, QueueConsole
 from labcrane.errors import ProtocolError
 from labcrane.feedback_crew import host_orders
@@ -19,7 +18,7 @@ from labcrane.registry import discover
 from labcrane.scene_text import SCENE_PLACED
 from labcrane.session import Visit
 from labcrane.session import run as run_session
-from labcrane.streams.frames import PHASES
+from labcrane.streams.frames import HEAD, frame_of
 from labcrane.study import Study
 
 
@@ -99,25 +98,8 @@ def movement(record: SessionRecord, trial: int | None = None) -> list[Frame]:
         there = ", ".join(str(int(number)) for number in counted.unique()) or "none"
         raise ProtocolError(f"there is no trial {trial} in the recording; there is {there}")
     arrays = [parts[name].to_numpy() for name in ("input", "command", "state", "task")]
-    heads = loop[["tick", "due", "woke", "elapsed", "phase", "paused"]].to_numpy()
-    found = []
-    for row in rows:
-        number, due, woke, elapsed, phase, paused = heads[row].tolist()
-        axes, command, state, task = (array[row] for array in arrays)
-        found.append(
-            Frame(
-                Tick(int(number), due, woke),
-                elapsed,
-                axes,
-                command,
-                state,
-                task,
-                PHASES[int(phase)],
-                int(trial or 0),
-                bool(paused),
-            )
-        )
-    return found
+    table = np.column_stack([loop[list(HEAD)].to_numpy(), *arrays])
+    return [frame_of(row, [array.shape[1] for array in arrays]) for row in table[rows]]
 
 
 def scene_of(record: SessionRecord, trial: int | None = None) -> str:

@@ -50,7 +50,9 @@ class FeedbackSettings:
         try:
             value = YAML(typ="safe", pure=True).load(written)
         except YAMLError:
-            raise ValueError(f"{written!r} cannot be read as a value") from None
+            raise ValueError(
+                f"{written!r} cannot be read as a value; write a number, a word, true or false"
+            ) from None
         if not isinstance(value, float | int | str | bool | None):
             message = f"{place.strip()} can be changed to a single value, not {written!r}"
             raise ValueError(message)  # noqa: TRY004 - what people wrote, like the rest

@@ -49,6 +49,36 @@ def frame_bytes(run: Run) -> int:
     return 8 * len(columns(run)) + CHUNK_BYTES
 
 
+class FrameRow:
+    """Puts frames into rows of numbers, in the order of :func:`columns`."""
+
+    def __init__(self, run: Run) -> None:
+        start = len(LOOP)
+        slices = []
+        for layout in (run.axes, run.command, run.state, run.task):
+            slices.append(slice(start, start + layout.size))
+            start += layout.size
+        self._axes, self._command, self._state, self._task = slices
+
+    def fill(self, row: FloatArray, frame: Frame, wrote: float) -> None:
+        """Fill ``row``; ``wrote`` is how long writing the frame before took, in seconds."""
+        number, due, woke = frame.tick
+        row[: len(LOOP)] = (
+            number,
+            due,
+            woke,
+            wrote,
+            frame.trial,
+            frame.elapsed,
+            PHASES[frame.phase],
+            frame.paused,
+        )
+        row[self._axes] = frame.axes
+        row[self._command] = frame.command
+        row[self._state] = frame.state
+        row[self._task] = frame.task
+
+
 class FrameLog:
     """Writes frames through to the journal, each before anybody else sees it.
 
@@ -71,12 +101,7 @@ class FrameLog:
         self._journal = journal
         self._reserve = reserve
         self._row = np.empty(len(columns(run)))
-        start = len(LOOP)
-        slices = []
-        for layout in (run.axes, run.command, run.state, run.task):
-            slices.append(slice(start, start + layout.size))
-            start += layout.size
-        self._axes, self._command, self._state, self._task = slices
+        self._fill = FrameRow(run).fill
         self._wrote = 0.0
         self._waiting: deque[Callable[[], None]] = deque()
 
@@ -84,7 +109,7 @@ class FrameLog:
         """Write one frame and its events; when this returns, the operating system has them."""
         began = time.perf_counter()
         row, tick = self._row, frame.tick
-        self._fill(row, frame)
+        self._fill(row, frame, self._wrote)
         if self._waiting or not self._through(frame, row):
             self._waiting.append(partial(self._journal.write_frame, tick.due, row.copy()))
             self._write_events(frame)
@@ -94,8 +119,19 @@ class FrameLog:
         self._wrote = time.perf_counter() - began
 
     def note(self, event: Event, tick: int = 0) -> None:
-        """Write an event that is in no frame: before the first, or found out after ``tick``."""
+        """Write an event that is in no frame: before the first, or at the end.
+
+        Raises
+        ------
+        RecordingError
+            The disk refuses it.
+        """
         self._journal.write_event(event, tick)
+
+    def append(self, event: Event, tick: int) -> None:
+        """Write an event that was found out after ``tick``; it waits as frames do."""
+        self._waiting.append(partial(self._journal.write_event, event, tick))
+        self._catch_up()
 
     def close(self) -> None:
         """Write what waits, if the disk takes it now, and close the journal.
@@ -116,23 +152,6 @@ class FrameLog:
             raise
         if lost:
             raise RecordingError(self._not_written(lost))
-
-    def _fill(self, row: FloatArray, frame: Frame) -> None:
-        number, due, woke = frame.tick
-        row[: len(LOOP)] = (
-            number,
-            due,
-            woke,
-            self._wrote,
-            frame.trial,
-            frame.elapsed,
-            PHASES[frame.phase],
-            frame.paused,
-        )
-        row[self._axes] = frame.axes
-        row[self._command] = frame.command
-        row[self._state] = frame.state
-        row[self._task] = frame.task
 
     def _not_written(self, lost: int) -> str:
         return (
@@ -162,6 +181,9 @@ class FrameLog:
             except RecordingError as error:
                 self.trouble = str(error)
                 return
+            except Exception:
+                self._waiting.popleft()  # a plugin's mistake, which no later attempt makes good
+                raise
             self._waiting.popleft()
 
     def _nearly_full(self, free: int) -> str:

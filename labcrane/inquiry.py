@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 
 from labcrane.privacy import personal
 from labcrane.questions import AnswerError, Item
+from labcrane.recording.answers import ANSWER, END, SCORE
 from labcrane.records import Value
 from labcrane.roles import Questionnaire
 
@@ -17,12 +18,7 @@ Said = tuple[str, dict[str, Value]]
 SIMULATION = "simulation"
 """Who answers for a simulated participant."""
 
-SCORE = "score."
-"""Before a score's name in the data of ``questionnaire.end``."""
-
-START, ANSWER, REFUSED, END = (
-    f"questionnaire.{what}" for what in ("start", "answer", "refused", "end")
-)
+START, REFUSED = "questionnaire.start", "questionnaire.refused"
 
 
 class Inquiry:

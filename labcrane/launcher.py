@@ -31,6 +31,9 @@ LOOK_S = 0.05
 
 RECORDER = "recorder"
 
+FOR_THE_RECORD = (Order.NOTE, Order.DENIED)
+"""What is kept for the session when it is said while streams and feedback are waited for."""
+
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
@@ -72,7 +75,7 @@ class Launcher:
         self._recorder: RecorderKeeper | None = None
         self._crew: FeedbackCrew | None = None
         self._lost: set[str] = set()
-        self.session_pid: int | None = None
+        self._kept: list[Command] = []
         self.sync_report: SyncReport | None = None
 
     def run(self) -> Outcome:
@@ -132,7 +135,16 @@ class Launcher:
         return True
 
     def _told_to_end(self) -> bool:
-        return any(command.order is Order.END for command in self._console.commands())
+        """Whether the run is to end before it has begun; what is for the record is kept for it."""
+        for command in self._console.commands():
+            if command.order is Order.END:
+                return True
+            if command.order in FOR_THE_RECORD:
+                self._kept.append(command)
+            else:
+                early = "the session has not begun; order it again when it has"
+                self._say(f"{command.order}: {early}")
+        return False
 
     def _run(self) -> int | None:
         context = multiprocessing.get_context("spawn")
@@ -140,7 +152,6 @@ class Launcher:
         process = context.Process(target=serve, args=(self._order, theirs), name="session")
         process.start()
         theirs.close()
-        self.session_pid = process.pid
         try:
             return self._watch(process, ours)
         finally:
@@ -152,8 +163,9 @@ class Launcher:
         stillness = Stillness(self._visit.whereabouts, self._say)
         while True:
             try:
-                for command in self._console.commands():
+                for command in (*self._kept, *self._console.commands()):
                     self._send(pipe, command)
+                self._kept.clear()
                 ready = wait([pipe, process.sentinel], LOOK_S)
             except KeyboardInterrupt:
                 self._send(pipe, Command(Order.END))

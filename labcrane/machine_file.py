@@ -20,7 +20,9 @@ def find_machine(name: str, beside: Path | None = None) -> Path:
         path = (beside or Path()) / name
         if path.is_file():
             return path
-        raise ProtocolError(f"machine file {str(path)!r} does not exist")
+        raise ProtocolError(
+            f"machine file {str(path)!r} does not exist; a path counts from the protocol's folder"
+        )
     if name in machine_names():
         return Path(str(files("labcrane") / "machines" / f"{name}.yaml"))
     raise ProtocolError(
@@ -37,8 +39,4 @@ def load_machine(name: str, beside: Path | None = None) -> Machine:
     ProtocolError
         The machine does not exist, or its file is wrong; the message names file and line.
     """
-    source = YamlFile.read(find_machine(name, beside))
-    machine = source.check(Machine)
-    source.raise_problems()
-    assert machine is not None  # noqa: S101 - no problems, so it was built
-    return machine
+    return YamlFile.read(find_machine(name, beside)).checked(Machine)

@@ -12,28 +12,7 @@ from labcrane.errors import LabcraneError
 from labcrane.machine import Machine
 from labcrane.offers import Offer
 from labcrane.registry import ROLES, Registry
-from labcrane.roles import (
-    Component,
-    Controller,
-    Cue,
-    Dynamics,
-    Exporter,
-    Feedback,
-    InputDevice,
-    Questionnaire,
-    Task,
-)
-
-PLACES: Mapping[type[Component], tuple[str, ...]] = {
-    InputDevice: ("input",),
-    Controller: ("scheme",),
-    Dynamics: ("dynamics",),
-    Task: ("tasks", "NAME"),
-    Questionnaire: ("questionnaires", "NAME"),
-    Cue: ("feedback", "NAME"),
-    Feedback: ("feedback", "NAME"),
-}
-"""Where a protocol uses what fills a role."""
+from labcrane.roles import Component, Cue, Exporter, Feedback, Questionnaire, Task
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +165,7 @@ def _recorded(offer: Offer[Component], machine: Machine) -> tuple[Recorded, ...]
 def _example(role: type[Component], name: str, settings: tuple[Setting, ...]) -> str:
     if role is Exporter:
         return f"labcrane export DATA --to {name} --out FOLDER"
-    *outer, last = (part.replace("NAME", name) for part in PLACES[role])
+    *outer, last = (part.replace("NAME", name) for part in ROLES[role].place)
     lines = [f"{'  ' * depth}{key}:" for depth, key in enumerate([*outer, last])]
     inner = "  " * len(lines)
     lines.append(f"{inner}use: {name}")

@@ -1,12 +1,11 @@
 """Find the commands that installed plugins offer."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from importlib.metadata import EntryPoint
-from typing import cast
 
 from labcrane.errors import PluginError
 from labcrane.offers import CommandOffer
-from labcrane.plugin_modules import load_plugins
+from labcrane.plugin_modules import load_plugins, offered
 
 
 def plugin_commands(
@@ -19,19 +18,23 @@ def plugin_commands(
     Raises
     ------
     PluginError
-        Two plugins offer the same words.
+        Two plugins offer the same words, or the hook of one fails.
     """
     manager = load_plugins(plugins).manager
     found: dict[tuple[str, str], CommandOffer] = {}
     owners: dict[tuple[str, str], str] = {}
     for implementation in manager.hook.labcrane_commands.get_hookimpls():
-        offers = cast("Sequence[CommandOffer]", implementation.function())
+        plugin = implementation.plugin_name
+        try:
+            offers = offered(implementation, CommandOffer, "labcrane.CommandOffer(...)")
+        except PluginError as error:
+            raise PluginError(f"plugin {plugin!r} is broken: {error}") from error
         for offer in offers:
             if offer.words in found:
                 raise PluginError(
-                    f"plugins {owners[offer.words]!r} and {implementation.plugin_name!r} both "
-                    f"offer the command {' '.join(offer.words)!r}; uninstall one of them"
+                    f"plugins {owners[offer.words]!r} and {plugin!r} both offer the command "
+                    f"{' '.join(offer.words)!r}; uninstall one of them"
                 )
             found[offer.words] = offer
-            owners[offer.words] = implementation.plugin_name
+            owners[offer.words] = plugin
     return found

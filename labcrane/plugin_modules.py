@@ -4,12 +4,12 @@ import hashlib
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from difflib import get_close_matches
 from importlib.machinery import SourceFileLoader
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import CodeType, ModuleType
+from typing import TypeVar
 
 import pluggy
 
@@ -18,6 +18,9 @@ from labcrane.culprit import told
 from labcrane.errors import PluginError
 from labcrane.hookspecs import PROJECT
 from labcrane.offers import API
+from labcrane.suggestion import suggestion
+
+OfferT = TypeVar("OfferT")
 
 FOLDER = "plugins"
 """Where a study keeps plugins of its own, beside its protocol."""
@@ -74,6 +77,27 @@ def load_plugins(
     return Modules(manager, broken, local)
 
 
+def offered(implementation: pluggy.HookImpl, kind: type[OfferT], made_by: str) -> list[OfferT]:
+    """Return what one plugin's hook offers; ``made_by`` is how a plugin makes such an offer.
+
+    Raises
+    ------
+    PluginError
+        The hook raised something, or returned something else.
+    """
+    try:
+        offers = implementation.function()
+    except PluginError:
+        raise
+    except Exception as error:
+        raise PluginError(told(error)) from error
+    if isinstance(offers, list | tuple) and all(isinstance(each, kind) for each in offers):
+        return list(offers)
+    raise PluginError(
+        f"{implementation.function.__name__} must return a list of {made_by}, not {offers!r}"
+    )
+
+
 def own_plugins(study: Path) -> dict[str, Path]:
     """Return the plugins in the folder beside a protocol, by name: ``plugins/arrow.py``."""
     return {f"{FOLDER}/{path.name}": path for path in sorted((study.parent / FOLDER).glob("*.py"))}
@@ -118,6 +142,4 @@ def _check_hooks(manager: pluggy.PluginManager, module: ModuleType) -> None:
     known = [name for name in vars(hookspecs) if name.startswith("labcrane_")]
     for caller in manager.get_hookcallers(module) or ():
         if not caller.has_spec():
-            close = get_close_matches(caller.name, known, n=1)
-            hint = f"did you mean {close[0]!r}?" if close else f"there is {', '.join(known)}"
-            raise PluginError(f"unknown hook {caller.name!r}; {hint}")
+            raise PluginError(f"unknown hook {caller.name!r}; {suggestion(caller.name, known)}")

@@ -136,12 +136,9 @@ def read_population(path: Path | None, study: Study) -> Population:
     if path is None:
         return EVERYBODY_THE_SAME
     source = YamlFile.read(path)
-    population = source.check(Population)
-    if population is not None:
-        _check(population, study, source)
+    population = source.checked(Population)
+    _check(population, study, source)
     source.raise_problems()
-    if population is None:
-        raise AssertionError("what cannot be read is a problem, and problems were raised")
     return population
 
 

@@ -20,7 +20,7 @@ RoleT = TypeVar("RoleT", bound=Component)
 class Presenter:
     """Presents frames with one feedback component and the cues it draws.
 
-    Used by the process below, and without it by previews and tests.
+    Used by the feedback process, and without it by previews, measurements of delays and tests.
     """
 
     def __init__(self, order: HostOrder, registry: Registry) -> None:

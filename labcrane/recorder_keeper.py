@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import IO, Any
@@ -16,7 +17,7 @@ from typing import IO, Any
 from labcrane.streams.request import StreamRequest
 
 PATIENCE_S = 15.0
-"""How long a recorder may take to close its journal when it is told to stop."""
+"""How long a recorder may take to close its journal when it is told to stop, or a spare to end."""
 
 
 class RecorderKeeper:
@@ -38,11 +39,6 @@ class RecorderKeeper:
         )
         self._spare = _Recorder()
         self._process = self._start()
-
-    @property
-    def pid(self) -> int:
-        """The recorder's process id."""
-        return self._process.pid
 
     @property
     def ready(self) -> bool:
@@ -71,6 +67,7 @@ class RecorderKeeper:
         """Start the recorder again if it has died; whether it had."""
         if self._process.poll() is None:
             return False
+        self._process.hang_up()
         self.restarts += 1
         self.status = {}
         self._process = self._start()
@@ -78,28 +75,23 @@ class RecorderKeeper:
 
     def stop(self) -> None:
         """Let the recorder write down what has come and close its journal."""
-        self._spare.stdin.close()  # it ends without having been told anything
-        self._spare.wait(PATIENCE_S)
-        self._spare.stdout.close()
         process = self._process
-        try:
+        with suppress(BrokenPipeError):  # when it has died its journal is as whole as it can be
             process.stdin.write("stop\n")
-            process.stdin.close()
-        except BrokenPipeError:
-            pass  # it died this very moment; its journal is as whole as it can be
-        try:
-            process.wait(PATIENCE_S)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+        process.hang_up()
+        process.end()
         self._listener.join()
+        self._spare.hang_up()  # it ends without having been told anything
+        self._spare.end()
+        self._spare.stdout.close()
 
     def _start(self) -> "_Recorder":
         """Give the spare recorder its orders, and have another one ready."""
         ready = self._spare if self._spare.poll() is None else _Recorder()
         process, self._spare = ready, _Recorder()
-        process.stdin.write(self._orders + "\n")
-        process.stdin.flush()
+        with suppress(BrokenPipeError):  # it died this very moment: the next look replaces it
+            process.stdin.write(self._orders + "\n")
+            process.stdin.flush()
         self._listener = threading.Thread(
             target=self._listen, args=(process, self.restarts), daemon=True
         )
@@ -121,10 +113,23 @@ class _Recorder(subprocess.Popen[str]):
 
     def __init__(self) -> None:
         super().__init__(
-            [sys.executable, "-m", "labcrane.streams.recorder"],
+            [sys.executable, "-m", "labcrane.streams.recorder_process"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
             # It closes its journal when told to, not when a key is pressed.
             start_new_session=True,
         )
+
+    def hang_up(self) -> None:
+        """Let it hear no more."""
+        with suppress(BrokenPipeError):
+            self.stdin.close()
+
+    def end(self) -> None:
+        """Wait until it has ended, as it was told to; one that hangs is killed."""
+        try:
+            self.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            self.kill()
+            self.wait()

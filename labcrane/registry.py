@@ -2,17 +2,15 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import TypeVar, cast
 
 import pluggy
 
-from labcrane.culprit import told
 from labcrane.errors import PluginError
 from labcrane.offers import Offer
-from labcrane.plugin_modules import load_plugins
+from labcrane.plugin_modules import load_plugins, offered
 from labcrane.roles import (
     Component,
     Controller,
@@ -24,6 +22,7 @@ from labcrane.roles import (
     Questionnaire,
     Task,
 )
+from labcrane.suggestion import suggestion
 
 RoleT = TypeVar("RoleT", bound=Component)
 
@@ -38,21 +37,26 @@ class RoleEntry:
         The hook that collects its offers.
     word
         What a researcher calls it.
+    place
+        Where a protocol uses it; empty for what no protocol names.
     """
 
     hook: str
     word: str
+    place: tuple[str, ...] = ()
 
 
 ROLES: Mapping[type[Component], RoleEntry] = {
-    InputDevice: RoleEntry("labcrane_inputs", "input"),
-    Controller: RoleEntry("labcrane_controllers", "scheme"),
-    Dynamics: RoleEntry("labcrane_dynamics", "dynamics"),
-    Task: RoleEntry("labcrane_tasks", "task"),
+    InputDevice: RoleEntry("labcrane_inputs", "input", ("input",)),
+    Controller: RoleEntry("labcrane_controllers", "scheme", ("scheme",)),
+    Dynamics: RoleEntry("labcrane_dynamics", "dynamics", ("dynamics",)),
+    Task: RoleEntry("labcrane_tasks", "task", ("tasks", "NAME")),
     Exporter: RoleEntry("labcrane_exporters", "exporter"),
-    Questionnaire: RoleEntry("labcrane_questionnaires", "questionnaire"),
-    Cue: RoleEntry("labcrane_cues", "cue"),
-    Feedback: RoleEntry("labcrane_feedback", "feedback"),
+    Questionnaire: RoleEntry(
+        "labcrane_questionnaires", "questionnaire", ("questionnaires", "NAME")
+    ),
+    Cue: RoleEntry("labcrane_cues", "cue", ("feedback", "NAME")),
+    Feedback: RoleEntry("labcrane_feedback", "feedback", ("feedback", "NAME")),
 }
 
 
@@ -81,12 +85,10 @@ class Registry:
         """Return the offer called ``name``, or say what there is instead."""
         if name in (offers := self.offers[role]):
             return cast("Offer[RoleT]", offers[name])
-        message = f"{ROLES[role].word} {name!r} is not installed"
-        if close := get_close_matches(name, offers, n=1):
-            message += f"; did you mean {close[0]!r}?"
-        else:
-            message += f"; there is {', '.join(sorted(offers)) or 'none'}"
-        message += " (labcrane plugins lists all)"
+        message = (
+            f"{ROLES[role].word} {name!r} is not installed; {suggestion(name, sorted(offers))} "
+            "(labcrane plugins lists all)"
+        )
         for plugin, why in self.broken.items():
             message += f"; plugin {plugin!r} is broken: {why}"
         raise PluginError(message)
@@ -125,9 +127,9 @@ def _collect(
     for implementation in hook.get_hookimpls():
         plugin = implementation.plugin_name
         try:
-            offers = _offers(implementation)
-        except Exception as error:  # noqa: BLE001 - someone else's hook can raise anything
-            broken[plugin] = str(error) if isinstance(error, PluginError) else told(error)
+            offers = offered(implementation, Offer, "labcrane.offer(...)")
+        except PluginError as error:
+            broken[plugin] = str(error)
             continue
         for offer in offers:
             if offer.name in found:
@@ -138,13 +140,3 @@ def _collect(
             found[offer.name] = offer
             origins[offer.name] = plugin
     return found, origins
-
-
-def _offers(implementation: pluggy.HookImpl) -> list[Offer[Component]]:
-    offers: object = implementation.function()
-    if isinstance(offers, list | tuple) and all(isinstance(each, Offer) for each in offers):
-        return cast("list[Offer[Component]]", list(offers))
-    raise PluginError(
-        f"{implementation.function.__name__} must return a list of labcrane.offer(...), not "
-        f"{offers!r}"
-    )

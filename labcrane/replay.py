@@ -18,8 +18,9 @@ import numpy as np
 from labcrane import loop, rig
 from labcrane.clock import ManualClock, SystemClock, Tick
 from labcrane.course import Course
+from labcrane.data_folder import DataFolder
 from labcrane.errors import ProtocolError, RecordingError
-from labcrane.frame_log import PHASES, FrameLog, columns
+from labcrane.frame_log import FrameLog, FrameRow, columns
 from labcrane.plan import plan_session
 from labcrane.recording.recording import SessionRecord, open_recording
 from labcrane.records import Frame, Run
@@ -34,9 +35,6 @@ if TYPE_CHECKING:
 
 COMPARED = ("tick", "trial", "elapsed", "phase", "paused")
 """Of the loop's columns; when ticks woke is not the machine's doing."""
-
-STAMPS = ("-SIMULATED", "-PILOT")
-"""What is put behind a pseudonym, the last one first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,9 +134,7 @@ def _run(
     sinks: Sequence[Callable[[Frame], None]],
 ) -> Replayed:
     script = Script(record)
-    participant = str(record.context["participant"])
-    for stamp in STAMPS:
-        participant = participant.removesuffix(stamp)
+    participant = DataFolder.pseudonym(str(record.context["participant"]))
     plan = plan_session(study, participant, session)
     machine = study.machine
     controller, dynamics = study.scheme.build(machine), study.dynamics.build(machine)
@@ -165,6 +161,7 @@ class _Log(FrameLog):
     def __init__(self, run: Run, script: "Script") -> None:
         self._script = script
         self._columns = columns(run)
+        self._fill = FrameRow(run).fill
         self._rows = np.full((script.ticks, len(self._columns)), np.nan)
         self.ticks = 0
 
@@ -174,10 +171,7 @@ class _Log(FrameLog):
         return self._script.disk_trouble
 
     def write(self, frame: Frame) -> None:
-        phase, tick = PHASES[frame.phase], frame.tick
-        loop_row = (*tick, 0.0, frame.trial, frame.elapsed, phase, frame.paused)
-        parts = (loop_row, frame.axes, frame.command, frame.state, frame.task)
-        self._rows[self.ticks] = np.concatenate(parts)
+        self._fill(self._rows[self.ticks], frame, 0.0)
         self.ticks += 1
 
     def frames(self) -> dict[str, "pd.DataFrame"]:

@@ -9,10 +9,13 @@ from typing import Any
 
 from labcrane.recording.recording import SessionRecord
 from labcrane.study import Study
-from labcrane.study_files import plain_settings, write_files
+from labcrane.study_files import write_files
 
 IRRELEVANT = ("pygame", "pylsl")
 """Of the recorded versions, those that bring input in or send frames out, and move nothing."""
+
+MOVING = ("scheme", "dynamics", "tasks.")
+"""The parts that a replay runs again."""
 
 
 def restore(
@@ -73,19 +76,10 @@ def differing_parts(record: SessionRecord, study: Study) -> tuple[str, ...]:
     yaml = YAML(typ="safe")
     then, now = yaml.load(context["machine"]), yaml.load(study.machine_text)
     found += _compared("machine", then, now)
-    choices = {
-        "scheme": study.scheme,
-        "dynamics": study.dynamics,
-        **{f"tasks.{name}": choice for name, choice in study.task_choices.items()},
-    }
-    for part, choice in choices.items():
-        recorded = context["components"].get(part)
-        chosen = {
-            "use": choice.name,
-            "plugin": choice.plugin,
-            "settings": plain_settings(choice.settings, study.path.parent),
-        }
-        found += _compared(part, recorded, chosen)
+    for part, choice in study.choices.items():
+        if part.startswith(MOVING):
+            recorded, now = context["components"].get(part), choice.described(study.path.parent)
+            found += _compared(part, recorded, now)
     found += _compared("rate_hz", float(context["rate_hz"]), study.protocol.rate_hz)
     return tuple(found)
 

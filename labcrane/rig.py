@@ -82,7 +82,15 @@ def opened(rig: Rig, study: Study, participant_seed: int) -> Iterator[Run]:
 
 def _task_signals(tasks: Mapping[str, Task]) -> tuple[Signal, ...]:
     """Return the signals of the tasks; tasks of one study show the same ones."""
-    shown = {task.signals for task in tasks.values()}
+    shown = {task.signals: name for name, task in tasks.items()}
     if len(shown) > 1:
-        raise ProtocolError("the tasks of one study must show the same signals, and these differ")
-    return shown.pop()
+        differ = "; ".join(
+            f"{name!r} shows {', '.join(signal.name for signal in signals) or 'nothing'}"
+            for signals, name in shown.items()
+        )
+        raise ProtocolError(
+            f"the tasks of one study must show the same signals, and these differ: {differ}; put "
+            "them into studies of their own"
+        )
+    (signals,) = shown
+    return signals

@@ -3,13 +3,13 @@
 import keyword
 import re
 from collections.abc import Mapping
-from difflib import get_close_matches
 from pathlib import Path
 
 from labcrane.durable_file import SHARED_FILE, write_text
 from labcrane.errors import PluginError
 from labcrane.plugin_commands import plugin_commands
 from labcrane.registry import Registry
+from labcrane.suggestion import suggestion
 
 TEMPLATES = Path(__file__).parent / "templates"
 ANY = "any"
@@ -95,9 +95,7 @@ def _role(role: str) -> str:
     known = ALIASES.get(role, role)
     if known in A_ROLE:
         return known
-    close = get_close_matches(role, A_ROLE, n=1)
-    hint = f"did you mean {close[0]!r}?" if close else f"there is {', '.join(A_ROLE)}"
-    raise PluginError(f"there is no role {role!r}; {hint}")
+    raise PluginError(f"there is no role {role!r}; {suggestion(role, A_ROLE)}")
 
 
 def _check_name(role: str, name: str, registry: Registry) -> None:

@@ -181,27 +181,35 @@ def load_scene(path: Path) -> Scene:
         raise ProtocolError(
             f"{path}: a scene is a mapping of keys, beginning with labcrane_scene: 1"
         )
-    scene = source.check(Scene)
-    if scene is not None:
-        for name, thing in scene.things.items():
-            low = thing.position[2] - _below(thing)
-            if low < -SUNK_M:
-                source.problem(
-                    ("things", name, "position"),
-                    f"{name!r} is {-low:.3f} m deep in the ground; its centre must be "
-                    f"{_below(thing):.3f} m high or more",
-                )
-        known = {"tip", *scene.things, *(("figure",) if scene.figure else ())}
-        for number, goal in enumerate(scene.goals):
-            for word in (goal.what, goal.beside or "tip"):
-                if word not in known:
-                    source.problem(
-                        ("goals", number),
-                        f"there is no {word!r} in this scene; there is {', '.join(sorted(known))}",
-                    )
+    scene = source.checked(Scene)
+    _check_ground(scene, source)
+    _check_goals(scene, source)
     source.raise_problems()
-    assert scene is not None  # noqa: S101 - no problems, so it was built
     return scene
+
+
+def _check_ground(scene: Scene, source: YamlFile) -> None:
+    """Note things that stand in the ground."""
+    for name, thing in scene.things.items():
+        low = thing.position[2] - _below(thing)
+        if low < -SUNK_M:
+            source.problem(
+                ("things", name, "position"),
+                f"{name!r} is {-low:.3f} m deep in the ground; its centre must be "
+                f"{_below(thing):.3f} m high or more",
+            )
+
+
+def _check_goals(scene: Scene, source: YamlFile) -> None:
+    """Note goals for what is not in the scene."""
+    known = {"tip", *scene.things, *(("figure",) if scene.figure else ())}
+    for number, goal in enumerate(scene.goals):
+        for word in (goal.what, goal.beside or "tip"):
+            if word not in known:
+                there = ", ".join(sorted(known))
+                source.problem(
+                    ("goals", number), f"there is no {word!r} in this scene; there is {there}"
+                )
 
 
 def place(scene: Scene, seed: int) -> tuple[Placed, ...]:

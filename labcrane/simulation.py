@@ -5,12 +5,9 @@ simulated again is the same to the last bit.
 """
 
 import json
-import os
 import shutil
-import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
@@ -19,6 +16,7 @@ from labcrane.console import Command, Order
 from labcrane.data_folder import DataFolder
 from labcrane.durable_file import make_folder, write_text
 from labcrane.errors import ProtocolError, RecordingError
+from labcrane.exclusive import alone_in
 from labcrane.plan import plan_session
 from labcrane.population import read_population
 from labcrane.records import Event
@@ -125,7 +123,8 @@ def simulate_study(
     first = orders[0]
     study = load(first.protocol, discover(study=first.protocol))
     read_population(first.cohort, study)
-    with _only_one(first.data):
+    make_folder(first.data)
+    with alone_in(first.data, wait=False):
         _check_same(first, study)
         shutil.rmtree(first.data / UNFINISHED, ignore_errors=True)
         missing = [order for order in orders if not order.folder.path.exists()]
@@ -154,25 +153,3 @@ def _check_same(order: SimulationOrder, study: Study) -> None:
             f"{order.data} holds a simulation with another {', '.join(different)}; give a new "
             "folder with --out"
         )
-
-
-@contextmanager
-def _only_one(folder: Path) -> Iterator[None]:
-    """Let one simulation at a time work in a folder; a killed one holds nothing."""
-    make_folder(folder)
-    if sys.platform == "win32":
-        yield
-        return
-    import fcntl  # noqa: PLC0415 - Unix only
-
-    fd = os.open(folder, os.O_RDONLY)
-    try:
-        try:
-            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise RecordingError(
-                f"another simulation is at work in {folder}; wait for it, or give another folder"
-            ) from None
-        yield
-    finally:
-        os.close(fd)

@@ -45,6 +45,6 @@ class Slowness:
                     "tick_s": self._period,
                 },
             )
-            self._log.note(event, frame.tick.number)
+            self._log.append(event, frame.tick.number)
             self._console.report(event)
         self._oversight.overruns.clear()

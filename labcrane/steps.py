@@ -1,6 +1,5 @@
 """What a session consists of, as a protocol writes it."""
 
-from difflib import get_close_matches
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -14,6 +13,7 @@ from pydantic import (
 
 from labcrane.design.words import Criterion
 from labcrane.offers import Settings
+from labcrane.suggestion import suggestion
 from labcrane.yaml_file import Place, YamlFile
 
 
@@ -129,9 +129,8 @@ def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
         return None
     (kind, value), *_ = step.items()
     if kind not in STEPS:
-        close = get_close_matches(kind, STEPS, n=1)
-        hint = f"did you mean {close[0]!r}?" if close else f"possible: {', '.join(STEPS)}"
-        source.problem(place, f"{kind!r} is not a step; {hint}")
+        instead = suggestion(str(kind), STEPS, "possible:")
+        source.problem(place, f"{kind!r} is not a step; {instead}")
         return None
     if kind == "instructions":
         return _instructions(source, place, value)

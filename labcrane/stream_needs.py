@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
 from labcrane.offers import Settings
-from labcrane.streams.request import MARKER_TYPES, StreamRequest
+from labcrane.streams.request import StreamRequest, same_type
 from labcrane.streams.verdict import Limit, Limits
 
 if TYPE_CHECKING:  # a protocol is checked without loading what corrects clocks
@@ -71,12 +71,7 @@ class StreamNeed(Settings):
             return False
         if self.source_id is not None and self.source_id != header.source_id:
             return False
-        markers = self.type is not None and self.type.lower() in MARKER_TYPES
-        return (
-            self.type is None
-            or self.type == header.type
-            or (markers and header.type.lower() in MARKER_TYPES)
-        )
+        return self.type is None or same_type(self.type, header.type)
 
     def treatment(self, header: "StreamHeader") -> "Treatment":
         """Return how the stamps of a recorded stream are to be read."""

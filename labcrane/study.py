@@ -65,13 +65,30 @@ class Study:
         """Hash of the protocol's text, hexadecimal."""
         return hashlib.sha256(self.text.encode()).hexdigest()
 
+    @property
+    def choices(self) -> dict[str, Choice]:
+        """The components for people, by the part they play: ``scheme``, ``tasks.NAME``."""
+        named = {
+            "tasks": self.task_choices,
+            "questionnaires": self.questionnaire_choices,
+            "feedback": self.cues | self.sounds,
+            "views": self.views,
+        }
+        return {
+            "input": self.input,
+            "scheme": self.scheme,
+            "dynamics": self.dynamics,
+            **{f"{kind}.{name}": choice for kind in named for name, choice in named[kind].items()},
+        }
+
     def check_participant(self, participant: str) -> None:
         """Raise :class:`ProtocolError` unless ``participant`` matches the protocol's pattern."""
         pattern = self.protocol.participants.pattern
         if not re.fullmatch(pattern, participant):
             raise ProtocolError(
                 # As it stands in the file, where a backslash is one backslash.
-                f"participant {participant!r} does not match the protocol's pattern '{pattern}'"
+                f"participant {participant!r} does not match the protocol's pattern '{pattern}'; "
+                "give the pseudonym as it was handed out, or correct participants: pattern:"
             )
 
     def check_session(self, number: int) -> None:

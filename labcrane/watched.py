@@ -10,6 +10,7 @@ from labcrane.machine import Body
 from labcrane.oversight import Oversight
 from labcrane.questions import Answers, Item
 from labcrane.records import Frame, Judgement, Planned, Run, Trial, Value
+from labcrane.registry import ROLES
 from labcrane.roles import Component, Controller, Dynamics, InputDevice, Questionnaire, Task
 from labcrane.signals import FloatArray, Layout
 
@@ -18,7 +19,7 @@ def watched(component: Component, name: str, plugin: str, oversight: Oversight) 
     """Return ``component`` under oversight; what runs in a process of its own as it is."""
     for role, made in WATCHED.items():
         if isinstance(component, role):
-            return made(component, f"{WORDS[role]} {name!r}", plugin, oversight)
+            return made(component, f"{ROLES[role].word} {name!r}", plugin, oversight)
     return component
 
 
@@ -228,11 +229,3 @@ WATCHED: Mapping[type[Component], type[_Watched]] = {
     Task: WatchedTask,
     Questionnaire: WatchedQuestionnaire,
 }
-WORDS: Mapping[type[Component], str] = {
-    InputDevice: "input",
-    Controller: "scheme",
-    Dynamics: "dynamics",
-    Task: "task",
-    Questionnaire: "questionnaire",
-}
-"""What a researcher calls each role."""

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,6 +12,7 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError
 
 from labcrane.errors import ProtocolError
+from labcrane.suggestion import suggestion
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 Place = tuple[str | int, ...]
@@ -48,7 +48,9 @@ class YamlFile:
             text = path.read_text(encoding="utf-8")
             marked = YAML(typ="rt").load(text)
         except FileNotFoundError:
-            raise ProtocolError(f"{path} does not exist") from None
+            raise ProtocolError(
+                f"{path} does not exist; check its name, and the folder you are in"
+            ) from None
         except (OSError, UnicodeDecodeError) as error:
             raise ProtocolError(f"{path} cannot be read: {error}") from error
         except MarkedYAMLError as error:
@@ -95,6 +97,14 @@ class YamlFile:
                 self.problem((*place, *_inside(value, each)), explain(each, place, model))
             return None
 
+    def checked(self, model: type[ModelT]) -> ModelT:
+        """Return the whole file as a ``model``, or raise all mistakes in it."""
+        found = self.check(model)
+        self.raise_problems()
+        if found is None:
+            raise AssertionError("what is wrong with a file is a problem, and problems were raised")
+        return found
+
     def raise_problems(self) -> None:
         """Raise :class:`ProtocolError` with one line for every mistake, in the file's order."""
         if self._problems:
@@ -108,9 +118,8 @@ def explain(error: ErrorDetails, place: Place, model: type[BaseModel]) -> str:
     key = loc[-1] if loc else _name(place)
     if error["type"] == "extra_forbidden":
         possible = _keys(model, loc[:-1])
-        close = get_close_matches(str(key), possible, n=1)
-        hint = f"did you mean {close[0]!r}?" if close else f"possible: {', '.join(possible)}"
-        return f"{str(key)!r} is not a key of {_name((*place, *loc[:-1]))}; {hint}"
+        instead = suggestion(str(key), possible, "possible:")
+        return f"{str(key)!r} is not a key of {_name((*place, *loc[:-1]))}; {instead}"
     if error["type"] == "missing":
         return f"{_name((*place, *loc[:-1]))} needs {str(key)!r}"
     what = error["msg"].removeprefix("Value error, ").removeprefix("Input should be ")

@@ -6,8 +6,9 @@ From the bottom up::
     movements      one movement's arrays, cut out of a session
     smoothness, sticks, fitts, gaze    what is measured in them
     measures       all of it, as a table with one row per movement
+    codebook       every column, with its unit and where it comes from
     learning       learning curves, one per participant
-    anova, trends, reported    statistics
+    anova, trends, reported, power    statistics
     quality        how well the loop ran and the clocks agreed
     figures, pages, report     the HTML report
     indicator, operator_tests  the performance indicator of tests

@@ -1,6 +1,6 @@
 """Who is in a data folder, and who counts."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from labcrane.errors import ProtocolError, RecordingError
+from labcrane.recording.parts import participant_path
 from labcrane.recording.recording import Recording, SessionRecord, open_recording
 
 if TYPE_CHECKING:
@@ -139,7 +140,6 @@ class Cohort:
 def find_cohort(
     folder: Path,
     include: Iterable[str] = (),
-    progress: Callable[[int, int], None] | None = None,
     struck: Mapping[str, Struck] | None = None,
 ) -> Cohort:
     """Look at every participant below ``folder``.
@@ -152,8 +152,6 @@ def find_cohort(
         The study's data folder.
     include
         Of simulated, pilot and half-finished, those to be used as well.
-    progress
-        Told how many participants have been looked at, of how many.
     struck
         Whom the register says not to count, and why, by name: they are listed, never used.
 
@@ -168,14 +166,10 @@ def find_cohort(
     if not folder.is_dir():
         raise RecordingError(f"there is no data folder {folder}; give the study's data folder")
     folders = [entry for entry in sorted(folder.iterdir()) if _is_participant(entry)]
-    people = []
     struck = struck or {}
     gone = [name for name in struck if not any(entry.name == name for entry in folders)]
-    for number, entry in enumerate(folders, start=1):
-        people.append(_look(entry, struck.get(entry.name)))
-        if progress is not None:
-            progress(number, len(folders))
-    people += [Participant(name, folder / name / f"{name}.h5", *struck[name]) for name in gone]
+    people = [_look(entry, struck.get(entry.name)) for entry in folders]
+    people += [Participant(name, participant_path(folder / name), *struck[name]) for name in gone]
     people.sort(key=lambda person: person.name)
     included = tuple(person for person in people if person.status in wanted)
     left_out = tuple(person for person in people if person.status not in wanted)
@@ -208,11 +202,11 @@ def _nobody(folder: Path, left_out: Sequence[Participant]) -> str:
 def _is_participant(entry: Path) -> bool:
     if not entry.is_dir():
         return False
-    return (entry / f"{entry.name}.h5").exists() or any(entry.glob("ses-*.xdf"))
+    return participant_path(entry).exists() or any(entry.glob("ses-*.xdf"))
 
 
 def _look(folder: Path, struck: Struck | None) -> Participant:
-    path = folder / f"{folder.name}.h5"
+    path = participant_path(folder)
     if struck is not None:
         return Participant(folder.name, path, *struck)
     try:

@@ -4,7 +4,6 @@ After Soukoreff & MacKenzie 2004 (Int J Human-Computer Studies 61:751-789).
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -20,6 +19,9 @@ WIDTH_FACTOR = math.sqrt(2.0 * math.pi * math.e)
 
 POOL_BELOW = 15
 """Fewer ends than this do not give a condition a width of its own."""
+
+CONDITION = "distance"
+"""The column that says to which condition a movement belongs."""
 
 
 def difficulty(distance: float, width: float) -> float:
@@ -81,32 +83,30 @@ def _around(value: float, reach: float) -> tuple[float, float]:
     return float(value - reach), float(value + reach)
 
 
-def throughput(movements: "pd.DataFrame", by: Sequence[str] = ("distance",)) -> "pd.DataFrame":
+def throughput(movements: "pd.DataFrame") -> "pd.DataFrame":
     """Return each participant's throughput: the mean over conditions of mean IDe / MT.
 
-    A condition's effective width comes of the spread of its ends along the task axis. With fewer
-    than :data:`POOL_BELOW` ends in a condition, the participant's conditions share one spread,
-    each about its own mean; with fewer than that in all, all participants do. ``pooled`` says
-    which. Where a task only ends inside the target, ends are cut off at its edge and
-    throughput is flattered; ``bounded`` counts those ends.
+    A condition is a distance. Its effective width comes of the spread of its ends along the task
+    axis. With fewer than :data:`POOL_BELOW` ends in a condition, the participant's conditions share
+    one spread, each about its own mean; with fewer than that in all, all participants do.
+    ``pooled`` says which. Where a task only ends inside the target, ends are cut off at its edge
+    and throughput is flattered; ``bounded`` counts those ends.
 
     Parameters
     ----------
     movements
         Of :func:`labcrane.analysis.measures.measure_participant`, successful ones only.
-    by
-        The columns that make a condition.
     """
     import pandas as pd
 
     movements = movements.dropna(subset=["movement_time", "amplitude", "error_along"])
-    everybody = _spread(movements, ["participant", *by])
+    everybody = _spread(movements, ["participant", CONDITION])
     rows = []
     for participant, own in movements.groupby("participant"):
-        groups = [group for _, group in own.groupby(list(by))]
+        groups = [group for _, group in own.groupby(CONDITION)]
         few = min(len(group) for group in groups) < POOL_BELOW
         pooled = "no" if not few else "participant" if len(own) >= POOL_BELOW else "study"
-        shared = everybody if pooled == "study" else _spread(own, list(by))
+        shared = everybody if pooled == "study" else _spread(own, [CONDITION])
         bits = []
         for group in groups:
             spread = float(group["error_along"].std(ddof=1)) if pooled == "no" else shared

@@ -136,10 +136,8 @@ def _aicc(squares: float, n: int) -> float:
     return likelihood + 2 * k + 2 * k * (k + 1) / (n - k - 1)
 
 
-def learning_curves(
-    movements: "pd.DataFrame", measure: str, along: str = "sequence"
-) -> "pd.DataFrame":
-    """Fit both curves to each participant's means of ``measure``.
+def learning_curves(movements: "pd.DataFrame", measure: str) -> "pd.DataFrame":
+    """Fit both curves to each participant's means of ``measure`` along the sequence.
 
     Returns one row per participant and curve; ``better`` is yes for the one with the lower AICc.
     """
@@ -147,7 +145,7 @@ def learning_curves(
 
     rows: list[dict[str, object]] = []
     for participant, own in movements.groupby("participant"):
-        means = own.groupby(along)[measure].mean()
+        means = own.groupby("sequence")[measure].mean()
         n = means.index.to_numpy(float)
         fits = [fit_curve(curve, n, means.to_numpy(float)) for curve in CURVES]
         found = [fit for fit in fits if fit is not None]

@@ -137,7 +137,7 @@ class Power:
     participants, cohorts
         How many in a cohort, and how many cohorts.
     power, power_low, power_high
-        Share of the cohorts with p below alpha, and its 95 % Wilson interval.
+        Share of the cohorts with p below :data:`ALPHA`, and its 95 % Wilson interval.
     null, null_low, null_high
         The same with the labels permuted: how often something is found where nothing is.
     """
@@ -160,7 +160,6 @@ def power(
     seed: int,
     *,
     fresh: bool = False,
-    alpha: float = ALPHA,
 ) -> Iterator[Power]:
     """Yield the power of the test for each size of the cohort.
 
@@ -183,12 +182,12 @@ def power(
         plain = pool.means[drawn]
         labels = None if pool.groups is None else pool.groups[drawn]
         permuted, shuffled = _permuted(plain, labels, random)
-        null = _p(permuted, shuffled, pool) < alpha
+        null = _p(permuted, shuffled, pool) < ALPHA
         if effect.size is None:
-            found = _p(plain, labels, pool) < alpha
+            found = _p(plain, labels, pool) < ALPHA
         else:
             added = pool.steps if shuffled is None else pool.steps[shuffled][..., None]
-            found = _p(permuted + effect.size * added, shuffled, pool) < alpha
+            found = _p(permuted + effect.size * added, shuffled, pool) < ALPHA
         yield Power(size, len(found), *_share(found), *_share(null))
 
 

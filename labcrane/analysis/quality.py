@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 def loop_quality(participant: Participant) -> "pd.DataFrame":
     """Return how late the loop's ticks were, one row per session.
 
-    Lateness is from when a tick was due to when it woke. A late tick is one whose lateness is a
-    period or more. A session on a clock that jumps (``--fast``) is never late.
+    Lateness is from when a tick was due to when it woke. A late tick is one whose lateness is
+    more than a period. A session on a clock that jumps (``--fast``) is never late.
     """
     import pandas as pd
 
@@ -35,7 +35,7 @@ def loop_quality(participant: Participant) -> "pd.DataFrame":
                 "lateness_median_ms": 1e3 * float(np.median(lateness)),
                 "lateness_p99_ms": 1e3 * float(np.quantile(lateness, 0.99)),
                 "lateness_worst_ms": 1e3 * float(lateness.max()),
-                "late_ticks": int((lateness >= 1.0 / rate_hz).sum()),
+                "late_ticks": int((lateness > 1.0 / rate_hz).sum()),
                 "paused_s": float(loop["paused"].sum() / rate_hz),
                 "write_worst_ms": 1e3 * float(wrote.max()),
             }

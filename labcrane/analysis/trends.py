@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 LEAST_EIGENVALUE = 1e-4
 """Of the correlation of random effects; below it one of them follows from the other."""
 
+FIXED = ("sequence", "difficulty", "far_side")
+"""Fixed terms of the mixed model; one that does not vary is left out."""
+
 
 @dataclass(frozen=True, slots=True)
 class Trend:
@@ -47,8 +50,8 @@ class Trend:
     n: int
 
 
-def linear_trend(movements: "pd.DataFrame", measure: str, along: str = "sequence") -> Trend | None:
-    """Test for a linear trend; None with fewer than three participants that have a slope.
+def linear_trend(movements: "pd.DataFrame", measure: str) -> Trend | None:
+    """Test for a linear trend over the sequence; None with fewer than three slopes.
 
     An F test over all positions says that some differ; only this says in which direction.
     """
@@ -56,7 +59,7 @@ def linear_trend(movements: "pd.DataFrame", measure: str, along: str = "sequence
 
     slopes = []
     for _, own in movements.groupby("participant"):
-        means = own.groupby(along)[measure].mean().dropna()
+        means = own.groupby("sequence")[measure].mean().dropna()
         if len(means) > 1:
             slopes.append(float(np.polyfit(means.index.to_numpy(float), means.to_numpy(), 1)[0]))
     if len(slopes) < 3 or np.ptp(slopes) == 0.0:  # noqa: PLR2004 - no test with fewer
@@ -65,7 +68,7 @@ def linear_trend(movements: "pd.DataFrame", measure: str, along: str = "sequence
     low, high = found.confidence_interval(0.95)
     return Trend(
         measure,
-        along,
+        "sequence",
         slope=float(np.mean(slopes)),
         slope_ci=(float(low), float(high)),
         t=float(found.statistic),
@@ -131,21 +134,10 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel | None:
     """
     import pandas as pd
 
-    kept = [measure, "sequence", "difficulty", "far_side", "participant"]
-    table = movements[kept].dropna()
-    table = table[table[measure] > 0.0]
-    if table["participant"].nunique() < 3:  # noqa: PLR2004
+    data = _modelled(movements, measure)
+    if data["participant"].nunique() < 3:  # noqa: PLR2004
         return None
-    data = pd.DataFrame(
-        {
-            "y": np.log(table[measure]),
-            "sequence": table["sequence"] - table["sequence"].mean(),
-            "difficulty": table["difficulty"] - table["difficulty"].mean(),
-            "far_side": table["far_side"],
-            "participant": table["participant"],
-        }
-    )
-    varied = [name for name in kept[1:4] if data[name].nunique() > 1]
+    varied = [name for name in FIXED if data[name].nunique() > 1]
     formula = "y ~ " + (" + ".join(varied) or "1")
     for slopes in (True, False):
         found = _fit(formula, data, "~sequence" if slopes else "1")
@@ -172,6 +164,16 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel | None:
         n=len(data),
         participants=data["participant"].nunique(),
     )
+
+
+def _modelled(movements: "pd.DataFrame", measure: str) -> "pd.DataFrame":
+    """Return what the model is fitted to: the measure's logarithm, and centred terms."""
+    table = movements[[measure, *FIXED, "participant"]].dropna()
+    table = table[table[measure] > 0.0]
+    data = table[[*FIXED, "participant"]].assign(y=np.log(table[measure]))
+    for name in ("sequence", "difficulty"):
+        data[name] -= data[name].mean()
+    return data
 
 
 def _fit(formula: str, data: "pd.DataFrame", random: str) -> Any:

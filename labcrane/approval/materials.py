@@ -3,7 +3,7 @@
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from importlib.metadata import EntryPoint, entry_points, version
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,8 @@ from typing import Any
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from labcrane.approval.source_tree import digest, hashes
+from labcrane.approval.source_tree import hashes
+from labcrane.durable_file import sha256
 from labcrane.errors import ProtocolError
 from labcrane.hookspecs import PROJECT
 from labcrane.registry import Registry
@@ -30,7 +31,6 @@ def materials(
     study: Study,
     registry: Registry,
     consent: Path | None = None,
-    plugins: Iterable[EntryPoint] | None = None,
 ) -> dict[str, Any]:
     """Return what ``study`` consists of, ready for JSON.
 
@@ -42,8 +42,6 @@ def materials(
     ----------
     consent
         The consent text, which belongs to the study without being named in the protocol.
-    plugins
-        Installed plugins, instead of those that are really there.
     """
     protocol = YamlFile.read(study.path).data
     folder = study.path.parent
@@ -53,7 +51,7 @@ def materials(
         "files": {name: content(path) for name, path in sorted(named.items())},
         "machine": content_of_text(study.machine_text, data=True),
         "settings": settings(study),
-        "plugins": _plugins(study, registry, protocol, plugins),
+        "plugins": _plugins(study, registry, protocol),
         "labcrane": {"version": version("labcrane"), "files": hashes("labcrane")},
     }
     if consent is not None and consent.is_file():
@@ -69,18 +67,10 @@ def settings(study: Study) -> dict[str, Any]:
     ProtocolError
         A setting names a file that would not move with the study, and be no part of the lock.
     """
-    choices = {"input": study.input, "scheme": study.scheme, "dynamics": study.dynamics}
-    for kind, named in (
-        ("tasks", study.task_choices),
-        ("questionnaires", study.questionnaire_choices),
-        ("feedback", {**study.cues, **study.sounds}),
-        ("views", study.views),
-    ):
-        choices |= {f"{kind}.{name}": choice for name, choice in named.items()}
     folder = study.path.parent
     return {
         part: _portable(choice.settings.model_dump(), folder, part)
-        for part, choice in choices.items()
+        for part, choice in study.choices.items()
     }
 
 
@@ -187,23 +177,18 @@ def _json_like(value: object) -> Any:
     return value if isinstance(value, bool | int | float | str | None) else str(value)
 
 
-def _plugins(
-    study: Study,
-    registry: Registry,
-    protocol: Mapping[str, Any],
-    plugins: Iterable[EntryPoint] | None,
-) -> dict[str, Any]:
+def _plugins(study: Study, registry: Registry, protocol: Mapping[str, Any]) -> dict[str, Any]:
     """Return version and source of every plugin that offers something the protocol names."""
     choices = (study.input, study.scheme, study.dynamics, *study.task_choices.values())
     used = {choice.plugin for choice in choices}
     said = set(_strings({key: value for key, value in protocol.items() if key not in WORDS_ONLY}))
     for offers in registry.plugins.values():
         used |= {plugin for name, plugin in offers.items() if name in said}
-    points = {point.name: point for point in plugins or entry_points(group=PROJECT)}
+    points = {point.name: point for point in entry_points(group=PROJECT)}
     found = {name: _plugin(points[name]) for name in sorted(used - registry.local.keys())}
     # Every file in the study's own folder runs when the study is read, whatever it offers.
     own = {
-        name: {"version": OWN, "files": {name: digest(path)}}
+        name: {"version": OWN, "files": {name: sha256(path)}}
         for name, path in registry.local.items()
     }
     return found | own

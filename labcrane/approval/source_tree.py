@@ -1,10 +1,10 @@
 """The files of an installed package, byte by byte."""
 
-import hashlib
 from importlib.machinery import ModuleSpec
 from importlib.util import find_spec
 from pathlib import Path
 
+from labcrane.durable_file import sha256
 from labcrane.errors import PluginError
 
 CACHES = frozenset({"__pycache__", ".mypy_cache", ".ruff_cache", ".pytest_cache"})
@@ -28,17 +28,11 @@ def hashes(package: str) -> dict[str, str]:
             f"package {package!r} has no files that could be hashed; install it as files"
         )
     return {
-        path.relative_to(root.parent).as_posix(): digest(path)
+        path.relative_to(root.parent).as_posix(): sha256(path)
         for root in roots
         for path in (sorted(root.rglob("*")) if root.is_dir() else [root])
         if path.is_file() and not _is_cache(path.relative_to(root.parent))
     }
-
-
-def digest(path: Path) -> str:
-    """Return the SHA-256 of a file, hexadecimal."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _roots(spec: ModuleSpec | None) -> list[Path]:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from labcrane.cli.inspect import ProtocolPath
+from labcrane.cli.arguments import ProtocolPath
 from labcrane.cli.output import out
 from labcrane.errors import ProtocolError
 

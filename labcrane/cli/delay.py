@@ -1,5 +1,6 @@
 """Measures how long views and sounds take, with a photodiode or a microphone."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from labcrane.cli.output import out
@@ -48,7 +49,7 @@ def _measure(
     count: int,
     channel: int,
 ) -> None:
-    from labcrane.delay_file import NOT_MEASURED, delay_in_words, read_delays, store
+    from labcrane.delay_file import delay_in_words, store
     from labcrane.registry import discover
     from labcrane.study import load
 
@@ -57,21 +58,11 @@ def _measure(
     if name is None and len(there) == 1:
         name = there[0]
     if stream is None:
-        known = read_delays(protocol)
-        for each in there:
-            before = known.get(each)
-            said = delay_in_words(before, before.facts) if before else NOT_MEASURED
-            out.print(f"{word} {each}: delay {said}", markup=False)
-            out.print(guide.format(name=each) + " Name it with --stream.", markup=False)
-        if not there:
-            out.print(f"{protocol} has no {word}s", markup=False)
+        _say_known(protocol, word, guide, there)
         return
     if name is None or name not in there:
-        raise ProtocolError(
-            f"say which {word} with --name; there is {', '.join(there) or 'none'}"
-            if name is None
-            else f"there is no {word} {name!r}; there is {', '.join(there) or 'none'}"
-        )
+        asked = f"say which {word} with --name" if name is None else f"there is no {word} {name!r}"
+        raise ProtocolError(f"{asked}; there is {', '.join(there) or 'none'}")
     from labcrane.delay_measurement import measure
 
     out.print(guide.format(name=name), markup=False)
@@ -86,3 +77,17 @@ def _measure(
         f"changes seen at {found.sensor_hz:.0f} Hz; {path}",
         markup=False,
     )
+
+
+def _say_known(protocol: Path, word: str, guide: str, there: Sequence[str]) -> None:
+    """Print what was measured before, and how to measure it."""
+    from labcrane.delay_file import NOT_MEASURED, delay_in_words, read_delays
+
+    known = read_delays(protocol)
+    for each in there:
+        before = known.get(each)
+        said = delay_in_words(before, before.facts) if before else NOT_MEASURED
+        out.print(f"{word} {each}: delay {said}", markup=False)
+        out.print(guide.format(name=each) + " Name it with --stream.", markup=False)
+    if not there:
+        out.print(f"{protocol} has no {word}s", markup=False)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labcrane.cli.arguments import DataBeside, data_folder
 from labcrane.cli.delay import measure_audio, measure_display
 from labcrane.cli.network import Local, stay_on_this_computer
 from labcrane.cli.output import out
@@ -22,9 +23,7 @@ def doctor(
     protocol: Annotated[
         Path | None, typer.Option(help="look at what this study needs, and at nothing else")
     ] = None,
-    data: Annotated[
-        Path | None, typer.Option(help="data folder; data/ beside the protocol by default")
-    ] = None,
+    data: DataBeside = None,
     peer: Annotated[
         list[str] | None, typer.Option(help="computer that sends a stream; may be given again")
     ] = None,
@@ -73,7 +72,7 @@ def _examine(
 
     registry = discover(study=protocol)
     study = load(protocol, registry) if protocol else None
-    folder = data or (protocol.parent if protocol else Path()) / "data"
+    folder = data_folder(data, protocol)
     needed = _session_bytes(study) if study else disk.NEEDED_BYTES
     checks = []
     for check in examine(folder, registry, study, needed_bytes=needed, peers=peers, move=move):
@@ -110,6 +109,7 @@ def _print(check: "Check") -> None:
 def _session_bytes(study: "Study") -> float:
     """Return what the longest session takes, with the same margin as ``labcrane run`` asks for."""
     from labcrane import rig
+    from labcrane.data_folder import needed_bytes
     from labcrane.frame_log import frame_bytes
     from labcrane.plan import plan_session
     from labcrane.pseudonyms import pseudonyms
@@ -121,4 +121,4 @@ def _session_bytes(study: "Study") -> float:
         plan_session(study, name, number).expected_s
         for number in range(1, len(study.protocol.sessions) + 1)
     )
-    return (2.0 * longest + RESERVE_S) * frame_bytes(run) * run.rate_hz
+    return needed_bytes(longest, frame_bytes(run) * run.rate_hz, RESERVE_S)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from labcrane.cli.inspect import ProtocolPath
+from labcrane.cli.arguments import ProtocolPath
 from labcrane.cli.network import stay_on_this_computer
 from labcrane.cli.output import out
 

@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labcrane.cli.arguments import AsJson, ProtocolPath
 from labcrane.cli.output import out
 from labcrane.errors import ProtocolError
 
 if TYPE_CHECKING:
     from labcrane.plan import SessionPlan
-
-AsJson = Annotated[bool, typer.Option("--json", help="for programs")]
-ProtocolPath = Annotated[Path, typer.Argument(metavar="PROTOCOL", help="the study's YAML file")]
 
 
 def check(protocol: ProtocolPath, as_json: AsJson = False) -> None:

@@ -34,7 +34,7 @@ def pages(
         visit.participant,
         visit.folder.name,
         visit.session,
-        f"{visit.study.protocol.study}/{visit.folder.name}/ses-{visit.session:02}",
+        visit.source,
         where.host,
         free_port(where.host, where.port),
         cameras_of(visit.study) if feedback else {},

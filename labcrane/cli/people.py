@@ -6,15 +6,12 @@ from typing import Annotated
 import typer
 
 from labcrane.cli.approval import today
-from labcrane.cli.inspect import ProtocolPath
+from labcrane.cli.arguments import DataBeside, ProtocolPath, data_folder
 from labcrane.cli.output import out, whole_table
 
 Someone = Annotated[str, typer.Argument(metavar="PARTICIPANT", help="pseudonym: P001")]
 Reason = Annotated[str, typer.Option(help="why; no names")]
 Data = Annotated[Path, typer.Option(help="the study's data folder")]
-DataBeside = Annotated[
-    Path | None, typer.Option(help="data folder; data/ beside the protocol by default")
-]
 HERE = Path("data")
 
 
@@ -57,7 +54,7 @@ def consent(protocol: ProtocolPath, participant: Someone, data: DataBeside = Non
     study = load(protocol, registry)
     lock = verify(study, registry, today())
     text = (lock.approval["consent"], lock.consent_version)
-    places = Places(data or protocol.parent / "data")
+    places = Places(data_folder(data, protocol))
     entry = confirm_consent(places, study, participant, text, today())
     group = f", group {entry.group}" if entry.group else ""
     out.print(

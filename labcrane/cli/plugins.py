@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labcrane.cli.inspect import AsJson
+from labcrane.cli.arguments import AsJson
 from labcrane.cli.output import out, whole_table
 from labcrane.errors import PluginError
 
@@ -49,19 +49,16 @@ def show(
     as_json: AsJson = False,
 ) -> None:
     """Show settings with units and defaults, what is recorded, and an example."""
-    from difflib import get_close_matches
-
     from labcrane.machine_file import load_machine
     from labcrane.offer_sheet import sheets
     from labcrane.registry import discover
+    from labcrane.suggestion import suggestion
 
     registry = discover(study=study)
     found = sheets(registry, name, load_machine("ch8"))
     if not found:
         known = sorted({each for offers in registry.offers.values() for each in offers})
-        close = get_close_matches(name, known, n=1)
-        hint = f"did you mean {close[0]!r}?" if close else f"there is {', '.join(known)}"
-        raise PluginError(f"nothing called {name!r} is installed; {hint}")
+        raise PluginError(f"nothing called {name!r} is installed; {suggestion(name, known)}")
     if as_json:
         typer.echo(json.dumps([sheet.as_json() for sheet in found], indent=1, ensure_ascii=False))
         return

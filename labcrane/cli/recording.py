@@ -130,7 +130,10 @@ def _recover(folder: Path) -> None:
     if not found:
         out.print(f"no journals below {folder}", markup=False)
     if problems := sum(bool(each.problem) for each in found):
-        raise RecordingError(f"{problems} of {len(found)} sessions could not be recovered")
+        raise RecordingError(
+            f"{problems} of {len(found)} sessions could not be recovered; it is said of each why: "
+            f"remove the cause, and run labcrane recover {folder} again"
+        )
 
 
 def resync(

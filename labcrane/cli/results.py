@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from labcrane.cli.approval import today
+from labcrane.cli.network import stay_on_this_computer
 from labcrane.cli.output import out
 from labcrane.errors import ProtocolError, RecordingError
 
 if TYPE_CHECKING:
     from labcrane.analysis.cohort import Cohort, Participant, Struck
+    from labcrane.analysis.movements import Groups
 
 DataFolder = Annotated[Path, typer.Argument(metavar="DATA", help="the study's data folder")]
 Include = Annotated[
@@ -124,19 +127,12 @@ def replay(
     from labcrane.replay import replay as run_again
 
     if speed is not None:
-        from labcrane.streams.network import use_loopback
-
-        use_loopback()
+        stay_on_this_computer()
     done = run_again(recording, session, protocol=protocol, machine=machine, speed=speed)
     for part in done.parts:
         out.print(f"differs: {part}", markup=False)
     if measures is not None:
-        from labcrane.analysis.measures import measure_session
-        from labcrane.recording.recording import open_recording
-
-        record = open_recording(recording).session(session)
-        measure_session(record, frames=done.frames).to_csv(measures, index=False)
-        out.print(f"measures: {measures}", markup=False)
+        _write_measures(recording, session, done.frames, measures)
     if done.difference is None:
         out.print(f"{done.ticks} ticks replayed, every number the same bit for bit", markup=False)
         return
@@ -146,6 +142,16 @@ def replay(
         f"is {first.replayed!r}"
         + ("" if done.parts else "; no part that is recorded differs, so look at the plugins")
     )
+
+
+def _write_measures(recording: Path, session: int, frames: "Groups", path: Path) -> None:
+    """Write the measures of a session's movements in the ``frames`` of its replay."""
+    from labcrane.analysis.measures import measure_session
+    from labcrane.recording.recording import open_recording
+
+    record = open_recording(recording).session(session)
+    measure_session(record, frames=frames).to_csv(path, index=False)
+    out.print(f"measures: {path}", markup=False)
 
 
 def cohort_of(data: Path, include: list[str] | None) -> "Cohort":
@@ -180,8 +186,6 @@ def _struck(data: Path) -> "dict[str, Struck]":
 
 def _keep_track(data: Path, to: str, folder: Path, cohort: "Cohort") -> None:
     """Note in the register where data of its participants went, for erasing and relabelling."""
-    from datetime import UTC, datetime
-
     from labcrane.participants.copies import record_export
     from labcrane.participants.places import Places
 
@@ -194,7 +198,7 @@ def _keep_track(data: Path, to: str, folder: Path, cohort: "Cohort") -> None:
         # A file that is named after somebody holds nobody else; a table may hold everybody.
         named = [name for name in names if name in str(inside)]
         files[inside] = named or names
-    record_export(Places(data), to, folder, files, datetime.now(UTC).date())
+    record_export(Places(data), to, folder, files, today())
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from labcrane.cli.inspect import ProtocolPath
+from labcrane.cli.arguments import DataBeside, ProtocolPath, data_folder
 from labcrane.cli.network import Local, stay_on_this_computer
 from labcrane.cli.output import out
 from labcrane.errors import LabcraneError, ProtocolError
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
 
 Participant = Annotated[str, typer.Option(help="pseudonym: P001")]
 SessionNumber = Annotated[int, typer.Option(help="which of the protocol's sessions")]
-DataPath = Annotated[
-    Path | None, typer.Option(help="data folder; data/ beside the protocol by default")
-]
 Simulate = Annotated[
     bool, typer.Option("--simulate", help="a simulated operator takes the controls")
 ]
@@ -42,7 +39,7 @@ def run(
     protocol: ProtocolPath,
     participant: Participant,
     session: SessionNumber = 1,
-    data: DataPath = None,
+    data: DataBeside = None,
     simulate: Simulate = False,
     fast: Annotated[
         bool, typer.Option("--fast", help="with --simulate: as fast as the machine can, no LSL")
@@ -61,7 +58,7 @@ def run(
         protocol,
         participant,
         session,
-        data or protocol.parent / "data",
+        data_folder(data, protocol),
         simulate,
         pilot,
         feedback=not simulate if feedback is None else feedback,
@@ -78,7 +75,7 @@ def resume(
     protocol: ProtocolPath,
     participant: Participant,
     session: SessionNumber = 1,
-    data: DataPath = None,
+    data: DataBeside = None,
     policy: Annotated[
         Literal["continue", "redo_trial", "redo_block"] | None,
         typer.Option(help="where to go on; as the protocol says by default"),
@@ -92,7 +89,7 @@ def resume(
     """Go on with a session whose process died."""
     from labcrane.session_process import VisitOrder
 
-    folder = data or protocol.parent / "data"
+    folder = data_folder(data, protocol)
     if local or simulate:
         stay_on_this_computer()
     shown = not simulate if feedback is None else feedback

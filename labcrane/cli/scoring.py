@@ -53,9 +53,4 @@ def _settings(path: Path) -> "IndicatorSettings":
     from labcrane.evaluation import IndicatorSettings
     from labcrane.yaml_file import YamlFile
 
-    source = YamlFile.read(path)
-    checked = source.check(IndicatorSettings)
-    source.raise_problems()
-    if checked is None:
-        raise AssertionError("what is wrong was raised")
-    return checked
+    return YamlFile.read(path).checked(IndicatorSettings)

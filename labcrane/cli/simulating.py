@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labcrane.cli.inspect import ProtocolPath
+from labcrane.cli.arguments import ProtocolPath
 from labcrane.cli.network import stay_on_this_computer
 from labcrane.cli.output import out
 from labcrane.cli.results import Scheduler, Workers, progress_bar
@@ -137,11 +137,11 @@ def _movements(
     from labcrane.analysis.cohort import find_cohort
     from labcrane.analysis.measures import measure_participant
     from labcrane.analysis.quality import is_result
+    from labcrane.data_folder import DataFolder
     from labcrane.workers import work
 
-    stamped = {f"{name}-SIMULATED" for name in names}
     people = find_cohort(folder.resolve(), ["simulated"]).included
-    wanted = [person for person in people if person.name in stamped]
+    wanted = [person for person in people if DataFolder.pseudonym(person.name) in names]
     with progress_bar("measure", len(wanted)) as advance:
         tables = []
         for table in work(measure_participant, wanted, workers, scheduler):

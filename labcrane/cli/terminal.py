@@ -10,7 +10,6 @@ import sys
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from types import TracebackType
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -99,12 +98,7 @@ class Terminal:
             self._listener.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self._over.set()
         self._console.events.put(None)
         self._printer.join()
@@ -141,6 +135,7 @@ class Terminal:
             if not select.select([descriptor], [], [], POLL_S)[0]:
                 continue
             if not (more := os.read(descriptor, 4096)):
+                self._line(text.decode(errors="replace").strip())  # the last one may have no end
                 return
             *lines, text = (text + more).split(b"\n")
             for line in lines:
@@ -244,7 +239,7 @@ def _event_line(event: Event) -> str | None:
         case "pause.start" | "pause.end":
             return f"{event.name.replace('.', ' ')} ({data['by']})"
         case name if name.startswith("order.") and data["refused"]:
-            return f"{name.removeprefix('command.')}: {data['refused']}"
+            return f"{name.removeprefix('order.')}: {data['refused']}"
         case _:
             return sheet_line(event)
 

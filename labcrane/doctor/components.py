@@ -85,10 +85,10 @@ def of_everything(registry: Registry) -> tuple[list[Look], list[str]]:
 def examine(look: Look, *, move: bool) -> Sequence[Finding]:
     """Return what the plugin finds; ``move`` when a person is there to move things."""
     with tempfile.NamedTemporaryFile(prefix="labcrane-doctor-") as complaints:
-        return _examine(look, move, Path(complaints.name))
+        return _examine(look, Path(complaints.name), move=move)
 
 
-def _examine(look: Look, move: bool, complaints: Path) -> Sequence[Finding]:  # noqa: FBT001
+def _examine(look: Look, complaints: Path, *, move: bool) -> Sequence[Finding]:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe(duplex=False)
     arguments = (theirs, look, move, str(complaints))

@@ -46,11 +46,10 @@ def examine(requests: Sequence[StreamRequest] = ()) -> list[Finding]:
 
 
 def _self_test(own: Sequence[FoundStream]) -> Finding:
+    fix = f"the firewall of this computer stops it: {OPEN_PORTS}"
     if not own:
-        fix = f"the firewall of this computer stops it: {OPEN_PORTS}"
         return Finding(Verdict.FAIL, "a stream of our own is not found (UDP 16571)", fix)
     if own[0].warnings and (blocked := _blocked(own[0])):
-        fix = f"the firewall of this computer stops it: {OPEN_PORTS}"
         return Finding(Verdict.FAIL, f"a stream of our own {blocked}", fix)
     return Finding(Verdict.PASS, f"a stream of our own is found and answers; {describe()}")
 

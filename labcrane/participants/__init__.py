@@ -2,7 +2,6 @@
 
 From the bottom up::
 
-    exclusive    one process at a time
     places       where personal data, raw data and exports lie
     register     pseudonyms, slots, sessions, consent, exclusions, exports, stores
     enrolment    into the register: slot, consent, exclusion, notes

@@ -3,7 +3,7 @@
 import csv
 import io
 import shutil
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
@@ -15,9 +15,6 @@ from labcrane.recording.relabelling import renaming
 
 TABLES = {".csv": ",", ".tsv": "\t"}
 """Exports in which single rows can be taken out, and what separates their cells."""
-
-Edit = Callable[[list[str]], list[str] | None]
-"""What becomes of a row; None takes it out."""
 
 
 @dataclass

@@ -15,11 +15,7 @@ from labcrane.study import Study
 def _entry(register: Register, study: Study, participant: str, today: date) -> Entry:
     register.check_finished()
     name = study.protocol.study
-    if register.study not in {"", name}:
-        raise ProtocolError(
-            f"the register is of study {register.study!r}, the protocol of {name!r}; give the "
-            "study's own data folder with --data"
-        )
+    register.check_study(name)
     register.study, register.pattern = name, study.protocol.participants.pattern
     if participant in register.participants:
         return register.participants[participant]
@@ -96,7 +92,7 @@ def waive(places: Places, participant: str, session: int, reason: str, today: da
 def check_words(text: str, what: str) -> None:
     """Refuse words that lead to a person, or none at all."""
     if not text.strip():
-        raise ProtocolError(f"a {what} needs words")
+        raise ProtocolError(f"a {what} needs words; say it without names")
     if found := personal(text):
         raise ProtocolError(
             f"the {what} holds {found}, which would lead to a person; write it without"

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from labcrane.durable_file import write_text
 from labcrane.errors import ProtocolError, RecordingError
-from labcrane.participants.exclusive import exclusive
+from labcrane.exclusive import exclusive
 from labcrane.participants.places import Places
 
 
@@ -156,13 +156,24 @@ class Register(Record):
                 "labcrane erase, relabel or transfer finishes it"
             )
 
+    def check_study(self, study: str) -> None:
+        """Raise :class:`ProtocolError` when this is the register of another study."""
+        if self.study not in {"", study}:
+            raise ProtocolError(
+                f"the register is of study {self.study!r}, the protocol of {study!r}; give the "
+                "study's own data folder with --data"
+            )
+
     def entry(self, participant: str) -> Entry:
         """Return a participant, or say who there is."""
         if participant in self.participants:
             return self.participants[participant]
         for stone in self.tombstones:
             if stone.participant == participant:
-                raise ProtocolError(f"participant {participant} was erased on {stone.date}")
+                raise ProtocolError(
+                    f"participant {participant} was erased on {stone.date}; nothing can be said "
+                    "of them any more"
+                )
         known = ", ".join(sorted(self.participants)) or "nobody"
         raise ProtocolError(f"participant {participant} is not in the register; it has {known}")
 

@@ -1,18 +1,15 @@
 """Copy finished sessions to the lab's store, and prove that both sides are equal."""
 
-import hashlib
 import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from labcrane.durable_file import copy
+from labcrane.durable_file import copy, sha256
 from labcrane.errors import RecordingError
 from labcrane.participants.copies import Reach, edit_file, in_store
 from labcrane.participants.places import Places
 from labcrane.participants.register import Register, changed, read
-from labcrane.recording.hdf5_columns import texts_of
-from labcrane.recording.participant_file import group_name, opened
-from labcrane.recording.parts import journal_path, parts
+from labcrane.recording.recover import is_recovered
 
 
 @dataclass
@@ -71,8 +68,8 @@ def _one(
     places: Places, store: Path, register: Register, name: str, path: Path, done: Transferred
 ) -> None:
     target = in_store(store, register.study, path.parent.name) / path.name
-    ours, put = _sha256(path), register.stores[str(store)].get(name)
-    theirs = _sha256(target) if target.exists() else None
+    ours, put = sha256(path), register.stores[str(store)].get(name)
+    theirs = sha256(target) if target.exists() else None
     if theirs not in {None, ours, put}:
         done.only_here.append(f"{name}: the store has another file {target}, not from labcrane")
         return
@@ -81,7 +78,7 @@ def _one(
         with changed(places) as now:
             now.stores[str(store)][name] = ours
         copy(path, target)
-        if _sha256(target) != ours:
+        if sha256(target) != ours:
             raise RecordingError(f"{target} differs from {path} after copying; check the store")
         done.copied.append(name)
     elif put != ours:
@@ -109,23 +106,4 @@ def settle_owed(places: Places) -> None:
 def _unfinished(folder: Path) -> set[str]:
     """Return the prefixes of sessions whose journals are not, or not wholly, in the file."""
     found = {path.name.split("_")[0] for path in folder.glob("ses-*_*.xdf")}
-    file = folder / f"{folder.name}.h5"
-    return {ses for ses in found if not _is_finished(file, int(ses.removeprefix("ses-")))}
-
-
-def _is_finished(file: Path, session: int) -> bool:
-    if not file.exists():
-        return False
-    kinds = (journal_path(file.parent, session, kind) for kind in ("run", "streams"))
-    sizes = {part.name: part.stat().st_size for first in kinds for part in parts(first)}
-    with opened(file) as recording:
-        if group_name(session) not in recording:
-            return False
-        journals = recording[f"{group_name(session)}/journals"]
-        held = zip(texts_of(journals["name"]), journals["size"][:].astype(int), strict=True)
-        return dict(held) == sizes
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    return {ses for ses in found if not is_recovered(folder, int(ses.removeprefix("ses-")))}

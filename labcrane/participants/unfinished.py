@@ -3,10 +3,10 @@
 from datetime import date
 from pathlib import Path
 
+from labcrane.exclusive import exclusive
 from labcrane.participants import erasure, relabel, transfer
 from labcrane.participants.copies import Reach
 from labcrane.participants.erasure import Erased
-from labcrane.participants.exclusive import exclusive
 from labcrane.participants.places import Places
 from labcrane.participants.register import Work, read
 from labcrane.participants.transfer import Transferred

@@ -15,11 +15,7 @@ def check_visit(
 ) -> None:
     """Raise :class:`ProtocolError` unless ``participant`` may be run today."""
     entry = register.entry(participant)
-    if register.study != study.protocol.study:
-        raise ProtocolError(
-            f"the register is of study {register.study!r}, the protocol of "
-            f"{study.protocol.study!r}; give the study's own data folder with --data"
-        )
+    register.check_study(study.protocol.study)
     if entry.exclusion:
         raise ProtocolError(
             f"participant {participant} was excluded on {entry.exclusion.date}: "

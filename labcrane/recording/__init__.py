@@ -2,13 +2,25 @@
 
 From the bottom up::
 
-    append_file      a file that only grows: one write per chunk, fsync in the background
-    stream_header    what a stream holds, as XDF and LSL describe it
-    xdf_chunk        how XDF packs its chunks
-    xdf              the writer of XDF files                  xdf_reader   the tolerant reader
-    journal          a session's frames and events            checks, chunks: what it stands on
-    participant_file what is written into HDF5                recording    reads it
-    consolidation    journals into a participant file         recover      whatever a crash left
+    append_file         a file that only grows: one write per chunk, fsync in the background
+    parts               what journals are called
+    stream_header       what a stream holds, as XDF and LSL describe it
+    xdf_chunk           how XDF packs its chunks
+    checks              which bytes are as they were written
+    xdf                 the writer of XDF files
+    chunks, samples     what a file holds, and past what is damaged
+    xdf_reader          the tolerant reader
+    journal             a session's frames and events
+    journal_reader      the same, read back
+    foreign_streams     the streams of others, with what is known of their times
+    hdf5_columns        what R, MATLAB and Octave read alike
+    answers, session_group, stream_group
+                        what goes into a participant file
+    participant_file    journals into a participant file
+    recording           reads it
+    recover             whatever a crash left
+    recorrect           clocks corrected again, from the file alone
+    relabelling         recordings under another pseudonym
 
 The layout of the files is described in ``docs/file-format.md``.
 """

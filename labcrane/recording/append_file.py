@@ -6,6 +6,7 @@ import os
 import threading
 from pathlib import Path
 
+from labcrane.durable_file import PRIVATE_FILE, sync_folder
 from labcrane.errors import RecordingError
 
 SYNC_S = 1.0
@@ -155,7 +156,7 @@ class AppendFile:
 def _create(path: Path) -> int:
     """Open a new file, and make its name as durable as its content."""
     try:
-        fd = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, 0o600)
+        fd = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, PRIVATE_FILE)
     except FileExistsError as error:
         raise RecordingError(
             f"{path} exists already and is not overwritten; go on in a new part"
@@ -165,18 +166,6 @@ def _create(path: Path) -> int:
         raise RecordingError(f"cannot create {path}: {error.strerror}; {remedy}") from error
     sync_folder(path.parent)
     return fd
-
-
-def sync_folder(folder: Path) -> None:
-    """Bring the names in a folder to the disk, where the system can."""
-    with contextlib.suppress(
-        PermissionError
-    ):  # Windows opens no folders, and needs no sync of them
-        fd = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(fd)
-        finally:
-            os.close(fd)
 
 
 def _free(path: Path) -> int:

@@ -70,8 +70,13 @@ def write_text(group: "h5py.Group", path: str, text: str) -> None:
     group.create_dataset(path, data=np.bytes_(clean(text).encode()))
 
 
+def holds_texts(dataset: "h5py.Dataset") -> bool:
+    """Whether a column holds texts, of one length or, from older files, of their own."""
+    return dataset.dtype.kind in "OS"
+
+
 def texts_of(dataset: "h5py.Dataset") -> npt.NDArray[np.object_]:
-    """Return a column of texts, whether of one length or, from older files, of their own."""
+    """Return a column of texts."""
     texts: npt.NDArray[np.object_] = dataset.asstr("utf-8")[:]
     return texts
 

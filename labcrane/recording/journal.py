@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -94,7 +93,7 @@ class SessionJournal:
         Parameters
         ----------
         stamp
-            When the tick woke, in seconds on the session's clock.
+            When the tick was due, in seconds on the session's clock.
         row
             Shape ``(n_columns,)``.
 
@@ -124,12 +123,7 @@ class SessionJournal:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self.close()
 
 
@@ -153,9 +147,9 @@ def event_text(event: Event, tick: int) -> str:
         text = json.dumps(content, allow_nan=False, ensure_ascii=False, default=_plain)
         text.encode()
     except UnicodeEncodeError:  # half a surrogate pair: file names from other systems hold them
-        return json.dumps(_finite(content), default=_plain)
+        return json.dumps(finite(content), default=_plain)
     except ValueError:
-        return json.dumps(_finite(content), ensure_ascii=False, default=_plain)
+        return json.dumps(finite(content), ensure_ascii=False, default=_plain)
     except TypeError as error:
         raise PluginError(
             f"the data of event {event.name!r} cannot be recorded: {error}"
@@ -166,11 +160,11 @@ def event_text(event: Event, tick: int) -> str:
 def _plain(value: object) -> object:
     """Return what json does not know as something it does."""
     if isinstance(value, np.generic):
-        return _finite(value.item())
+        return finite(value.item())
     if isinstance(value, np.ndarray):
-        return _finite(value.tolist())
+        return finite(value.tolist())
     if isinstance(value, Mapping):
-        return _finite(dict(value))
+        return finite(dict(value))
     if isinstance(value, Path):
         return str(value)
     raise TypeError(
@@ -178,14 +172,14 @@ def _plain(value: object) -> object:
     )
 
 
-def _finite(value: object) -> object:
+def finite(value: object) -> object:
     """Return ``value`` with None in place of every NaN and infinity."""
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {name: _finite(item) for name, item in value.items()}
+        return {name: finite(item) for name, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
+        return [finite(item) for item in value]
     return value
 
 

@@ -5,9 +5,7 @@ the old one, which is brought to the disk, read again, and only then takes the o
 """
 
 import json
-import os
 import re
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,8 +14,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from labcrane.durable_file import replacing
 from labcrane.errors import RecordingError
-from labcrane.recording.append_file import sync_folder
+from labcrane.exclusive import alone_in
 from labcrane.recording.foreign_streams import Conclude, RecordedStream, read_streams
 from labcrane.recording.hdf5_columns import node_names, write_attributes, write_text
 from labcrane.recording.journal_reader import JournalState, SessionLog, read_journal
@@ -101,23 +100,9 @@ def consolidate(
         its journals do. The participant file is as it was.
     """
     session = _read(path, journals)
-    with _locked(path.parent):
-        for left in path.parent.glob(f".{path.name}.*"):
-            left.unlink()  # by a consolidation that was killed
-        temporary = path.with_name(f".{path.name}.{os.getpid()}")
-        try:
-            _write(temporary, path, session, conclude)
-            _verify(temporary, path, session)
-            _sync(temporary)
-            temporary.replace(path)
-        except (OSError, RuntimeError, ValueError) as error:  # all of them h5py's
-            raise RecordingError(
-                f"cannot write {path}: {_reason(error)}; it is as it was, and so are the journals: "
-                f"remove the cause and run labcrane recover {path.parent}"
-            ) from error
-        finally:
-            temporary.unlink(missing_ok=True)
-        sync_folder(path.parent)
+    with renewed(path, f"labcrane recover {path.parent}") as beside:
+        _write(beside, path, session, conclude)
+        _verify(beside, path, session)
     return Consolidated(
         path,
         session.number,
@@ -126,6 +111,32 @@ def consolidate(
         {stream.header.name: len(stream.time_raw) for stream in session.streams},
         [note for journal in session.journals for note in journal.notes],
     )
+
+
+@contextmanager
+def renewed(path: Path, again: str) -> Iterator[Path]:
+    """Give a file beside a participant file to be written; it takes its place when it is whole.
+
+    Waits for whoever renews one in the same folder. May be killed at any moment.
+
+    Parameters
+    ----------
+    again
+        The command that makes up for it when it cannot be written.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be written; the participant file is as it was.
+    """
+    with alone_in(path.parent), replacing(path) as beside:
+        try:
+            yield beside
+        except (OSError, RuntimeError, ValueError) as error:  # all of them h5py's
+            raise RecordingError(
+                f"cannot write {path}: {_reason(error)}; it is as it was, and so are the journals: "
+                f"remove the cause and run {again}"
+            ) from error
 
 
 def _reason(error: Exception) -> str:
@@ -156,11 +167,11 @@ def _read(path: Path, journals: Sequence[Path]) -> _Session:
     return _Session(sessions.pop(), log, streams, states + more_states)
 
 
-def _write(temporary: Path, path: Path, session: _Session, conclude: Conclude | None) -> None:
+def _write(beside: Path, path: Path, session: _Session, conclude: Conclude | None) -> None:
     import h5py  # noqa: PLC0415 - loads for a second
 
     context = session.log.context
-    with h5py.File(temporary, "w-") as new:
+    with h5py.File(beside, "w") as new:
         if path.exists():
             with opened(path) as old:
                 _refuse_less(path, old, session)
@@ -203,7 +214,10 @@ def opened(path: Path) -> Iterator["h5py.File"]:
         raise RecordingError(f"cannot read {path}: {error}") from error
     with file:
         if file.attrs.get("format") != FORMAT:
-            raise RecordingError(f"{path} is an HDF5 file, but not a participant file of labcrane")
+            raise RecordingError(
+                f"{path} is an HDF5 file, but not a participant file of labcrane; give the .h5 "
+                "file in a participant's folder"
+            )
         if file.attrs["format_version"] != VERSION:
             raise RecordingError(
                 f"{path} has format version {file.attrs['format_version']!r}, this labcrane reads "
@@ -225,9 +239,9 @@ def _refuse_less(path: Path, old: "h5py.File", session: _Session) -> None:
         )
 
 
-def _verify(temporary: Path, path: Path, session: _Session) -> None:
+def _verify(beside: Path, path: Path, session: _Session) -> None:
     """Read the new file again, and compare it with the journals and with the old file."""
-    with opened(temporary) as new:
+    with opened(beside) as new:
         group = new[session.group]
         expected = {"time": session.log.time}
         expected["events/time"] = np.array([event.time for event in session.log.events])
@@ -237,13 +251,16 @@ def _verify(temporary: Path, path: Path, session: _Session) -> None:
         for name, values in expected.items():
             if not np.array_equal(group[name][:], values, equal_nan=True):
                 raise RecordingError(
-                    f"{session.group}/{name} of {temporary} is not what the journals hold; "
+                    f"{session.group}/{name} of {beside} is not what the journals hold; "
                     f"{path} is left as it is: check the disk"
                 )
         for column in session.log.columns:
             held = group[f"{column.group}/{column.label.replace('.', '/')}"]
             if held.shape != session.log.time.shape:
-                raise RecordingError(f"{held.name} of {temporary} has lost samples")
+                raise RecordingError(
+                    f"{held.name} of {beside} has lost samples; {path} is left as it is: check the "
+                    "disk"
+                )
         if path.exists():
             _compare(new, path, session.group)
 
@@ -266,24 +283,3 @@ def _inventory(group: "h5py.Group") -> list[tuple[str, object, str]]:
         )
     )
     return nodes
-
-
-def _sync(path: Path) -> None:
-    with path.open("rb") as file:
-        os.fsync(file.fileno())
-
-
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Let one process at a time consolidate in a folder; a killed one holds nothing."""
-    if sys.platform == "win32":
-        yield
-        return
-    import fcntl  # noqa: PLC0415 - Unix only
-
-    fd = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(fd, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(fd)

@@ -1,4 +1,4 @@
-"""Names of journals.
+"""Names of journals, and of the participant file made of them.
 
 A session's journals are ``ses-01_run.xdf`` (frames and events) and ``ses-01_streams.xdf`` (the
 streams of others). A process never appends to a file of another one: after a crash the next
@@ -20,6 +20,11 @@ def journal_path(folder: Path, session: int, kind: str) -> Path:
     return folder / f"ses-{session:02d}_{kind}.xdf"
 
 
+def participant_path(folder: Path) -> Path:
+    """Return the path of the participant file in a participant's folder, whose name it has."""
+    return folder / f"{folder.absolute().name}.h5"
+
+
 def part_path(path: Path, number: int) -> Path:
     """Return the path of a part, counted from 1, of the journal whose first part is ``path``."""
     return path if number == 1 else path.with_name(f"{path.stem}.part{number}.xdf")
@@ -29,7 +34,9 @@ def part_number(path: Path) -> int:
     """Return which part a journal is, counted from 1."""
     found = _NAME.fullmatch(path.name)
     if found is None:
-        raise RecordingError(f"{path} is not named like a journal, ses-01_run.part2.xdf")
+        raise RecordingError(
+            f"{path} is not named like a journal; give it a name such as ses-01_run.part2.xdf"
+        )
     return int(found["number"] or 1)
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from labcrane.errors import RecordingError
-from labcrane.recording.hdf5_columns import text_of, texts_of
+from labcrane.recording.hdf5_columns import holds_texts, text_of, texts_of
 from labcrane.recording.journal import GROUPS
 from labcrane.recording.participant_file import SYNC_REPORT, group_name, opened
 from labcrane.signals import FloatArray
@@ -242,4 +242,4 @@ def _columns(group: "h5py.Group") -> list[tuple[str, "h5py.Dataset"]]:
 
 
 def _values(dataset: "h5py.Dataset") -> Any:
-    return texts_of(dataset) if dataset.dtype.kind in "OS" else dataset[:]
+    return texts_of(dataset) if holds_texts(dataset) else dataset[:]

@@ -1,17 +1,16 @@
 """Corrects the clocks of a participant file's streams again, from nothing but the file."""
 
 import json
-import os
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane.recording.append_file import sync_folder
 from labcrane.recording.foreign_streams import Conclude, Note, RecordedStream
 from labcrane.recording.hdf5_columns import text_of, texts_of
-from labcrane.recording.participant_file import opened
+from labcrane.recording.participant_file import opened, renewed
+from labcrane.recording.recording import open_recording
 from labcrane.recording.stream_group import write_time
 from labcrane.recording.stream_header import StreamHeader
 
@@ -24,26 +23,28 @@ def recorrect(path: Path, conclude: Conclude) -> dict[int, list[str]]:
 
     The file is replaced by a new one in one step; raw stamps, probes and samples are copied as
     they are.
+
+    Raises
+    ------
+    RecordingError
+        The file cannot be read or written; it is as it was.
     """
     import h5py  # noqa: PLC0415 - loads for a second
 
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    open_recording(path)  # which says what to do when there is none
     done: dict[int, list[str]] = {}
-    try:
-        with opened(path) as old, h5py.File(temporary, "w-") as new:
-            for name in old:
-                old.copy(name, new)
-            for name, value in old.attrs.items():
-                new.attrs[name] = value
-            for name in new:
-                if match := re.fullmatch(r"ses-(\d+)", name):
-                    done[int(match[1])] = _session(new[name], conclude)
-        with temporary.open("rb") as file:
-            os.fsync(file.fileno())
-        temporary.replace(path)
-        sync_folder(path.parent)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with (
+        renewed(path, f"labcrane resync {path}") as beside,
+        opened(path) as old,
+        h5py.File(beside, "w") as new,
+    ):
+        for name in old:
+            old.copy(name, new)
+        for name, value in old.attrs.items():
+            new.attrs[name] = value
+        for name in new:
+            if match := re.fullmatch(r"ses-(\d+)", name):
+                done[int(match[1])] = _session(new[name], conclude)
     return done
 
 
@@ -54,6 +55,7 @@ def _session(group: "h5py.Group", conclude: Conclude) -> list[str]:
         stream = group["streams"][name]
         if "time" in stream:
             del stream["time"]
+        stream.attrs.pop("uncorrected", None)
         write_time(stream, read_stream(stream), conclusion.correct)
     return names
 

@@ -7,7 +7,7 @@ from labcrane.errors import RecordingError
 from labcrane.recording.foreign_streams import Conclude
 from labcrane.recording.hdf5_columns import texts_of
 from labcrane.recording.participant_file import Consolidated, consolidate, group_name, opened
-from labcrane.recording.parts import journal_path, parts, session_of
+from labcrane.recording.parts import journal_path, participant_path, parts, session_of
 from labcrane.whereabouts import read_whereabouts, whereabouts_path
 
 
@@ -56,23 +56,29 @@ def recover(folder: Path, conclude: Conclude | None = None) -> list[Recovery]:
 
 
 def _recover(folder: Path, session: int, conclude: Conclude | None) -> Recovery:
-    path = folder / f"{folder.resolve().name}.h5"
-    firsts = [journal_path(folder, session, kind) for kind in ("run", "streams")]
-    journals = [first for first in firsts if parts(first)]
-    where = str(read_whereabouts(whereabouts_path(firsts[0])) or "")
+    path, journals = participant_path(folder), _journals_of(folder, session)
+    where = str(read_whereabouts(whereabouts_path(journal_path(folder, session, "run"))) or "")
     try:
-        if _is_current(path, session, journals):
+        if is_recovered(folder, session):
             return Recovery(path, session, where=where)
         return Recovery(path, session, consolidate(path, journals, conclude), where=where)
     except RecordingError as error:
-        return Recovery(path, session, problem=str(error))
+        return Recovery(path, session, problem=str(error), where=where)
 
 
-def _is_current(path: Path, session: int, journals: list[Path]) -> bool:
-    """Return whether the session was made of exactly these journals."""
+def is_recovered(folder: Path, session: int) -> bool:
+    """Return whether the participant file holds a session made of exactly the journals there are.
+
+    Raises
+    ------
+    RecordingError
+        The participant file cannot be read.
+    """
+    path = participant_path(folder)
     if not path.exists():
         return False
-    on_disk = {part.name: part.stat().st_size for first in journals for part in parts(first)}
+    firsts = _journals_of(folder, session)
+    on_disk = {part.name: part.stat().st_size for first in firsts for part in parts(first)}
     with opened(path) as file:
         if group_name(session) not in file:
             return False
@@ -80,3 +86,9 @@ def _is_current(path: Path, session: int, journals: list[Path]) -> bool:
         return on_disk == dict(
             zip(texts_of(made_of["name"]), made_of["size"][:].astype(int), strict=True)
         )
+
+
+def _journals_of(folder: Path, session: int) -> list[Path]:
+    """Return the first parts of a session's journals that there are."""
+    firsts = (journal_path(folder, session, kind) for kind in ("run", "streams"))
+    return [first for first in firsts if parts(first)]

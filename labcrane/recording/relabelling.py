@@ -14,7 +14,13 @@ import numpy as np
 
 from labcrane.errors import RecordingError
 from labcrane.recording.checks import CHECK_NAME
-from labcrane.recording.hdf5_columns import text_of, texts_of, write_text, write_texts
+from labcrane.recording.hdf5_columns import (
+    holds_texts,
+    text_of,
+    texts_of,
+    write_text,
+    write_texts,
+)
 from labcrane.recording.journal import START
 from labcrane.recording.xdf import XdfWriter
 from labcrane.recording.xdf_reader import XdfFile, XdfStream, read_xdf
@@ -24,9 +30,6 @@ if TYPE_CHECKING:
 
 SAMPLES = 100_000
 """Numbers are written in chunks of so many samples."""
-
-TEXT_KINDS = "OS"
-"""Numpy's kinds of texts: of their own length in older files, of one length in newer ones."""
 
 FORMERLY = "formerly"
 """Under which name the old pseudonym stays in the record."""
@@ -146,7 +149,7 @@ def _copy_group(before: "h5py.Group", after: "h5py.Group", rename: Rename) -> No
         if isinstance(node, h5py.Group):
             _copy_group(node, after.create_group(name), rename)
             continue
-        if node.dtype.kind not in TEXT_KINDS:
+        if not holds_texts(node):
             before.copy(name, after)
         elif node.shape == ():
             write_text(after, name, rename(text_of(node)))

@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -143,9 +142,11 @@ class XdfWriter:
         The way of the loop: one call to the operating system, and little before it.
         """
         written = self._find(stream)
-        if values.dtype.char != "d" or values.shape != (len(written.header.channels),):
-            raise _misfit(written.header, values)
-        if written.header.format != "double64":
+        if (
+            values.dtype.char != "d"
+            or values.shape != (len(written.header.channels),)
+            or written.header.format != "double64"
+        ):
             raise _misfit(written.header, values)
         block = written.head + struct.pack("<d", stamp) + values.tobytes()
         with self._lock:
@@ -219,12 +220,7 @@ class XdfWriter:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         self.close()
 
     def _find(self, stream: int) -> _Written:

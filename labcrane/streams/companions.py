@@ -28,6 +28,10 @@ OPENED = "opened"
 """The first note of every part: counts of samples start anew with it."""
 
 RESET = "reset"
+"""A note of a source that was replaced."""
+
+COUNTER_GAP = "counter gap"
+"""A note of samples that the source's own counter left out; ``missing`` says how many."""
 
 
 class Companions:
@@ -70,7 +74,7 @@ class Companions:
         self._writer.write_texts(self._notes, [time], [[text]])
 
 
-def raw_of(recorded: RecordedStream, index: FloatArray | None = None) -> RawStream:
+def raw_of(recorded: RecordedStream) -> RawStream:
     """Return the times of a recorded stream, for correction.
 
     Parameters
@@ -78,8 +82,6 @@ def raw_of(recorded: RecordedStream, index: FloatArray | None = None) -> RawStre
     recorded
         As read from journals of labcrane or of another recorder, whose clock offsets count as
         probes with an unknown round trip.
-    index
-        The source's own sample counter, unwrapped, shape ``(n,)``, if it has one.
     """
     probes = recorded.probes
     if not len(probes) and len(recorded.offsets):
@@ -90,7 +92,6 @@ def raw_of(recorded: RecordedStream, index: FloatArray | None = None) -> RawStre
         probes=probes,
         arrivals=recorded.arrivals,
         resets=_resets(recorded),
-        index=index,
     )
 
 

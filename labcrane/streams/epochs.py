@@ -33,7 +33,7 @@ class Epoch:
     start, stop
         Range of its samples.
     probes
-        Shape ``(n, 4)``, in the order of ``PROBE_COLUMNS``; may be empty.
+        Shape ``(n, 4)``, in the order of :class:`~labcrane.streams.probes.Probe`; may be empty.
     unsure
         How many samples at its start may belong to the clock before.
     """
@@ -119,10 +119,7 @@ def _changes(
         near = [k for k in left if probes[k - 1, LOCAL] - 1.0 <= told <= probes[k, LOCAL]]
         probe = near[0] if near else int(np.searchsorted(probes[:, LOCAL], told))
         left -= set(near)
-        sample, unsure = int(low), 0
-        if high > low:
-            sample, unsure = _within(raw, int(low), int(high))
-        changes.append(_Change(probe, sample, unsure))
+        changes.append(_Change(probe, _within(raw, int(low), int(high))))
     for k in sorted(left):
         sample, unsure = _step(raw, probes[k - 1], probes[k], regular=regular)
         changes.append(_Change(k, sample, unsure))
@@ -131,13 +128,13 @@ def _changes(
     return [replace(change, probe=k) for k, change in zip(firsts, changes, strict=True)]
 
 
-def _within(raw: RawStream, low: int, high: int) -> tuple[int, int]:
+def _within(raw: RawStream, low: int, high: int) -> int:
     """Return the first sample of a new clock, known to lie in a range."""
     first, last = max(low, 1), min(high, len(raw.stamps) - 1)
-    if last < first:
-        return low, 0
+    if high <= low or last < first:
+        return low
     steps = np.abs(np.diff(raw.stamps[first - 1 : last + 1]))
-    return first + int(np.argmax(steps)), 0
+    return first + int(np.argmax(steps))
 
 
 def _step(

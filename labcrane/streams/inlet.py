@@ -13,7 +13,7 @@ from labcrane.errors import RecordingError
 from labcrane.recording.stream_header import StreamHeader
 from labcrane.recording.xdf import XdfWriter
 from labcrane.signals import FloatArray
-from labcrane.streams.companions import OPENED, RESET, Companions
+from labcrane.streams.companions import COUNTER_GAP, OPENED, RESET, Companions
 from labcrane.streams.probes import ClockProbe, Probe, was_reset
 from labcrane.streams.watchdog import Counter
 
@@ -161,7 +161,7 @@ class Inlet:
         while True:
             stopping = self._stop.wait(PULL_S)
             came = self._pull(inlet, companions, counter)
-            silent = self._mark_silence(silent, came=came)
+            silent = self._mark_silence(silent=silent, came=came)
             if stopping:
                 break
         prober.join()
@@ -227,9 +227,9 @@ class Inlet:
         if missing := counter.missing(data):
             self.flow.missing += missing
             first = self.flow.samples - len(data)
-            self.note("counter gap", missing=missing, samples=[first, first + len(data)])
+            self.note(COUNTER_GAP, missing=missing, samples=[first, first + len(data)])
 
-    def _mark_silence(self, silent: bool, *, came: bool) -> bool:  # noqa: FBT001
+    def _mark_silence(self, *, silent: bool, came: bool) -> bool:
         """Note where a regular stream falls silent, and where it goes on."""
         if self.header is None or self.header.rate_hz <= 0.0:
             return False

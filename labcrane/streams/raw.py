@@ -7,9 +7,6 @@ import numpy as np
 from labcrane.errors import RecordingError
 from labcrane.signals import FloatArray
 
-PROBE_COLUMNS = ("remote_time", "offset", "rtt", "local")
-ARRIVAL_COLUMNS = ("samples", "arrival")
-
 
 def _nothing(columns: int) -> FloatArray:
     return np.empty((0, columns))

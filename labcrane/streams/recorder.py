@@ -1,26 +1,12 @@
-"""The process that records the streams of others, and outlives the session.
+"""Records the streams of others: whatever was asked for, late or again after a restart."""
 
-It is started with its orders as JSON, and finds whatever it was asked for, late or again after a
-restart. Its own journal is closed some seconds after its pipe or the session it watches ends, so
-that nothing of the end is lost; a recorder that was killed is started again and writes the next
-part.
-
-    python -m labcrane.streams.recorder '{"journal": "ses-01_streams.xdf", "streams": [...]}'
-
-Without the JSON it waits for it as the first line of its standard input.
-
-It reads ``stop`` on its standard input, and writes a line of JSON on its standard output every
-second: how each stream is, and whether all that is required flows.
-"""
-
-import json
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from labcrane.errors import RecordingError, StreamError
+from labcrane.errors import RecordingError
 from labcrane.recording.parts import next_part
 from labcrane.recording.xdf import XdfWriter
 from labcrane.streams.inlet import Inlet
@@ -32,43 +18,6 @@ if TYPE_CHECKING:
 
 FORGET_S = 3.0
 """A stream that has gone is listed for so long; only then is another one of its id a duplicate."""
-
-
-@dataclass(frozen=True, slots=True)
-class Orders:
-    """What a recorder is to do.
-
-    Attributes
-    ----------
-    journal
-        The first part; a later recorder writes the next one.
-    streams
-        What to record.
-    session_pid
-        The session process, which it outlives by the grace; None watches the pipe alone.
-    grace_s
-        How long it goes on when the session has died.
-    local
-        Whether LSL is kept on this computer, unless ``LSLAPICFG`` says something.
-    """
-
-    journal: Path
-    streams: tuple[StreamRequest, ...]
-    session_pid: int | None = None
-    grace_s: float = 3.0
-    local: bool = False
-
-    @classmethod
-    def of(cls, fields: Mapping[str, Any]) -> "Orders":
-        """Return the orders that JSON holds."""
-        known = cls.__dataclass_fields__
-        if unknown := sorted(set(fields) - set(known)):
-            raise StreamError(
-                f"a recorder cannot be told {', '.join(unknown)}; it can be told {', '.join(known)}"
-            )
-        streams = tuple(StreamRequest.of(one) for one in fields.get("streams", ()))
-        rest = {key: value for key, value in fields.items() if key not in ("journal", "streams")}
-        return cls(Path(fields["journal"]), streams, **rest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,24 +178,3 @@ def _absent(request: StreamRequest) -> Health:
         resets=0,
         warnings=[f"{request} is not on the network: start it, and check that LSL is enabled"],
     )
-
-
-def main(arguments: Sequence[str]) -> int:
-    """Record until told to stop; the process's exit status.
-
-    Without arguments the process loads what it needs, looks around for streams, and waits for its
-    orders, a line of JSON on the standard input: a spare recorder takes over at once.
-    """
-    from labcrane.streams.recorder_process import await_orders, run  # noqa: PLC0415 - a cycle
-
-    if arguments:
-        return run(Orders.of(json.loads(arguments[0])))
-    resolver = a_resolver()
-    orders = await_orders()
-    return run(Orders.of(json.loads(orders)), resolver) if orders else 0
-
-
-if __name__ == "__main__":
-    import sys
-
-    sys.exit(main(sys.argv[1:]))

@@ -1,4 +1,16 @@
-"""The recorder as a process: whom it listens to, and when it ends."""
+"""The process that records the streams of others, and outlives the session.
+
+It is started with its orders as JSON, and finds whatever it was asked for, late or again after a
+restart. Its own journal is closed some seconds after its pipe ends, so that nothing of the end is
+lost; a recorder that was killed is started again and writes the next part.
+
+    python -m labcrane.streams.recorder_process '{"journal": "ses-01_streams.xdf", "streams": []}'
+
+Without the JSON it waits for it as the first line of its standard input.
+
+It reads ``stop`` on its standard input, and writes a line of JSON on its standard output every
+second: how each stream is, and whether all that is required flows.
+"""
 
 import contextlib
 import json
@@ -7,12 +19,15 @@ import select
 import signal
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from labcrane.streams.network import use_loopback
+from labcrane.errors import StreamError
 from labcrane.streams.outlets import check_clock
-from labcrane.streams.recorder import Orders, Recorder
+from labcrane.streams.recorder import Recorder, a_resolver
+from labcrane.streams.request import StreamRequest
 
 if TYPE_CHECKING:
     import pylsl
@@ -22,13 +37,55 @@ STATUS_S = 1.0
 STATUS_FD = 1
 
 
+@dataclass(frozen=True, slots=True)
+class Orders:
+    """What a recorder is to do.
+
+    Attributes
+    ----------
+    journal
+        The first part; a later recorder writes the next one.
+    streams
+        What to record.
+    grace_s
+        How long it goes on when whoever started it has died.
+    """
+
+    journal: Path
+    streams: tuple[StreamRequest, ...]
+    grace_s: float = 3.0
+
+    @classmethod
+    def of(cls, fields: Mapping[str, Any]) -> "Orders":
+        """Return the orders that JSON holds."""
+        known = cls.__dataclass_fields__
+        if unknown := sorted(set(fields) - set(known)):
+            raise StreamError(
+                f"a recorder cannot be told {', '.join(unknown)}; it can be told {', '.join(known)}"
+            )
+        streams = tuple(StreamRequest.of(one) for one in fields.get("streams", ()))
+        rest = {key: value for key, value in fields.items() if key not in ("journal", "streams")}
+        return cls(Path(fields["journal"]), streams, **rest)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Record until told to stop; the process's exit status.
+
+    Without arguments the process loads what it needs, looks around for streams, and waits for its
+    orders, a line of JSON on the standard input: a spare recorder takes over at once.
+    """
+    if arguments:
+        return run(Orders.of(json.loads(arguments[0])))
+    resolver = a_resolver()
+    orders = await_orders()
+    return run(Orders.of(json.loads(orders)), resolver) if orders else 0
+
+
 def run(orders: Orders, resolver: "pylsl.ContinuousResolver | None" = None) -> int:
     """Record until told to stop, or until whoever started it has died.
 
     ``resolver`` is one that has looked around already.
     """
-    if orders.local:
-        use_loopback()
     check_clock()
     recorder = Recorder(orders.journal, orders.streams, resolver)
     teller = _Teller()
@@ -58,19 +115,14 @@ def await_orders() -> str:
 
 def _watch(orders: Orders) -> Iterator[bool]:
     """Yield several times a second until it is time to end; True when a status is due."""
-    stopped = _signals()
-    session = _open_session(orders.session_pid)
-    inputs = {0} if session is None else {0, session}
+    stopped, inputs = _signals(), {0}
     ends = float("inf")
     due = 0.0
     while time.monotonic() < ends:
         ready, _, _ = select.select([*inputs, stopped], [], [], LOOK_S)
         if stopped in ready or (0 in ready and _told_to_stop(inputs)):
             return
-        if session in ready:
-            inputs.discard(session)
-        # The pipe's end, or the session's: what its streams still send is recorded.
-        if ends == float("inf") and (0 not in inputs or (session and session not in inputs)):
+        if ends == float("inf") and not inputs:  # what the session's streams still send is recorded
             ends = time.monotonic() + orders.grace_s
         status = time.monotonic() >= due
         if status:
@@ -84,18 +136,6 @@ def _told_to_stop(inputs: set[int]) -> bool:
     if not text:
         inputs.discard(0)
     return b"stop" in text
-
-
-def _open_session(pid: int | None) -> int | None:
-    """Return a descriptor that becomes readable when the session process ends."""
-    if pid is None:
-        return None
-    try:
-        return os.pidfd_open(pid)
-    except ProcessLookupError:
-        ended, other = os.pipe()
-        os.close(other)
-        return ended
 
 
 def _signals() -> int:
@@ -134,4 +174,4 @@ class _Teller:
 
 
 if __name__ == "__main__":
-    sys.exit(run(Orders.of(json.loads(sys.argv[1]))))
+    sys.exit(main(sys.argv[1:]))

@@ -72,7 +72,7 @@ class StreamRequest:
         if self.type is None:
             return True
         by_type_only = self.name is None and self.source_id is None
-        return _same_type(self.type, info.type()) and not (
+        return same_type(self.type, info.type()) and not (
             by_type_only and info.name().startswith(OURS)
         )
 
@@ -90,7 +90,8 @@ class StreamRequest:
         return f"{self.label} ({', '.join(f'{k} {v!r}' for k, v in wanted.items() if v)})"
 
 
-def _same_type(wanted: str, actual: str) -> bool:
+def same_type(wanted: str, actual: str) -> bool:
+    """Whether a stream's type is the one that is wanted, under whichever of its names."""
     if wanted.lower() in MARKER_TYPES:
         return actual.lower() in MARKER_TYPES
     return wanted == actual

@@ -24,9 +24,9 @@ def treatment_of(header: StreamHeader) -> Treatment:
     )
 
 
-def resync(recorded: RecordedStream, treatment: Treatment | None = None) -> Corrected:
-    """Correct a recorded stream, by its header unless told otherwise."""
-    return correct(raw_of(recorded), treatment or treatment_of(recorded.header))
+def resync(recorded: RecordedStream) -> Corrected:
+    """Correct a recorded stream by its header."""
+    return correct(raw_of(recorded), treatment_of(recorded.header))
 
 
 def correction_of(corrected: Corrected, treatment: Treatment) -> Correction:

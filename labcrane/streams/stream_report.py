@@ -1,13 +1,14 @@
 """How right one stream's time stamps are, and what to do where they are not."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from labcrane.finding import Finding, Verdict, worst
 from labcrane.recording.foreign_streams import RecordedStream
+from labcrane.streams.companions import COUNTER_GAP, RESET
 from labcrane.streams.quality import Quality
 from labcrane.streams.verdict import Limits
 
@@ -29,7 +30,8 @@ class StreamReport:
 def judge_stream(
     recorded: RecordedStream, quality: Quality, limits: Limits, *, required: bool = True
 ) -> StreamReport:
-    """Judge a corrected stream."""
+    """Judge a corrected stream, with what the recorder noted beside it."""
+    quality = replace(quality, dropped=max(quality.dropped, _missing(recorded)))
     samples = len(recorded.time_raw)
     header = recorded.header
     if samples == 0:
@@ -49,6 +51,12 @@ def judge_stream(
         quality,
         tuple(findings),
     )
+
+
+def _missing(recorded: RecordedStream) -> int:
+    """Return how many samples the source's own counter left out while it was recorded."""
+    gaps = [note.data for note in recorded.notes if note.data.get("event") == COUNTER_GAP]
+    return sum(int(gap["missing"]) for gap in gaps)
 
 
 def _empty(*, required: bool) -> Finding:
@@ -150,7 +158,7 @@ def _certainty(quality: Quality) -> list[Finding]:
 def _noted(recorded: RecordedStream) -> list[Finding]:
     """Return what the recorder noticed."""
     found: list[Finding] = []
-    resets = sum(note.data.get("event") == "reset" for note in recorded.notes)
+    resets = sum(note.data.get("event") == RESET for note in recorded.notes)
     if resets:
         _add(
             found,

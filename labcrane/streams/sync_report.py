@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from labcrane.finding import Finding, Verdict, worst
+from labcrane.recording.journal import finite
 from labcrane.signals import FloatArray
 from labcrane.streams.stream_report import StreamReport
 from labcrane.streams.verdict import Limits
@@ -58,7 +59,8 @@ class SyncReport:
 
     def as_json(self) -> dict[str, Any]:
         """Return what JSON can hold; what is not known is null."""
-        return {"verdict": self.verdict.value, **_plain(asdict(self))}
+        plain = {name: finite(each) for name, each in asdict(self).items()}
+        return {"verdict": self.verdict.value, **plain}
 
     def table(self) -> list[tuple[str, ...]]:
         """Return a row of text per stream, in the order of ``COLUMNS``."""
@@ -126,13 +128,3 @@ def _row(one: StreamReport) -> tuple[str, ...]:
 
 def _number(value: float, form: str) -> str:
     return format(value, form) if np.isfinite(value) else "-"
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if np.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {key: _plain(one) for key, one in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(one) for one in value]
-    return value

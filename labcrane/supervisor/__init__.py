@@ -5,6 +5,8 @@ From the bottom up::
     rights      who may see and ask what: one-time tokens, cookies, refusals
     board       what is known of the session, from its events
     live        machine and scenario signals, from LSL
+    words       what pages say, in the participant's language
+    desk        the session as pages see it, and how they ask
     form        a questionnaire on a page
     consent     the consent text on a page, before the session
     surroundings

@@ -46,7 +46,6 @@ class PageKeeper:
         streams: Callable[[], dict[str, Any]],
     ) -> None:
         self.restarts = 0
-        self.pid: int | None = None
         self._order = order
         self._give = give
         self._say = say
@@ -87,7 +86,6 @@ class PageKeeper:
             process = context.Process(target=serve, args=(self._order, theirs), name="pages")
             process.start()
             theirs.close()
-            self.pid = process.pid
             sender = threading.Thread(target=self._send, args=(ours,), daemon=True)
             with self._lock:
                 self._news.put(None)  # for the sender of a process that died

@@ -9,6 +9,7 @@ import numpy as np
 
 from labcrane.analysis.cohort import Participant, Status
 from labcrane.kinematics import Arm
+from labcrane.machine import Machine
 from labcrane.machine_file import load_machine
 from labcrane.recording.journal import Column, SessionJournal
 from labcrane.recording.participant_file import consolidate
@@ -37,9 +38,24 @@ def a_participant(folder: Path, name: str = "P001") -> Participant:
 
 def _write(path: Path, name: str) -> None:
     machine = load_machine("ch8")
-    machine_text = (files("labcrane") / "machines" / "ch8.yaml").read_text(encoding="utf-8")
+    with SessionJournal(path, _columns(machine), RATE_HZ) as journal:
+        journal.write_event(Event("session.start", 0.0, _context(name)), 0)
+        tick, dt = 0, 1.0 / RATE_HZ
+        for trial in range(1, TRIALS + 1):
+            began = tick * dt
+            journal.write_event(Event("trial.start", began, {"trial": trial, "attempt": 1}), tick)
+            for number, row in enumerate(_movement(machine, outward=bool(trial % 2))):
+                stamp = tick * dt
+                head = (tick, stamp, stamp, 0.0, trial, number * dt, 1.0, 0.0)
+                journal.write_frame(stamp, np.array([*head, *row], np.float64))
+                tick += 1
+            journal.write_event(Event("trial.end", (tick - 1) * dt, _row(trial, began)), tick - 1)
+        journal.write_event(Event("session.end", tick * dt, {"reason": "complete"}), tick - 1)
+
+
+def _columns(machine: Machine) -> tuple[Column, ...]:
     joints = machine.names
-    columns = (
+    return (
         *(Column("loop", label, "1") for label in ("tick", "due", "woke", "wrote")),
         *(Column("loop", label, "1") for label in ("trial", "elapsed", "phase", "paused")),
         *(Column("input", label, "1") for label in ("left.x", "left.y", "right.x", "right.y")),
@@ -49,7 +65,10 @@ def _write(path: Path, name: str) -> None:
         *(Column("state", f"tip.velocity.{axis}", "m/s") for axis in POINT),
         Column("task", "target.radius", "m"),
     )
-    context: dict[str, Any] = {
+
+
+def _context(name: str) -> dict[str, Any]:
+    return {
         "study": "contract",
         "title": "A made-up study",
         "participant": name,
@@ -60,39 +79,27 @@ def _write(path: Path, name: str) -> None:
         "pilot": False,
         "rate_hz": RATE_HZ,
         "protocol": "sessions: [{name: only}]",
-        "machine": machine_text,
+        "machine": (files("labcrane") / "machines" / "ch8.yaml").read_text(encoding="utf-8"),
         "versions": {"labcrane": "0"},
         "trial_units": {"movement_time": "s", "distance": "m", "error": "m"},
     }
-    arm = Arm(machine)
-    with SessionJournal(path, columns, RATE_HZ) as journal:
-        journal.write_event(Event("session.start", 0.0, context), 0)
-        tick, dt = 0, 1.0 / RATE_HZ
-        before = np.array(arm.tip(machine.rest))
-        for trial in range(1, TRIALS + 1):
-            began = tick * dt
-            journal.write_event(Event("trial.start", began, {"trial": trial, "attempt": 1}), tick)
-            for step in range(round(MOVEMENT_S * RATE_HZ)):
-                s = (step + 1) * dt / MOVEMENT_S
-                way = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-                slew = 0.5 * (way if trial % 2 else 1.0 - way)
-                angles = (slew, *machine.rest[1:])
-                tip = np.array(arm.tip(angles))
-                push = 30.0 * s**2 * (1.0 - s) ** 2 / 2.0
-                row = [
-                    *(tick, tick * dt, tick * dt, 0.0, trial, step * dt, 1.0, 0.0),
-                    *(push, 0.0, push / 2.0, 0.0),
-                    *(push * 0.1, *(0.0 for _ in joints[1:])),
-                    *angles,
-                    *tip,
-                    *((tip - before) * RATE_HZ),
-                    0.25,
-                ]
-                journal.write_frame(tick * dt, np.array(row, np.float64))
-                before = tip
-                tick += 1
-            journal.write_event(Event("trial.end", (tick - 1) * dt, _row(trial, began)), tick - 1)
-        journal.write_event(Event("session.end", tick * dt, {"reason": "complete"}), tick - 1)
+
+
+def _movement(machine: Machine, *, outward: bool) -> Iterator[list[float]]:
+    """Yield input, command, state and task of every tick of a movement."""
+    arm, ticks = Arm(machine), round(MOVEMENT_S * RATE_HZ)
+    before: np.ndarray | None = None
+    for tick in range(-1, ticks):
+        s = (tick + 1) / ticks
+        way = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+        angles = (0.5 * (way if outward else 1.0 - way), *machine.rest[1:])
+        tip = np.array(arm.tip(angles))
+        if before is not None:
+            push = 30.0 * s**2 * (1.0 - s) ** 2 / 2.0
+            command = (push * 0.1, *(0.0 for _ in angles[1:]))
+            velocity = (tip - before) * RATE_HZ
+            yield [push, 0.0, push / 2.0, 0.0, *command, *angles, *tip, *velocity, 0.25]
+        before = tip
 
 
 def _row(trial: int, began: float) -> dict[str, float | int | str | bool | None]:

@@ -46,19 +46,8 @@ class World:
         angles: Sequence[float],
         placed: Sequence[Placed],
     ) -> None:
-        self._client: int | None = pybullet.connect(pybullet.DIRECT)
-        if self._client is None or self._client < 0:
-            raise PluginError("PyBullet could not start another engine; end other users of it")
-        client = self._client
-        pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=dt,
-            numSubSteps=0,
-            numSolverIterations=ITERATIONS,
-            solverResidualThreshold=0.0,
-            deterministicOverlappingPairs=1,
-            physicsClientId=client,
-        )
-        pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
+        client = _engine(dt)
+        self._client: int | None = client
         self.arm = _load(machine, settings, client)
         self._jaws = settings.jaws is not None
         joints = len(machine.joints) + (1 if self._jaws else 0)
@@ -152,6 +141,23 @@ class World:
 
 
 DEGREE = 0.017453292519943295
+
+
+def _engine(dt: float) -> int:
+    """Start an engine that steps by ``dt`` in s; return its number."""
+    client: int | None = pybullet.connect(pybullet.DIRECT)
+    if client is None or client < 0:
+        raise PluginError("PyBullet could not start another engine; end other users of it")
+    pybullet.setPhysicsEngineParameter(
+        fixedTimeStep=dt,
+        numSubSteps=0,
+        numSolverIterations=ITERATIONS,
+        solverResidualThreshold=0.0,
+        deterministicOverlappingPairs=1,
+        physicsClientId=client,
+    )
+    pybullet.setGravity(0.0, 0.0, -GRAVITY, physicsClientId=client)
+    return client
 
 
 def _load(machine: Machine, settings: ArmSettings, client: int) -> int:

@@ -2,8 +2,11 @@
 
 import ast
 import json
+import re
 import subprocess
 import sys
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,6 +15,12 @@ ROOT = Path(__file__).parents[2]
 PLUGINS = sorted(path for path in (ROOT / "plugins").iterdir() if (path / "__init__.py").exists())
 HEAVY = {"pybullet", "pygame", "pyo", "panda3d", "pandas", "h5py", "nicegui", "pylsl", "matplotlib"}
 AIMING = str(ROOT / "protocols" / "aiming" / "protocol.yaml")
+
+
+def read_start(package: Path) -> str:
+    """Return what stands in a package's first file; nothing for what is no package."""
+    start = package / "__init__.py"
+    return start.read_text() if start.exists() else ""
 
 
 def imported_modules(source: str) -> set[str]:
@@ -56,6 +65,86 @@ def test_looking_loads_nothing_heavy(arguments: list[str]) -> None:
     status, loaded = json.loads(done.stdout.splitlines()[-1])
     assert status == 0, done.stdout + done.stderr
     assert not HEAVY & set(loaded)
+
+
+LISTING = re.compile(r"^ {4}([a-z_0-9]+(?:, [a-z_0-9]+)*)(?: {2,}\S|$)", re.M)
+"""Names of modules in a package's docstring, and what they are."""
+
+
+@pytest.mark.parametrize(
+    "package",
+    [path for path in (ROOT / "labcrane").iterdir() if "up::" in read_start(path)],
+    ids=lambda path: path.name,
+)
+def test_a_package_lists_its_modules_and_no_others(package: Path) -> None:
+    told = ast.get_docstring(ast.parse(read_start(package))) or ""
+    listed = [name for names in LISTING.findall(told) for name in names.split(", ")]
+    assert len(listed) == len(set(listed))
+    assert set(listed) == {path.stem for path in package.glob("*.py")} - {"__init__"}
+
+
+ASKED_FOR_BY_OTHERS = {"get_code"}  # by Python's import
+
+
+def defined(module: Path) -> Iterator[str]:
+    """Yield what a module defines, but for what a decorator hands to somebody else."""
+    for node in ast.walk(ast.parse(module.read_text())):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            given = [ast.unparse(decorator) for decorator in node.decorator_list]
+            if all("property" in name or "contextmanager" in name for name in given):
+                yield node.name
+        elif isinstance(node, ast.ClassDef):
+            yield node.name
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            yield from (target.id for target in targets if isinstance(target, ast.Name))
+            yield from (
+                target.attr
+                for target in targets
+                if isinstance(target, ast.Attribute) and ast.unparse(target.value) == "self"
+            )
+
+
+def test_nothing_is_defined_that_only_tests_use() -> None:
+    places = (("labcrane", "*.py*"), ("plugins", "*.py"), ("docs", "*.md"), ("benchmarks", "*.py"))
+    users = [path for folder, what in places for path in (ROOT / folder).rglob(what)]
+    texts = [path.read_text() for path in users if path.suffix in {".py", ".pyi", ".md"}]
+    used = Counter(word for text in texts for word in re.findall(r"\w+", text))
+    idle = {
+        f"{module.relative_to(ROOT)}: {name}"
+        for folder in ("labcrane", "plugins")
+        for module in (ROOT / folder).rglob("*.py")
+        if "templates" not in module.parts
+        for name in defined(module)
+        if used[name] == 1 and not name.startswith(("__", "test_", "labcrane_"))
+    }
+    assert {entry.partition(": ")[2] for entry in idle} <= ASKED_FOR_BY_OTHERS, idle
+
+
+SCREEN = 40
+"""Lines that a reader has before their eyes at once; the docstring is read before."""
+
+
+def long_functions(module: Path) -> dict[str, int]:
+    """Return the functions that do not fit a screen, and their lines without the docstring."""
+    found = {}
+    for node in ast.walk(ast.parse(module.read_text())):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            first = node.body[0]
+            told = ast.get_docstring(node) is not None
+            docstring = 1 + first.end_lineno - first.lineno if told else 0
+            lines = 1 + node.end_lineno - node.lineno - docstring
+            if lines > SCREEN:
+                found[f"{module.relative_to(ROOT)}:{node.lineno} {node.name}"] = lines
+    return found
+
+
+def test_functions_fit_a_screen() -> None:
+    modules = [
+        module for folder in ("labcrane", "plugins") for module in (ROOT / folder).rglob("*.py")
+    ]
+    found = {name: lines for module in modules for name, lines in long_functions(module).items()}
+    assert not found, f"more than {SCREEN} lines: {found}"
 
 
 def test_files_stay_short() -> None:

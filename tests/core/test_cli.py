@@ -110,7 +110,7 @@ def test_lines_of_a_pipe_are_orders(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     (tmp_path / "again.yaml").write_text(SHORT.replace("{use: dual_joystick}", recorded))
     done = labcrane_command(
         "run", "again.yaml", "--participant", "P002", "--local", "--pilot",
-        cwd=tmp_path, said="note hello there\nnonsense\nend\n",
+        cwd=tmp_path, said="note hello there\nnonsense\nend",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "'nonsense' is not an order; there is start, pause" in done.stdout

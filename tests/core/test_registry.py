@@ -1,5 +1,6 @@
 """Discovery, and what users are told when it fails."""
 
+import sys
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import pytest
 
 import labcrane
 from labcrane import Dynamics, PluginError, Task
+from labcrane.plugin_commands import plugin_commands
 from labcrane.registry import ROLES, discover
 
 ROOT = Path(__file__).parents[2]
@@ -143,3 +145,22 @@ def test_the_line_of_a_plugin_is_told_though_a_library_raised(
     (why,) = discover([point("lamp", "in_two_files")]).broken.values()
     assert why.startswith("JSONDecodeError: ")
     assert why.endswith(f"({package / 'lamp.py'}:3)")
+
+
+@pytest.mark.parametrize(
+    ("offers", "complaint"),
+    [
+        ("raise ValueError('no lift today')", r"ValueError: no lift today \(.*lifting.py:\d+\)"),
+        ("return 'lift'", r"labcrane_commands must return a list of labcrane.CommandOffer\(...\)"),
+    ],
+)
+def test_commands_that_cannot_be_offered_are_told_of_with_their_plugin(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, offers: str, complaint: str
+) -> None:
+    (tmp_path / "lifting.py").write_text(
+        f"import labcrane\n@labcrane.hookimpl\ndef labcrane_commands():\n    {offers}\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "lifting", raising=False)
+    with pytest.raises(PluginError, match=f"^plugin 'lift' is broken: {complaint}"):
+        plugin_commands([point("lift", "lifting")])

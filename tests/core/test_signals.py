@@ -1,8 +1,11 @@
 """Named quantities, and where they sit in an array."""
 
+from types import SimpleNamespace
+
 import pytest
 
 from labcrane import Layout, ProtocolError, Signal, signals_of
+from labcrane.rig import Rig, describe
 
 SIGNALS = (
     Signal("left", "1", ("x", "trigger")),
@@ -33,3 +36,13 @@ def test_what_is_not_there_is_told_with_what_is() -> None:
         layout.find("tip")
     with pytest.raises(ProtocolError, match=r"has no 'left\.y'; it has left\.x, left\.tri"):
         layout.index("left.y")
+
+
+def test_tasks_that_show_other_signals_are_named_with_what_they_show() -> None:
+    device = SimpleNamespace(signals=SIGNALS)
+    tasks = {"aim": SimpleNamespace(signals=SIGNALS[:2]), "rest": SimpleNamespace(signals=())}
+    study = SimpleNamespace(protocol=SimpleNamespace(rate_hz=240.0), machine=None)
+    with pytest.raises(
+        ProtocolError, match=r"'aim' shows left, joint.angle; 'rest' shows nothing; put them into"
+    ):
+        describe(Rig(device, device, device, tasks), study, participant_seed=1)

@@ -1,5 +1,6 @@
 """Keys of a real terminal give orders."""
 
+import io
 import os
 import pty
 import subprocess
@@ -10,8 +11,11 @@ from pathlib import Path
 
 import pytest
 from rehearsal import SHORT
+from rich.console import Console
 
-from labcrane import open_recording
+from labcrane import Event, open_recording
+from labcrane.cli.terminal import Terminal
+from labcrane.console import QueueConsole
 
 
 class TerminalUser:
@@ -125,3 +129,11 @@ def test_a_questionnaire_is_filled_in_at_the_terminal(tmp_path: Path) -> None:
     scores = table[table["kind"] == "score"].set_index("questionnaire")["value"]
     assert scores["subjective_accuracy"] == 0.7
     assert scores.isna()["situational_awareness"]
+
+
+def test_a_refused_order_is_called_as_it_is_given() -> None:
+    console, printed = QueueConsole(), io.StringIO()
+    refused = {"refused": "no trial is running", "text": "", "by": "terminal"}
+    with Terminal(console, Console(file=printed), total=1, keys=False):
+        console.report(Event("order.repeat", 1.0, refused))
+    assert "repeat: no trial is running" in map(str.strip, printed.getvalue().splitlines())

@@ -1,4 +1,8 @@
+import errno
+import fcntl
 import json
+import os
+import threading
 from pathlib import Path
 
 import h5py
@@ -16,6 +20,7 @@ from labcrane.recording.foreign_streams import (
 )
 from labcrane.recording.participant_file import consolidate
 from labcrane.recording.recording import open_recording
+from labcrane.recording.recorrect import recorrect
 from labcrane.recording.recover import recover
 from labcrane.recording.stream_header import Channel, StreamHeader
 from labcrane.recording.xdf import XdfWriter
@@ -132,3 +137,58 @@ def test_pyxdf_reads_the_streams_beside(folder: Path) -> None:
     assert named["EEG / 1|probes"]["info"]["desc"][0]["of"] == ["1"]
     assert named["EEG / 1|probes"]["time_series"].tolist() == [[1.0, 8.0, 1e-4, 9.0]]
     np.testing.assert_allclose(named["EEG / 1"]["time_stamps"], np.arange(1000) / 500 + 8.0)
+
+
+def as_they_are(stream: RecordedStream) -> Correction:
+    return Correction(stream.time_raw)
+
+
+def test_clocks_that_are_corrected_later_are_no_longer_uncorrected(folder: Path) -> None:
+    def correct(stream: RecordedStream) -> Correction:
+        raise RecordingError("no probes")
+
+    recover(folder, lambda context: Conclusion(correct))
+    path = folder / "P001.h5"
+    assert recorrect(path, lambda context: Conclusion(as_they_are)) == {
+        1: ["EEG _ 1", "Gaze", "Keys"]
+    }
+    eeg = open_recording(path).session(1).streams["EEG _ 1"]
+    assert eeg.attrs["corrected"] is True
+    assert "uncorrected" not in eeg.attrs
+
+
+def test_a_disk_that_refuses_new_corrections_leaves_the_file_as_it_was(folder: Path) -> None:
+    recover(folder)
+    path = folder / "P001.h5"
+    before, beside = path.read_bytes(), sorted(folder.iterdir())
+
+    def full(context: object) -> Conclusion:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with pytest.raises(RecordingError, match=r"No space left .* and run labcrane resync .*P001.h5"):
+        recorrect(path, full)
+    assert path.read_bytes() == before
+    assert sorted(folder.iterdir()) == beside
+
+
+def test_correcting_again_waits_for_whoever_writes_the_participant_file(folder: Path) -> None:
+    recover(folder)
+    path, entered = folder / "P001.h5", threading.Event()
+
+    def conclude(context: object) -> Conclusion:
+        entered.set()
+        return Conclusion(as_they_are)
+
+    held = os.open(folder, os.O_RDONLY)
+    fcntl.flock(held, fcntl.LOCK_EX)
+    again = threading.Thread(target=recorrect, args=(path, conclude))
+    again.start()
+    assert not entered.wait(0.5)
+    os.close(held)
+    again.join(60)
+    assert entered.is_set()
+
+
+def test_correcting_a_file_that_is_not_there_says_what_makes_one(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=r"no participant file .*; labcrane recover"):
+        recorrect(tmp_path / "nobody" / "P009.h5", lambda context: Conclusion(as_they_are))

@@ -235,6 +235,16 @@ def test_recover_finds_what_is_missing_and_leaves_the_rest_alone(tmp_path: Path)
     assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.h5")} == files
 
 
+def test_a_participants_folder_may_be_a_link_to_another_disk(tmp_path: Path) -> None:
+    (tmp_path / "disk-7").mkdir()
+    folder = tmp_path / "P001"
+    folder.symlink_to(tmp_path / "disk-7")
+    write(folder / "ses-01_run.xdf", 10)
+    (done,) = recover(folder)
+    assert done.path == folder / "P001.h5"
+    assert open_recording(done.path).participant == "P001"
+
+
 def test_recover_takes_in_a_part_that_came_later(path: Path) -> None:
     write(path.parent / "ses-01_run.part2.xdf", 5, first=COUNT)
     (again,) = recover(path.parent)

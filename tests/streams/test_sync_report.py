@@ -71,6 +71,15 @@ def test_each_shortcoming_is_named_with_what_to_do(change, verdict, text):
     assert len(finding.advice) > 10
 
 
+def test_samples_that_a_sources_counter_left_out_are_judged():
+    gaps = [(101.0, 2), (103.0, 400)]
+    notes = [Note(t, {"event": "counter gap", "missing": n, "samples": [0, 9]}) for t, n in gaps]
+    report = judged(recorded(clock=SourceClock(ppm=40.0), notes=notes))
+    (finding,) = report.findings
+    assert (finding.verdict, report.quality.dropped) == (Verdict.FAIL, 402)
+    assert finding.text == "402 samples are missing by the source's counter"
+
+
 def test_what_is_not_known_fails():
     assert Limit(1.0, 2.0).judge(math.nan) is Verdict.FAIL
     assert Limit(1.0, 2.0).judge(1.0) is Verdict.PASS

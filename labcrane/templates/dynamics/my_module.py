@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from pydantic import PositiveFloat
 
 from labcrane import (
     Arm,
@@ -25,7 +26,7 @@ labcrane_api = 1
 class MyPartSettings(Settings):
     """Settings of my_part; a protocol writes them beside ``use``."""
 
-    lag_s: float = 0.1
+    lag_s: PositiveFloat = 0.1
     """Time in which a joint reaches 63 % of the speed asked for, in seconds."""
 
 

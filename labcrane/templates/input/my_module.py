@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from pydantic import PositiveFloat
 
 from labcrane import (
     FloatArray,
@@ -24,7 +25,7 @@ labcrane_api = 1
 class MyPartSettings(Settings):
     """Settings of my_part; a protocol writes them beside ``use``."""
 
-    period_s: float = 4.0
+    period_s: PositiveFloat = 4.0
     """How long the wave takes that stands in for a hand, in seconds."""
 
 
@@ -37,11 +38,13 @@ class MyPart(InputDevice):
         self._settings = settings
 
     def open(self, run: Run) -> None:
-        """Connect here, and raise labcrane.DeviceError when nobody answers."""
+        # Connect here, and raise labcrane.DeviceError when nobody answers.
+        self._rate_hz = run.rate_hz
 
     def read(self, tick: Tick, seen: Frame) -> FloatArray:
         # Never wait here. Say in self.fault why the device cannot be trusted, None when it can.
-        wave = math.sin(2.0 * math.pi * tick.number / 240.0 / self._settings.period_s)
+        seconds = tick.number / self._rate_hz
+        wave = math.sin(2.0 * math.pi * seconds / self._settings.period_s)
         return np.array([wave, 0.0, 0.0, 0.0])
 
     def close(self) -> None:

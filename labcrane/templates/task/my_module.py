@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from pydantic import PositiveFloat
 
 from labcrane import (
     Event,
@@ -31,10 +32,10 @@ class MyPartSettings(Settings):
     heights: tuple[float, ...] = (0.5, 1.5)
     """Heights of the targets above the base, in metres; each is one trial."""
 
-    radius: float = 0.3
+    radius: PositiveFloat = 0.3
     """Of a target, in metres."""
 
-    limit_s: float = 30.0
+    limit_s: PositiveFloat = 30.0
     """Time after which a trial ends without success, in seconds."""
 
 

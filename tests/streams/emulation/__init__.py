@@ -93,7 +93,7 @@ class Lab:
     def recorder(self, *streams: dict[str, object], **orders: object) -> subprocess.Popen[str]:
         told = {"journal": str(self.journal), "streams": list(streams), **orders}
         process = subprocess.Popen(
-            [sys.executable, "-m", "labcrane.streams.recorder", json.dumps(told)],
+            [sys.executable, "-m", "labcrane.streams.recorder_process", json.dumps(told)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
