@@ -17,8 +17,7 @@ def examine(settings: SonificationSettings, ask: Ask | None) -> list[Finding]:
     try:
         made = server(settings)
     except DeviceError as error:
-        said, _, fix = str(error).partition("; ")
-        return [Finding(Verdict.FAIL, said, fix)]
+        return [Finding.failed(error)]
     block, rate = int(made.getBufferSize()), float(made.getSamplingRate())
     found = _scheduling() if settings.driver == "jack" and sys.platform == "linux" else []
     made.stop()

@@ -6,6 +6,8 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_
 
 from labcrane import Settings
 
+MOST_OVERTONES = 15
+
 
 class SonificationSettings(Settings):
     """How the tone follows the movement, and how it is played.
@@ -60,6 +62,3 @@ class SonificationSettings(Settings):
             few, many = self.overtones
             raise ValueError(f"overtones must be 0 to {MOST_OVERTONES}, but are {few}, {many}")
         return self
-
-
-MOST_OVERTONES = 15

@@ -2,8 +2,9 @@
 
 import math
 import wave
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,9 +13,12 @@ from pydantic import BaseModel
 from labcrane import Feedback, FloatArray, Frame, Run, Signal, Situation, Value
 from labcrane_sonification import real_time
 from labcrane_sonification.settings import SonificationSettings
-from labcrane_sonification.synth import Maker, Synth, offline_server, server
+from labcrane_sonification.synth import Synth, offline_server, server
 from labcrane_sonification.tone import Tone, tone
 from labcrane_sonification.underruns import Underruns
+
+Maker = Callable[[SonificationSettings], Any]
+"""Makes a sound server."""
 
 LIVE = ("far", "pitch_hz", "level", "aside", "pan", "silent_after_s", "ramp_s")
 """Settings that can change while the sound server runs: a server that is closed and opened again is

@@ -40,7 +40,8 @@ def server(settings: SonificationSettings) -> Any:
         )
     if (rate := int(made.getSamplingRate())) != settings.rate_hz:
         raise DeviceError(
-            f"rate_hz is {settings.rate_hz}, but the {settings.driver} sound system runs at {rate}"
+            f"rate_hz is {settings.rate_hz}, but the {settings.driver} sound system runs at "
+            f"{rate}; write that, or start the system at the other rate"
         )
     made.start()
     return made
@@ -146,6 +147,3 @@ class Synth:
         size = int(self.server.getBufferSize()) * CHANNELS
         pointer = ctypes.cast(place, ctypes.POINTER(ctypes.c_float))
         return np.ctypeslib.as_array(pointer, (size,)).reshape(-1, CHANNELS)
-
-
-Maker = Callable[[SonificationSettings], Any]

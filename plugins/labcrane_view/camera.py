@@ -13,7 +13,7 @@ from labcrane import FloatArray, Frame, Machine, ProtocolError
 from labcrane_view.areas import Projection, axes_of
 from labcrane_view.settings import CameraSettings
 from labcrane_view.stage import Stage
-from labcrane_view.window import Window
+from labcrane_view.window import SEEN, Window, hidden_picture
 
 NEAR, FAR = 0.15, 170.0
 ROUNDING_S = 1e-9
@@ -109,13 +109,8 @@ class Camera:
         self._node = self._stage.root.attach_new_node(eye)
         picture = None
         if self.apart:
-            picture = core.Texture(self.settings.name)
-            picture.set_minfilter(core.SamplerState.FT_nearest)
-            picture.set_magfilter(core.SamplerState.FT_nearest)
-            self._buffer = window.output.make_texture_buffer(
-                self.settings.name, part.width, part.height, picture
-            )
-            self._buffer.set_sort(-7)  # after the shadow map, before what shows it
+            size = part.width, part.height
+            self._buffer, picture = hidden_picture(window.output, self.settings.name, size, SEEN)
             self._buffer.set_active(False)
             region = self._buffer.make_display_region()
         else:

@@ -17,8 +17,7 @@ def examine(settings: ViewSettings, ask: Ask | None) -> list[Finding]:
     try:
         window = open_window(settings, "labcrane doctor")
     except DeviceError as error:
-        said, _, fix = str(error).rpartition("; ")
-        return [Finding(Verdict.FAIL, said or fix, fix if said else "")]
+        return [Finding.failed(error)]
     size = window.output.size
     text = f"{window.driver} draws a window of {size[0]} x {size[1]} pixels"
     window.close()
@@ -56,6 +55,8 @@ def refresh_rates(text: str) -> list[tuple[str, float]]:
 
 
 def _rate(name: str, rate_hz: float) -> Finding:
+    if rate_hz <= 0.0:  # a virtual screen has none
+        return Finding(Verdict.PASS, f"monitor {name} has no refresh rate of its own")
     text = f"monitor {name} shows {rate_hz:g} pictures a second"
     if rate_hz >= SLOW_HZ:
         return Finding(Verdict.PASS, text)

@@ -36,7 +36,7 @@ def read_mesh(asked: MeshFile) -> Mesh:
     ]
     whole = [part for part in parts if len(part.faces)]
     if not whole:
-        raise DeviceError(f"mesh {str(asked.file)!r} holds no triangles")
+        raise DeviceError(f"mesh {str(asked.file)!r} holds no triangles; export its surface")
     mesh = joined(*whole)
     turn = turned(asked.turn_deg)
     points = asked.scale * mesh.points @ turn.T + np.array(asked.position)

@@ -39,7 +39,10 @@ def monitors() -> list[Monitor]:
             "x11-xserver-utils) or leave screen out"
         ) from None
     except subprocess.CalledProcessError as error:
-        raise DeviceError(f"xrandr lists no monitors: {error.stderr.strip()}") from None
+        raise DeviceError(
+            f"xrandr lists no monitors: {error.stderr.strip()}; check that DISPLAY names the "
+            "running display, or leave screen out"
+        ) from None
     return parse(done.stdout)
 
 

@@ -35,7 +35,7 @@ from labcrane_view.overlay import Overlay
 from labcrane_view.settings import ViewSettings
 from labcrane_view.shots import Shots
 from labcrane_view.stage import HAZE, Stage
-from labcrane_view.window import Window, font, open_window
+from labcrane_view.window import TURNED, Window, font, hidden_picture, open_window
 
 BOX = ("left", "top", "right", "bottom")
 PREVIEW_S = 0.5
@@ -120,11 +120,7 @@ class View(Feedback):
 
     def _turned_over(self, output: Any) -> Any:
         """Return a hidden picture that is copied to the window, turned over, when it is drawn."""
-        picture = core.Texture("picture")
-        picture.set_minfilter(core.SamplerState.FT_nearest)
-        picture.set_magfilter(core.SamplerState.FT_nearest)
-        hidden = output.make_texture_buffer("picture", *self._size, picture)
-        hidden.set_sort(output.get_sort() - 5)  # after the shadow map, whose sort is -10
+        hidden, picture = hidden_picture(output, "picture", self._size, TURNED)
         overlay = Overlay(output, self._size, sort=0)
         overlay.turned_over(picture, self._settings.flip)
         return hidden

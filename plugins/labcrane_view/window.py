@@ -26,6 +26,11 @@ textures-power-2 none
 """
 
 
+SEEN, TURNED = -7, -5
+"""When cameras' pictures and the whole window turned over are drawn: after the shadows (Panda3D's
+-10), before what shows them (0)."""
+
+
 @dataclass(frozen=True)
 class Window:
     """Where pictures appear.
@@ -85,6 +90,16 @@ def open_window(settings: ViewSettings, title: str) -> Window:
         "nothing can draw here: neither OpenGL nor the software renderer could be opened; check "
         f"that DISPLAY {os.environ.get('DISPLAY')!r} exists and may be used"
     )
+
+
+def hidden_picture(output: Any, name: str, size: tuple[int, int], turn: int) -> tuple[Any, Any]:
+    """Return what is drawn into unseen, pixel by pixel as it will be shown, and its texture."""
+    picture = core.Texture(name)
+    picture.set_minfilter(core.SamplerState.FT_nearest)
+    picture.set_magfilter(core.SamplerState.FT_nearest)
+    hidden = output.make_texture_buffer(name, *size, picture)
+    hidden.set_sort(output.get_sort() + turn)
+    return hidden, picture
 
 
 def _output(
