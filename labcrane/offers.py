@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Generic, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationInfo
+from pydantic import AfterValidator, ValidationInfo
 
+from labcrane.documented import Documented
 from labcrane.finding import Finding
 from labcrane.machine import Machine
 from labcrane.roles import Component
@@ -21,12 +22,8 @@ API = 1
 plugin says ``labcrane_api = 1`` in its module; ``docs/compatibility.md`` says when it rises."""
 
 
-class Settings(BaseModel):
+class Settings(Documented):
     """Base of every plugin's settings: unknown keys are errors, values never change."""
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False
-    )
 
 
 def _beside(path: Path, info: ValidationInfo) -> Path:
