@@ -1,8 +1,11 @@
 """The plain data that flows through a run."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -10,7 +13,10 @@ import numpy.typing as npt
 from labcrane.clock import Tick
 from labcrane.machine import Body, Machine
 from labcrane.shapes import Shape
-from labcrane.signals import FloatArray, Layout
+from labcrane.signals import Layout
+
+if TYPE_CHECKING:
+    from labcrane.arrays import FloatArray
 
 Value = float | int | str | bool | None
 """What an event, a condition or a result may hold: what JSON and a table cell can."""

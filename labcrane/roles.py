@@ -10,12 +10,13 @@ every role; a plugin's tests subclass it.
 An Exporter works on what was recorded, long after: it is built, but never opened.
 """
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 from pydantic import BaseModel
 
 from labcrane.clock import Tick
@@ -23,10 +24,11 @@ from labcrane.machine import Body
 from labcrane.questions import Answers, Item, Score
 from labcrane.records import Frame, Judgement, Picture, Planned, Run, Situation, Trial, Value
 from labcrane.shapes import Shape
-from labcrane.signals import FloatArray, Signal
+from labcrane.signals import Signal
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # a protocol is checked without loading numpy
     from labcrane.analysis.cohort import Participant
+    from labcrane.arrays import FloatArray
 
 
 class Component(ABC):
@@ -76,6 +78,8 @@ class Controller(Component):
 
     def rest(self) -> FloatArray:
         """Return the command that holds the machine still, shape ``(n_command,)``."""
+        import numpy as np  # noqa: PLC0415
+
         return np.zeros(sum(len(signal.columns) for signal in self.signals))
 
     @abstractmethod
@@ -145,7 +149,7 @@ class Exporter(Component):
     """
 
     @abstractmethod
-    def export(self, participants: "Iterable[Participant]", folder: Path) -> None:
+    def export(self, participants: Iterable[Participant], folder: Path) -> None:
         """Write the data of ``participants`` into ``folder``, which exists and is empty.
 
         Go through the participants once and keep nothing of one while the next is read: there may
@@ -194,6 +198,8 @@ class Cue(Component):
 
     def values(self, frame: Frame) -> FloatArray:
         """Return the numbers behind the picture, shape ``(n_signals,)``, as pure as ``draw``."""
+        import numpy as np  # noqa: PLC0415
+
         return np.empty(0)
 
 

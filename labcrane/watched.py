@@ -1,8 +1,10 @@
 """Components under oversight: the same methods, and every call is watched."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from labcrane.clock import Tick
 from labcrane.errors import PluginError
@@ -12,7 +14,10 @@ from labcrane.questions import Answers, Item
 from labcrane.records import Frame, Judgement, Planned, Run, Trial, Value
 from labcrane.registry import ROLES
 from labcrane.roles import Component, Controller, Dynamics, InputDevice, Questionnaire, Task
-from labcrane.signals import FloatArray, Layout
+from labcrane.signals import Layout
+
+if TYPE_CHECKING:
+    from labcrane.arrays import FloatArray
 
 
 def watched(component: Component, name: str, plugin: str, oversight: Oversight) -> Component:

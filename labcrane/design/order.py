@@ -3,8 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from labcrane.design.sampling import sequence
 from labcrane.design.squares import Square, latin_square, williams
 
@@ -28,6 +26,8 @@ class Turn:
 
 def shuffled(levels: Sequence[str], seed: int) -> tuple[str, ...]:
     """Return the levels in a random order that follows from ``seed``."""
+    import numpy as np  # noqa: PLC0415 - a protocol is checked without it
+
     order = np.random.default_rng(seed).permutation(len(levels))
     return tuple(levels[index] for index in order)
 
@@ -41,6 +41,8 @@ def complete(levels: Sequence[str], turn: Turn, times: int, most: int | None) ->
 
 def blocked(levels: Sequence[str], turn: Turn, times: int, most: int | None) -> tuple[str, ...]:
     """Shuffle each repetition by itself, so that all levels come before any comes again."""
+    import numpy as np  # noqa: PLC0415 - a protocol is checked without it
+
     random = np.random.default_rng(turn.seed)
     chosen: list[str] = []
     for _ in range(times):

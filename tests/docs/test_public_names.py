@@ -99,12 +99,12 @@ def test_arrays_have_shapes_and_numbers_have_units(name: str) -> None:
         assert UNIT.search(text), f"{name} has numbers ({', '.join(numbers)}) without a unit"
 
 
-def hints_of(function: object) -> dict[str, object]:
-    """Return the types of a function's parameters and of what it returns."""
+def hints_of(what: object) -> dict[str, object]:
+    """Return the types of a function's parameters and result, or of a record's fields."""
     import pandas  # as labcrane has it for type checkers only
 
     public = {name: getattr(labcrane, name) for name in labcrane.__all__}
-    return typing.get_type_hints(function, localns={"pd": pandas, **public})
+    return typing.get_type_hints(what, localns={"pd": pandas, **public})
 
 
 def has_float(hint: object) -> bool:
@@ -124,7 +124,7 @@ def test_every_field_of_a_record_is_described(name: str) -> None:
     }
     summary = " ".join([*document["Summary"], *document["Extended Summary"]])
     below = field_docstrings(what)
-    hints = typing.get_type_hints(what)
+    hints = hints_of(what)
     for each in fields(what):
         if each.name.startswith("_"):
             continue
