@@ -1,16 +1,20 @@
 """How a plugin says what it has: a name, its settings, and how to build it."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeVar
 
 from pydantic import AfterValidator, ValidationInfo
 
 from labcrane.documented import Documented
-from labcrane.finding import Finding
-from labcrane.machine import Machine
 from labcrane.roles import Component
+
+if TYPE_CHECKING:
+    from labcrane.finding import Finding
+    from labcrane.machine import Machine
 
 RoleT = TypeVar("RoleT", bound=Component)
 RoleT_co = TypeVar("RoleT_co", bound=Component, covariant=True)

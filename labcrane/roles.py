@@ -19,16 +19,15 @@ from typing import TYPE_CHECKING
 
 from pydantic import BaseModel
 
-from labcrane.clock import Tick
-from labcrane.machine import Body
-from labcrane.questions import Answers, Item, Score
-from labcrane.records import Frame, Judgement, Picture, Planned, Run, Situation, Trial, Value
-from labcrane.shapes import Shape
-from labcrane.signals import Signal
-
-if TYPE_CHECKING:  # a protocol is checked without loading numpy
+if TYPE_CHECKING:  # a protocol is checked without loading what it does not need
     from labcrane.analysis.cohort import Participant
     from labcrane.arrays import FloatArray
+    from labcrane.clock import Tick
+    from labcrane.machine import Body
+    from labcrane.questions import Answers, Item, Score
+    from labcrane.records import Frame, Judgement, Picture, Planned, Run, Situation, Trial, Value
+    from labcrane.shapes import Shape
+    from labcrane.signals import Signal
 
 
 class Component(ABC):

@@ -43,6 +43,8 @@ PRIVATE = 0o077
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit status: 2 for what cannot be run as written."""
     before = os.umask(PRIVATE)
+    # Pydantic would look for plugins of its own in all that is installed.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         words = sys.argv[1:] if arguments is None else list(arguments)
         commands(words)(args=words, prog_name="labcrane")

@@ -3,6 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from labcrane.design.sampling import sequence
 from labcrane.design.squares import Square, latin_square, williams
 
@@ -26,8 +28,6 @@ class Turn:
 
 def shuffled(levels: Sequence[str], seed: int) -> tuple[str, ...]:
     """Return the levels in a random order that follows from ``seed``."""
-    import numpy as np  # noqa: PLC0415 - a protocol is checked without it
-
     order = np.random.default_rng(seed).permutation(len(levels))
     return tuple(levels[index] for index in order)
 
@@ -41,8 +41,6 @@ def complete(levels: Sequence[str], turn: Turn, times: int, most: int | None) ->
 
 def blocked(levels: Sequence[str], turn: Turn, times: int, most: int | None) -> tuple[str, ...]:
     """Shuffle each repetition by itself, so that all levels come before any comes again."""
-    import numpy as np  # noqa: PLC0415 - a protocol is checked without it
-
     random = np.random.default_rng(turn.seed)
     chosen: list[str] = []
     for _ in range(times):
@@ -79,13 +77,10 @@ RULES: Mapping[str, Rule] = {
     "latin_square": _row_of(latin_square),
     "williams": _row_of(williams),
 }
-"""What a protocol may say under ``design: order:``."""
+"""How to follow what a protocol says under ``design: order:``."""
 
 SQUARES: Mapping[str, Callable[[int], Square]] = {
     "latin_square": latin_square,
     "williams": williams,
 }
 """Rules that give each participant a row of a square."""
-
-LIMITED = frozenset({"shuffled", "blocked"})
-"""Rules that can be told how often a level may come in a row."""

@@ -101,10 +101,13 @@ def test_arrays_have_shapes_and_numbers_have_units(name: str) -> None:
 
 def hints_of(what: object) -> dict[str, object]:
     """Return the types of a function's parameters and result, or of a record's fields."""
-    import pandas  # as labcrane has it for type checkers only
+    import numpy.typing  # as labcrane has them for type checkers only
+    import pandas
 
     public = {name: getattr(labcrane, name) for name in labcrane.__all__}
-    return typing.get_type_hints(what, localns={"pd": pandas, **public})
+    return typing.get_type_hints(
+        what, localns={"pd": pandas, "np": numpy, "npt": numpy.typing, **public}
+    )
 
 
 def has_float(hint: object) -> bool:
