@@ -1,10 +1,9 @@
 """Find installed plugins and look up what they offer."""
 
 from collections.abc import Collection, Iterable, Mapping
-from dataclasses import dataclass
 from importlib.metadata import EntryPoint
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import NamedTuple, TypeVar, cast
 
 import pluggy
 
@@ -27,8 +26,7 @@ from labcrane.suggestion import suggestion
 RoleT = TypeVar("RoleT", bound=Component)
 
 
-@dataclass(frozen=True, slots=True)
-class RoleEntry:
+class RoleEntry(NamedTuple):
     """How a role is found and spoken of.
 
     Attributes
