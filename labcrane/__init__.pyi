@@ -3,6 +3,7 @@
 from .actuator import PRESETS, Actuator, ActuatorSettings
 from .analysis.cohort import Participant
 from .analysis.movements import Movement, movements
+from .arrays import FloatArray
 from .boxes import link_boxes
 from .clock import Tick
 from .errors import (
@@ -49,7 +50,7 @@ from .roles import (
 from .scene import Form, Part, Placed, Scene, load_scene, place
 from .scene_text import SCENE_PLACED, read_placed, write_placed
 from .shapes import Ball, Beam, Shape, Targets
-from .signals import FloatArray, Layout, Signal, signals_of
+from .signals import Layout, Signal, signals_of
 from .urdf_text import urdf, urdf_joint, urdf_link
 
 __version__: str

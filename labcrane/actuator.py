@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pydantic import (
-    BaseModel,
-    ConfigDict,
     GetJsonSchemaHandler,
     NonNegativeFloat,
     PositiveFloat,
@@ -16,15 +14,12 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+from labcrane.documented import Documented
 from labcrane.suggestion import suggestion
 
 
-class ActuatorSettings(BaseModel):
+class ActuatorSettings(Documented):
     """How a drive follows its command: written out, or the name of one of :data:`PRESETS`."""
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False
-    )
 
     dead_time_s: NonNegativeFloat = 0.0
     """Time before a command has any effect, in seconds; rounded to whole ticks."""
@@ -40,7 +35,8 @@ class ActuatorSettings(BaseModel):
         cls, core: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         """Say that a name will do."""
-        return {"anyOf": [{"enum": list(PRESETS)}, handler(core)]}
+        written = super().__get_pydantic_json_schema__(core, handler)
+        return {"anyOf": [{"enum": list(PRESETS)}, written]}
 
     @model_validator(mode="before")
     @classmethod

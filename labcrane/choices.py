@@ -99,7 +99,7 @@ class Chooser:
         settings = self._source.check(offer.settings, place, use.settings)
         if settings is None:
             return None
-        plugin = self._registry.plugins[role][use.use]
+        plugin = self._registry.plugin(role, use.use)
         return Choice(use.use, plugin, offer, settings, self.oversight)
 
     def choose_feedback(self) -> tuple[dict[str, Choice], dict[str, Choice], dict[str, Choice]]:
@@ -122,9 +122,11 @@ class Chooser:
 
     def _is_cue(self, name: object) -> bool:
         """Whether what is named under ``feedback`` is a cue, or is one misspelt."""
+        if not isinstance(name, str):
+            return False
+        if (roles := self._registry.roles(name)) & {Cue, Feedback}:
+            return Cue in roles
         cues, others = self._registry.offers[Cue], self._registry.offers[Feedback]
-        if name in cues or name in others or not isinstance(name, str):
-            return name in cues
         return bool(get_close_matches(name, cues)) and not get_close_matches(name, others)
 
     def machine(self) -> tuple[Machine, str] | None:

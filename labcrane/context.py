@@ -10,7 +10,7 @@ from typing import Any, Protocol
 from labcrane.attempt import trial_units
 from labcrane.data_folder import DataFolder
 from labcrane.doctor.examination import at_start
-from labcrane.hookspecs import PROJECT
+from labcrane.entry_points import PROJECT
 from labcrane.plan import SessionPlan
 from labcrane.plugin_modules import own_plugins
 from labcrane.records import Run

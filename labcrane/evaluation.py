@@ -2,17 +2,15 @@
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, NonNegativeFloat, PositiveInt, model_validator
+from pydantic import NonNegativeFloat, PositiveInt, model_validator
+
+from labcrane.documented import Documented
 
 Reading = Literal["separate_overloads", "shared_overloads"]
 
 
-class Judging(BaseModel):
+class Judging(Documented):
     """A part of a protocol that judges: unknown keys are errors, values never change."""
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False
-    )
 
 
 class Weights(Judging):

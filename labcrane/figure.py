@@ -5,15 +5,9 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    NonNegativeFloat,
-    PositiveFloat,
-    model_validator,
-)
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
+from labcrane.documented import Documented
 from labcrane.mesh_file import MeshFile
 
 Point = tuple[float, float, float]
@@ -78,10 +72,8 @@ HEIGHT_M = 0.22
 REGIONS = (*(part.name for part in TRUNK), *LIMBS)
 
 
-class Deformity(BaseModel):
+class Deformity(Documented):
     """A limb that is bent where it should be straight."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
     limbs: tuple[str, ...] = Field(min_length=1)
     """One of these has it; which one is drawn from the trial's seed."""
@@ -90,12 +82,8 @@ class Deformity(BaseModel):
     """By how much it is bent, in degrees; drawn evenly."""
 
 
-class Figure(BaseModel):
+class Figure(Documented):
     """A person of simple shapes, lying on the back."""
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False
-    )
 
     position: Point
     """Where the chest is, in the machine's base frame, in metres."""

@@ -7,10 +7,10 @@ from functools import partial
 
 import numpy as np
 
+from labcrane.arrays import FloatArray
 from labcrane.errors import RecordingError
 from labcrane.recording.journal import Column, SessionJournal
 from labcrane.records import Event, Frame, Phase, Run
-from labcrane.signals import FloatArray
 
 PHASES: Mapping[Phase, float] = {phase: float(code) for code, phase in enumerate(Phase)}
 """The number that stands for a phase in ``loop/phase``."""

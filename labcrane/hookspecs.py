@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import pluggy
 
+from labcrane.entry_points import PROJECT
 from labcrane.offers import CommandOffer, Offer
 from labcrane.roles import (
     Controller,
@@ -20,8 +21,6 @@ from labcrane.roles import (
     Questionnaire,
     Task,
 )
-
-PROJECT = "labcrane"
 
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)

@@ -8,15 +8,18 @@ and a planar chain, 26 times cheaper than the numpy product.
 
 import math
 from collections.abc import Sequence
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from labcrane.machine import Machine
-from labcrane.signals import FloatArray
+
+if TYPE_CHECKING:  # whether a point can be reached is known without loading numpy
+    from labcrane.arrays import FloatArray
 
 
-def dh_matrix(a: float, alpha: float, d: float, theta: float) -> FloatArray:
+def dh_matrix(a: float, alpha: float, d: float, theta: float) -> "FloatArray":
     """Return the standard DH transform, shape ``(4, 4)``: lengths in m, angles in rad."""
+    import numpy as np  # noqa: PLC0415
+
     ct, st, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
     return np.array(
         [
@@ -28,12 +31,14 @@ def dh_matrix(a: float, alpha: float, d: float, theta: float) -> FloatArray:
     )
 
 
-def frames(machine: Machine, angles: Sequence[float]) -> FloatArray:
+def frames(machine: Machine, angles: Sequence[float]) -> "FloatArray":
     """Return the base frame's and every joint's frame, shape ``(n_joints + 1, 4, 4)``.
 
     ``angles`` are joint angles in rad. Frame ``i`` sits at the far end of link ``i``; the last
     one is the tip.
     """
+    import numpy as np  # noqa: PLC0415
+
     pose = np.eye(4)
     pose[0, 3] = machine.base_x
     poses = [pose]
@@ -43,8 +48,10 @@ def frames(machine: Machine, angles: Sequence[float]) -> FloatArray:
     return np.stack(poses)
 
 
-def jacobian(machine: Machine, angles: Sequence[float]) -> FloatArray:
+def jacobian(machine: Machine, angles: Sequence[float]) -> "FloatArray":
     """Return the tip velocity per joint speed, shape ``(3, n_joints)``, in m/rad."""
+    import numpy as np  # noqa: PLC0415
+
     poses = frames(machine, angles)
     tip = poses[-1, :3, 3]
     return np.column_stack([np.cross(pose[:3, 2], tip - pose[:3, 3]) for pose in poses[:-1]])

@@ -8,8 +8,9 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, model_validator
+from pydantic import Field, PositiveFloat, model_validator
 
+from labcrane.documented import Documented
 from labcrane.mesh_file import Looks, MeshFile
 
 FEWEST_JOINTS = 3
@@ -18,12 +19,8 @@ UPWARD_TO_LEVEL = -90.0
 """Twist in degrees from a slew axis to the pitch axes behind it."""
 
 
-class Joint(BaseModel):
+class Joint(Documented):
     """One joint and the link behind it, as a row of a standard DH table."""
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False
-    )
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
     """A lower-case word; names the joint's columns in a recording."""
@@ -93,12 +90,8 @@ class Joint(BaseModel):
         return math.radians(self.offset_deg)
 
 
-class Machine(BaseModel):
+class Machine(Documented):
     """A slewing base and a chain of pitch joints; positive pitch is down."""
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False
-    )
 
     title: str
     """What it is, for people."""

@@ -3,14 +3,9 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    PositiveFloat,
-    ValidationInfo,
-)
+from pydantic import AfterValidator, BeforeValidator, PositiveFloat, ValidationInfo
+
+from labcrane.documented import Documented
 
 FORMATS = (".stl", ".obj", ".gltf", ".glb")
 
@@ -27,12 +22,8 @@ def _beside(path: Path, info: ValidationInfo) -> Path:
     return file
 
 
-class MeshFile(BaseModel):
+class MeshFile(Documented):
     """What something looks like; what it touches is not changed by it."""
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False
-    )
 
     file: Annotated[Path, AfterValidator(_beside)]
     """STL, OBJ or glTF; its axes are taken as they are in the file."""

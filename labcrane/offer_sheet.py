@@ -91,7 +91,7 @@ def _sheet(
             name,
             possible(written, schema.get("$defs", {})),
             None if fields[name].is_required() else _default(fields[name]),
-            " ".join((fields[name].description or "").split()),
+            " ".join(written.get("description", "").split()),
         )
         for name, written in schema.get("properties", {}).items()
     )

@@ -1,15 +1,20 @@
 """How a plugin says what it has: a name, its settings, and how to build it."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationInfo
+from pydantic import AfterValidator, ValidationInfo
 
-from labcrane.finding import Finding
-from labcrane.machine import Machine
+from labcrane.documented import Documented
 from labcrane.roles import Component
+
+if TYPE_CHECKING:
+    from labcrane.finding import Finding
+    from labcrane.machine import Machine
 
 RoleT = TypeVar("RoleT", bound=Component)
 RoleT_co = TypeVar("RoleT_co", bound=Component, covariant=True)
@@ -21,12 +26,8 @@ API = 1
 plugin says ``labcrane_api = 1`` in its module; ``docs/compatibility.md`` says when it rises."""
 
 
-class Settings(BaseModel):
+class Settings(Documented):
     """Base of every plugin's settings: unknown keys are errors, values never change."""
-
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False
-    )
 
 
 def _beside(path: Path, info: ValidationInfo) -> Path:

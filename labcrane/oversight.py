@@ -4,25 +4,30 @@ Every call of a component that fails becomes a :class:`PluginError` that names c
 tick and line. Errors of labcrane's own kind pass as they are: they are the plugin's own words.
 """
 
+from __future__ import annotations
+
 import inspect
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from labcrane.culprit import told
 from labcrane.errors import LabcraneError, PluginError
-from labcrane.signals import FloatArray, Layout, Signal
+from labcrane.signals import Layout, Signal
 from labcrane.whereabouts import SHIFT, Place, WhereaboutsFile
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from labcrane.arrays import FloatArray
 
 P = ParamSpec("P")
 T = TypeVar("T")
-FLOAT64 = np.dtype(np.float64)
 
 
 @dataclass(slots=True)
@@ -60,6 +65,13 @@ class Oversight:
     def begin_tick(self, number: int) -> None:
         """Take note of the tick that begins."""
         self._base = (number + 1) << SHIFT
+
+    @cached_property
+    def _arrays(self) -> tuple[type[np.ndarray[Any, Any]], np.dtype[np.float64]]:
+        """The type and the dtype of what a tick is made of: loaded when the first is checked."""
+        import numpy as np  # noqa: PLC0415
+
+        return np.ndarray, np.dtype(np.float64)
 
     @contextmanager
     def published(self, path: Path) -> Iterator[None]:
@@ -117,7 +129,8 @@ class Oversight:
         With ``layout``, what it returns is checked as by :meth:`check`: here, because a call of
         Python's own costs as much as the check.
         """
-        array, shape, isfinite = np.ndarray, layout.shape if layout else None, math.isfinite
+        (array, float64), isfinite = self._arrays, math.isfinite
+        shape = layout.shape if layout else None
 
         def call(*args: object) -> Any:
             try:
@@ -128,7 +141,7 @@ class Oversight:
                 raise self._failure(number, function, error) from error
             if layout is not None and not (
                 type(values) is array
-                and values.dtype is FLOAT64
+                and values.dtype is float64
                 and values.shape == shape
                 and isfinite(values.dot(values))
             ):
@@ -145,16 +158,27 @@ class Oversight:
         PluginError
             It is no array of that shape, or holds what is no number.
         """
+        array, float64 = self._arrays
         if (
-            type(values) is np.ndarray
-            and values.dtype is FLOAT64
+            type(values) is array
+            and values.dtype is float64
             and values.shape == layout.shape
             # The product is a number when all are, and costs a third of looking at each.
             and (not finite or math.isfinite(values.dot(values)))
         ):
             return
-        if wrong := _wrong(values, layout, finite=finite):
+        if wrong := self._wrong(values, layout, finite=finite):
             raise PluginError(self.complaint(number, f"returned {wrong}"))
+
+    def _wrong(self, values: FloatArray, layout: Layout, *, finite: bool) -> str:
+        """Return what is wrong with what a method returned; empty when nothing is."""
+        array, float64 = self._arrays
+        if type(values) is not array or values.dtype != float64:
+            return f"{getattr(values, 'dtype', type(values).__name__)}, and not an array of float64"
+        if values.shape != (layout.size,):
+            return f"shape {values.shape}, and its signals promise ({layout.size},)"
+        pairs = zip(layout.columns, values.tolist(), strict=True)
+        return ", ".join(f"{name} {x}" for name, x in pairs if finite and not math.isfinite(x))
 
     def _failure(
         self, number: int, function: Callable[..., object], error: BaseException
@@ -165,16 +189,6 @@ class Oversight:
         """Return what a method did wrong, with all that is known of it."""
         when = f" in tick {self.tick}" if self.tick >= 0 else ""
         return f"{self._places[number - 1]}, {what}{when}"
-
-
-def _wrong(values: FloatArray, layout: Layout, *, finite: bool) -> str:
-    """Return what is wrong with what a method returned; empty when nothing is."""
-    if type(values) is not np.ndarray or values.dtype != FLOAT64:
-        return f"{getattr(values, 'dtype', type(values).__name__)}, and not an array of float64"
-    if values.shape != (layout.size,):
-        return f"shape {values.shape}, and its signals promise ({layout.size},)"
-    pairs = zip(layout.columns, values.tolist(), strict=True)
-    return ", ".join(f"{name} {x}" for name, x in pairs if finite and not math.isfinite(x))
 
 
 def promised(

@@ -5,7 +5,7 @@ from importlib.metadata import EntryPoint
 
 from labcrane.errors import PluginError
 from labcrane.offers import CommandOffer
-from labcrane.plugin_modules import load_plugins, offered
+from labcrane.plugin_modules import PluginModules, offered
 
 
 def plugin_commands(
@@ -20,10 +20,11 @@ def plugin_commands(
     PluginError
         Two plugins offer the same words, or the hook of one fails.
     """
-    manager = load_plugins(plugins).manager
+    modules = PluginModules(plugins)
+    modules.load()
     found: dict[tuple[str, str], CommandOffer] = {}
     owners: dict[tuple[str, str], str] = {}
-    for implementation in manager.hook.labcrane_commands.get_hookimpls():
+    for implementation in modules.manager.hook.labcrane_commands.get_hookimpls():
         plugin = implementation.plugin_name
         try:
             offers = offered(implementation, CommandOffer, "labcrane.CommandOffer(...)")

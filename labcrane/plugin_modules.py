@@ -2,21 +2,20 @@
 
 import hashlib
 import sys
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Set
 from importlib.machinery import SourceFileLoader
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import CodeType, ModuleType
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import pluggy
 
 from labcrane import hookspecs
 from labcrane.culprit import told
+from labcrane.entry_points import PROJECT, declared
 from labcrane.errors import PluginError
-from labcrane.hookspecs import PROJECT
 from labcrane.offers import API
 from labcrane.suggestion import suggestion
 
@@ -26,29 +25,15 @@ FOLDER = "plugins"
 """Where a study keeps plugins of its own, beside its protocol."""
 
 
-@dataclass(frozen=True, slots=True)
-class Modules:
-    """The plugins that could be imported, and why others could not.
-
-    Attributes
-    ----------
-    manager
-        Knows their hooks.
-    broken
-        What is wrong with a plugin, by its name.
-    local
-        The files of the study's own plugins, by name: ``plugins/arrow.py``.
-    """
-
-    manager: pluggy.PluginManager
-    broken: dict[str, str]
-    local: dict[str, Path]
+OFFERS = f"{PROJECT}.offers"
+"""Entry points that name what a plugin offers, and lead to its module: known without importing it
+(docs/decisions/0110-offers-by-entry-point.md)."""
 
 
-def load_plugins(
-    installed: Iterable[EntryPoint] | None = None, study: Path | None = None
-) -> Modules:
-    """Import every plugin; one that fails is noted, and the others are imported all the same.
+class PluginModules:
+    """Imports plugins, each once, when something that it may offer is wanted.
+
+    One that fails is noted, and the others are imported all the same.
 
     Parameters
     ----------
@@ -56,25 +41,77 @@ def load_plugins(
         Instead of what is in the ``labcrane`` entry-point group.
     study
         A protocol; the Python files in the folder ``plugins`` beside it are plugins too.
+
+    Attributes
+    ----------
+    manager
+        Knows the hooks of those that were imported.
+    broken
+        What is wrong with a plugin, by its name.
+    local
+        The files of the study's own plugins, by name: ``plugins/arrow.py``.
+    names
+        All there are, imported or not, the study's own last.
     """
-    manager = pluggy.PluginManager(PROJECT)
-    manager.add_hookspecs(hookspecs)
-    local = own_plugins(study) if study else {}
-    points = entry_points(group=PROJECT) if installed is None else installed
-    loaders: list[tuple[str, Callable[[], ModuleType]]] = [(p.name, p.load) for p in points]
-    loaders += [(name, _Source(path).load) for name, path in local.items()]
-    broken: dict[str, str] = {}
-    for name, load in loaders:
+
+    def __init__(
+        self, installed: Iterable[EntryPoint] | None = None, study: Path | None = None
+    ) -> None:
+        self.manager = pluggy.PluginManager(PROJECT)
+        self.manager.add_hookspecs(hookspecs)
+        self.broken: dict[str, str] = {}
+        self.local = own_plugins(study) if study else {}
+        lines = list(declared()) if installed is None else ()
+        offers: dict[str, set[str]] = {}
+        for group, name, value in lines:
+            if group == OFFERS:
+                offers.setdefault(value, set()).add(name)
+        if installed is None:
+            installed = [
+                EntryPoint(n, value, group) for group, n, value in lines if group == PROJECT
+            ]
+        self._waiting = [
+            _Waiting(point.name, point.load, offers.get(point.value)) for point in installed
+        ]
+        self._waiting += [_Waiting(name, _Source(path).load) for name, path in self.local.items()]
+        self.names = tuple(each.plugin for each in self._waiting)
+
+    def load(self, offers: Collection[str] | None = None) -> frozenset[str]:
+        """Import what may offer something of one of these names, or else all.
+
+        Returns
+        -------
+        frozenset
+            Names of the plugins that were imported now.
+        """
+        wanted = [each for each in self._waiting if each.may_offer(offers)]
+        self._waiting = [each for each in self._waiting if each not in wanted]
+        for each in wanted:
+            self._load(each)
+        return frozenset(each.plugin for each in wanted)
+
+    def _load(self, waiting: "_Waiting") -> None:
+        name = waiting.plugin
         try:
-            module = load()
+            module = waiting.load()
             _check_interface(module)
-            manager.register(module, name=name)
-            _check_hooks(manager, module)
+            self.manager.register(module, name=name)
+            _check_hooks(self.manager, module)
         except (Exception, SystemExit) as error:  # noqa: BLE001 - someone else's import
-            broken[name] = str(error) if isinstance(error, PluginError) else told(error)
-            if manager.get_plugin(name):
-                manager.unregister(name=name)
-    return Modules(manager, broken, local)
+            self.broken[name] = str(error) if isinstance(error, PluginError) else told(error)
+            if self.manager.get_plugin(name):
+                self.manager.unregister(name=name)
+
+
+class _Waiting(NamedTuple):
+    """A plugin that is not imported yet, and what it says that it offers, if it says so."""
+
+    plugin: str
+    load: Callable[[], ModuleType]
+    names: Set[str] | None = None
+
+    def may_offer(self, offers: Collection[str] | None) -> bool:
+        return offers is None or self.names is None or not self.names.isdisjoint(offers)
 
 
 def offered(implementation: pluggy.HookImpl, kind: type[OfferT], made_by: str) -> list[OfferT]:

@@ -10,8 +10,8 @@ from typing import Literal
 
 import numpy as np
 
+from labcrane.arrays import FloatArray
 from labcrane.errors import DeviceError
-from labcrane.signals import FloatArray
 
 EARLY_S = 0.02
 """How long before a change its edge may be: sensors are stamped only so well."""

@@ -5,6 +5,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from labcrane.arrays import FloatArray
 from labcrane.delay_file import delay_in_words
 from labcrane.host_order import HostOrder, Part
 from labcrane.offers import Offer, Settings
@@ -12,7 +13,7 @@ from labcrane.oversight import promised
 from labcrane.records import Frame, Situation, Value
 from labcrane.registry import Registry
 from labcrane.roles import Component, Cue, Feedback
-from labcrane.signals import FloatArray, Layout
+from labcrane.signals import Layout
 
 RoleT = TypeVar("RoleT", bound=Component)
 

@@ -1,16 +1,21 @@
 """The plain data that flows through a run."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
-import numpy as np
-import numpy.typing as npt
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
 
-from labcrane.clock import Tick
-from labcrane.machine import Body, Machine
-from labcrane.shapes import Shape
-from labcrane.signals import FloatArray, Layout
+    from labcrane.arrays import FloatArray
+    from labcrane.clock import Tick
+    from labcrane.machine import Body, Machine
+    from labcrane.shapes import Shape
+    from labcrane.signals import Layout
 
 Value = float | int | str | bool | None
 """What an event, a condition or a result may hold: what JSON and a table cell can."""

@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from labcrane.arrays import FloatArray
 from labcrane.clock import Tick
 from labcrane.console import Command, Order
 from labcrane.inquiry import SIMULATION
 from labcrane.recording.recording import SessionRecord
 from labcrane.records import Event, Frame
 from labcrane.roles import InputDevice
-from labcrane.signals import FloatArray, Signal, signals_of
+from labcrane.signals import Signal, signals_of
 
 
 class RecordOver(Exception):  # noqa: N818 - ends a loop, and is no error

@@ -10,23 +10,24 @@ every role; a plugin's tests subclass it.
 An Exporter works on what was recorded, long after: it is built, but never opened.
 """
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 from pydantic import BaseModel
 
-from labcrane.clock import Tick
-from labcrane.machine import Body
-from labcrane.questions import Answers, Item, Score
-from labcrane.records import Frame, Judgement, Picture, Planned, Run, Situation, Trial, Value
-from labcrane.shapes import Shape
-from labcrane.signals import FloatArray, Signal
-
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # a protocol is checked without loading what it does not need
     from labcrane.analysis.cohort import Participant
+    from labcrane.arrays import FloatArray
+    from labcrane.clock import Tick
+    from labcrane.machine import Body
+    from labcrane.questions import Answers, Item, Score
+    from labcrane.records import Frame, Judgement, Picture, Planned, Run, Situation, Trial, Value
+    from labcrane.shapes import Shape
+    from labcrane.signals import Signal
 
 
 class Component(ABC):
@@ -76,6 +77,8 @@ class Controller(Component):
 
     def rest(self) -> FloatArray:
         """Return the command that holds the machine still, shape ``(n_command,)``."""
+        import numpy as np  # noqa: PLC0415
+
         return np.zeros(sum(len(signal.columns) for signal in self.signals))
 
     @abstractmethod
@@ -145,7 +148,7 @@ class Exporter(Component):
     """
 
     @abstractmethod
-    def export(self, participants: "Iterable[Participant]", folder: Path) -> None:
+    def export(self, participants: Iterable[Participant], folder: Path) -> None:
         """Write the data of ``participants`` into ``folder``, which exists and is empty.
 
         Go through the participants once and keep nothing of one while the next is read: there may
@@ -194,6 +197,8 @@ class Cue(Component):
 
     def values(self, frame: Frame) -> FloatArray:
         """Return the numbers behind the picture, shape ``(n_signals,)``, as pure as ``draw``."""
+        import numpy as np  # noqa: PLC0415
+
         return np.empty(0)
 
 

@@ -5,11 +5,12 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import Any
 
+from labcrane.arrays import FloatArray
 from labcrane.errors import PluginError
 from labcrane.machine import Body, Machine
 from labcrane.mesh_file import read_mesh, write_mesh
 from labcrane.records import Run
-from labcrane.signals import FloatArray, Layout, Signal
+from labcrane.signals import Layout, Signal
 
 
 def write_run(run: Run) -> str:

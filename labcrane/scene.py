@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from labcrane.documented import Documented
 from labcrane.errors import ProtocolError
 from labcrane.figure import Figure, Form, Part, figure_parts
 from labcrane.mesh_file import Looks
@@ -26,13 +27,7 @@ SUNK_M = 0.001
 """Depth in the ground, in metres, from which on a scene is impossible."""
 
 
-class _Model(BaseModel):
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, use_attribute_docstrings=True, allow_inf_nan=False
-    )
-
-
-class Scatter(_Model):
+class Scatter(Documented):
     """How far from its place a thing may stand; drawn evenly from the trial's seed."""
 
     x: Extent = (0.0, 0.0)
@@ -45,7 +40,7 @@ class Scatter(_Model):
     """Degrees, turned to the left."""
 
 
-class Thing(_Model):
+class Thing(Documented):
     """An object, or an obstacle when it is fixed."""
 
     shape: Literal["box", "cylinder", "sphere"]
@@ -83,7 +78,7 @@ class Thing(_Model):
     """What it looks like instead of its shape, in a frame at its centre; its touch is the same."""
 
 
-class Goal(_Model):
+class Goal(Documented):
     """A region in which something must come to be, and the way there.
 
     Each is reached in its turn.
@@ -111,7 +106,7 @@ class Goal(_Model):
     """Whether something must be in the grip (true), or nothing may be (false), to be there."""
 
 
-class Scene(_Model):
+class Scene(Documented):
     """Everything around the machine, and what is to be done with it."""
 
     labcrane_scene: Literal[1]

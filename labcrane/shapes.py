@@ -1,10 +1,16 @@
 """What a cue draws: plain shapes in the machine's base frame, the same for every view."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from labcrane.signals import FloatArray, Layout
+from labcrane.signals import Layout
+
+if TYPE_CHECKING:
+    from labcrane.arrays import FloatArray
 
 Point = tuple[float, float, float]
 Colour = tuple[float, float, float, float]

@@ -4,13 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-import numpy.typing as npt
-
 from labcrane.errors import ProtocolError
-
-FloatArray = npt.NDArray[np.float64]
-"""Numbers in float64; who gives or takes them says their shape and unit."""
 
 
 @dataclass(frozen=True, slots=True)

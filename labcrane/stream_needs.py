@@ -5,12 +5,12 @@ from typing import TYPE_CHECKING
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
 from labcrane.offers import Settings
-from labcrane.streams.request import StreamRequest, same_type
 from labcrane.streams.verdict import Limit, Limits
 
 if TYPE_CHECKING:  # a protocol is checked without loading what corrects clocks
     from labcrane.recording.stream_header import StreamHeader
     from labcrane.streams.correction import Treatment
+    from labcrane.streams.request import StreamRequest
 
 
 class StreamNeed(Settings):
@@ -52,8 +52,10 @@ class StreamNeed(Settings):
             raise ValueError("a stream needs a type, a name or a source_id to be found by")
         return self
 
-    def request(self, label: str, *, required: bool) -> StreamRequest:
+    def request(self, label: str, *, required: bool) -> "StreamRequest":
         """Return what the recorder is asked for; ``label`` is the study's name for it."""
+        from labcrane.streams.request import StreamRequest  # noqa: PLC0415
+
         return StreamRequest(
             label=label,
             type=self.type,
@@ -67,6 +69,8 @@ class StreamNeed(Settings):
 
     def is_for(self, header: "StreamHeader") -> bool:
         """Whether a recorded stream is the one, or one of those, that is needed."""
+        from labcrane.streams.request import same_type  # noqa: PLC0415
+
         if self.name is not None and self.name != header.name:
             return False
         if self.source_id is not None and self.source_id != header.source_id:

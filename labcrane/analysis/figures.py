@@ -8,7 +8,7 @@ import numpy as np
 
 from labcrane.analysis.fitts import regress
 from labcrane.analysis.learning import CURVES
-from labcrane.signals import FloatArray
+from labcrane.arrays import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from labcrane.arrays import FloatArray
 from labcrane.recording.recording import SessionRecord
-from labcrane.signals import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from labcrane.arrays import FloatArray
 from labcrane.errors import ProtocolError
-from labcrane.signals import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd

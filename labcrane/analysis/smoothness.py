@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labcrane.signals import FloatArray
+from labcrane.arrays import FloatArray
 
 
 def sparc(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labcrane.signals import FloatArray
+from labcrane.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True)

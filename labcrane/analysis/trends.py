@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from labcrane.signals import FloatArray
+from labcrane.arrays import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -13,8 +13,8 @@ from ruamel.yaml.error import YAMLError
 
 from labcrane.approval.source_tree import hashes
 from labcrane.durable_file import sha256
+from labcrane.entry_points import PROJECT
 from labcrane.errors import ProtocolError
-from labcrane.hookspecs import PROJECT
 from labcrane.registry import Registry
 from labcrane.study import Study
 from labcrane.yaml_file import YamlFile

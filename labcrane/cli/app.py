@@ -43,6 +43,8 @@ PRIVATE = 0o077
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit status: 2 for what cannot be run as written."""
     before = os.umask(PRIVATE)
+    # Pydantic would look for plugins of its own in all that is installed.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         words = sys.argv[1:] if arguments is None else list(arguments)
         commands(words)(args=words, prog_name="labcrane")
@@ -62,15 +64,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def commands(words: Sequence[str]) -> typer.Typer:
     """Return the command line as far as ``words`` ask for it."""
+    first = words[0] if words else ""
+    known = {name.replace("_", "-"): module for module, names in MODULES.items() for name in names}
     app = typer.Typer(
         no_args_is_help=True,
+        add_completion=first not in known,  # its options come before a command
         pretty_exceptions_enable=False,
         rich_markup_mode=None,  # what draws boxes round the help takes longer than all the rest
     )
     app.callback()(_labcrane)
-    first = words[0] if words else ""
     everything = COMPLETING in os.environ
-    known = {name.replace("_", "-"): module for module, names in MODULES.items() for name in names}
     if first in known:
         app.command(first)(_function(known[first], first))
         return app

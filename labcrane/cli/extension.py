@@ -2,15 +2,15 @@
 
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from importlib.machinery import ModuleSpec
-from pathlib import Path
 
 import typer
 
+from labcrane.entry_points import PROJECT, declared
 from labcrane.errors import PluginError
 
-GROUP = "labcrane.commands"
+GROUP = f"{PROJECT}.commands"
 """Entry points that name a group of commands, and the module with its hook: known without importing
 any plugin (docs/decisions/0091-groups-by-entry-point.md)."""
 
@@ -25,7 +25,11 @@ def extend(app: typer.Typer, first: str, *, everything: bool) -> None:
     """
     own = {command.name for command in app.registered_commands}
     # Two plugins can share a group; its help is by the one that is found first.
-    modules = dict(reversed(list(declared(GROUP))))
+    modules = {
+        point.name: point.value.partition(":")[0]
+        for point in reversed(list(declared()))
+        if point.group == GROUP
+    }
     for group, module in sorted(modules.items()):
         if group in own:
             raise PluginError(
@@ -73,26 +77,6 @@ def description(module: str) -> str:
     get_source = getattr(spec and spec.loader, "get_source", lambda name: None)
     said = DOCSTRING.match(get_source(whole) or "")
     return said["line"] if said else f"Commands of {module}."
-
-
-def declared(group: str) -> Iterator[tuple[str, str]]:
-    """Yield the names of the entry points in a group and their modules, of what is in folders.
-
-    Their files are read here, because ``importlib.metadata`` loads what reads mail, which would
-    take longer than all the rest of the help. What imports them goes through it all the same.
-    """
-    for folder in dict.fromkeys(sys.path):
-        for path in Path(folder).glob("*.*-info/entry_points.txt"):
-            text = path.read_text(encoding="utf-8")
-            if group not in text:
-                continue
-            section = ""
-            for line in map(str.strip, text.splitlines()):
-                if line.startswith("["):
-                    section = line.strip("[] ")
-                elif section == group and line and not line.startswith(("#", ";")):
-                    name, _, value = line.partition("=")
-                    yield name.strip(), value.partition(":")[0].strip()
 
 
 def _offered(group: str) -> dict[str, Callable[..., None]]:

@@ -30,10 +30,10 @@ def check(protocol: ProtocolPath, as_json: AsJson = False) -> None:
         typer.echo(json.dumps({"fine": True, "problems": [], "study": study.protocol.study}))
         return
     sessions = len(study.protocol.sessions)
-    out.print(
+    # One plain line, for which rich is not worth loading.
+    typer.echo(
         f"{protocol}: study {study.protocol.study!r} is fine: {sessions} "
-        f"session{'s' if sessions > 1 else ''} on the {study.machine.title}",
-        markup=False,
+        f"session{'s' if sessions > 1 else ''} on the {study.machine.title}"
     )
 
 

@@ -50,9 +50,8 @@ def export(
     registry = discover()
     offer = registry.find(Exporter, to)
     oversight = Oversight()
-    place = oversight.place(
-        f"exporter {to!r}", registry.plugins[Exporter][to], "export", offer.build
-    )
+    plugin = registry.plugin(Exporter, to)
+    place = oversight.place(f"exporter {to!r}", plugin, "export", offer.build)
     chosen = _settings(offer.settings, settings or [], to)
     if folder.exists() and any(folder.iterdir()):
         raise ProtocolError(f"{folder} is not empty, and nothing is overwritten; give a new folder")

@@ -77,13 +77,10 @@ RULES: Mapping[str, Rule] = {
     "latin_square": _row_of(latin_square),
     "williams": _row_of(williams),
 }
-"""What a protocol may say under ``design: order:``."""
+"""How to follow what a protocol says under ``design: order:``."""
 
 SQUARES: Mapping[str, Callable[[int], Square]] = {
     "latin_square": latin_square,
     "williams": williams,
 }
 """Rules that give each participant a row of a square."""
-
-LIMITED = frozenset({"shuffled", "blocked"})
-"""Rules that can be told how often a level may come in a row."""

@@ -4,8 +4,13 @@ from typing import Annotated, Any
 
 from pydantic import Field, PositiveInt, field_validator
 
-from labcrane.design.order import LIMITED, RULES
 from labcrane.offers import Settings
+
+RULES = ("as_written", "blocked", "latin_square", "shuffled", "williams")
+"""What a protocol may say under ``design: order:``; :mod:`labcrane.design.order` follows it."""
+
+LIMITED = frozenset({"shuffled", "blocked"})
+"""Rules that can be told how often a level may come in a row."""
 
 
 class Order(Settings):
@@ -22,7 +27,7 @@ class Order(Settings):
     """How often a level may come in a row, where the order is random."""
 
 
-RuleName = Annotated[str, Field(json_schema_extra={"enum": sorted(RULES)})]
+RuleName = Annotated[str, Field(json_schema_extra={"enum": list(RULES)})]
 """A rule in its short form; only a schema needs it, the long form is checked."""
 
 AS_WRITTEN = Order(rule="as_written")
@@ -52,7 +57,7 @@ class Design(Settings):
         for factor, said in long.items():
             rule = said.get("rule") if isinstance(said, dict) else None
             if isinstance(rule, str) and rule not in RULES:
-                raise ValueError(f"{factor} is {rule!r}; it can be {', '.join(sorted(RULES))}")
+                raise ValueError(f"{factor} is {rule!r}; it can be {', '.join(RULES)}")
             if isinstance(rule, str) and said.get("in_a_row") and rule not in LIMITED:
                 raise ValueError(f"{factor} is {rule!r}, where nothing is random; drop in_a_row")
         return long

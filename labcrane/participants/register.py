@@ -20,9 +20,7 @@ from labcrane.participants.places import Places
 class Record(BaseModel):
     """A part of the register."""
 
-    model_config = ConfigDict(
-        extra="forbid", use_attribute_docstrings=True, validate_assignment=True
-    )
+    model_config = ConfigDict(extra="forbid", validate_assignment=True)
 
 
 class Consent(Record):

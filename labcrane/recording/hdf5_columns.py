@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from labcrane.signals import FloatArray
+from labcrane.arrays import FloatArray
 
 if TYPE_CHECKING:
     import h5py

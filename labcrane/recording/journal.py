@@ -10,12 +10,12 @@ from typing import Self
 
 import numpy as np
 
+from labcrane.arrays import FloatArray
 from labcrane.errors import PluginError, RecordingError
 from labcrane.recording.append_file import SYNC_S
 from labcrane.recording.stream_header import Channel, StreamHeader
 from labcrane.recording.xdf import XdfWriter
 from labcrane.records import Event
-from labcrane.signals import FloatArray
 
 FRAMES = "labcrane.frames"
 EVENTS = "labcrane.events"

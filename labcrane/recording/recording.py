@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from labcrane.arrays import FloatArray
 from labcrane.errors import RecordingError
 from labcrane.recording.hdf5_columns import holds_texts, text_of, texts_of
 from labcrane.recording.journal import GROUPS
 from labcrane.recording.participant_file import SYNC_REPORT, group_name, opened
-from labcrane.signals import FloatArray
 
 if TYPE_CHECKING:
     import h5py

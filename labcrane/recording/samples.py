@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from labcrane.arrays import FloatArray
 from labcrane.recording.checks import Span
 from labcrane.recording.chunks import Chunk, read_length
 from labcrane.recording.stream_header import StreamHeader
 from labcrane.recording.xdf_chunk import sample_dtype
-from labcrane.signals import FloatArray
 
 _ID_BYTES = 4
 _STAMPED = 8

@@ -17,6 +17,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
+from labcrane.arrays import FloatArray
 from labcrane.errors import RecordingError
 from labcrane.recording.append_file import SYNC_S, AppendFile
 from labcrane.recording.checks import CHECK_HEADER, CHECK_ID, CheckLog
@@ -32,7 +33,6 @@ from labcrane.recording.xdf_chunk import (
     pack_texts,
     samples_head,
 )
-from labcrane.signals import FloatArray
 
 CHECK_EVERY_S = 1.0
 """Seconds of writing between two boundary chunks, each followed by the checks of what is new."""

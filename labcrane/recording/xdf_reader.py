@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from labcrane.arrays import FloatArray
 from labcrane.errors import RecordingError
 from labcrane.recording.checks import CHECK_ID, Span, Verdict, verify
 from labcrane.recording.chunks import Chunk, Walk
 from labcrane.recording.samples import Texts, unpack
 from labcrane.recording.stream_header import StreamHeader
 from labcrane.recording.xdf_chunk import MAGIC, Tag
-from labcrane.signals import FloatArray
 
 __all__ = ["Span", "Texts", "XdfFile", "XdfStream", "read_xdf"]
 

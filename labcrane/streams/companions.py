@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from labcrane.arrays import FloatArray
 from labcrane.recording.foreign_streams import (
     ARRIVALS,
     NOTES,
@@ -20,7 +21,6 @@ from labcrane.recording.foreign_streams import (
 )
 from labcrane.recording.stream_header import StreamHeader
 from labcrane.recording.xdf import XdfWriter
-from labcrane.signals import FloatArray
 from labcrane.streams.probes import Probe
 from labcrane.streams.raw import RawStream
 

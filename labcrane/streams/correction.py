@@ -18,8 +18,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from labcrane.arrays import FloatArray
 from labcrane.errors import RecordingError
-from labcrane.signals import FloatArray
 from labcrane.streams.dejitter import Dejitter, even
 from labcrane.streams.epochs import REMOTE, Epoch, epochs
 from labcrane.streams.offset import OffsetCurve, fit

@@ -11,7 +11,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from labcrane.signals import FloatArray
+from labcrane.arrays import FloatArray
 
 STRETCH_S = 120.0
 BLOCK_S = 0.05

@@ -12,9 +12,10 @@ from typing import Protocol
 
 import numpy as np
 
+from labcrane.arrays import FloatArray
 from labcrane.records import Frame
 from labcrane.roles import Feedback
-from labcrane.signals import FloatArray, Layout
+from labcrane.signals import Layout
 from labcrane.streams.outlets import Samples, channel, source_id, stream_info
 
 HEAD = (("frame.tick", "1"), ("frame.due", "s"), ("frame.skipped", "1"))

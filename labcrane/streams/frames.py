@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from labcrane.arrays import FloatArray
 from labcrane.clock import Tick
 from labcrane.records import Frame, Phase, Run
-from labcrane.signals import FloatArray, Layout
+from labcrane.signals import Layout
 from labcrane.streams.outlets import Samples, channel, stream_info
 
 if TYPE_CHECKING:

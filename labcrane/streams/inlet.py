@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from labcrane.arrays import FloatArray
 from labcrane.errors import RecordingError
 from labcrane.recording.stream_header import StreamHeader
 from labcrane.recording.xdf import XdfWriter
-from labcrane.signals import FloatArray
 from labcrane.streams.companions import COUNTER_GAP, OPENED, RESET, Companions
 from labcrane.streams.probes import ClockProbe, Probe, was_reset
 from labcrane.streams.watchdog import Counter

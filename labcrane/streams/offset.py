@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labcrane.signals import FloatArray
+from labcrane.arrays import FloatArray
 from labcrane.streams.epochs import OFFSET, REMOTE, RTT
 
 FEWEST = 6

@@ -20,10 +20,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from labcrane.arrays import FloatArray
 from labcrane.errors import StreamError
 from labcrane.recording.journal import event_text
 from labcrane.records import Frame, Run
-from labcrane.signals import FloatArray, Layout
+from labcrane.signals import Layout
 from labcrane.streams.markers import CODES, OTHER
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from labcrane.signals import FloatArray
+from labcrane.arrays import FloatArray
 from labcrane.streams.dejitter import runs
 from labcrane.streams.epochs import REMOTE, RTT
 from labcrane.streams.offset import OffsetCurve

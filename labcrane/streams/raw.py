@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labcrane.arrays import FloatArray
 from labcrane.errors import RecordingError
-from labcrane.signals import FloatArray
 
 
 def _nothing(columns: int) -> FloatArray:

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from labcrane.arrays import FloatArray
 from labcrane.finding import Finding, Verdict, worst
 from labcrane.recording.journal import finite
-from labcrane.signals import FloatArray
 from labcrane.streams.stream_report import StreamReport
 from labcrane.streams.verdict import Limits
 

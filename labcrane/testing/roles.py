@@ -5,13 +5,14 @@ from contextlib import closing, contextmanager
 
 import numpy as np
 
+from labcrane.arrays import FloatArray
 from labcrane.clock import Tick
 from labcrane.kinematics import Arm
 from labcrane.machine import Machine
 from labcrane.machine_file import load_machine
 from labcrane.records import Frame, Phase, Planned, Run, Trial
 from labcrane.roles import Component, Controller, Dynamics, InputDevice
-from labcrane.signals import FloatArray, Layout, Signal
+from labcrane.signals import Layout, Signal
 from labcrane.testing.every_role import check_closes_after_failed_open, check_soon
 
 RATE_HZ = 240.0

@@ -2,12 +2,10 @@
 
 import math
 from collections.abc import Mapping, Sequence
-
-import numpy as np
+from functools import partial
 
 from labcrane import (
     Event,
-    FloatArray,
     Frame,
     Judgement,
     Machine,
@@ -20,7 +18,6 @@ from labcrane import (
     Trial,
     reach,
 )
-from labcrane_aiming.movement import Movement
 from labcrane_aiming.pairs import Pair, Point, index_of_difficulty, pairs
 from labcrane_aiming.settings import AimingSettings
 
@@ -76,7 +73,6 @@ class Aiming(Task):
                         f"({', '.join(f'{value:.2f}' for value in point)}) m is out of reach of "
                         f"the {machine.title}; move the centre or shorten the distance"
                     )
-        self._values: FloatArray = np.zeros(7)
 
     def factors(self) -> Mapping[str, Sequence[str]]:
         return {"pairs": tuple(self._pairs)}
@@ -107,6 +103,10 @@ class Aiming(Task):
         return Planned(condition, expected_s=expected, counted=number > 0)
 
     def open(self, run: Run) -> None:
+        # A protocol is checked, and a study planned, without loading numpy.
+        from labcrane_aiming.movement import Movement  # noqa: PLC0415
+
+        self._movement_from = partial(Movement, self._settings)
         self._tip = run.state.find("tip.position")
         self._velocity = run.state.find("tip.velocity")
         self._command = run.command.find("command")
@@ -117,8 +117,8 @@ class Aiming(Task):
     def begin_trial(self, trial: Trial) -> None:
         condition = trial.planned.condition
         start, target = _point(condition, "start"), _point(condition, "target")
-        self._movement = Movement(self._settings, start, target)
-        self._values = np.array([*target, self._settings.width / 2, *start])
+        self._movement = self._movement_from(start, target)
+        self._values = self._movement.shown
         self._going_on = Judgement(Phase.RUNNING, self._values)  # what most ticks are
         self._limit = self._settings.limit_s
         self._pressed = True  # a trigger still held from the last movement ends nothing

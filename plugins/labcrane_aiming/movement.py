@@ -68,6 +68,11 @@ class Movement:
         self.distance.append(distance)
 
     @property
+    def shown(self) -> FloatArray:
+        """The task's signals: target, radius and where it comes from, in metres, shape ``(7,)``."""
+        return np.array([*self.target, self.settings.width / 2, *self.start])
+
+    @property
     def rested(self) -> bool:
         """Whether the tip has been at rest, where it must be, for long enough."""
         return self.elapsed[-1] - self.rest_since >= self.settings.rest_s - ROUNDING_S

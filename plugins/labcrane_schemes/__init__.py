@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from labcrane import Controller, Offer, hookimpl, offer
+from labcrane import Controller, Machine, Offer, hookimpl, offer
 from labcrane_schemes.settings import (
     EndEffectorSettings,
     JointVelocitySettings,
@@ -14,12 +14,23 @@ labcrane_api = 1
 
 @hookimpl
 def labcrane_controllers() -> Sequence[Offer[Controller]]:
-    from labcrane_schemes.end_effector import EndEffector
-    from labcrane_schemes.joint_velocity import JointVelocity
-    from labcrane_schemes.switchable import Switchable
+    def joint_velocity(settings: JointVelocitySettings, machine: Machine) -> Controller:
+        from labcrane_schemes.joint_velocity import JointVelocity
+
+        return JointVelocity(settings, machine)
+
+    def end_effector(settings: EndEffectorSettings, machine: Machine) -> Controller:
+        from labcrane_schemes.end_effector import EndEffector
+
+        return EndEffector(settings, machine)
+
+    def switchable(settings: SwitchableSettings, machine: Machine) -> Controller:
+        from labcrane_schemes.switchable import Switchable
+
+        return Switchable(settings, machine)
 
     return (
-        offer("joint_velocity", JointVelocitySettings, JointVelocity),
-        offer("end_effector", EndEffectorSettings, EndEffector),
-        offer("switchable", SwitchableSettings, Switchable),
+        offer("joint_velocity", JointVelocitySettings, joint_velocity),
+        offer("end_effector", EndEffectorSettings, end_effector),
+        offer("switchable", SwitchableSettings, switchable),
     )

@@ -2,60 +2,14 @@
 
 import math
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from labcrane import Ball, Cue, FloatArray, Frame, Run, Settings, Shape, Signal
+from labcrane import Ball, Cue, FloatArray, Frame, Run, Shape, Signal
+from labcrane_sphere.settings import SphereSettings
 
 STEEPNESS = 9.0
 """Of the logarithmic law: a tenth of the range of distance gives the first 28 % of the change."""
-
-
-class SphereSettings(Settings):
-    """Where the sphere is, and how it follows the distance.
-
-    The published study names brightness and size, not their laws: these are a proposal.
-    """
-
-    at: Literal["target", "tip"] = "target"
-    """Where it is drawn."""
-
-    far: PositiveFloat = 4.0
-    """Distance of tip and target, in metres, from which on the sphere stays as it is."""
-
-    law: Literal["linear", "log"] = "linear"
-    """How it changes with distance; ``log`` changes most near the target."""
-
-    polarity: Literal["shrinks", "grows"] = "shrinks"
-    """What its size does as the tip comes closer."""
-
-    brightness: Literal["brightens", "darkens", "constant"] = "brightens"
-    """What its brightness does as the tip comes closer."""
-
-    smallest: PositiveFloat = 0.15
-    """Smallest radius, in metres."""
-
-    largest: PositiveFloat = 0.60
-    """Largest radius, in metres."""
-
-    darkest: NonNegativeFloat = Field(default=0.25, lt=1.0)
-    """Smallest brightness, 1 being the full colour."""
-
-    colour: tuple[float, float, float] = (0.15, 0.75, 1.0)
-    """Red, green and blue at full brightness, each 0 to 1."""
-
-    opacity: float = Field(default=0.45, gt=0.0, le=1.0)
-    """1 hides what is behind it."""
-
-    @model_validator(mode="after")
-    def _sizes_rise(self) -> "SphereSettings":
-        if self.smallest > self.largest:
-            raise ValueError(
-                f"smallest is {self.smallest:g} m and largest {self.largest:g} m; exchange them"
-            )
-        return self
 
 
 class Sphere(Cue):

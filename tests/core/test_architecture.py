@@ -48,13 +48,13 @@ def test_core_never_imports_a_plugin() -> None:
         assert not {name for name in names if name.startswith("labcrane_")}, module.name
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["plugins"], ["check", AIMING]])
-def test_looking_loads_nothing_heavy(arguments: list[str]) -> None:
+def loaded_by(*arguments: str) -> tuple[set[str], list[str]]:
+    """Return the modules that a command loads, and the files whose source it reads."""
     program = (
-        "import json, sys\n"
+        "import json, linecache, sys\n"
         "from labcrane.cli.app import main\n"
         "status = main(json.loads(sys.argv[1]))\n"
-        "print(json.dumps([status, sorted(m.split('.')[0] for m in sys.modules)]))\n"
+        "print(json.dumps([status, sorted(sys.modules), sorted(linecache.cache)]))\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", program, json.dumps(arguments)],
@@ -62,9 +62,44 @@ def test_looking_loads_nothing_heavy(arguments: list[str]) -> None:
         text=True,
         check=True,
     )
-    status, loaded = json.loads(done.stdout.splitlines()[-1])
+    status, modules, sources = json.loads(done.stdout.splitlines()[-1])
     assert status == 0, done.stdout + done.stderr
-    assert not HEAVY & set(loaded)
+    return set(modules), sources
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["plugins"], ["check", AIMING]])
+def test_looking_loads_nothing_heavy(arguments: list[str]) -> None:
+    modules, _ = loaded_by(*arguments)
+    assert not HEAVY & {name.split(".")[0] for name in modules}
+
+
+def test_checking_a_protocol_imports_only_the_plugins_that_it_names() -> None:
+    modules, _ = loaded_by("check", AIMING)
+    plugins = {name for name in modules if name.startswith("labcrane_") and "." not in name}
+    named = (
+        "aiming",
+        "bullet",
+        "joystick",
+        "operator",
+        "schemes",
+        "sonification",
+        "sphere",
+        "view",
+    )
+    assert plugins == {f"labcrane_{name}" for name in named}, "is labcrane installed as it is now?"
+
+
+def test_checking_a_protocol_loads_nothing_that_works_with_what_it_says() -> None:
+    modules, sources = loaded_by("check", AIMING)
+    working = {"numpy", "rich.console", "labcrane.arrays", "labcrane.questions", "labcrane.shapes"}
+    working |= {"labcrane.design.order", "labcrane.loop", "labcrane_aiming.movement"}
+    assert not working & modules
+    assert not sources, "docstrings of settings are for schemas"
+
+
+def test_the_help_loads_no_model() -> None:
+    modules, _ = loaded_by("--help")
+    assert not {"pydantic", "pluggy", "ruamel.yaml", "importlib.metadata", "numpy"} & modules
 
 
 LISTING = re.compile(r"^ {4}([a-z_0-9]+(?:, [a-z_0-9]+)*)(?: {2,}\S|$)", re.M)

@@ -127,15 +127,6 @@ def test_every_command_has_help(command: str, capsys: pytest.CaptureFixture[str]
     assert "Usage" in capsys.readouterr().out
 
 
-def test_the_help_lists_the_groups_that_the_installed_packages_declare() -> None:
-    from importlib.metadata import entry_points
-
-    from labcrane.cli.extension import GROUP, declared
-
-    installed = sorted((point.name, point.module) for point in entry_points(group=GROUP))
-    assert sorted(declared(GROUP)) == installed
-
-
 def test_groups_of_plugins_have_the_plugins_own_words(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -5,6 +5,7 @@ from collections import Counter
 
 from labcrane.design.order import RULES, Turn, shuffled
 from labcrane.design.seeds import derive
+from labcrane.design.words import RULES as WORDS
 
 LEVELS = ("a", "b", "c", "d")
 
@@ -12,6 +13,10 @@ LEVELS = ("a", "b", "c", "d")
 def test_a_seed_is_the_start_of_a_sha256() -> None:
     digest = hashlib.sha256(b"aiming\x1fP001\x1f1").hexdigest()
     assert derive("aiming", "P001", 1) == int(digest[:12], 16)
+
+
+def test_what_a_protocol_may_say_of_an_order_is_what_can_be_followed() -> None:
+    assert sorted(RULES) == [*WORDS]
 
 
 def test_seeds_are_exact_in_a_float64() -> None:

@@ -18,7 +18,7 @@ from labcrane import (
 )
 from labcrane.host_order import HostOrder, Part
 from labcrane.presenter import Presenter
-from labcrane.registry import Registry, discover
+from labcrane.registry import discover
 from labcrane.testing import TARGETS, a_run, a_target, ch8
 
 
@@ -48,9 +48,9 @@ class Notebook(Feedback):
 
 
 def presenter(*, always: bool) -> Presenter:
-    found = discover()
+    registry = discover()
     book = offer("notebook", Plain, lambda settings, machine: Notebook(settings))
-    registry = Registry({**found.offers, Feedback: {"notebook": book}}, found.plugins, {})
+    registry.offers[Feedback]["notebook"] = book
     order = HostOrder(
         "book",
         Part("notebook", {}),

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import labcrane
-from labcrane import Dynamics, PluginError, Task
+from labcrane import Cue, Dynamics, PluginError, Task
 from labcrane.plugin_commands import plugin_commands
 from labcrane.registry import ROLES, discover
 
@@ -92,6 +92,76 @@ def test_two_plugins_may_not_offer_the_same_name(
         PluginError, match="plugins 'a' and 'b' both offer the task 'aiming'; uninstall or rename"
     ):
         discover([point("a", "labcrane_aiming"), point("b", "copycat")])
+
+
+def test_what_bundled_plugins_declare_is_what_they_offer() -> None:
+    # What is not declared is found all the same, but by importing everything.
+    installed = {entry.name: entry.value for entry in entry_points(group="labcrane")}
+    registry = discover()
+    offered = {
+        (name, installed[plugin])
+        for role in ROLES
+        for name, plugin in registry.plugins[role].items()
+        if (ROOT / "plugins" / installed[plugin]).exists()
+    }
+    declared = {(entry.name, entry.value) for entry in entry_points(group="labcrane.offers")}
+    assert declared == offered
+
+
+def test_a_name_leads_to_the_plugin_that_declares_it_and_to_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lamps(tmp_path, monkeypatch, declared=True)
+    registry = discover()
+    assert registry.find(Cue, "blink").name == "blink"
+    assert registry.plugin(Cue, "blink") == "lamp_a"
+    assert registry.roles("blink") == {Cue}
+    assert "lamp_b" not in sys.modules
+    with pytest.raises(PluginError, match=r"^cue 'blinc' is not .* did you mean 'blink'\?"):
+        registry.find(Cue, "blinc")
+    assert "lamp_b" in sys.modules  # whoever is told what there is, is told of all
+
+
+def test_a_plugin_that_declares_nothing_is_asked_always(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lamps(tmp_path, monkeypatch, declared=False)
+    assert discover().find(Cue, "glow").name == "glow"
+
+
+def test_a_plugin_that_offers_more_than_it_declares_is_found_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lamps(tmp_path, monkeypatch, declared=True)
+    assert discover().find(Cue, "undeclared_a").name == "undeclared_a"
+
+
+LAMP = """\
+import labcrane
+
+labcrane_api = 1
+
+@labcrane.hookimpl
+def labcrane_cues():
+    return [labcrane.offer(name, labcrane.Settings, None) for name in NAMES]
+"""
+
+
+def lamps(folder: Path, monkeypatch: pytest.MonkeyPatch, *, declared: bool) -> None:
+    """Install two plugins, whose cues are called blink and glow."""
+    monkeypatch.syspath_prepend(folder)
+    for plugin, name in (("a", "blink"), ("b", "glow")):
+        monkeypatch.delitem(sys.modules, f"lamp_{plugin}", raising=False)
+        names = [name, f"undeclared_{plugin}"]
+        (folder / f"lamp_{plugin}.py").write_text(LAMP.replace("NAMES", repr(names)))
+        info = folder / f"lamp_{plugin}-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(
+            f"Metadata-Version: 2.1\nName: lamp_{plugin}\nVersion: 1.0\n"
+        )
+        lines = ["[labcrane]", f"lamp_{plugin} = lamp_{plugin}"]
+        lines += ["[labcrane.offers]", f"{name} = lamp_{plugin}"] if declared else []
+        (info / "entry_points.txt").write_text("\n".join(lines))
 
 
 BROKEN = {

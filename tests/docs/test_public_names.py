@@ -21,6 +21,7 @@ from pydantic import BaseModel
 
 import labcrane
 import labcrane.testing
+from labcrane.documented import descriptions
 
 NOT_ASKED = {
     "ES01": "a summary that says all needs no more",
@@ -98,12 +99,15 @@ def test_arrays_have_shapes_and_numbers_have_units(name: str) -> None:
         assert UNIT.search(text), f"{name} has numbers ({', '.join(numbers)}) without a unit"
 
 
-def hints_of(function: object) -> dict[str, object]:
-    """Return the types of a function's parameters and of what it returns."""
-    import pandas  # as labcrane has it for type checkers only
+def hints_of(what: object) -> dict[str, object]:
+    """Return the types of a function's parameters and result, or of a record's fields."""
+    import numpy.typing  # as labcrane has them for type checkers only
+    import pandas
 
     public = {name: getattr(labcrane, name) for name in labcrane.__all__}
-    return typing.get_type_hints(function, localns={"pd": pandas, **public})
+    return typing.get_type_hints(
+        what, localns={"pd": pandas, "np": numpy, "npt": numpy.typing, **public}
+    )
 
 
 def has_float(hint: object) -> bool:
@@ -123,7 +127,7 @@ def test_every_field_of_a_record_is_described(name: str) -> None:
     }
     summary = " ".join([*document["Summary"], *document["Extended Summary"]])
     below = field_docstrings(what)
-    hints = typing.get_type_hints(what)
+    hints = hints_of(what)
     for each in fields(what):
         if each.name.startswith("_"):
             continue
@@ -158,10 +162,11 @@ def texts_below(body: list[ast.stmt]) -> Iterator[tuple[str, str]]:
 
 @pytest.mark.parametrize("name", [n for n, c in CLASSES.items() if issubclass(c, BaseModel)])
 def test_every_key_of_a_model_is_described(name: str) -> None:
+    written = descriptions(CLASSES[name])
     for key, field in CLASSES[name].model_fields.items():
-        assert field.description, f"{name}.{key} is not described"
+        assert key in written, f"{name}.{key} is not described"
         if field.annotation is float:
-            assert UNIT.search(field.description), f"{name}.{key} has no unit: {field.description}"
+            assert UNIT.search(written[key]), f"{name}.{key} has no unit: {written[key]}"
 
 
 def values() -> Iterator[tuple[ModuleType, str]]:

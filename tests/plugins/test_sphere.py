@@ -10,7 +10,8 @@ from pydantic import ValidationError
 
 from labcrane import Cue
 from labcrane.testing import TARGETS, CueContract, a_run, a_target, ch8
-from labcrane_sphere.sphere import Sphere, SphereSettings
+from labcrane_sphere.settings import SphereSettings
+from labcrane_sphere.sphere import Sphere
 
 
 class TestSphere(CueContract):
