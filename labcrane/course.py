@@ -214,6 +214,8 @@ class Course:
     def _wished_end(self) -> Phase | None:
         if self._held.ending:
             return Phase.ENDED
+        if not self._wishes:
+            return None
         if Order.SKIP in self._wishes:
             return Phase.SKIPPED
         return Phase.REPEATED if Order.REPEAT in self._wishes else None
