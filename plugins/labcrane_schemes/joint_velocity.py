@@ -37,7 +37,7 @@ class JointVelocity(Controller):
         self._sticks = tuple(
             (axis, sign * full) for (axis, sign), full in zip(axes, self._full, strict=True)
         )
-        self._n_axes = run.axes.size
+        self._hands = np.zeros(run.axes.size)
         self._angle = run.state.find("joint.angle")
 
     def command(self, axes: FloatArray, state: FloatArray) -> FloatArray:
@@ -56,8 +56,8 @@ class JointVelocity(Controller):
     def steer(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
         angles = state[self._angle].tolist()
         speeds, scale, factors = self._rate.solve_base(angles, *velocity.tolist())
-        axes, unshape = [0.0] * self._n_axes, self._shaping.unshape
+        hands, unshape = self._hands, self._shaping.unshape
         for (axis, full), speed, left in zip(self._sticks, speeds, factors, strict=True):
-            if abs(speed) > NOTHING and left > 0.0:
-                axes[axis] = unshape(scale * speed / (full * left))
-        return np.array(axes)
+            moves = abs(speed) > NOTHING and left > 0.0
+            hands[axis] = unshape(scale * speed / (full * left)) if moves else 0.0
+        return hands
