@@ -62,7 +62,8 @@ class Movement:
     ) -> None:
         """Take one tick."""
         settings = self.settings
-        speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
+        vx, vy, vz = velocity
+        speed = math.sqrt(vx * vx + vy * vy + vz * vz)
         distance = math.dist(tip, self.target)
         inside = distance <= settings.width / 2
         self.entered = inside and not self.inside

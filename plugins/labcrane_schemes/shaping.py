@@ -40,13 +40,10 @@ class Shaping:
         if share == 0.0:
             return 0.0
         size = abs(share)
-        push = self._edge + self._rest * self._root(size if size < 1.0 else 1.0)
+        x = size if size < 1.0 else 1.0
+        if self._stretch > 0.0:  # the one real root, after Cardano in its hyperbolic form
+            x = self._stretch * math.sinh(math.asinh(self._steepness * x) / 3.0)
+        elif not self._straight:
+            x = math.cbrt(x)
+        push = self._edge + self._rest * x
         return math.copysign(push if push < 1.0 else 1.0, share)
-
-    def _root(self, share: float) -> float:
-        """Return the one real root of the cubic, after Cardano in its hyperbolic form."""
-        if self._straight:
-            return share
-        if self._stretch == 0.0:
-            return math.cbrt(share)
-        return self._stretch * math.sinh(math.asinh(self._steepness * share) / 3.0)
