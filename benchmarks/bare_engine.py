@@ -7,6 +7,9 @@ from typing import Self
 
 from labcrane import Machine
 
+PASSES = 200
+"""Solver passes with which PyBullet alone follows a crane's commands and keeps its limits."""
+
 
 class BareEngine:
     """Four motors set, one step, four joints read, with nothing of labcrane in between.

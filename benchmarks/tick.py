@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.bare_engine import BareEngine
+from benchmarks.bare_engine import PASSES, BareEngine
 from benchmarks.table import Row
 from labcrane import Frame, InputDevice, Signal, Tick, loop, rig
 from labcrane.clock import Clock, ManualClock, SystemClock, ticks
@@ -176,11 +176,9 @@ def rows() -> list[Row]:
 
 def cost(folder: Path) -> dict[str, list[np.ndarray]]:
     """Print the cost of a tick, bare and whole; return all times in s."""
-    from labcrane_bullet import bullet_crane as crane  # noqa: PLC0415
-
     study = study_at(240.0, folder)
     found: dict[str, list[np.ndarray]] = {"bare": [], "whole": [], "whole, LSL": []}
-    with BareEngine(study.machine, study.protocol.rate_hz, crane.ITERATIONS) as engine:
+    with BareEngine(study.machine, study.protocol.rate_hz, PASSES) as engine:
         for _ in range(ROUNDS):
             gc.collect()
             found["bare"].append(bare_times(engine, TICKS)[WARM_UP:])

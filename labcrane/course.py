@@ -78,7 +78,7 @@ class Course:
     @property
     def moving(self) -> bool:
         """Whether the operator's command reaches the machine in this tick."""
-        return self._attempt is not None and not self._held
+        return self._attempt is not None and not self._held.by
 
     def heed(
         self, commands: Sequence[Command], lost_input: str | None, disk_trouble: str | None
@@ -98,7 +98,7 @@ class Course:
 
     def judge(self, frame: Frame) -> None:
         """Complete ``frame``: trial, phase, the task's values, and everything that happened."""
-        frame.paused = bool(self._held)
+        frame.paused = bool(self._held.by)
         frame.events = self._stamped(frame)
         try:
             self._script.send(frame)
@@ -214,6 +214,8 @@ class Course:
     def _wished_end(self) -> Phase | None:
         if self._held.ending:
             return Phase.ENDED
+        if not self._wishes:
+            return None
         if Order.SKIP in self._wishes:
             return Phase.SKIPPED
         return Phase.REPEATED if Order.REPEAT in self._wishes else None

@@ -26,6 +26,8 @@ class Holding:
     ----------
     awaited
         Those of them that have neither presented nor been left out.
+    by
+        Who holds the session.
     ending
         Why the session must end, reason by reason; empty while it may go on.
     """
@@ -38,32 +40,29 @@ class Holding:
     ) -> None:
         self._on_fault = on_fault
         self._note = note
-        self._by: set[str] = set()
+        self.by: set[str] = set()
         self.ending: list[str] = []
         self.awaited = set(awaits)
         for name in sorted(self.awaited):
             note("feedback.awaited", {"what": name})
 
     def __contains__(self, who: str) -> bool:
-        return who in self._by
-
-    def __bool__(self) -> bool:
-        return bool(self._by)
+        return who in self.by
 
     def hold(self, who: str) -> None:
         """Hold the session for ``who``."""
-        self._by.add(who)
+        self.by.add(who)
         self._note("pause.start", {"by": who})
 
     def release(self, who: str) -> None:
         """Let the session go on as far as ``who`` is concerned."""
-        if who in self._by:
-            self._by.discard(who)
+        if who in self.by:
+            self.by.discard(who)
             self._note("pause.end", {"by": who})
 
     def watch(self, part: str, trouble: str | None) -> None:
         """Hold the session while a part is in trouble; None is none."""
-        held = part in self._by
+        held = part in self.by
         if trouble is not None and not held:
             self._note(f"{part}.lost", {"why": trouble})
             self.hold(part)
@@ -97,5 +96,5 @@ class Holding:
         self._note("feedback.lost", {"what": name, "why": why, "left_out": left_out})
         if left_out:
             self.awaited.discard(name)
-        if self._on_fault.feedback_lost == "pause" and who not in self._by:
+        if self._on_fault.feedback_lost == "pause" and who not in self.by:
             self.hold(who)

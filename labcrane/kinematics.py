@@ -69,13 +69,13 @@ class Arm:
         self._base_x = machine.base_x
         self._height = slew.d
         self._slew_offset = slew.offset
-        self._links = tuple((joint.a, joint.offset) for joint in chain)
+        self._links = tuple((number, each.a, each.offset) for number, each in enumerate(chain, 1))
 
     def plane(self, angles: Sequence[float]) -> tuple[float, float]:
         """Return the tip's radius and height in m."""
         radius, height, pitch = 0.0, self._height, 0.0
-        for (length, offset), angle in zip(self._links, angles[1:], strict=True):
-            pitch += angle + offset
+        for joint, length, offset in self._links:
+            pitch += angles[joint] + offset
             radius += length * math.cos(pitch)
             height -= length * math.sin(pitch)
         return radius, height
@@ -90,15 +90,16 @@ class Arm:
         """Return the direction in which the arm points from the slew axis, in rad."""
         return angles[0] + self._slew_offset
 
-    def planar_jacobian(self, angles: Sequence[float]) -> tuple[tuple[float, float], ...]:
+    def planar_jacobian(self, angles: Sequence[float]) -> Sequence[tuple[float, float]]:
         """Return radius and height per joint speed in m/rad, one pair for every pitch joint."""
-        pitch, ends = 0.0, []
-        for (length, offset), angle in zip(self._links, angles[1:], strict=True):
-            pitch += angle + offset
-            ends.append((length * math.cos(pitch), length * math.sin(pitch)))
+        pitch, links = 0.0, []
+        for joint, length, offset in self._links:
+            pitch += angles[joint] + offset
+            links.append((length, pitch))
         radius, drop, columns = 0.0, 0.0, []
-        for forward, down in reversed(ends):  # a joint moves all links behind it
-            radius += forward
-            drop += down
+        for length, pitch in reversed(links):  # a joint moves all links behind it
+            radius += length * math.cos(pitch)
+            drop += length * math.sin(pitch)
             columns.append((-drop, -radius))
-        return tuple(reversed(columns))
+        columns.reverse()
+        return columns

@@ -34,13 +34,11 @@ class Phase(StrEnum):
     ENDED = "ended"  # by command: the session ended in the middle of the trial
     INTERRUPTED = "interrupted"  # the session's process died in the middle of the trial
 
-    @property
-    def over(self) -> bool:
-        """Whether the trial has ended."""
-        return self not in _OPEN
+    over: bool
+    """Whether the trial has ended."""
 
-
-_OPEN = (Phase.RUNNING, Phase.IDLE)
+    def __init__(self, name: str) -> None:
+        self.over = name not in {"idle", "running"}
 
 
 @dataclass(frozen=True, slots=True)

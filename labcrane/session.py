@@ -1,5 +1,6 @@
 """Run one session: open the rig, lead it through its plan, leave a participant file."""
 
+import gc
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -161,7 +162,8 @@ def record(visit: Visit, console: Console) -> None:
                 onlookers = [*outlets, _teller(console)]
                 if not visit.fast:
                     onlookers.append(Slowness(study.oversight, this_run.rate_hz, log, console))
-                loop.run(the_rig, this_run, course, clock, console, log, onlookers)
+                with _settled():
+                    loop.run(the_rig, this_run, course, clock, console, log, onlookers)
         except (PluginError, DeviceError) as error:
             log.note(Event("session.failed", clock.now(), {"why": str(error)}))
             error.add_note(
@@ -209,6 +211,19 @@ def _opening(
         # The dead process could not close its trial; it is a row like any other.
         lost = {**so_far.interrupted, "outcome": str(Phase.INTERRUPTED)}
         yield Event("trial.end", now, lost)
+
+
+@contextmanager
+def _settled() -> Iterator[None]:
+    """Leave what is there before the first tick out of every search for garbage.
+
+    It is as much as everything else that a search looks through, and one takes many ticks' time.
+    """
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 def _teller(console: Console) -> Callable[[Frame], None]:

@@ -136,14 +136,17 @@ def merge(files: Iterable[XdfFile]) -> SessionLog:
         return log
     for _, _, columns in frames:
         log.columns += [column for column in columns if column not in log.columns]
-    log.time = np.concatenate([stream.stamps for _, stream, _ in frames])
+    log.time = _joined([stream.stamps for _, stream, _ in frames])
     log.part = np.concatenate(
         [np.full(len(stream.stamps), float(part)) for part, stream, _ in frames]
     )
-    log.rows = np.concatenate(
-        [_widened(stream, columns, log.columns) for _, stream, columns in frames]
-    )
+    log.rows = _joined([_widened(stream, columns, log.columns) for _, stream, columns in frames])
     return log
+
+
+def _joined(parts: Sequence[FloatArray]) -> FloatArray:
+    """Return all parts as one array; a single one as it is, for a copy takes as long as reading."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def _columns(stream: XdfStream) -> list[Column]:

@@ -26,6 +26,7 @@ PLAN_INTERCEPT_S = 1.0
 PLAN_SLOPE_S = 3.2
 
 PRESSED = 0.5  # a button is 0 or 1
+RUNNING = Phase.RUNNING  # Python 3.11 takes long to find it there in every tick; 3.12 does not
 
 
 class Aiming(Task):
@@ -167,7 +168,7 @@ class Aiming(Task):
             return Phase.SUCCESS, movement.tick_at(movement.rest_since)
         if frame.elapsed >= self._limit:
             return Phase.TIMEOUT, None
-        return Phase.RUNNING, None
+        return RUNNING, None
 
     def _arrived(self) -> bool:
         anywhere = self._settings.end == "rest_anywhere"

@@ -1,8 +1,10 @@
 """One movement of the tip: what was seen of it so far, and its measures when it is over."""
 
 import math
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 
@@ -12,6 +14,14 @@ from labcrane_aiming.settings import AimingSettings
 
 ROUNDING_S = 1e-9
 """Elapsed times are sums of whole ticks."""
+
+Numbers: TypeAlias = "array[float]"
+"""A few in every tick; a list of them takes four times the memory."""
+
+
+def none_yet() -> Numbers:
+    """Return numbers, to be appended to."""
+    return array("d")
 
 
 @dataclass
@@ -25,7 +35,8 @@ class Movement:
     elapsed, due
         Trial time and time on the run's clock of every tick, in seconds.
     speed, position, distance
-        Tip speed in m/s, position in m, and distance to the target's centre in m.
+        Tip speed in m/s, position in m (x, y and z of a tick one after the other), and distance to
+        the target's centre in m.
     inside, entered
         Whether the tip is in the target now, and whether it came into it in this very tick.
     """
@@ -33,11 +44,11 @@ class Movement:
     settings: AimingSettings
     start: Point
     target: Point
-    elapsed: list[float] = field(default_factory=list)
-    due: list[float] = field(default_factory=list)
-    speed: list[float] = field(default_factory=list)
-    position: list[Sequence[float]] = field(default_factory=list)
-    distance: list[float] = field(default_factory=list)
+    elapsed: Numbers = field(default_factory=none_yet)
+    due: Numbers = field(default_factory=none_yet)
+    speed: Numbers = field(default_factory=none_yet)
+    position: Numbers = field(default_factory=none_yet)
+    distance: Numbers = field(default_factory=none_yet)
     entries: int = 0
     first_entry: float = math.nan
     command_onset: float = math.nan
@@ -51,7 +62,8 @@ class Movement:
     ) -> None:
         """Take one tick."""
         settings = self.settings
-        speed = math.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
+        vx, vy, vz = velocity
+        speed = math.sqrt(vx * vx + vy * vy + vz * vz)
         distance = math.dist(tip, self.target)
         inside = distance <= settings.width / 2
         self.entered = inside and not self.inside
@@ -64,7 +76,7 @@ class Movement:
         self.elapsed.append(elapsed)
         self.due.append(due)
         self.speed.append(speed)
-        self.position.append(tip)
+        self.position.extend(tip)
         self.distance.append(distance)
 
     @property
@@ -81,7 +93,7 @@ class Movement:
     def done(self) -> float:
         """Fraction of the way from circle to circle that the tip has made along the task axis."""
         axis = np.subtract(self.target, self.start)
-        way = np.subtract(self.position[-1], self.start)
+        way = np.subtract(self.position[-3:], self.start)
         return float(way @ axis / (axis @ axis))
 
     def onset(self) -> int | None:
@@ -115,8 +127,9 @@ class Movement:
         onset = self.onset()
         last = len(self.elapsed) - 1 if end is None else end
         began = self.elapsed[onset] if onset is not None else math.nan
-        path = np.array(self.position[onset or 0 : last + 1])
-        along, across = self._error(self.position[last])
+        positions = np.array(self.position).reshape(-1, 3)
+        path = positions[onset or 0 : last + 1]
+        along, across = self._error(positions[last])
         bounded = self.settings.end == "rest_inside" and end is not None
         return {
             "reaction_time": began,
@@ -132,7 +145,7 @@ class Movement:
             "peak_speed": max(self.speed),
         }
 
-    def _error(self, tip: Sequence[float]) -> tuple[float, float]:
+    def _error(self, tip: FloatArray) -> tuple[float, float]:
         axis: FloatArray = np.subtract(self.target, self.start)
         axis = axis / np.linalg.norm(axis)
         miss = np.subtract(tip, self.target)

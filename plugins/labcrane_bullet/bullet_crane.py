@@ -44,7 +44,9 @@ class BulletCrane(Crane):
         self._joints = tuple(range(len(machine.joints)))
         self._efforts = tuple(joint.effort for joint in machine.joints)
         self._no_efforts = (0.0,) * len(machine.joints)
-        self._bounds = tuple((*joint.limits, joint.effort) for joint in machine.joints)
+        self._bounds = tuple(
+            (number, *joint.limits, joint.effort) for number, joint in enumerate(machine.joints)
+        )
         self._client: int | None = None
         self._folder: tempfile.TemporaryDirectory[str] | None = None
 
@@ -91,7 +93,7 @@ class BulletCrane(Crane):
         for joint, angle in zip(self._joints, angles, strict=True):
             _prepare(body, joint, client)
             pybullet.resetJointState(body, joint, angle, 0.0, physicsClientId=client)
-        self._angles, self._speeds = tuple(angles), (0.0,) * len(self._joints)
+        self._angles, self._speeds = list(angles), [0.0] * len(self._joints)
         self._motors_on = True
         # One call moves all joints and one reads them; a call per joint costs three times more.
         motors = partial(
@@ -117,15 +119,16 @@ class BulletCrane(Crane):
             self._solve(targetVelocities=speeds)
             self._motors_on = True
         self._step()
-        self._angles, self._speeds, *_ = zip(*self._read(), strict=True)
+        states = self._read()
+        self._angles = [state[0] for state in states]
+        self._speeds = [state[1] for state in states]
         return self._state.fill(self._angles, self._speeds)
 
     def _suffice(self, torques: Sequence[float]) -> bool:
         """Say whether the motors can give these torques, and no joint is beyond its limits."""
-        for angle, torque, (lowest, highest, effort) in zip(
-            self._angles, torques, self._bounds, strict=True
-        ):
-            if not (lowest <= angle <= highest and -effort <= torque <= effort):
+        angles = self._angles
+        for joint, lowest, highest, effort in self._bounds:
+            if not (lowest <= angles[joint] <= highest and -effort <= torques[joint] <= effort):
                 return False
         return True
 

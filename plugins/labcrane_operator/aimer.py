@@ -20,6 +20,10 @@ class Doing(Enum):
     HOLDING = auto()  # at rest inside the target
 
 
+# Python 3.11 takes long to find an attribute of an enumeration; 3.12 does not.
+WAITING, REACTING, MOVING, LOOKING, HOLDING = Doing
+
+
 class Aimer:
     """One trial's aimed movements.
 
@@ -46,7 +50,7 @@ class Aimer:
         self._noise = noise
         self._slowness = slowness
         self._dt = dt
-        self._doing = Doing.WAITING
+        self._doing = WAITING
         self._target: Point | None = None
         self._plan: SubMovement | None = None
         self._time = 0.0
@@ -56,11 +60,11 @@ class Aimer:
     @property
     def pressing(self) -> bool:
         """Whether the trigger is pressed now."""
-        return self._doing is Doing.HOLDING and self._press > 0.0
+        return self._doing is HOLDING and self._press > 0.0
 
     def rest(self) -> None:
         """There is no target: forget the last one."""
-        self._doing, self._target = Doing.WAITING, None
+        self._doing, self._target = WAITING, None
 
     def move(self, tip: Point, speed: float, target: Point, radius: float) -> Point:
         """Return the tip velocity in m/s that the hands ask for now.
@@ -70,30 +74,32 @@ class Aimer:
         """
         if target != self._target:
             self._see(target)
+        if self._doing is MOVING:
+            return self._follow(tip)
         self._wait -= self._dt
         off = math.dist(tip, target)
         inside = off <= self._settings.inside * radius
-        if self._doing is Doing.HOLDING:
+        if self._doing is HOLDING:
             self._press -= self._dt
             if inside:
                 return STILL
             self._aim(tip, target, radius)
-        elif self._doing is Doing.REACTING:
+        elif self._doing is REACTING:
             if self._wait > 0.0:
                 return STILL
             self._aim(tip, target, radius)
-        elif self._doing is Doing.LOOKING and self._wait <= 0.0:
+        elif self._doing is LOOKING and self._wait <= 0.0:
             if not inside:
                 self._aim(tip, target, radius)
             elif speed < self._settings.still_m_s:
-                self._doing = Doing.HOLDING
+                self._doing = HOLDING
                 return STILL
         return self._follow(tip)
 
     def _see(self, target: Point) -> None:
         """Turn to a new target."""
         settings = self._settings
-        self._doing, self._target = Doing.REACTING, target
+        self._doing, self._target = REACTING, target
         self._wait = self._noise.reaction(settings.reaction_s, settings.reaction_sd)
         if self._noise.lapse(settings.lapse_rate):
             self._wait += settings.lapse_s
@@ -107,7 +113,7 @@ class Aimer:
         )
         end = self._noise.scatter(tip, target, settings.endpoint_noise)
         self._plan = SubMovement(tip, end, duration)
-        self._doing, self._time = Doing.MOVING, 0.0
+        self._doing, self._time = MOVING, 0.0
 
     def _follow(self, tip: Point) -> Point:
         """Return the velocity in m/s along the plan and towards it, with the hands' noise."""
@@ -119,7 +125,7 @@ class Aimer:
         pace = self._advance(plan, math.sqrt(ex * ex + ey * ey + ez * ez))
         gain = settings.gain_per_s
         vx, vy, vz = pace * vx + gain * ex, pace * vy + gain * ey, pace * vz + gain * ez
-        if vx * vx + vy * vy + vz * vz < settings.still_m_s**2 and self._doing is Doing.LOOKING:
+        if vx * vx + vy * vy + vz * vz < settings.still_m_s**2 and self._doing is LOOKING:
             return STILL
         nx, ny, nz = self._noise.motor()
         sd = settings.motor_noise
@@ -129,8 +135,8 @@ class Aimer:
         """Go on in the plan by a tick; return its pace, below 1 when the machine lags behind."""
         pace = 2.0 - 2.0 * lag / self._settings.patience_m
         pace = 1.0 if pace > 1.0 else pace if pace > 0.0 else 0.0
-        if self._doing is Doing.MOVING:
+        if self._doing is MOVING:
             self._time += pace * self._dt
             if self._time >= plan.duration:
-                self._doing, self._wait = Doing.LOOKING, self._settings.look_s
+                self._doing, self._wait = LOOKING, self._settings.look_s
         return pace

@@ -27,7 +27,6 @@ class EndEffector(Controller):
             )
         self.signals = scheme_signals(machine)
         self._settings = settings
-        self._full = machine.speeds
         self._speed = settings.speed_m_s
         self._base = settings.frame == "base"
         self._arm = Arm(machine)
@@ -35,6 +34,7 @@ class EndEffector(Controller):
         self._rate = ResolvedRate(
             machine,
             soft_stops(machine, settings.soft_stop_deg),
+            machine.speeds,
             settings.redundancy,
             settings.damping,
             settings.threshold_m,
@@ -54,8 +54,7 @@ class EndEffector(Controller):
         shape, full_speed = self._shaping.shape, self._speed
         velocity = [sign * full_speed * shape(pushes[axis]) for axis, sign in self._axes]
         solve = self._rate.solve_base if self._base else self._rate.solve
-        speeds = solve(angles, *velocity)
-        scale, factors = self._rate.fit(angles, speeds, self._full)
+        speeds, scale, factors = solve(angles, *velocity)
         joints = len(speeds)
         out[joints] = scale
         for joint, speed in enumerate(speeds):

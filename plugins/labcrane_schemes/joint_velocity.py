@@ -1,5 +1,8 @@
 """Joint-velocity control: each axis turns one joint."""
 
+from functools import partial
+from struct import Struct
+
 import numpy as np
 
 from labcrane import Controller, FloatArray, Machine, Run
@@ -22,40 +25,39 @@ class JointVelocity(Controller):
         self._full = tuple(settings.speed * speed for speed in machine.speeds)
         self._shaping = Shaping(settings.dead_zone, settings.expo)
         self._stops = soft_stops(machine, settings.soft_stop_deg)
-        self._rate = ResolvedRate(machine, self._stops)
+        self._rate = ResolvedRate(machine, self._stops, self._full)
         self._out = rest(machine)
         self._rest = rest(machine)
-        self._axes: tuple[Axis, ...] = ()
+        # Packing numbers into an array costs half of assigning them.
+        self._put = partial(Struct(f"{len(self._out)}d").pack_into, self._out.data, 0)
+        self._sticks: tuple[Axis, ...] = ()  # with the joint's speed that a full push asks for
 
     def open(self, run: Run) -> None:
-        self._axes = find_axes(run.axes, self._names, self._settings.map)
-        self._n_axes = run.axes.size
+        axes = find_axes(run.axes, self._names, self._settings.map)
+        self._sticks = tuple(
+            (axis, sign * full) for (axis, sign), full in zip(axes, self._full, strict=True)
+        )
+        self._hands = np.zeros(run.axes.size)
         self._angle = run.state.find("joint.angle")
 
     def command(self, axes: FloatArray, state: FloatArray) -> FloatArray:
-        pushes, angles, out = axes.tolist(), state[self._angle].tolist(), self._out
-        shape, factor = self._shaping.shape, self._stops.factor
-        speeds, limited = [], []
-        free = self._stops.free(angles)
-        for joint, (axis, sign) in enumerate(self._axes):
-            speed = sign * shape(pushes[axis]) * self._full[joint]
-            left = 1.0 if free else factor(joint, angles[joint], speed)
-            speeds.append(speed * left)
-            limited.append(left)
-        out[:] = (*speeds, 1.0, *limited)
-        return out
+        pushes, angles = axes.tolist(), state[self._angle].tolist()
+        shape = self._shaping.shape
+        speeds = [full * shape(pushes[axis]) for axis, full in self._sticks]
+        limited = self._stops.factors(angles, speeds)
+        if limited is not self._stops.nothing_lost:
+            speeds = [speed * left for speed, left in zip(speeds, limited, strict=True)]
+        self._put(*speeds, 1.0, *limited)
+        return self._out
 
     def rest(self) -> FloatArray:
         return self._rest.copy()
 
     def steer(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
         angles = state[self._angle].tolist()
-        speeds = self._rate.solve_base(angles, *velocity.tolist())
-        scale, factors = self._rate.fit(angles, speeds, self._full)
-        axes, unshape = [0.0] * self._n_axes, self._shaping.unshape
-        for (axis, sign), speed, full, left in zip(
-            self._axes, speeds, self._full, factors, strict=True
-        ):
-            if abs(speed) > NOTHING and left > 0.0:
-                axes[axis] = sign * unshape(scale * speed / (full * left))
-        return np.array(axes)
+        speeds, scale, factors = self._rate.solve_base(angles, *velocity.tolist())
+        hands, unshape = self._hands, self._shaping.unshape
+        for (axis, full), speed, left in zip(self._sticks, speeds, factors, strict=True):
+            moves = abs(speed) > NOTHING and left > 0.0
+            hands[axis] = unshape(scale * speed / (full * left)) if moves else 0.0
+        return hands

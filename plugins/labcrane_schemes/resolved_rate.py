@@ -16,6 +16,13 @@ Redundancy = Literal["minimum_norm", "hold_pitch"]
 NOTHING = 1e-12
 """Joint speed in rad/s that is rounding, not motion; a joint at its limit may have it."""
 
+Column = tuple[float, float]
+"""Radius and height per joint speed, in m/rad."""
+
+Motion = tuple[Sequence[float], float, Sequence[float]]
+"""Joint speeds in rad/s, the scale that brings them all within their limits, and the share of each
+that the soft stops leave."""
+
 
 class ResolvedRate:
     """Inverse differential kinematics of one machine.
@@ -30,6 +37,8 @@ class ResolvedRate:
         Whose joints.
     stops
         What is left of a joint's speed near its limits.
+    full
+        The largest joint speeds in rad/s.
     redundancy
         ``minimum_norm`` or ``hold_pitch``.
     damping, threshold
@@ -40,104 +49,113 @@ class ResolvedRate:
         self,
         machine: Machine,
         stops: SoftStops,
+        full: Sequence[float],
         redundancy: Redundancy = "minimum_norm",
         damping: float = 0.2,
         threshold: float = 0.5,
     ) -> None:
         self._arm = Arm(machine)
         self._stops = stops
+        self._full = tuple(full)
         self._hold_pitch = redundancy == "hold_pitch"
         self._damping2 = damping * damping
         self._threshold2 = threshold * threshold
 
-    def solve_base(
-        self, angles: Sequence[float], x: float, y: float, z: float
-    ) -> tuple[float, ...]:
-        """Return the joint speeds in rad/s for a tip velocity in the base frame, in m/s."""
+    def solve_base(self, angles: Sequence[float], x: float, y: float, z: float) -> Motion:
+        """Return the joints' motion for a tip velocity in the base frame, in m/s."""
         bearing = self._arm.bearing(angles)
         cos, sin = math.cos(bearing), math.sin(bearing)
         return self.solve(angles, cos * x + sin * y, cos * y - sin * x, z)
 
     def solve(
         self, angles: Sequence[float], radial: float, tangential: float, vertical: float
-    ) -> tuple[float, ...]:
-        """Return the joint speeds in rad/s for a tip velocity along the arm, in m/s."""
+    ) -> Motion:
+        """Return the joints' motion for a tip velocity along the arm, in m/s."""
         columns = self._arm.planar_jacobian(angles)
         radius = -columns[0][1]  # the shoulder sits on the slew axis
         radius2 = radius * radius
         slew = tangential * radius / (radius2 + self._damp(radius2))
-        weights = [1.0] * len(columns)
-        pitch = self._pitch(columns, weights, radial, vertical)
+        if self._hold_pitch:
+            columns = _without_turning(columns)
+        pitch = self._pitch(columns, radial, vertical)
+        if self._stops.free(angles):
+            return self._fit([slew, *pitch], self._stops.nothing_lost)
         # A joint less would leave too few to keep the pitch and the tip on its path.
-        if self._hold_pitch or self._stops.free(angles):
-            return slew, *pitch
-        for _ in columns:  # each pass takes load off at least one more joint
-            if not self._relieve(angles, pitch, weights):
-                break
-            pitch = self._pitch(columns, weights, radial, vertical)
-        return slew, *pitch
+        if not self._hold_pitch:
+            pitch = self._relieved(angles, columns, pitch, radial, vertical)
+        speeds = [slew, *pitch]
+        return self._fit(speeds, self._stops.factors(angles, speeds))
 
-    def fit(
-        self, angles: Sequence[float], speeds: Sequence[float], full: Sequence[float]
-    ) -> tuple[float, list[float]]:
-        """Return the scale that brings all joints within their speeds, and the soft stops.
+    def _fit(self, speeds: Sequence[float], factors: Sequence[float]) -> Motion:
+        """Bring all joints within their speeds by one scale, which keeps the tip's direction.
 
-        ``full`` are the largest joint speeds in rad/s. One scale for all joints keeps the tip's
-        direction; cutting single joints would bend its path.
+        Cutting single joints would bend its path.
         """
-        scale, factors = 1.0, [1.0] * len(speeds)
-        free = self._stops.free(angles)
-        for joint, speed in enumerate(speeds):
-            if not free:
-                factors[joint] = self._stops.factor(joint, angles[joint], speed)
-            size, most = abs(speed), full[joint] * factors[joint]
-            if size > NOTHING and size * scale > most:
+        scale = 1.0
+        for speed, full, factor in zip(speeds, self._full, factors, strict=True):
+            size, most = abs(speed), full * factor
+            if size * scale > most and size > NOTHING:
                 scale = most / size
-        return scale, factors
+        return speeds, scale, factors
 
-    def _relieve(
-        self, angles: Sequence[float], pitch: Sequence[float], weights: list[float]
-    ) -> bool:
-        """Weight down the joints that run into their soft stops; say whether any was."""
-        relieved = False
-        for number, speed in enumerate(pitch):
-            factor = self._stops.factor(number + 1, angles[number + 1], speed)
-            if factor < weights[number]:
-                weights[number] = factor
-                relieved = True
-        return relieved
-
-    def _pitch(
+    def _relieved(
         self,
-        columns: Sequence[tuple[float, float]],
-        weights: Sequence[float],
+        angles: Sequence[float],
+        columns: Sequence[Column],
+        pitch: Sequence[float],
         radial: float,
         vertical: float,
-    ) -> list[float]:
-        """Return ``W Jᵀ (J W Jᵀ + λ² I)⁻¹ v``, the pitch joints' speeds in rad/s."""
-        if self._hold_pitch:  # J (I - 1 1ᵀ/n): what is left has speeds that add up to zero
-            mean_r = sum(r for r, _ in columns) / len(columns)
-            mean_z = sum(z for _, z in columns) / len(columns)
-            columns = [(r - mean_r, z - mean_z) for r, z in columns]
+    ) -> Sequence[float]:
+        """Return the pitch joints' speeds with those weighted down that run into a soft stop."""
+        weights = [1.0] * len(columns)
+        for _ in columns:  # each pass takes load off at least one more joint
+            relieved = False
+            for number, speed in enumerate(pitch):
+                factor = self._stops.factor(number + 1, angles[number + 1], speed)
+                if factor < weights[number]:
+                    weights[number] = factor
+                    relieved = True
+            if not relieved:
+                break
+            roots = [math.sqrt(weight) for weight in weights]
+            scaled = [(root * r, root * z) for root, (r, z) in zip(roots, columns, strict=True)]
+            shares = self._pitch(scaled, radial, vertical)
+            pitch = [root * share for root, share in zip(roots, shares, strict=True)]
+        return pitch
+
+    def _pitch(self, columns: Sequence[Column], radial: float, vertical: float) -> Sequence[float]:
+        """Return ``Jᵀ (J Jᵀ + λ² I)⁻¹ v``, the pitch joints' speeds in rad/s."""
         rr = rz = zz = 0.0
-        for (r, z), weight in zip(columns, weights, strict=True):
-            rr += weight * r * r
-            rz += weight * r * z
-            zz += weight * z * z
-        largest2 = 0.5 * (rr + zz + math.hypot(rr - zz, 2.0 * rz))
-        smallest2 = max(rr * zz - rz * rz, 0.0) / largest2 if largest2 > 0.0 else 0.0
-        damp = self._damp(smallest2)
-        rr += damp
-        zz += damp
+        for r, z in columns:
+            rr += r * r
+            rz += r * z
+            zz += z * z
+        threshold2 = self._threshold2
+        # Whether an eigenvalue is below the threshold is told without a root; mostly none is.
+        if rr < threshold2 or (rr - threshold2) * (zz - threshold2) <= rz * rz:
+            damp = self._damp(_smallest(rr, rz, zz))
+            rr += damp
+            zz += damp
         det = rr * zz - rz * rz
         y_r = (zz * radial - rz * vertical) / det
         y_z = (rr * vertical - rz * radial) / det
-        return [
-            weight * (r * y_r + z * y_z) for (r, z), weight in zip(columns, weights, strict=True)
-        ]
+        return [r * y_r + z * y_z for r, z in columns]
 
     def _damp(self, singular2: float) -> float:
         """Return the square of the damping, in m², for the square of a singular value."""
         if singular2 >= self._threshold2:
             return 0.0
         return self._damping2 * (1.0 - singular2 / self._threshold2)
+
+
+def _without_turning(columns: Sequence[Column]) -> list[Column]:
+    """Return ``J (I - 1 1ᵀ/n)``: what is left has speeds that add up to zero."""
+    mean_r = sum(r for r, _ in columns) / len(columns)
+    mean_z = sum(z for _, z in columns) / len(columns)
+    return [(r - mean_r, z - mean_z) for r, z in columns]
+
+
+def _smallest(rr: float, rz: float, zz: float) -> float:
+    """Return the smaller eigenvalue of a symmetric matrix that has none below 0."""
+    largest = 0.5 * (rr + zz + math.hypot(rr - zz, 2.0 * rz))
+    return max(rr * zz - rz * rz, 0.0) / largest if largest > 0.0 else 0.0

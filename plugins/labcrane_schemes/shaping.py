@@ -24,7 +24,8 @@ class Shaping:
         self._linear = 1.0 - expo
         self._straight = expo < ROUNDING
         cubic = not self._straight and self._linear > 0.0
-        self._stretch = math.sqrt(self._linear / (3.0 * expo)) if cubic else 0.0
+        self._stretch = 2.0 * math.sqrt(self._linear / (3.0 * expo)) if cubic else 0.0
+        self._steepness = 3.0 / (self._linear * self._stretch) if cubic else 0.0
 
     def shape(self, push: float) -> float:
         """Return the share of full speed, in [-1, 1], that a deflection in [-1, 1] asks for."""
@@ -39,14 +40,10 @@ class Shaping:
         if share == 0.0:
             return 0.0
         size = abs(share)
-        push = self._edge + self._rest * self._root(size if size < 1.0 else 1.0)
+        x = size if size < 1.0 else 1.0
+        if self._stretch > 0.0:  # the one real root, after Cardano in its hyperbolic form
+            x = self._stretch * math.sinh(math.asinh(self._steepness * x) / 3.0)
+        elif not self._straight:
+            x = math.cbrt(x)
+        push = self._edge + self._rest * x
         return math.copysign(push if push < 1.0 else 1.0, share)
-
-    def _root(self, share: float) -> float:
-        """Return the one real root of the cubic, after Cardano in its hyperbolic form."""
-        if self._straight:
-            return share
-        stretch = self._stretch
-        if stretch == 0.0:
-            return math.cbrt(share)
-        return 2.0 * stretch * math.sinh(math.asinh(1.5 * share / (self._linear * stretch)) / 3.0)

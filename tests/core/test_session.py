@@ -1,5 +1,6 @@
 """A whole session: what it leaves behind, and what is said when it cannot run."""
 
+import gc
 import hashlib
 import json
 import os
@@ -15,7 +16,7 @@ from rehearsal import SHORT, ScriptedConsole, a_study, rehearse
 from virtual_sticks import desk
 
 import labcrane
-from labcrane import DeviceError, PluginError, ProtocolError, RecordingError, rig
+from labcrane import DeviceError, Event, PluginError, ProtocolError, RecordingError, rig
 from labcrane.session import Visit, run
 
 ROOT = Path(__file__).parents[2]
@@ -37,6 +38,18 @@ def test_the_participant_file_holds_every_frame_and_event(visit: Visit) -> None:
     np.testing.assert_array_equal(axes, [frame.axes for frame in seen.frames])
     assert session.events["name"].tolist() == ["session.start", *seen.names]
     assert len(session.trials) == 2
+
+
+def test_ticks_do_not_search_what_was_there_before_them_for_garbage(visit: Visit) -> None:
+    class Looking(ScriptedConsole):
+        def report(self, event: Event) -> None:
+            left_out.append(gc.get_freeze_count())
+            super().report(event)
+
+    left_out: list[int] = []
+    run(visit, Looking())
+    assert min(left_out) > 100_000, "all modules"
+    assert gc.get_freeze_count() == 0
 
 
 def test_the_participant_file_tells_everything_about_its_making(visit: Visit) -> None:

@@ -20,6 +20,7 @@ from cranes import (
     rates,
     standing,
 )
+from rehearsal import SHORT, a_study, rehearse
 
 from labcrane import PRESETS, Arm, FloatArray, Machine, frames
 from labcrane.machine_file import load_machine
@@ -249,3 +250,22 @@ def test_torques_worked_out_before_the_step_change_its_time_only(
             paths.append(drive(crane, commands, rate_hz))
     assert all(passes) == (share < 1.0), "either kind of tick is tried"
     np.testing.assert_allclose(paths[0][:, :8], paths[1][:, :8], rtol=0, atol=1e-6)
+
+
+@needs_bullet
+def test_a_simulated_operator_who_aims_asks_no_motor_for_too_much(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every tick that did would cost the solver's time (docs/decisions/0108)."""
+    from labcrane_bullet.bullet_crane import BulletCrane
+
+    suffice, enough = BulletCrane._suffice, []
+
+    def count(crane: BulletCrane, torques: list[float]) -> bool:
+        enough.append(suffice(crane, torques))
+        return enough[-1]
+
+    monkeypatch.setattr(BulletCrane, "_suffice", count)
+    rehearse(a_study(tmp_path, SHORT.replace("kinematic_crane", "bullet_crane")))
+    assert len(enough) > 1000
+    assert all(enough)
