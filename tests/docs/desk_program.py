@@ -34,15 +34,18 @@ def start() -> None:
 
 
 def follow(sticks) -> None:
-    """Move the sticks as the pipe says, for ever."""
+    """Move the sticks as the pipe says, for as long as there are any."""
     # For writing as well, so that the pipe does not end with the person's last movement.
     with open(os.open(os.environ["HANDS"], os.O_RDWR), encoding="ascii") as pipe:  # noqa: PTH123
         for line in pipe:
             side, what, much = line.split()
-            if what == "trigger":
-                sticks[side].press(down=much == "1")
-            else:
-                sticks[side].move(int(what), int(much))
+            try:
+                if what == "trigger":
+                    sticks[side].press(down=much == "1")
+                else:
+                    sticks[side].move(int(what), int(much))
+            except OSError:  # the program is at its end and has let go of SDL
+                return
 
 
 sdl.start = start
