@@ -43,11 +43,24 @@ class Pictures:
     def __init__(self, source: str, cameras: Mapping[str, tuple[str, ...]]) -> None:
         self.cameras = cameras
         self._newest: dict[tuple[str, str], Shot] = {}
-        for view in cameras:
-            wanted = pictures_source(source, view)
+        self._stop = threading.Event()
+        self._threads = [
             threading.Thread(
-                target=self._pull, args=(view, wanted), name=f"pictures of {view}", daemon=True
-            ).start()
+                target=self._pull,
+                args=(view, pictures_source(source, view)),
+                name=f"pictures of {view}",
+                daemon=True,
+            )
+            for view in cameras
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    def close(self) -> None:
+        """Let go of all streams."""
+        self._stop.set()
+        for thread in self._threads:
+            thread.join()
 
     def of(self, view: str, camera: str) -> tuple[Shot | None, str]:
         """Return the picture that may be shown now, if there is one, and what to say of it."""
@@ -65,9 +78,10 @@ class Pictures:
         import pylsl  # noqa: PLC0415
 
         while not (found := pylsl.resolve_byprop("source_id", wanted, 1, timeout=WAIT_S)):
-            pass
+            if self._stop.is_set():
+                return
         inlet = PictureInlet(found[0])  # it finds a view that is started again by itself
-        while True:
+        while not self._stop.is_set():
             for sample, stamp in inlet.newest(WAIT_S):
                 self._newest[view, sample["camera"]] = Shot(
                     f"data:image/png;base64,{sample['png']}",

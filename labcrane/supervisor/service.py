@@ -6,6 +6,7 @@ import signal
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -108,12 +109,10 @@ def serve(order: PageOrder, pipe: Connection) -> None:
         gate, host=order.host, port=order.port, log_level="error", server_header=False
     )
     server = uvicorn.Server(config)
-
-    def end() -> None:
-        server.should_exit = True
-
+    end = partial(setattr, server, "should_exit", True)  # noqa: FBT003 - the attribute's value
     threading.Thread(target=_listen, args=(pipe, desk.board, end), daemon=True).start()
     server.run()
+    pictures.close()
 
 
 def _listen(pipe: Connection, board: Board, end: Callable[[], None]) -> None:

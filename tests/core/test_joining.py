@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -145,10 +146,10 @@ def test_pictures_for_the_supervisor_are_made_only_while_somebody_watches(joined
     joined.record()
     wait_for(lambda: len(joined.shown()) > 5, patience_s=60)
     assert not joined.notes.with_suffix(".pictures").exists()
-    page = Pictures(joined.source, {"notes": ("eye",)})
+    with closing(Pictures(joined.source, {"notes": ("eye",)})) as page:
 
-    def a_picture_has_come() -> bool:
-        joined.shown()
-        return page.of("notes", "eye")[1] != "no picture yet"
+        def a_picture_has_come() -> bool:
+            joined.shown()
+            return page.of("notes", "eye")[1] != "no picture yet"
 
-    wait_for(a_picture_has_come, patience_s=60)
+        wait_for(a_picture_has_come, patience_s=60)

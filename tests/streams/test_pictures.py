@@ -1,7 +1,8 @@
 """Pictures of cameras on their way to the supervisor's page."""
 
 import base64
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
 from io import BytesIO
 
 import matplotlib.image
@@ -29,16 +30,30 @@ def outlet(source: str) -> Iterator[PictureOutlet]:
     made.close()
 
 
+Watching = Callable[[str, tuple[str, ...]], Pictures]
+
+
+@pytest.fixture
+def watching() -> Iterator[Watching]:
+    """Return what watches cameras of the view until the test is over."""
+    with ExitStack() as open_:
+        yield lambda source, cameras: open_.enter_context(
+            closing(Pictures(source, {"watch": cameras}))
+        )
+
+
 def test_pictures_are_wanted_only_while_somebody_watches(
     outlet: PictureOutlet, source: str
 ) -> None:
     assert not outlet.wanted
-    Pictures(source, {"watch": ("depth",)})
-    wait_for(lambda: outlet.wanted)
+    with closing(Pictures(source, {"watch": ("depth",)})):
+        wait_for(lambda: outlet.wanted)
 
 
-def test_a_picture_arrives_as_it_was_with_its_age(outlet: PictureOutlet, source: str) -> None:
-    page = Pictures(source, {"watch": ("depth", "cab")})
+def test_a_picture_arrives_as_it_was_with_its_age(
+    outlet: PictureOutlet, source: str, watching: Watching
+) -> None:
+    page = watching(source, ("depth", "cab"))
     assert page.of("watch", "depth") == (None, "no picture yet")
     wait_for(lambda: outlet.wanted)
     now = pylsl.local_clock()
@@ -56,8 +71,10 @@ def test_a_picture_arrives_as_it_was_with_its_age(outlet: PictureOutlet, source:
     assert page.of("watch", "cab") == (None, "no picture yet")
 
 
-def test_a_picture_that_is_out_of_date_is_not_shown(outlet: PictureOutlet, source: str) -> None:
-    page = Pictures(source, {"watch": ("depth",)})
+def test_a_picture_that_is_out_of_date_is_not_shown(
+    outlet: PictureOutlet, source: str, watching: Watching
+) -> None:
+    page = watching(source, ("depth",))
     wait_for(lambda: outlet.wanted)
     made = pylsl.local_clock() - 100.0
     outlet.push({"depth": Picture(GREYS, made)}, made)
