@@ -5,7 +5,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from labcrane import Machine
+from labcrane import Machine, urdf
 
 PASSES = 200
 """Solver passes with which PyBullet alone follows a crane's commands and keeps its limits."""
@@ -27,7 +27,6 @@ class BareEngine:
     def __init__(self, machine: Machine, rate_hz: float, passes: int) -> None:
         from labcrane_bullet import bullet_crane as crane  # noqa: PLC0415
         from labcrane_bullet.engine import pybullet  # noqa: PLC0415
-        from labcrane_bullet.urdf import urdf  # noqa: PLC0415
 
         self._engine = pybullet
         self._client = client = pybullet.connect(pybullet.DIRECT)

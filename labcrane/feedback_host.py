@@ -125,6 +125,7 @@ class FeedbackProcess:
         from labcrane.streams.outlets import source_id  # noqa: PLC0415
 
         ours = source_id(self._order.source, "")
+        # Kept: to end a search takes as long as one that waits.
         self._resolver = pylsl.ContinuousResolver(pred=f"starts-with(source_id, '{ours}')")
         while not self._stop.wait(WAIT_S):
             self._beat()

@@ -6,11 +6,10 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
-from labcrane import FloatArray, Machine, PluginError, Run, Value
+from labcrane import FloatArray, Machine, PluginError, Run, Value, urdf
 from labcrane_bullet.crane import Crane
 from labcrane_bullet.engine import pybullet
 from labcrane_bullet.settings import CraneSettings
-from labcrane_bullet.urdf import urdf
 
 GRAVITY = 9.81
 """In m/s²."""

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from labcrane import Event, FloatArray, Placed, Run, Scene
+from labcrane import Event, FloatArray, Layout, Placed, Run, Scene
 
 Point = tuple[float, float, float]
 ANY = -1.0
@@ -21,16 +21,8 @@ class Way:
     def __init__(self, scene: Scene, placed: tuple[Placed, ...], run: Run) -> None:
         self._goals = scene.goals
         self._placed = {each.name: each for each in placed}
-        self._positions = {
-            signal.name.split(".")[1]: run.state.find(signal.name)
-            for signal in run.state.signals
-            if signal.name.startswith("scene.") and signal.name.endswith(".position")
-        }
-        self._turns = {
-            signal.name: run.state.find(signal.name)
-            for signal in run.state.signals
-            if signal.name.startswith("scene.") and signal.name.endswith(".orientation")
-        }
+        self._positions = _of_things(run.state, "position")
+        self._turns = _of_things(run.state, "orientation")
         self._tip = run.state.find("tip.position")
         self._jaws = run.state.find("joint.angle").stop - 1
         self._opening = run.machine.limits[-1]
@@ -54,9 +46,9 @@ class Way:
 
     def nearest(self, state: FloatArray, what: str, part: str) -> float:
         """Return how far the tip is from the middle of a thing's part, in m."""
-        thing, columns = self._placed[what], f"scene.{what}.orientation"
-        if columns in self._turns:
-            x, y, z, w = state[self._turns[columns]].tolist()
+        thing = self._placed[what]
+        if what in self._turns:
+            x, y, z, w = state[self._turns[what]].tolist()
         else:
             x, y, z, w = 0.0, 0.0, math.sin(thing.yaw / 2.0), math.cos(thing.yaw / 2.0)
         axis, at = np.array([x, y, z]), np.array(self.position(state, what))
@@ -115,3 +107,13 @@ class Way:
         cos, sin = math.cos(thing.yaw), math.sin(thing.yaw)
         ahead, left, up = thing.position
         return ahead + cos * x - sin * y, left + sin * x + cos * y, up + z
+
+
+def _of_things(state: Layout, quantity: str) -> dict[str, slice]:
+    """Return where the state has a quantity of each thing that moves, by the thing's name."""
+    names = (signal.name.split(".") for signal in state.signals)
+    return {
+        words[1]: state.find(".".join(words))
+        for words in names
+        if len(words) == 3 and words[0] == "scene" and words[2] == quantity  # noqa: PLR2004
+    }

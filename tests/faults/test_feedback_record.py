@@ -2,21 +2,17 @@
 
 import os
 import shutil
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from faults.jack_session import Examiner, a_jack_session
 from faults.sessions import unique
-from jack_server import a_jack_server
 from simple_crane import FORM
 
 import labcrane as lab
-from labcrane.console import Command, Order, QueueConsole
-from labcrane.launcher import Launcher
+from labcrane.console import Command, Order
 from labcrane.records import Event
-from labcrane.session_process import VisitOrder
 
 STUDY = (
     """\
@@ -48,17 +44,19 @@ SETTLED_S = 0.5
 """A change is in the next picture and the next tone, on however busy a computer."""
 
 
-class ChangingConsole(QueueConsole):
-    """An examiner who changes settings when all have presented something, and ends soon after."""
+class Changing(Examiner):
+    """Changes settings when all have presented something, and ends soon after."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.presented: Callable[[], list[int]] = list
         self.begun = 0
+
+    def all_have_presented(self) -> bool:
+        return min(keeper.presented for keeper in self.launcher._crew.keepers) > 60
 
     def report(self, event: Event) -> None:
         super().report(event)
-        if event.name != "trial.start" or not (self.begun or min(self.presented()) > 60):
+        if event.name != "trial.start" or not (self.begun or self.all_have_presented()):
             return
         if not self.begun:
             for change in CHANGES:
@@ -73,19 +71,8 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> lab.SessionRecord:
     if shutil.which("jackd") is None and not os.environ.get("CI"):
         pytest.skip("needs jackd")
     folder = tmp_path_factory.mktemp("settings")
-    protocol = folder / "study.yaml"
-    protocol.write_text(STUDY.format(study=unique("settings")))
-    order = VisitOrder(protocol, "P001", 1, folder / "data", simulated=True)
-    said: list[str] = []
-    with a_jack_server(folder) as (name, _), pytest.MonkeyPatch.context() as patch:
-        patch.setenv("JACK_DEFAULT_SERVER", name)
-        console = ChangingConsole()
-        launcher = Launcher(order, console, said.append)
-        console.presented = lambda: [keeper.presented for keeper in launcher._crew.keepers]
-        outcome = launcher.run()
-    assert outcome.died is None, said
-    path = Path("P001-SIMULATED", "P001-SIMULATED.h5")
-    return lab.open_recording(folder / "data" / path).session(1)
+    played, _ = a_jack_session(STUDY.format(study=unique("settings")), folder, Changing())
+    return played
 
 
 def distances(session: lab.SessionRecord, tick: np.ndarray) -> np.ndarray:

@@ -37,7 +37,7 @@ class Engine:
     def loaded(self, machine: Machine) -> Iterator["Engine"]:
         import pybullet
 
-        from labcrane_bullet.urdf import urdf
+        from labcrane import urdf
 
         self.bullet = pybullet
         (self.folder / "crane.urdf").write_text(urdf(machine))

@@ -23,13 +23,13 @@ from labcrane import (
     frames,
     link_boxes,
     read_placed,
+    urdf,
     write_placed,
 )
 from labcrane.approval.materials import referred
 from labcrane.run_text import read_run, write_run
 from labcrane.scene import load_scene, place
 from labcrane.testing import TARGETS, a_run, crane_state
-from labcrane_bullet.urdf import urdf
 from labcrane_view.mesh_reader import read_mesh
 from labcrane_view.settings import CameraSettings, ViewSettings
 from labcrane_view.view import View
