@@ -1,0 +1,37 @@
+"""A session whose sound is played by a JACK server of its own."""
+
+from pathlib import Path
+
+import pytest
+from jack_server import a_jack_server, underruns
+
+from labcrane import SessionRecord, open_recording
+from labcrane.console import QueueConsole
+from labcrane.launcher import Launcher
+from labcrane.session_process import VisitOrder
+
+
+class Examiner(QueueConsole):
+    """Gives orders as the session goes on, and can ask its launcher."""
+
+    launcher: Launcher
+
+
+def a_jack_session(
+    protocol: str, folder: Path, examiner: Examiner, *, real_time: bool = False
+) -> tuple[SessionRecord, list[str]]:
+    """Run a simulated session; return its record, and what the server complained of."""
+    path = folder / "study.yaml"
+    path.write_text(protocol)
+    order = VisitOrder(path, "P001", 1, folder / "data", simulated=True)
+    said: list[str] = []
+    with (
+        a_jack_server(folder, real_time=real_time) as (name, log),
+        pytest.MonkeyPatch.context() as patch,
+    ):
+        patch.setenv("JACK_DEFAULT_SERVER", name)
+        examiner.launcher = Launcher(order, examiner, said.append)
+        outcome = examiner.launcher.run()
+    assert outcome.died is None, said
+    recording = folder / "data" / "P001-SIMULATED" / "P001-SIMULATED.h5"
+    return open_recording(recording).session(1), underruns(log)
