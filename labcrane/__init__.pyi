@@ -19,6 +19,7 @@ from .kinematics import Arm, frames, jacobian
 from .machine import Body, Joint, Machine
 from .mesh_file import MeshFile
 from .offers import Ask, CommandOffer, Offer, Settings, StudyPath, offer
+from .participants.products import written_about
 from .questions import AnswerError, Answers, Item, Score, numbers
 from .quiet_import import quietly_imported
 from .reachability import reach
@@ -136,4 +137,5 @@ __all__ = [
     "urdf_joint",
     "urdf_link",
     "write_placed",
+    "written_about",
 ]

@@ -2,9 +2,10 @@
 
 import re
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import (
+    AfterValidator,
     ConfigDict,
     Field,
     PositiveFloat,
@@ -14,10 +15,20 @@ from pydantic import (
 
 from labcrane.design.words import Design
 from labcrane.evaluation import IndicatorSettings, StopRule
+from labcrane.names import misfit
 from labcrane.page_settings import PageSettings
 from labcrane.steps import Section, Session, read_sessions
 from labcrane.stream_needs import StreamNeed, TimeLimits
 from labcrane.yaml_file import YamlFile
+
+
+def _names_a_folder(name: str) -> str:
+    if why := misfit(name, person=False):
+        raise ValueError(f"{name!r} {why}")
+    return name
+
+
+FolderName = Annotated[str, AfterValidator(_names_a_folder)]
 
 
 class Use(Section):
@@ -81,7 +92,7 @@ class Protocol(Section):
     labcrane: Literal[1]
     """Version of the protocol format."""
 
-    study: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
+    study: Annotated[FolderName, Field(pattern=r"^[a-z][a-z0-9_-]*$")]
     """Short name of the study, in lower case; part of every seed."""
 
     title: str
@@ -130,7 +141,9 @@ class Protocol(Section):
     views: dict[str, Use] = Field(default_factory=dict)
     """Windows and other displays that are always there, by name."""
 
-    streams: dict[str, StreamNeed] = Field(default_factory=dict)
+    streams: dict[Annotated[str, AfterValidator(_names_a_folder)], StreamNeed] = Field(
+        default_factory=dict
+    )
     """Streams of others to be recorded, by the study's names for them."""
 
     sync: TimeLimits = TimeLimits()

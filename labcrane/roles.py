@@ -15,7 +15,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from pydantic import BaseModel
 
@@ -147,9 +147,17 @@ class Exporter(Component):
     called.
     """
 
+    shared: ClassVar[tuple[str, ...]] = ()
+    """Patterns of files that hold nothing of any participant, as ``read.R``: they stay when one is
+    erased. Every other file that may hold a participant's data is edited then, or removed."""
+
     @abstractmethod
     def export(self, participants: Iterable[Participant], folder: Path) -> None:
         """Write the data of ``participants`` into ``folder``, which exists and is empty.
+
+        Whatever is in it at the end is entered into the register, with the participants in it: a
+        file that is named after one participant, and is written while that participant is the last
+        that was read, is that one's alone. Its files move to their place afterwards.
 
         Go through the participants once and keep nothing of one while the next is read: there may
         be hundreds. Every table says the status of each participant; the caller writes down who
@@ -214,6 +222,13 @@ class Feedback(Component):
 
     cameras: tuple[str, ...] = ()
     """Names of the cameras whose pictures the supervisor's page shows; see ``pictures``."""
+
+    title: str = ""
+    """What a window of it is called; set before it is opened."""
+
+    before: Sequence[BaseModel] = ()
+    """Settings of others of the same kind that the protocol names before it, which may have windows
+    already; set before it is opened."""
 
     def hear(self, situation: Situation) -> None:
         """Be told what the session is about, before the first frame and whenever it changes."""

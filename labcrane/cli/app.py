@@ -26,7 +26,7 @@ MODULES = {
     "simulating": ("simulate", "power"),
     "approval": ("approve", "amend", "methods"),
     "people": ("participants", "consent", "exclude", "note", "waive", "deviations"),
-    "upkeep": ("erase", "relabel", "transfer"),
+    "upkeep": ("where", "erase", "relabel", "transfer"),
 }
 """Where commands are: a module, and its functions."""
 

@@ -1,7 +1,7 @@
 """Commands that work on recordings: export, report, replay."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +15,7 @@ from labcrane.errors import ProtocolError, RecordingError
 if TYPE_CHECKING:
     from labcrane.analysis.cohort import Cohort, Participant, Struck
     from labcrane.analysis.movements import Groups
+    from labcrane.participants.products import Product
 
 DataFolder = Annotated[Path, typer.Argument(metavar="DATA", help="the study's data folder")]
 Include = Annotated[
@@ -25,7 +26,6 @@ Workers = Annotated[int, typer.Option(help="processes on this computer", min=1)]
 Scheduler = Annotated[
     str | None, typer.Option(help="a Dask scheduler whose workers do it: tcp://host:8786")
 ]
-MANIFEST = "labcrane_export.json"
 
 
 def export(
@@ -58,12 +58,12 @@ def export(
     cohort = cohort_of(data.resolve() if scheduler else data, include)
     _, first = next(cohort.included[0].sessions())
     exporter = oversight.call(place, offer.build, chosen, machine_of(first))
-    folder.mkdir(parents=True, exist_ok=True)
     people = _measured(cohort, workers, scheduler)
-    with progress_bar(f"export to {to}", len(cohort.included)) as advance:
-        oversight.call(place, exporter.export, _counted(people, advance), folder)
-    _write_manifest(folder, to, chosen.model_dump(mode="json"), cohort)
-    _keep_track(data, to, folder, cohort)
+    with _product(data, to, folder, cohort, shared=exporter.shared) as made:
+        handed = made.handing_out((person.name, person) for person in people)
+        with progress_bar(f"export to {to}", len(cohort.included)) as advance:
+            oversight.call(place, exporter.export, _counted(handed, advance), made.folder)
+        _write_manifest(made.folder, to, chosen.model_dump(mode="json"), cohort)
     out.print(f"{to}: {folder}", markup=False)
 
 
@@ -95,15 +95,18 @@ def report(
     from labcrane.analysis.report import write_report
 
     cohort = cohort_of(data.resolve() if scheduler else data, include)
-    with progress_bar("report", len(cohort.included)) as advance:
+    with (
+        _product(data, "report", folder, cohort, whole=True) as made,
+        progress_bar("report", len(cohort.included)) as advance,
+    ):
         page = write_report(
             cohort,
-            folder,
+            made.folder,
             progress=lambda done, of: advance(),
             workers=workers,
             scheduler=scheduler,
         )
-    out.print(f"report: {page}", markup=False)
+    out.print(f"report: {folder / page.name}", markup=False)
 
 
 def replay(
@@ -146,10 +149,12 @@ def replay(
 def _write_measures(recording: Path, session: int, frames: "Groups", path: Path) -> None:
     """Write the measures of a session's movements in the ``frames`` of its replay."""
     from labcrane.analysis.measures import measure_session
+    from labcrane.participants.products import written_about
     from labcrane.recording.recording import open_recording
 
     record = open_recording(recording).session(session)
-    measure_session(record, frames=frames).to_csv(path, index=False)
+    with written_about(recording, "replay", path) as beside:
+        measure_session(record, frames=frames).to_csv(beside, index=False)
     out.print(f"measures: {path}", markup=False)
 
 
@@ -183,21 +188,25 @@ def _struck(data: Path) -> "dict[str, Struck]":
     return struck
 
 
-def _keep_track(data: Path, to: str, folder: Path, cohort: "Cohort") -> None:
-    """Note in the register where data of its participants went, for erasing and relabelling."""
-    from labcrane.participants.copies import record_export
-    from labcrane.participants.places import Places
+def _product(
+    data: Path,
+    writer: str,
+    folder: Path,
+    cohort: "Cohort",
+    *,
+    shared: Sequence[str] = (),
+    whole: bool = False,
+) -> "AbstractContextManager[Product]":
+    """Return a folder to write into that the register knows; see :mod:`~.participants.products`.
 
-    if not Places(data).register.exists():
-        return  # pilots and simulations only: nobody's data have gone anywhere
-    names = [person.name for person in cohort.included]
-    files = {}
-    for path in (path for path in folder.rglob("*") if path.is_file()):
-        inside = path.relative_to(folder)
-        # A file that is named after somebody holds nobody else; a table may hold everybody.
-        named = [name for name in names if name in str(inside)]
-        files[inside] = named or names
-    record_export(Places(data), to, folder, files, today())
+    Those who were left out are listed in it, with the reason.
+    """
+    from labcrane.analysis.cohort import Status
+    from labcrane.participants.products import product
+
+    people = [*cohort.included, *cohort.left_out]
+    names = [person.name for person in people if person.status is not Status.ERASED]
+    return product(data, writer, folder, names, today(), shared=shared, whole=whole)
 
 
 @contextmanager
@@ -221,7 +230,7 @@ def progress_bar(what: str, total: int) -> Iterator[Any]:
         yield lambda: progress.advance(task)
 
 
-def _counted(participants: "Sequence[Participant]", advance: Any) -> "Iterator[Participant]":
+def _counted(participants: "Iterable[Participant]", advance: Any) -> "Iterator[Participant]":
     for participant in participants:
         yield participant
         advance()
@@ -253,12 +262,11 @@ def _write_manifest(folder: Path, to: str, settings: Any, cohort: "Cohort") -> N
 
     BIDS and Psych-DS allow no further files, so it is hidden from them under ``.labcrane``.
     """
-    import json
     from datetime import UTC, datetime
 
     from labcrane import __version__
+    from labcrane.participants.copies import write_manifest
 
-    (folder / ".labcrane").mkdir()
     content = {
         "labcrane": __version__,
         "format": to,
@@ -267,5 +275,4 @@ def _write_manifest(folder: Path, to: str, settings: Any, cohort: "Cohort") -> N
         "data": cohort.folder.name,
         "participants": cohort.listing().to_dict("records"),
     }
-    path = folder / ".labcrane" / MANIFEST
-    path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_manifest(folder, content)

@@ -29,6 +29,8 @@ class Bids(Exporter):
     export.
     """
 
+    shared = ("dataset_description.json", "README", "participants.json", "phenotype/*.json")
+
     def __init__(self, settings: BidsSettings, machine: Machine) -> None:
         self._settings = settings
         self._machine = machine

@@ -29,6 +29,8 @@ class Matlab(Exporter):
     are double columns, texts are cells.
     """
 
+    shared = (READER,)
+
     def __init__(self, settings: MatlabSettings) -> None:
         self._settings = settings
 

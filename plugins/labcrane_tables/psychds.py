@@ -16,6 +16,8 @@ class PsychDs(Exporter):
     Streams stay in the participant files: Psych-DS is for tables that people read.
     """
 
+    shared = ("dataset_description.json", "README.md")
+
     def __init__(self, settings: PsychDsSettings) -> None:
         self._settings = settings
 

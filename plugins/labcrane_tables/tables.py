@@ -30,6 +30,8 @@ class Tables(Exporter):
     ===================  ==============================================================
     """
 
+    shared = (READER, "codebook.csv")
+
     def __init__(self, settings: TableSettings) -> None:
         self._settings = settings
 
@@ -99,7 +101,11 @@ def write_csv(table: "pd.DataFrame", path: Path) -> None:
 
     rows = pa.Table.from_pandas(table, preserve_index=False)  # NaN becomes null, which is empty
     if path.suffix == ".gz":
-        with gzip.open(path, "wb", compresslevel=GZIP_LEVEL) as out:
+        # Its head says nothing: neither what the file was called, nor when it was made.
+        with (
+            path.open("wb") as file,
+            gzip.GzipFile("", "wb", GZIP_LEVEL, file, mtime=0) as out,
+        ):
             csv.write_csv(rows, out)
     else:
         csv.write_csv(rows, path)
