@@ -41,6 +41,10 @@ class HostOrder:
         What was measured of its delay, if anything was.
     recorded
         Whether there is a recorder, without which it presents nothing; a preview has none.
+    title
+        What a window of it is called: its name, and the study's.
+    before
+        The displays that come before it in the protocol: windows lie beside theirs.
     """
 
     name: str
@@ -52,6 +56,8 @@ class HostOrder:
     cues: Mapping[str, Part] = field(default_factory=dict)
     measured: Measured | None = None
     recorded: bool = True
+    title: str = ""
+    before: tuple[Part, ...] = ()
 
     def as_json(self) -> str:
         """Return the order as one line."""
@@ -65,6 +71,8 @@ class HostOrder:
             "cues": {name: asdict(part) for name, part in self.cues.items()},
             "measured": asdict(self.measured) if self.measured else None,
             "recorded": self.recorded,
+            "title": self.title,
+            "before": [asdict(part) for part in self.before],
         }
         return json.dumps(fields)
 
@@ -82,4 +90,6 @@ class HostOrder:
             {name: Part(**part) for name, part in found["cues"].items()},
             measured_of(found["measured"]) if found["measured"] else None,
             found["recorded"],
+            found["title"],
+            tuple(Part(**part) for part in found["before"]),
         )

@@ -29,6 +29,10 @@ plugin says ``labcrane_api = 1`` in its module; ``docs/compatibility.md`` says w
 class Settings(Documented):
     """Base of every plugin's settings: unknown keys are errors, values never change."""
 
+    def warnings(self) -> Sequence[str]:
+        """Return what is allowed but should be known beforehand; ``labcrane check`` says it."""
+        return ()
+
 
 def _beside(path: Path, info: ValidationInfo) -> Path:
     return info.context["folder"] / path if info.context else path

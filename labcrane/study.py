@@ -9,6 +9,7 @@ from pathlib import Path
 from labcrane.choices import Choice, Chooser
 from labcrane.errors import ProtocolError
 from labcrane.machine import Machine
+from labcrane.names import check_name
 from labcrane.oversight import Oversight
 from labcrane.protocol import DEFAULT_OPERATOR, Protocol, read
 from labcrane.registry import Registry
@@ -81,6 +82,12 @@ class Study:
             **{f"{kind}.{name}": choice for kind in named for name, choice in named[kind].items()},
         }
 
+    def warnings(self) -> Iterator[str]:
+        """Yield what is allowed, but should be known before people take part."""
+        for part, choice in self.choices.items():
+            for warning in choice.settings.warnings():
+                yield f"{part}: {warning}"
+
     def check_participant(self, participant: str) -> None:
         """Raise :class:`ProtocolError` unless ``participant`` matches the protocol's pattern."""
         pattern = self.protocol.participants.pattern
@@ -90,6 +97,7 @@ class Study:
                 f"participant {participant!r} does not match the protocol's pattern '{pattern}'; "
                 "give the pseudonym as it was handed out, or correct participants: pattern:"
             )
+        check_name(participant, "participant")
 
     def check_session(self, number: int) -> None:
         """Raise :class:`ProtocolError` unless the protocol has session ``number``."""
