@@ -2,12 +2,14 @@
 
 import hashlib
 import platform
+from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import entry_points, version
 from importlib.util import find_spec
 from typing import Any, Protocol
 
 from labcrane.attempt import trial_units
+from labcrane.choices import Choice
 from labcrane.data_folder import DataFolder
 from labcrane.doctor.examination import at_start
 from labcrane.entry_points import PROJECT
@@ -15,6 +17,7 @@ from labcrane.plan import SessionPlan
 from labcrane.plugin_modules import own_plugins
 from labcrane.records import Run
 from labcrane.rig import Rig
+from labcrane.roles import Questionnaire
 from labcrane.study import Study
 from labcrane.study_files import named_files
 
@@ -105,6 +108,10 @@ def _of_study(study: Study, *, simulated: bool) -> dict[str, Any]:
             for label, need in study.protocol.streams.items()
         },
         "rights": {name: each.rights for name, each in study.questionnaires.items()},
+        "questionnaires": {
+            name: _asked(each, study.questionnaire_choices.get(name))
+            for name, each in study.questionnaires.items()
+        },
         "indicator": study.protocol.indicator.model_dump(mode="json"),
         "sync": study.protocol.sync.model_dump(mode="json"),
         "trial_units": {
@@ -112,6 +119,16 @@ def _of_study(study: Study, *, simulated: bool) -> dict[str, Any]:
             for task in study.tasks.values()
             for column, unit in trial_units(task).items()
         },
+    }
+
+
+def _asked(questionnaire: Questionnaire, choice: Choice | None) -> dict[str, Any]:
+    """Return what a questionnaire asks, in which words, and what it is worth."""
+    return {
+        "title": questionnaire.title,
+        "language": str(getattr(choice.settings, "language", "")) if choice else "",
+        "items": [asdict(item) for item in questionnaire.items()],
+        "scores": [asdict(score) for score in questionnaire.scores],
     }
 
 
