@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from labcrane.analysis.cohort import Participant
-from labcrane.recording.answers import ANSWER, END, SCORE
-from labcrane.recording.recording import SessionRecord
+from labcrane.recording.participant_file.questionnaires import ANSWER, END, SCORE
+from labcrane.recording.participant_file.reader import SessionRecord
 
 if TYPE_CHECKING:
     import pandas as pd

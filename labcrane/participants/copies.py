@@ -12,9 +12,9 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from labcrane.durable_file import UNFINISHED, replacing, write_text
+from labcrane.files.atomic import UNFINISHED, replacing, write_text
+from labcrane.participants.folders import Places
 from labcrane.participants.mentions import Mentions
-from labcrane.participants.places import Places
 from labcrane.participants.proof import mentioned
 from labcrane.participants.register import Export, Owed, Register, changed
 

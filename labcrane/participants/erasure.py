@@ -14,8 +14,8 @@ from labcrane.participants.copies import (
     remove_from_stores,
 )
 from labcrane.participants.enrolment import check_words
+from labcrane.participants.folders import Places
 from labcrane.participants.mentions import Mentions
-from labcrane.participants.places import Places
 from labcrane.participants.proof import mentioned
 from labcrane.participants.register import (
     Owed,

@@ -14,13 +14,13 @@ from datetime import date, datetime
 from pathlib import Path
 from typing import TypeVar
 
-from labcrane.data_folder import DataFolder
-from labcrane.durable_file import UNFINISHED, make_folder, sync_folder
+from labcrane.files.atomic import UNFINISHED, make_folder, sync_folder
 from labcrane.names import file_name_of
 from labcrane.participants.copies import MANIFEST, enter, kept_folder
+from labcrane.participants.folders import Places
 from labcrane.participants.mentions import Mentions
-from labcrane.participants.places import Places
 from labcrane.participants.register import Export, changed, read
+from labcrane.recording.data_folder import DataFolder
 
 Someone = TypeVar("Someone")
 

@@ -6,8 +6,8 @@ import shutil
 from datetime import date
 from pathlib import Path
 
-from labcrane.durable_file import copy, make_folder, replacing, sync_folder
 from labcrane.errors import ProtocolError
+from labcrane.files.atomic import copy, make_folder, replacing, sync_folder
 from labcrane.names import check_name
 from labcrane.participants.copies import (
     Reach,
@@ -18,7 +18,7 @@ from labcrane.participants.copies import (
 )
 from labcrane.participants.enrolment import check_apart, check_words
 from labcrane.participants.erasure import forget_store, reaching
-from labcrane.participants.places import Places
+from labcrane.participants.folders import Places
 from labcrane.participants.register import (
     Deviation,
     Entry,
@@ -29,7 +29,7 @@ from labcrane.participants.register import (
     read,
 )
 from labcrane.participants.transfer import transfer
-from labcrane.recording.relabelling import (
+from labcrane.recording.participant_file.relabel import (
     relabel_journal,
     relabel_participant_file,
     renaming,

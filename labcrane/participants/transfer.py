@@ -5,8 +5,8 @@ import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from labcrane.durable_file import copy, sha256, write_text
 from labcrane.errors import RecordingError
+from labcrane.files.atomic import copy, sha256, write_text
 from labcrane.participants.copies import (
     STORE,
     Reach,
@@ -15,10 +15,10 @@ from labcrane.participants.copies import (
     store_reachable,
     traces,
 )
+from labcrane.participants.folders import Places
 from labcrane.participants.mentions import Mentions
-from labcrane.participants.places import Places
 from labcrane.participants.register import Owed, Register, changed, read
-from labcrane.recording.recover import is_recovered
+from labcrane.recording.participant_file.recover import is_recovered
 
 
 @dataclass

@@ -4,14 +4,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from labcrane.participants.copies import concerns, in_store, reachable, store_reachable, traces
-from labcrane.participants.places import Places
+from labcrane.participants.folders import Places
 from labcrane.participants.register import read
 
 HERE, AWAY, DUE = "there", "cannot be reached now", "due: to be erased or relabelled"
 
 
 @dataclass(frozen=True, slots=True)
-class Whereabouts:
+class CrashMarker:
     """One place.
 
     Attributes
@@ -29,18 +29,18 @@ class Whereabouts:
     state: str
 
 
-def whereabouts(places: Places, participant: str) -> list[Whereabouts]:
+def whereabouts(places: Places, participant: str) -> list[CrashMarker]:
     """Return every place with data of a participant, by exact name."""
     register = read(places)
-    found = [Whereabouts("recordings", str(folder), HERE) for folder in places.all_raw(participant)]
+    found = [CrashMarker("recordings", str(folder), HERE) for folder in places.all_raw(participant)]
     found += [
-        Whereabouts("recordings", str(link), "a link, which is never followed")
+        CrashMarker("recordings", str(link), "a link, which is never followed")
         for link in places.links(participant)
     ]
     if participant in register.participants:
-        found.append(Whereabouts("register", str(places.register), HERE))
+        found.append(CrashMarker("register", str(places.register), HERE))
     if any(stone.participant == participant for stone in register.tombstones):
-        found.append(Whereabouts("register", str(places.register), "tombstone: was erased"))
+        found.append(CrashMarker("register", str(places.register), "tombstone: was erased"))
     for export in register.exports:
         if not concerns(export, participant):
             continue
@@ -49,10 +49,10 @@ def whereabouts(places: Places, participant: str) -> list[Whereabouts]:
         state = HERE if there else AWAY
         if export.staging:
             found.append(
-                Whereabouts(export.exporter, str(places.root / export.staging), "not finished")
+                CrashMarker(export.exporter, str(places.root / export.staging), "not finished")
             )
         found += [
-            Whereabouts(export.exporter, str(folder / name), state)
+            CrashMarker(export.exporter, str(folder / name), state)
             for name, people in sorted(export.files.items())
             if participant in people
         ]
@@ -60,9 +60,9 @@ def whereabouts(places: Places, participant: str) -> list[Whereabouts]:
         if any(name.split("/")[0] == participant for name in files):
             state = HERE if store_reachable(store, register.study, files, ()) else AWAY
             place = in_store(Path(store), register.study, participant)
-            found.append(Whereabouts("store", str(place), state))
+            found.append(CrashMarker("store", str(place), state))
     found += [
-        Whereabouts("owed", owed.folder, DUE)
+        CrashMarker("owed", owed.folder, DUE)
         for owed in register.owed
         if owed.participant == participant
     ]

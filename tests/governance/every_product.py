@@ -18,13 +18,13 @@ from pyarrow import parquet
 
 from labcrane.analysis.indicator import Performance, indicate
 from labcrane.analysis.operator_tests import OperatorTest
-from labcrane.analysis.workbook import write_workbook
+from labcrane.analysis.report.workbook import write_workbook
 from labcrane.cli.app import main
-from labcrane.evaluation import IndicatorSettings
-from labcrane.participants import unfinished
-from labcrane.participants.places import Places
+from labcrane.participants import recovery as unfinished
+from labcrane.participants.folders import Places
 from labcrane.participants.products import product, written_about
 from labcrane.participants.register import read
+from labcrane.protocol.evaluation import IndicatorSettings
 
 PEOPLE = ("P001", "P0011", "VP-001")
 """Each name, or its number, is a part of another."""

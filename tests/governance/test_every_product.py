@@ -18,7 +18,7 @@ from governance.kept_people import REASON
 from governed import TODAY, Lab
 
 from labcrane.cli.app import main
-from labcrane.participants import unfinished
+from labcrane.participants import recovery as unfinished
 from labcrane.participants.register import read
 from labcrane.participants.whereabouts import whereabouts
 

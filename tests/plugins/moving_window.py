@@ -9,9 +9,9 @@ import sys
 import threading
 
 from plugins.whole_picture import counted
-from windows import MACHINE, POSE, a_frame, a_scene
+from windows import MACHINE, POSE, a_scene, make_frame
 
-from labcrane import Situation
+from labcrane import SessionState
 from labcrane.testing import crane_at
 from labcrane_view.settings import ViewSettings
 from labcrane_view.view import View
@@ -22,11 +22,11 @@ settings = ViewSettings(size=(480, 320), renderer=renderer, camera="free", seen_
 view = View(settings, MACHINE)
 view.title, view.before = title, before
 view.open(a_scene())
-view.hear(Situation(step=1, kind="block", block=1, block_name="first", trial=3, trials=9))
+view.update(SessionState(step=1, kind="block", block=1, block_name="first", trial=3, trials=9))
 
 
 def show(number: int) -> None:
-    frame = a_frame(number)
+    frame = make_frame(number)
     frame.trial = 3
     frame.state = crane_at(MACHINE, (0.35 * math.sin(number / 15.0), *POSE[1:]))
     view.present(frame)

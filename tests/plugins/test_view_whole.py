@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from PIL import ImageGrab
 from plugins.whole_picture import counted
-from windows import a_frame, a_view, an_x_server
+from windows import a_view, an_x_server, make_frame
 
 from labcrane_view.settings import ViewSettings
 from labcrane_view.window import free_place
@@ -104,7 +104,7 @@ def test_windows_lie_beside_those_before_them_where_there_is_room() -> None:
 
 
 def test_paused_covers_the_whole_picture() -> None:
-    frame = a_frame()
+    frame = make_frame()
     with a_view(hud=None, content="feedback", targets=False) as view:
         view.present(frame)
         view.present(frame)
