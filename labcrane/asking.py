@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from labcrane.console import Command, Order, by_whom
+from labcrane.console import Command, Order, by_whom, whence
 from labcrane.design.seeds import derive
 from labcrane.inquiry import Inquiry, Said
 from labcrane.plan import SessionPlan
@@ -58,8 +58,10 @@ class Asking:
     def heed(self, command: Command) -> Said:
         """Take an answer, or hand the questionnaire in; return what is said of it."""
         if command.order is Order.SUBMIT:
-            return self._inquiry.hand_in(by_whom(command))
-        return self._inquiry.take(command.text, by_whom(command))
+            name, data = self._inquiry.hand_in(by_whom(command))
+        else:
+            name, data = self._inquiry.take(command.text, by_whom(command))
+        return name, {**data, **whence(command)}
 
     def end(self) -> Iterator[Said]:
         """Yield what is said at its end: that it was left, and the stop rules that it meets."""

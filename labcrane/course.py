@@ -8,7 +8,7 @@ from collections.abc import Generator, Iterable, Mapping, Sequence
 
 from labcrane.asking import Asking
 from labcrane.attempt import Attempt
-from labcrane.console import FAULTS, Command, Order, by_whom
+from labcrane.console import FAULTS, Command, Order, beyond_limits, by_whom, whence
 from labcrane.feedback_settings import FeedbackSettings
 from labcrane.holding import DISK, EXAMINER, INPUT, STOP, Holding
 from labcrane.plan import PlannedBlock, PlannedStep, SessionPlan, next_attempt
@@ -19,6 +19,7 @@ from labcrane.study import Study
 from labcrane.warm_up import WarmUp
 
 Ticks = Generator[None, Frame, None]
+
 
 NOT_ASKED = {
     Order.ANSWER: "no questionnaire is asked",
@@ -88,7 +89,7 @@ class Course:
             if command.order in FAULTS:
                 self._held.report(command)
             elif command.order is Order.DENIED:
-                self._note("page.denied", why=command.text, by=by_whom(command))
+                self._note("page.denied", why=command.text, by=by_whom(command), **whence(command))
             elif self._asking is not None and command.order in {Order.ANSWER, Order.SUBMIT}:
                 self._notes.append(self._asking.heed(command))
             else:
@@ -227,10 +228,16 @@ class Course:
     # Orders
 
     def _obey(self, command: Command) -> None:
-        refused = self._refusal(command)
+        # Every door has looked already; the loop must not fall when one has not.
+        beyond = beyond_limits(command)
+        refused = beyond or self._refusal(command)
         # What names a person must not be in the record, not even as a refused note.
-        text = "" if personal(command.text) else command.text
-        about: dict[str, Value] = {"refused": refused, "by": by_whom(command)}
+        text = "" if beyond or personal(command.text) else command.text
+        about: dict[str, Value] = {
+            "refused": refused,
+            "by": by_whom(command),
+            **whence(command),
+        }
         self._note(f"order.{command.order}", text=text, **about)
         if refused is not None:
             return

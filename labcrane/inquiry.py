@@ -6,6 +6,7 @@ import random
 import re
 from collections.abc import Iterator, Mapping
 
+from labcrane.limits import LimitError, read_json
 from labcrane.privacy import personal
 from labcrane.questions import AnswerError, Item
 from labcrane.recording.answers import ANSWER, END, SCORE
@@ -19,6 +20,10 @@ SIMULATION = "simulation"
 """Who answers for a simulated participant."""
 
 START, REFUSED = "questionnaire.start", "questionnaire.refused"
+
+ANSWER_KIND = "answer"
+UNREAD = "unread"
+"""Item of an answer that was refused before it was read: beyond the limits, or no JSON."""
 
 
 class Inquiry:
@@ -61,14 +66,17 @@ class Inquiry:
         """Take an answer, as JSON of questionnaire, item and value; return what is to be said."""
         data: dict[str, Value] = {**self._about, "by": by}
         try:
-            given = json.loads(text)
+            given = read_json(text, ANSWER_KIND)
             item, value = self._find(given)
             answer = item.check(value)
             if isinstance(answer, str) and (found := personal(answer)):
                 # What names a person must not be in the record, not even as a refused answer.
                 why = f"an answer must not hold {found}; write it without"
                 return REFUSED, {**data, "given": "", "item": item.name, "why": why}
-        except (AnswerError, json.JSONDecodeError) as error:
+        except LimitError as error:
+            # Nor what no page could show.
+            return REFUSED, {**data, "given": "", "item": UNREAD, "why": str(error)}
+        except AnswerError as error:
             return REFUSED, {**data, "given": text, "item": _item_of(text), "why": str(error)}
         self._answers[item.name] = answer
         return ANSWER, {**data, "item": item.name, "value": answer}

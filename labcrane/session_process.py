@@ -19,6 +19,9 @@ from labcrane.registry import discover
 from labcrane.session import Visit, record
 from labcrane.study import load
 
+MOST_A_TICK = 16
+"""Orders taken up in one tick; what else has come waits for the next."""
+
 
 @dataclass(frozen=True, slots=True)
 class VisitOrder:
@@ -81,7 +84,7 @@ class PipeConsole:
         if self._alone:
             return given
         try:
-            while self._pipe.poll():
+            while len(given) < MOST_A_TICK and self._pipe.poll():
                 given.append(self._pipe.recv())
         except (EOFError, OSError):
             self._alone = True
