@@ -52,6 +52,7 @@ from .scene_text import SCENE_PLACED, read_placed, write_placed
 from .shapes import Ball, Beam, Shape, Targets
 from .signals import Layout, Signal, signals_of
 from .urdf_text import urdf, urdf_joint, urdf_link
+from .yaml_file import read_yaml
 
 __version__: str
 
@@ -131,6 +132,7 @@ __all__ = [
     "quietly_imported",
     "reach",
     "read_placed",
+    "read_yaml",
     "signals_of",
     "urdf",
     "urdf_joint",

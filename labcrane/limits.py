@@ -115,15 +115,20 @@ def check_size(size: int, kind: str, what: str = "") -> None:
 def check_text(text: str, kind: str) -> None:
     """Raise :class:`LimitError` where ``text`` may not enter as this ``kind`` of input."""
     check_size(len(text), kind, f"the {kind}")
-    if found := _FOREIGN.search(text):
+    if (sign := foreign(text)) is not None:
         raise LimitError(
-            f"the {kind} holds the character U+{ord(found[0]):04X}, which is no writing; "
-            "leave it out"
+            f"the {kind} holds the character U+{ord(sign):04X}, which is no writing; leave it out"
         )
     if kind == "setting" and (found := _SETTING.search(text)):
         raise LimitError(
             f"the setting holds {found[0]!r}; it is one plain value in one line: name.key=value"
         )
+
+
+def foreign(text: str) -> str | None:
+    """Return the first character in ``text`` that is no writing; None where there is none."""
+    found = _FOREIGN.search(text)
+    return found[0] if found else None
 
 
 def read_json(text: str, kind: str) -> Any:

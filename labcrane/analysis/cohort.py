@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from labcrane.errors import ProtocolError, RecordingError
 from labcrane.recording.parts import participant_path
 from labcrane.recording.recording import Recording, SessionRecord, open_recording
+from labcrane.yaml_file import parse_yaml
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -250,6 +251,4 @@ def _unfinished(session: SessionRecord) -> str | None:
 
 def _planned(protocol: str) -> int:
     """Return how many sessions a protocol has."""
-    from ruamel.yaml import YAML
-
-    return len(YAML(typ="safe").load(protocol)["sessions"])
+    return len(parse_yaml(protocol, "the recorded protocol")["sessions"])

@@ -10,6 +10,7 @@ import numpy as np
 from labcrane.arrays import FloatArray
 from labcrane.machine import Machine
 from labcrane.recording.recording import SessionRecord
+from labcrane.yaml_file import parse_yaml
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,9 +88,7 @@ def groups(session: SessionRecord) -> dict[str, "pd.DataFrame"]:
 
 def machine_of(session: SessionRecord) -> Machine:
     """Return the machine that was operated."""
-    from ruamel.yaml import YAML
-
-    return Machine.model_validate(YAML(typ="safe").load(session.context["machine"]))
+    return Machine.model_validate(parse_yaml(session.context["machine"], "the recorded machine"))
 
 
 def movements(session: SessionRecord) -> Iterator[Movement]:

@@ -8,16 +8,13 @@ from importlib.metadata import EntryPoint, entry_points, version
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
-
 from labcrane.approval.source_tree import hashes
 from labcrane.durable_file import sha256
 from labcrane.entry_points import PROJECT
 from labcrane.errors import ProtocolError
 from labcrane.registry import Registry
 from labcrane.study import Study
-from labcrane.yaml_file import YamlFile
+from labcrane.yaml_file import YamlFile, parse_yaml
 
 DATA = frozenset({".yaml", ".yml", ".json"})
 OWN = "the study's own"
@@ -164,8 +161,8 @@ def content_of_text(text: str, *, data: bool) -> dict[str, Any]:
 def _parsed(text: str) -> Any:
     """Return YAML, of which JSON is a part, as plain data; None if it is none."""
     try:
-        return _json_like(YAML(typ="safe").load(text))
-    except YAMLError:
+        return _json_like(parse_yaml(text, "a file of the study"))
+    except ProtocolError:
         return None
 
 
