@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from labcrane.approval.source_tree import hashes
-from labcrane.durable_file import sha256
-from labcrane.entry_points import PROJECT
 from labcrane.errors import ProtocolError
-from labcrane.registry import Registry
-from labcrane.study import Study
-from labcrane.yaml_file import YamlFile, parse_yaml
+from labcrane.files.atomic import sha256
+from labcrane.files.yaml import YamlFile, parse_yaml
+from labcrane.protocol.study import Study
+from labcrane.registry.entry_points import PROJECT
+from labcrane.registry.registry import Registry
 
 DATA = frozenset({".yaml", ".yml", ".json"})
 OWN = "the study's own"

@@ -10,7 +10,7 @@ from pydantic import Field, NonNegativeFloat, ValidationError, model_validator
 from ruamel.yaml import YAML
 
 from labcrane import ProtocolError, Settings, read_yaml
-from labcrane_dmd.layer import Layer
+from labcrane_dmd.interpolation import Layer
 from labcrane_dmd.model import Direction, Model, Segment, Source
 from labcrane_dmd.output import written
 from labcrane_dmd.recordings import FULL

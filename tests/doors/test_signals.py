@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from labcrane import ProtocolError
 from labcrane.testing import ch8
-from labcrane_can.asked import PanelCommands
+from labcrane_can.command_state import PanelCommands
 from labcrane_can.dbc import signal_names
 from labcrane_can.listener import Listener
 from labcrane_can.settings import CanSettings, ValveMap

@@ -10,12 +10,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from rehearsal import SHORT, a_study, rehearse
 
-from labcrane.console import FAULTS, KINDS, Command, Order, QueueConsole, beyond_limits
-from labcrane.inquiry import Inquiry
+from labcrane.core.items import AnswerError, Item
 from labcrane.limits import LIMITS, LimitError, check_text, read_json
-from labcrane.privacy import personal
-from labcrane.questions import AnswerError, Item
-from labcrane.study import Study
+from labcrane.participants.personal_data import personal
+from labcrane.protocol.study import Study
+from labcrane.session.commands import FAULTS, KINDS, Command, Order, QueueConsole, beyond_limits
+from labcrane.session.questionnaire import QuestionnaireForm
 
 QUESTIONS = """\
 questionnaires:
@@ -164,7 +164,9 @@ def test_looking_for_persons_takes_time_that_grows_no_faster_than_the_text(piece
 
 def test_any_bytes_as_an_answer_leave_a_questionnaire_that_can_be_handed_in(study: Study) -> None:
     dice = random.Random(7)
-    inquiry = Inquiry("subjective_accuracy", study.questionnaires["subjective_accuracy"], {})
+    inquiry = QuestionnaireForm(
+        "subjective_accuracy", study.questionnaires["subjective_accuracy"], {}
+    )
     for _ in range(2000):
         raw = bytes(dice.choices(b'{}[]":,0123456789eE+-.\\u itemvalueques', k=dice.randint(0, 80)))
         name, _ = inquiry.take(raw.decode(), "participant")

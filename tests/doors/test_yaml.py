@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from labcrane import LabcraneError, ProtocolError, read_yaml
 from labcrane.cli.app import main
-from labcrane.registry import Registry, discover
-from labcrane.study import load
-from labcrane.yaml_file import YamlFile, parse_yaml
+from labcrane.files.yaml import YamlFile, parse_yaml
+from labcrane.protocol.study import load
+from labcrane.registry.registry import Registry, discover
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 

@@ -1,0 +1,314 @@
+"""A YAML file that remembers where everything stands, so that every mistake gets a line."""
+
+import re
+from collections.abc import Mapping, Set
+from dataclasses import dataclass, field
+from datetime import date
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.reader import ReaderError
+
+from labcrane.errors import ProtocolError, suggestion
+from labcrane.limits import LIMITS, LimitError, check_size, foreign
+
+DEEPEST = LIMITS["YAML file"].depth
+MOST_MARKS = 20_000
+"""Marks of YAML in a file: they, more than its length, are what reading it takes time for."""
+
+MOST_VALUES = 50_000
+"""Values in a file once every alias stands for what it names."""
+
+MOST_BITS = 1000
+"""Of a whole number: Python writes down no more than 4,300 digits."""
+
+GARBLED = (ValueError, LookupError, TypeError, ArithmeticError, AttributeError, AssertionError)
+
+_MARKS = re.compile(r"[,:\[\]{}\n-]")
+_BRACKETS = re.compile(r"[\[\]{}]")
+_STAIRS = re.compile(r"(?:[-?:] *){50}| {200}")
+
+ModelT = TypeVar("ModelT", bound=BaseModel)
+Place = tuple[str | int, ...]
+"""The keys and indices that lead to a value: ``("sessions", 0, "steps", 2)``."""
+
+
+@dataclass
+class YamlFile:
+    """One file's content, and what is wrong with it.
+
+    Mistakes are collected, so that all of them are told at once by :meth:`raise_problems`.
+
+    Attributes
+    ----------
+    path
+        As the user wrote it.
+    text
+        The file, as it is.
+    data
+        Its content as plain dicts, lists, strings and numbers.
+    """
+
+    path: Path
+    text: str
+    data: Any
+    _marked: Any = None
+    _problems: list[tuple[int, str]] = field(default_factory=list)
+
+    @classmethod
+    def read(cls, path: Path) -> "YamlFile":
+        """Read ``path``; a file that is missing or no YAML raises :class:`ProtocolError`."""
+        text = read_text(path)
+        marked = _load(text, str(path))
+        return cls(path, text, _plain(marked, str(path)), marked)
+
+    def line(self, place: Place) -> int:
+        """Return the line, counted from 1, of the key or list item at ``place``.
+
+        A place that does not exist (a missing key) gives the line of what should hold it.
+        """
+        node, line = self._marked, 1
+        for step in place:
+            if isinstance(node, CommentedMap) and step in node:
+                line = node.lc.key(step)[0] + 1
+            elif isinstance(node, CommentedSeq) and isinstance(step, int) and step < len(node):
+                line = node.lc.item(step)[0] + 1
+            else:
+                break
+            node = node[step]
+        return line
+
+    def problem(self, place: Place, message: str) -> None:
+        """Note a mistake at ``place``."""
+        self._problems.append((self.line(place), message))
+
+    def check(self, model: type[ModelT], place: Place = (), value: Any = None) -> ModelT | None:
+        """Return what stands at ``place`` as a ``model``, or note what is wrong and return None.
+
+        ``value`` is checked instead where what the model sees is not what stands in the file.
+        """
+        if value is None:
+            value = self.data
+            for step in place:
+                value = value[step]
+        if not isinstance(value, Mapping):
+            self.problem(place, f"{_name(place)} must be a mapping of keys, but is {value!r}")
+            return None
+        try:
+            return model.model_validate(value, context={"folder": self.path.parent})
+        except ValidationError as error:
+            for each in error.errors():
+                self.problem((*place, *_inside(value, each)), explain(each, place, model))
+            return None
+
+    def checked(self, model: type[ModelT]) -> ModelT:
+        """Return the whole file as a ``model``, or raise all mistakes in it."""
+        found = self.check(model)
+        self.raise_problems()
+        if found is None:
+            raise AssertionError("what is wrong with a file is a problem, and problems were raised")
+        return found
+
+    def raise_problems(self) -> None:
+        """Raise :class:`ProtocolError` with one line for every mistake, in the file's order."""
+        if self._problems:
+            lines = [f"{self.path}:{line}: {message}" for line, message in sorted(self._problems)]
+            raise ProtocolError("\n".join(dict.fromkeys(lines)))
+
+
+def explain(error: ErrorDetails, place: Place, model: type[BaseModel]) -> str:
+    """Return what was written and what is possible, for one of pydantic's complaints."""
+    loc = error["loc"]
+    key = loc[-1] if loc else _name(place)
+    if error["type"] == "extra_forbidden":
+        possible = _keys(model, loc[:-1])
+        instead = suggestion(str(key), possible, "possible:")
+        return f"{str(key)!r} is not a key of {_name((*place, *loc[:-1]))}; {instead}"
+    if error["type"] == "missing":
+        return f"{_name((*place, *loc[:-1]))} needs {str(key)!r}"
+    what = error["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    if error["type"] == "value_error":
+        return f"{_name((*place, *loc))}: {what}"
+    return f"{_name((*place, *loc))} is {error['input']!r}; it must be {what}"
+
+
+def _keys(model: type[BaseModel], place: Place) -> list[str]:
+    fields: Any = model
+    for step in place:
+        if isinstance(step, int):
+            continue
+        annotation = fields.model_fields[step].annotation if step in fields.model_fields else None
+        nested = [a for a in (annotation, *getattr(annotation, "__args__", ())) if _is_model(a)]
+        if not nested:
+            return []
+        fields = nested[0]
+    return list(fields.model_fields)
+
+
+def _is_model(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+def _inside(value: Any, error: ErrorDetails) -> Place:
+    """Return the part of pydantic's location that is really in the file."""
+    place: list[str | int] = []
+    for step in error["loc"]:
+        is_key = isinstance(value, Mapping) and step in value
+        is_item = isinstance(value, list) and isinstance(step, int) and step < len(value)
+        if not (is_key or is_item):
+            break
+        value = value[step]
+        place.append(step)
+    return tuple(place)
+
+
+def _name(place: Place) -> str:
+    text = ""
+    for step in place:
+        text += f"[{step + 1}]" if isinstance(step, int) else f".{step}" if text else str(step)
+    return text or "the file"
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a file in UTF-8 that people write.
+
+    Raises
+    ------
+    ProtocolError
+        There is none, it is larger than such files are, or no text.
+    """
+    try:
+        check_size(path.stat().st_size, "YAML file", "it")
+        if not path.is_file():
+            raise ProtocolError(f"{path} is no file; give a YAML file")
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise ProtocolError(
+            f"{path} does not exist; check its name, and the folder you are in"
+        ) from None
+    except LimitError as error:
+        raise ProtocolError(f"{path} cannot be read: {error}; split it up") from None
+    except (OSError, ValueError) as error:  # a path with a NUL, bytes that are no UTF-8
+        raise ProtocolError(f"{path} cannot be read: {error}") from error
+
+
+def read_yaml(path: Path) -> Any:
+    """Return the content of a YAML file as plain values, dates as dates.
+
+    Raises
+    ------
+    ProtocolError
+        As :func:`read_text`, or the text is no YAML.
+    """
+    return parse_yaml(read_text(path), str(path))
+
+
+def parse_yaml(text: str, name: str) -> Any:
+    """Return the content of a text of YAML as plain values, dates as dates.
+
+    Parameters
+    ----------
+    name
+        What the text is, for the message when it is none.
+
+    Raises
+    ------
+    ProtocolError
+        It is no YAML, or longer, deeper or larger behind its aliases than may be.
+    """
+    return _plain(_load(text, name), name)
+
+
+def _scalar(node: Any, name: str) -> Any:
+    if node is None or isinstance(node, bool | date | bytes):
+        return node
+    if isinstance(node, int) and node.bit_length() > MOST_BITS:
+        raise ProtocolError(f"{name} holds a whole number of {node.bit_length()} bits; write less")
+    if isinstance(node, str) and (sign := foreign(node)) is not None:
+        raise ProtocolError(
+            f"{name} holds the character U+{ord(sign):04X} in {str(node)[:40]!r}, which is no "
+            "writing; leave it out"
+        )
+    for kind in (int, float, str):
+        if isinstance(node, kind):
+            return kind(node)
+    raise ProtocolError(f"{name} holds {str(node)[:40]!r} with a tag; write plain values")
+
+
+def _load(text: str, name: str) -> Any:
+    try:
+        check_size(len(text), "YAML file", "it")
+    except LimitError as error:
+        raise ProtocolError(f"{name} cannot be read: {error}; split it up") from None
+    if len(_MARKS.findall(text)) > MOST_MARKS:
+        raise ProtocolError(
+            f"{name} has more than {MOST_MARKS} commas, colons, brackets, dashes and line ends; "
+            "split it up"
+        )
+    if (line := _too_deep(text)) is not None:
+        raise ProtocolError(f"{name}:{line}: nested deeper than {DEEPEST} levels; write it flat")
+    try:
+        # Also where no line is asked for: the plain loader copies each merge into the next.
+        return YAML(typ="rt", pure=True).load(text)
+    except MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 1
+        raise ProtocolError(f"{name}:{line}: this is no YAML: {error.problem}") from error
+    except ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        raise ProtocolError(
+            f"{name}:{line}: this is no YAML: it holds the character U+{_code(error):04X}, which "
+            "no text may; remove it"
+        ) from error
+    except RecursionError:
+        raise ProtocolError(
+            f"{name} is nested deeper than {DEEPEST} levels; write it flat"
+        ) from None
+    # Impossible dates, numbers of too many digits, tags on what they do not fit, and whatever else
+    # ruamel.yaml stumbles over: it does not say what it raises.
+    except (YAMLError, *GARBLED) as error:
+        raise ProtocolError(f"{name}: this is no YAML: {str(error) or repr(error)}") from error
+
+
+def _code(error: ReaderError) -> int:
+    return error.character if isinstance(error.character, int) else ord(error.character)
+
+
+def _too_deep(text: str) -> int | None:
+    """Return the line in which brackets, dashes or indentation nest too deep; None if none does.
+
+    What looks nested inside quotes counts as well: nobody writes so.
+    """
+    depth = 0
+    for number, line in enumerate(text.split("\n"), start=1):
+        if _STAIRS.match(line):
+            return number
+        for sign in _BRACKETS.findall(line):
+            depth = depth + 1 if sign in "[{" else max(0, depth - 1)
+            if depth > DEEPEST:
+                return number
+    return None
+
+
+def _plain(node: Any, name: str) -> Any:
+    """Return a node as plain values; what aliases repeat is counted as often as it is there."""
+    left = [MOST_VALUES]
+
+    def plain(node: Any, depth: int) -> Any:
+        left[0] -= 1
+        if left[0] < 0 or depth > 2 * DEEPEST:
+            raise ProtocolError(
+                f"{name} holds more than {MOST_VALUES} values, or itself, behind its aliases; "
+                "write fewer of them"
+            )
+        if isinstance(node, Mapping):
+            return {str(key): plain(value, depth + 1) for key, value in node.items()}
+        if isinstance(node, list | tuple | Set):
+            return [plain(value, depth + 1) for value in node]
+        return _scalar(node, name)
+
+    return plain(node, 0)
