@@ -48,26 +48,26 @@ ERROR = "an error with file, line and what to do"
 LOST = "the input is lost: command to zero, pause, event; back with the next good value"
 
 LIMITS: Mapping[str, Limit] = {
-    "answer": Limit(8_000, "characters", 4, f"JSON of {TEXT}", "supervisor.desk, console", EVENT),
-    "note": Limit(4_000, "characters", 0, TEXT, "supervisor.desk, console", EVENT),
-    "hint": Limit(500, "characters", 0, TEXT, "supervisor.desk, console", EVENT),
+    "answer": Limit(8_000, "characters", 4, f"JSON of {TEXT}", "web.page, session.commands", EVENT),
+    "note": Limit(4_000, "characters", 0, TEXT, "web.page, session.commands", EVENT),
+    "hint": Limit(500, "characters", 0, TEXT, "web.page, session.commands", EVENT),
     "setting": Limit(
-        200, "characters", 0, "one line without YAML's marks", "supervisor.desk, console", EVENT
+        200, "characters", 0, "one line without YAML's marks", "web.page, session.commands", EVENT
     ),
-    "order": Limit(200, "characters", 0, TEXT, "supervisor.desk, console", EVENT),
+    "order": Limit(200, "characters", 0, TEXT, "web.page, session.commands", EVENT),
     "request body": Limit(
-        32_000, "bytes", 0, "any", "supervisor.guard", "status 413 before it is buffered"
+        32_000, "bytes", 0, "any", "web.guard", "status 413 before it is buffered"
     ),
     "message of a page": Limit(
-        64_000, "bytes", 0, "any", "supervisor.guard", "the socket is closed with 1009"
+        64_000, "bytes", 0, "any", "web.guard", "the socket is closed with 1009"
     ),
     "requests of one address": Limit(
-        200, "requests a second", 0, "any", "supervisor.guard", "status 429; one event a second"
+        200, "requests a second", 0, "any", "web.guard", "status 429; one event a second"
     ),
     "orders of one page": Limit(
-        20, "orders a second", 0, "any", "supervisor.desk", "refused; one event a second"
+        20, "orders a second", 0, "any", "web.page", "refused; one event a second"
     ),
-    "sockets": Limit(100, "connections", 0, "any", "supervisor.service", "status 503"),
+    "sockets": Limit(100, "connections", 0, "any", "web.service", "status 503"),
     "CAN frame": Limit(
         4_000, "frames a second", 0, "finite signals within full flow", "labcrane_can", LOST
     ),
@@ -78,16 +78,21 @@ LIMITS: Mapping[str, Limit] = {
         64, "samples a tick", 0, "finite numbers, 0 to 1", "labcrane_keyboard", LOST
     ),
     "stream header": Limit(
-        1_000_000, "characters", 32, "XML without a document type", "recording.stream_header", ERROR
+        1_000_000, "characters", 32, "XML without a document type", "recording.xdf.header", ERROR
     ),
     "stream channels": Limit(
-        4_096, "channels", 0, "a format of XDF, a finite rate", "recording.stream_header", ERROR
+        4_096, "channels", 0, "a format of XDF, a finite rate", "recording.xdf.header", ERROR
     ),
     "YAML file": Limit(
-        256_000, "bytes", 50, "UTF-8; 20,000 marks, 50,000 values after aliases", "yaml_file", ERROR
+        256_000,
+        "bytes",
+        50,
+        "UTF-8; 20,000 marks, 50,000 values after aliases",
+        "files.yaml",
+        ERROR,
     ),
     "DBC file": Limit(1_000_000, "bytes", 0, "a DBC file", "labcrane_can", ERROR),
-    "mesh": Limit(100_000_000, "bytes", 0, "STL, OBJ or glTF", "mesh_file", ERROR),
+    "mesh": Limit(100_000_000, "bytes", 0, "STL, OBJ or glTF", "machines.mesh", ERROR),
     "participant file": Limit(
         5_000_000, "values a column", 0, "HDF5 without links and data outside", "recording", ERROR
     ),

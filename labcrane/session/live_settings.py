@@ -6,10 +6,10 @@ from typing import Any
 from pydantic import ValidationError
 
 from labcrane.core.records import Value
+from labcrane.core.settings import Settings
 from labcrane.errors import ProtocolError
 from labcrane.files.yaml import parse_yaml
 from labcrane.protocol.components import ComponentSpec
-from labcrane.registry.offers import Settings
 
 
 class FeedbackSettings:

@@ -1,4 +1,4 @@
-"""What a panel last asked of each joint."""
+"""Command state: what a panel last asked of each joint."""
 
 import math
 from dataclasses import dataclass
