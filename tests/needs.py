@@ -75,6 +75,9 @@ def _may_run_in_real_time() -> bool:
     return _succeeds(sys.executable, "-c", asked)  # in a process of its own: it would stay so
 
 
+GRAPHICS = tuple(LIBRARIES)
+"""What any picture is drawn with, a hidden one by the software renderer too."""
+
 OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
     "mounts": (
         lambda: _succeeds(*UNSHARE, "sh", "-c", "mount -t tmpfs none /mnt"),

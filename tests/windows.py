@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
-from needs import need
+from needs import GRAPHICS, need
 
 from labcrane import Frame, Run, link_boxes
 from labcrane.testing import TARGETS, a_run, a_target, ch8, crane_at
@@ -33,6 +33,7 @@ def a_frame(number: int = 0) -> Frame:
 
 @contextmanager
 def a_view(**settings: object) -> Iterator[View]:
+    need(*GRAPHICS)
     view = View(ViewSettings(**{"display": "hidden", "size": SIZE, "hud": ()} | settings), MACHINE)
     try:
         view.open(a_scene())

@@ -4,6 +4,7 @@ Both run in threads of their own, so that a slow terminal never makes the loop w
 """
 
 import codecs
+import math
 import os
 import select
 import sys
@@ -214,7 +215,7 @@ def _trial_line(data: Mapping[str, object]) -> str:
     measures = [
         f"{name.replace('_', ' ')} {value:.3g} {unit}"
         for name, unit in (("movement_time", "s"), ("error", "m"))
-        if isinstance(value := data.get(name), float)
+        if isinstance(value := data.get(name), float) and math.isfinite(value)
     ]
     return f"trial {data['trial']}: {', '.join([str(data['outcome']), *measures])}"
 

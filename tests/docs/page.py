@@ -143,7 +143,7 @@ class Reader:
 
     def follow(self, block: Block) -> None:
         """Do what a block says; whatever goes wrong is raised."""
-        self._prepare(block)
+        self.prepare(block)
         marks, text = block.marks, block.text + block.marks.get("then", "")
         language = marks.get("with", block.language)
         if "runs" in marks:
@@ -160,7 +160,7 @@ class Reader:
         elif "file" not in marks or language in PARSERS:
             self._read(language, text, block.line)
 
-    def _prepare(self, block: Block) -> None:
+    def prepare(self, block: Block) -> None:
         """Do what marks ask for before the block itself."""
         marks = block.marks
         if command := marks.get("first"):

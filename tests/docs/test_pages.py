@@ -56,6 +56,7 @@ def follow(
             continue
         if here := [name for name in block.needs if missing(name)]:
             lacking.update(here)
+            reader.prepare(block)  # blocks that follow may need it
             continue
         try:
             reader.follow(block)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from needs import GRAPHICS, needs
 from windows import (
     MACHINE,
     POSE,
@@ -30,6 +31,7 @@ from labcrane_view.settings import CAMERAS, CameraSettings, ViewSettings
 from labcrane_view.view import View
 
 
+@needs(*GRAPHICS)
 class TestView(FeedbackContract):
     """Offered as "view"."""
 
