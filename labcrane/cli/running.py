@@ -13,7 +13,6 @@ from labcrane.cli.output import out
 from labcrane.errors import LabcraneError, ProtocolError
 
 if TYPE_CHECKING:
-    from labcrane.plan import SessionPlan
     from labcrane.session_process import VisitOrder
 
 Participant = Annotated[str, typer.Option(help="pseudonym: P001")]
@@ -129,7 +128,7 @@ def _run_fast(order: "VisitOrder") -> Path:
     visit = replace(order.visit(), fast=True)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
-    with Terminal(console, out.console, _counted(plan), keys=False):
+    with Terminal(console, out.console, len(plan.trials), keys=False):
         return run_session(visit, console)
 
 
@@ -143,11 +142,13 @@ def _launch(order: "VisitOrder", *, page: bool) -> None:
     from labcrane.plan import plan_session
 
     visit = order.visit()
+    if not order.resumed:
+        visit.folder.check_new(order.session)  # before anything is shown
     ask_for_consent(visit, page=page)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
     keys, asked = not visit.simulated, visit.study.questionnaires
-    shown, count = out.console, _counted(plan)
+    shown, count = out.console, len(plan.trials)
     with Terminal(console, shown, count, keys=keys, questionnaires=asked) as terminal:
         launcher = Launcher(order, console, terminal.say)
         with (
@@ -169,12 +170,3 @@ def _launch(order: "VisitOrder", *, page: bool) -> None:
             f"participant file; go on with: labcrane resume {order.protocol} --participant "
             f"{order.participant} --session {order.session}"
         )
-
-
-def _counted(plan: "SessionPlan") -> int:
-    return sum(
-        trial.planned.counted
-        for block in plan.blocks
-        if not block.practice
-        for trial in block.trials
-    )

@@ -6,7 +6,8 @@ from typing import Any
 
 from labcrane.doctor import clock, components, disk, scheduling
 from labcrane.doctor.diagnosis import Check, as_data, diagnosis, latest
-from labcrane.finding import Finding
+from labcrane.doctor.versions import versions
+from labcrane.finding import Finding, Verdict
 from labcrane.registry import Registry
 from labcrane.study import Study
 
@@ -39,6 +40,7 @@ def examine(
         Whether a person is there to move the controls.
     """
     rate_hz = study.protocol.rate_hz if study else RATE_HZ
+    yield from _checks("version", (Finding(Verdict.PASS, line) for line in versions()))
     yield from _checks("clock", clock.examine())
     yield from _checks("scheduling", scheduling.examine(rate_hz))
     yield from _checks("disk", disk.examine(data, needed_bytes))

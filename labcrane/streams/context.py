@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
-from labcrane.records import Event, Frame, Run, Situation
+from labcrane.records import Event, Frame, Run, Situation, is_counted, is_done
 from labcrane.run_text import write_run
 from labcrane.streams.outlets import channel, stream_info
 
@@ -40,9 +40,10 @@ def situation_after(situation: Situation, event: Event) -> Situation:
         case "trial.start":
             named = data.get("feedback", "none")
             active = () if named == "none" else tuple(named.split("+"))
-            return replace(now, trial=data["trial"], active=active)
+            counted = now.done + 1 if is_counted(data) else 0
+            return replace(now, trial=data["trial"], active=active, counted=counted)
         case "trial.end":
-            return replace(now, trial=0, active=())
+            return replace(now, trial=0, active=(), counted=0, done=now.done + is_done(data))
         case "scene.placed":
             return replace(now, scene=data["things"])
         case "feedback.setting":

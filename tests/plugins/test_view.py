@@ -195,7 +195,7 @@ def test_text_is_written_in_the_operators_language() -> None:
     pictures = []
     for language in ("en", "de", "pl"):
         with a_view(language=language, hud=("distance", "trial"), renderer="software") as view:
-            view.hear(Situation(trials=3))
+            view.hear(Situation(trials=3, counted=1))
             view.present(a_frame())
             pictures.append(view.picture()[:60, :250])
     assert len({picture.tobytes() for picture in pictures}) == 3
