@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from labcrane.cli import extension
+from labcrane.cli import plugin_groups as extension
 from labcrane.cli.help import Plain, Sections
 from labcrane.errors import LabcraneError, ProtocolError
 

@@ -13,7 +13,7 @@ from faults.sessions import labcrane, unique, wait_for
 from pages.room import STUDY, Room, a_room
 
 from labcrane import open_recording
-from labcrane.console import FAULTS
+from labcrane.session.commands import FAULTS
 
 RECONNECTS = 200
 
