@@ -9,24 +9,26 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
+from typing import Annotated
 
 import typer
 
 from labcrane.cli import plugin_groups as extension
+from labcrane.cli.help import Plain, Sections
 from labcrane.errors import LabcraneError, ProtocolError
 
 MODULES = {
-    "running": ("demo", "run", "resume"),
-    "inspect": ("check", "plan"),
+    "run": ("demo", "run", "resume"),
+    "check": ("check", "plan"),
     "doctor": ("doctor",),
     "plugins": ("schema", "new_plugin"),
-    "recording": ("streams", "record", "recover", "resync"),
-    "scoring": ("score",),
+    "record": ("streams", "record", "recover", "resync"),
+    "score": ("score",),
     "results": ("export", "report", "replay"),
-    "simulating": ("simulate", "power"),
+    "simulate": ("simulate", "power"),
     "approval": ("approve", "amend", "methods"),
-    "people": ("participants", "consent", "exclude", "note", "waive", "deviations"),
-    "upkeep": ("where", "erase", "relabel", "transfer"),
+    "participants": ("participants", "consent", "exclude", "note", "waive", "deviations"),
+    "data": ("where", "erase", "relabel", "transfer"),
 }
 """Where commands are: a module, and its functions."""
 
@@ -71,18 +73,19 @@ def commands(words: Sequence[str]) -> typer.Typer:
         add_completion=first not in known,  # its options come before a command
         pretty_exceptions_enable=False,
         rich_markup_mode=None,  # what draws boxes round the help takes longer than all the rest
+        cls=Sections,
     )
     app.callback()(_labcrane)
     everything = COMPLETING in os.environ
     if first in known:
-        app.command(first)(_function(known[first], first))
+        app.command(first, cls=Plain)(_function(known[first], first))
         return app
     for name, module in known.items():
         run = _function(module, name)
         about = extension.first_line(run)
         app.command(name, short_help=about)(run if everything else _stub(run))
     if first == PLUGINS or everything:
-        app.add_typer(import_module(f"labcrane.cli.{PLUGINS}").app, name=PLUGINS)
+        app.add_typer(import_module(f"labcrane.cli.commands.{PLUGINS}").app, name=PLUGINS)
     else:
         extension.add(app, PLUGINS, "What installed plugins offer.")
     extension.add(app, FEEDBACK, "Views and sounds.")
@@ -93,7 +96,7 @@ def commands(words: Sequence[str]) -> typer.Typer:
 
 
 def _function(module: str, name: str) -> Callable[..., None]:
-    there = import_module(f"labcrane.cli.{module}")
+    there = import_module(f"labcrane.cli.commands.{module}")
     found: Callable[..., None] = getattr(there, name.replace("-", "_"))
     return found
 
@@ -108,5 +111,20 @@ def _stub(run: Callable[..., None]) -> Callable[[], None]:
     return stub
 
 
-def _labcrane() -> None:
+def _version(asked: bool) -> None:  # noqa: FBT001 - as typer calls it
+    if asked:
+        from labcrane.doctor.versions import versions
+
+        for line in versions():
+            typer.echo(line)
+        raise typer.Exit
+
+
+def _labcrane(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_version, is_eager=True, help="what a bug report needs"),
+    ] = False,
+) -> None:
     """Studies of people operating cranes and manipulators."""
+    del version  # it has been printed

@@ -1,4 +1,4 @@
-"""What a session of one participant consists of, before anything is opened."""
+"""Plan of one participant's session, before anything is opened."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -137,6 +137,20 @@ class SessionPlan:
     def blocks(self) -> tuple[PlannedBlock, ...]:
         """The blocks among the steps."""
         return tuple(step.block for step in self.steps if step.block)
+
+    @property
+    def trials(self) -> tuple[Trial, ...]:
+        """The trials that a study is about, which whoever counts trials counts.
+
+        Practice and what only leads to the next trial are not among them.
+        """
+        return tuple(
+            trial
+            for block in self.blocks
+            if not block.practice
+            for trial in block.trials
+            if trial.planned.counted
+        )
 
     @property
     def expected_s(self) -> float:

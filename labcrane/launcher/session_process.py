@@ -19,6 +19,9 @@ from labcrane.session.commands import Command, Order
 from labcrane.session.resume import Policy
 from labcrane.session.session import Visit, record
 
+MOST_A_TICK = 16
+"""Orders taken up in one tick; what else has come waits for the next."""
+
 
 @dataclass(frozen=True, slots=True)
 class SessionConfig:
@@ -81,7 +84,7 @@ class PipeConsole:
         if self._alone:
             return given
         try:
-            while self._pipe.poll():
+            while len(given) < MOST_A_TICK and self._pipe.poll():
                 given.append(self._pipe.recv())
         except (EOFError, OSError):
             self._alone = True

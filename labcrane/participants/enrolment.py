@@ -7,7 +7,7 @@ from typing import Literal
 from labcrane.design.seeds import derive
 from labcrane.design.slots import group_of, next_slot
 from labcrane.errors import ProtocolError
-from labcrane.names import check_name, twin_key
+from labcrane.files.names import check_name, twin_key
 from labcrane.participants.folders import Places
 from labcrane.participants.mentions import Mentions
 from labcrane.participants.personal_data import personal

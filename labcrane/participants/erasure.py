@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 
-from labcrane.names import OURS, check_name
+from labcrane.files.names import OURS, check_name
 from labcrane.participants.copies import (
     Reach,
     edit_exports,

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable
 
-from labcrane.names import STAMPS
+from labcrane.files.names import STAMPS
 
 LETTER = r"[A-Za-z0-9]"
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from labcrane.files.atomic import UNFINISHED, make_folder, sync_folder
-from labcrane.names import file_name_of
+from labcrane.files.names import file_name_of
 from labcrane.participants.copies import MANIFEST, enter, kept_folder
 from labcrane.participants.folders import Places
 from labcrane.participants.mentions import Mentions

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from labcrane.errors import ProtocolError
 from labcrane.files.atomic import copy, make_folder, replacing, sync_folder
-from labcrane.names import check_name
+from labcrane.files.names import check_name
 from labcrane.participants.copies import (
     Reach,
     edit_exports,

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from labcrane.core.roles import Controller, Dynamics, InputDevice, Questionnaire, Task
 from labcrane.errors import ProtocolError
+from labcrane.files.names import check_name
 from labcrane.files.yaml import Place, YamlFile
 from labcrane.machines.machine import Machine
-from labcrane.names import check_name
 from labcrane.protocol.components import ComponentResolver, ComponentSpec
 from labcrane.protocol.protocol import DEFAULT_OPERATOR, Protocol, read
 from labcrane.protocol.steps import Block

@@ -1,4 +1,4 @@
-"""What the people in the room say to a session, and what it tells them."""
+"""Commands of the people in the room, and what the session tells them."""
 
 import queue
 from collections.abc import Callable
@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
-from labcrane.core.records import Event
+from labcrane.core.records import Event, Value
+from labcrane.limits import LimitError, check_text
 
 
 class Order(StrEnum):
@@ -36,6 +37,14 @@ class Order(StrEnum):
 FAULTS = frozenset({Order.LOST, Order.BACK, Order.FAILED, Order.LEFT_OUT, Order.MENDED})
 """What the launcher says, not people."""
 
+KINDS = {
+    Order.ANSWER: "answer",
+    Order.NOTE: "note",
+    Order.HINT: "hint",
+    Order.SETTING: "setting",
+}
+"""Which of the limits holds for an order's words; that of an order for the rest."""
+
 
 @dataclass(frozen=True, slots=True)
 class Command:
@@ -44,11 +53,28 @@ class Command:
     order: Order
     text: str = ""
     by: str = ""  # which page; empty for the terminal
+    at: str = ""  # the address from which a page asked
 
 
 def by_whom(command: Command) -> str:
     """Return who gave an order: a page by its name, or the terminal."""
     return command.by or "terminal"
+
+
+def whence(command: Command) -> dict[str, Value]:
+    """Return from which address a page ordered, as data of an event; nothing for the terminal."""
+    return {"at": command.at} if command.at else {}
+
+
+def beyond_limits(command: Command) -> str | None:
+    """Return why an order's words may not enter, or None when they may."""
+    if command.order in FAULTS:
+        return None
+    try:
+        check_text(command.text, KINDS.get(command.order, "order"))
+    except LimitError as error:
+        return str(error)
+    return None
 
 
 class Console(Protocol):
@@ -72,7 +98,14 @@ class QueueConsole:
         self.listeners: list[Callable[[Event], None]] = []
 
     def give(self, command: Command) -> None:
-        """Give an order; the session takes it up at its next tick."""
+        """Give an order; the session takes it up at its next tick.
+
+        What may not enter becomes the news that it was refused: it never reaches a pipe.
+        """
+        why = beyond_limits(command)
+        if why is not None:
+            why = f"{command.order.value}: {why}"
+            command = Command(Order.DENIED, why, by_whom(command), command.at)
         self._orders.put(command)
 
     def commands(self) -> list[Command]:

@@ -11,7 +11,7 @@ from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan, next_at
 from labcrane.participants.personal_data import personal
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
-from labcrane.session.commands import FAULTS, Command, Order, by_whom
+from labcrane.session.commands import FAULTS, Command, Order, beyond_limits, by_whom, whence
 from labcrane.session.live_settings import FeedbackSettings
 from labcrane.session.pause import DISK, EXAMINER, INPUT, STOP, Suspenders
 from labcrane.session.practice import WarmUp
@@ -19,6 +19,7 @@ from labcrane.session.questionnaire import QuestionnaireRun
 from labcrane.session.trial import TrialRun
 
 Ticks = Generator[None, Frame, None]
+
 
 NOT_ASKED = {
     Order.ANSWER: "no questionnaire is asked",
@@ -88,7 +89,7 @@ class Sequencer:
             if command.order in FAULTS:
                 self._held.report(command)
             elif command.order is Order.DENIED:
-                self._note("page.denied", why=command.text, by=by_whom(command))
+                self._note("page.denied", why=command.text, by=by_whom(command), **whence(command))
             elif self._asking is not None and command.order in {Order.ANSWER, Order.SUBMIT}:
                 self._notes.append(self._asking.handle(command))
             else:
@@ -229,10 +230,16 @@ class Sequencer:
     # Orders
 
     def _obey(self, command: Command) -> None:
-        refused = self._refusal(command)
+        # Every door has looked already; the loop must not fall when one has not.
+        beyond = beyond_limits(command)
+        refused = beyond or self._refusal(command)
         # What names a person must not be in the record, not even as a refused note.
-        text = "" if personal(command.text) else command.text
-        about: dict[str, Value] = {"refused": refused, "by": by_whom(command)}
+        text = "" if beyond or personal(command.text) else command.text
+        about: dict[str, Value] = {
+            "refused": refused,
+            "by": by_whom(command),
+            **whence(command),
+        }
         self._note(f"order.{command.order}", text=text, **about)
         if refused is not None:
             return

@@ -3,7 +3,6 @@
 import gzip
 import io
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -12,9 +11,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from needs import needs
 
 from labcrane import ProtocolError
 from labcrane.analysis.cohort import Cohort
+from labcrane.analysis.measures import measures_of
 from labcrane.testing import ch8
 from labcrane_bids.bids import Bids
 from labcrane_bids.settings import BidsSettings
@@ -55,9 +56,7 @@ def errors(folder: Path) -> list[str]:
     return [f"{i['code']} {i.get('location')}" for i in issues if i["severity"] == "error"]
 
 
-validated = pytest.mark.skipif(
-    VALIDATOR is None and os.environ.get("CI") != "true", reason="pip install bids-validator-deno"
-)
+validated = needs("bids-validator-deno")
 
 
 @validated
@@ -110,7 +109,7 @@ def test_what_the_validator_misses(folder: Path, cohort: Cohort, system: str) ->
 
 def test_events_are_seconds_from_the_first_sample(folder: Path, cohort: Cohort) -> None:
     events = pd.read_csv(folder / f"{MOTION}_events.tsv", sep="\t", na_values="n/a")
-    measured = cohort.included[0].measures()
+    measured = measures_of(cohort.included[0])
     starts = events[(events["trial_type"] == "trial.start") & events["response_time"].notna()]
     np.testing.assert_allclose(starts["response_time"], measured["reaction_time"])
     np.testing.assert_allclose(starts["onset"], measured["started"] - 100.0, atol=1e-9)

@@ -42,8 +42,8 @@ def export(
     scheduler: Scheduler = None,
 ) -> None:
     """Export recordings for R, MATLAB, BIDS, Psych-DS or EEG programs."""
+    from labcrane.analysis.exporter import Exporter
     from labcrane.analysis.movements import machine_of
-    from labcrane.core.roles import Exporter
     from labcrane.registry.call_monitor import CallMonitor
     from labcrane.registry.registry import discover
 
@@ -239,14 +239,15 @@ def _counted(participants: "Iterable[Participant]", advance: Any) -> "Iterator[P
 def _settings(model: Any, words: list[str], name: str) -> Any:
     """Return an exporter's settings from NAME=VALUE; values are YAML, as in a protocol."""
     from pydantic import ValidationError
-    from ruamel.yaml import YAML
+
+    from labcrane.files.yaml import parse_yaml
 
     given = {}
     for word in words:
         key, separator, value = word.partition("=")
         if not separator:
             raise ProtocolError(f"--set {word!r} sets nothing; write NAME=VALUE")
-        given[key] = YAML(typ="safe").load(value)
+        given[key] = parse_yaml(value, f"--set {key}")
     try:
         return model.model_validate(given)
     except ValidationError as error:
