@@ -5,6 +5,7 @@ from .analysis.cohort import Participant
 from .analysis.exporter import Exporter
 from .analysis.measures import measures_of
 from .analysis.movements import Movement, movements
+from .analysis.questionnaires import answers_of, asked_in, scores_of
 from .core.clock import Tick
 from .core.findings import Finding, Verdict
 from .core.items import AnswerError, Answers, Item, Score, numeric_answers
@@ -31,6 +32,7 @@ from .errors import (
     ProtocolError,
     RecordingError,
 )
+from .files.names import file_name_of
 from .files.yaml import read_yaml
 from .machines.actuator import ACTUATOR_PRESETS, Actuator, ActuatorSettings
 from .machines.inverse_kinematics import reach
@@ -115,7 +117,10 @@ __all__ = [
     "Value",
     "Verdict",
     "XdfWriter",
+    "answers_of",
+    "asked_in",
     "codebook_of",
+    "file_name_of",
     "hookimpl",
     "jacobian",
     "link_boxes",
@@ -131,6 +136,7 @@ __all__ = [
     "reach",
     "read_placed",
     "read_yaml",
+    "scores_of",
     "signals_of",
     "urdf",
     "urdf_joint",

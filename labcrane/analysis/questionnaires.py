@@ -1,6 +1,6 @@
 """Questionnaires as tidy tables: one row per answer, and one per score."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -92,9 +92,12 @@ def occasions(session: SessionRecord) -> list[Occasion]:
     return list(found.values())
 
 
-def described(session: SessionRecord, questionnaire: str) -> Mapping[str, Any]:
-    """Return title, language, items and scores as the recording says them; empty in older files."""
-    about: Mapping[str, Any] = session.context.get("questionnaires", {}).get(questionnaire, {})
+def asked_in(session: SessionRecord) -> Mapping[str, Mapping[str, Any]]:
+    """Return title, language, items and scores of each questionnaire of a session's study.
+
+    As the recording says them; older recordings do not.
+    """
+    about: Mapping[str, Mapping[str, Any]] = session.context.get("questionnaires", {})
     return about
 
 
@@ -145,20 +148,6 @@ def scores_of(participant: Participant) -> "pd.DataFrame":
     return pd.DataFrame(rows, columns=list(SCORES))
 
 
-def questionnaire_codebook(names: Sequence[str] = ANSWERS) -> "pd.DataFrame":
-    """Return unit, meaning and source of the columns of both tables."""
-    import pandas as pd
-
-    from labcrane.analysis.codebook import IDENTITY, WRITTEN
-
-    rows = [
-        (table, column, *(MEANING.get(column) or ("", IDENTITY[column])), WRITTEN)
-        for table, columns in (("questionnaires", names), ("scores", SCORES))
-        for column in columns
-    ]
-    return pd.DataFrame(rows, columns=["table", "column", "unit", "description", "source"])
-
-
 def _when(participant: Participant, number: int, asked: Occasion) -> dict[str, Any]:
     return {
         "participant": participant.name,
@@ -172,7 +161,7 @@ def _when(participant: Participant, number: int, asked: Occasion) -> dict[str, A
 
 
 def _answers(session: SessionRecord, asked: Occasion) -> Iterator[dict[str, Any]]:
-    about = described(session, asked.questionnaire)
+    about = asked_in(session).get(asked.questionnaire, {})
     items = [item["name"] for item in about.get("items", ())]
     # What was answered and is not among the items can only be of an older recording.
     for name in dict.fromkeys([*items, *asked.answers]):
