@@ -133,6 +133,6 @@ def file_name_of(text: str) -> str:
     Different texts have different names, upper and lower case apart.
     """
     name = re.sub(r"[^A-Za-z0-9_.-]+", "_", text).strip("._-")[:LONGEST].rstrip("._-")
-    if name == text and name.lower().split(".")[0] not in DEVICES:
+    if name and name == text and name.lower().split(".")[0] not in DEVICES:
         return name
     return f"{name or 'x'}-{sha256(text.encode('utf-8', 'surrogatepass')).hexdigest()[:HASHED]}"

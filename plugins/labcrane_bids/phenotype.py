@@ -87,7 +87,8 @@ def label_of(name: str) -> str:
 def _row(subject: str, answers: "pd.DataFrame") -> dict[str, Any]:
     rows = answers.to_dict("records")
     first = rows[0]
-    numbers = {row["item"]: row["text"] or _known(row["value"]) for row in rows}
+    # A line of the table is one row, whatever somebody wrote.
+    given = {row["item"]: " ".join(row["text"].split()) or _known(row["value"]) for row in rows}
     missing = [f"{row['item']}: {row['missing']}" for row in rows if row["missing"]]
     return {
         "participant_id": subject,
@@ -97,7 +98,7 @@ def _row(subject: str, answers: "pd.DataFrame") -> dict[str, Any]:
         "version": first["version"],
         "language": first["language"] or None,
         "missing": "; ".join(missing) or None,
-        **numbers,
+        **given,
     }
 
 
