@@ -16,7 +16,7 @@ class Asking:
     Parameters
     ----------
     answered
-        What was answered before the session's process died.
+        What was answered before the session stopped.
     after
         The trial it follows; None when it is a step of its own.
 
@@ -61,10 +61,13 @@ class Asking:
             return self._inquiry.hand_in(by_whom(command))
         return self._inquiry.take(command.text, by_whom(command))
 
-    def end(self) -> Iterator[Said]:
-        """Yield what is said at its end: that it was left, and the stop rules that it meets."""
+    def end(self, *, skipped: bool) -> Iterator[Said]:
+        """Yield what is said at its end: that it was left, and the stop rules that it meets.
+
+        One that was left and not skipped is owed: the session has ended.
+        """
         if not self.over:
-            yield self._inquiry.leave()
+            yield self._inquiry.leave(done=skipped)
         scores = self._inquiry.scores()
         for rule in self._rules:
             if scores[rule.score] > rule.above:  # a score that is NaN stops nobody

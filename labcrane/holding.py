@@ -6,8 +6,8 @@ from labcrane.console import Command, Order
 from labcrane.protocol import OnFault
 from labcrane.records import Value
 
-EXAMINER, INPUT, DISK, STOP = "examiner", "input", "disk", "stop rule"
-"""Who can hold a session, beside lost streams and feedback: it goes on when nobody does."""
+INPUT, DISK = "input", "disk"
+"""What can hold a session beside people, lost streams and feedback."""
 
 
 class Holding:

@@ -31,7 +31,7 @@ class Inquiry:
     about
         Where in the session it is asked: step, and trial if it follows one.
     answered
-        What was answered before the session's process died.
+        What was answered before the session stopped.
 
     Attributes
     ----------
@@ -84,12 +84,15 @@ class Inquiry:
             why = f"{', '.join(open_items)} have no answer; answer or decline them"
             return REFUSED, {**self._about, "by": by, "given": "", "item": "", "why": why}
         self.over = True
-        return self._end(by, handed_in=True)
+        return self._end(by, handed_in=True, done=True)
 
-    def leave(self) -> Said:
-        """Return the event with which it ends without having been handed in."""
+    def leave(self, *, done: bool) -> Said:
+        """Return the event with which it ends without having been handed in.
+
+        ``done`` is whether it need not be asked again.
+        """
         self.over = True
-        return self._end("", handed_in=False)
+        return self._end("", handed_in=False, done=done)
 
     def scores(self) -> dict[str, float]:
         """Return every score; NaN where it needs an answer that is missing."""
@@ -103,7 +106,7 @@ class Inquiry:
             yield self.take(answer, SIMULATION)
         yield self.hand_in(SIMULATION)
 
-    def _end(self, by: str, *, handed_in: bool) -> Said:
+    def _end(self, by: str, *, handed_in: bool, done: bool) -> Said:
         missing = sum(self._answers.get(name) is None for name in self._items)
         scores: dict[str, Value] = {
             f"{SCORE}{name}": None if math.isnan(value) else value
@@ -113,6 +116,7 @@ class Inquiry:
             **self._about,
             "by": by,
             "handed_in": handed_in,
+            "done": done,
             "missing": missing,
             **scores,
         }
