@@ -8,7 +8,7 @@ from collections.abc import Generator, Iterable, Mapping, Sequence
 
 from labcrane.asking import Asking
 from labcrane.attempt import Attempt
-from labcrane.console import FAULTS, Command, Order, by_whom
+from labcrane.console import Command, Message, Order, by_whom
 from labcrane.feedback_settings import FeedbackSettings
 from labcrane.holding import DISK, INPUT, Holding
 from labcrane.plan import PlannedBlock, PlannedStep, SessionPlan, next_attempt
@@ -84,11 +84,11 @@ class Course:
         return self._attempt is not None and not self._held.by
 
     def heed(
-        self, commands: Sequence[Command], lost_input: str | None, disk_trouble: str | None
+        self, commands: Sequence[Message], lost_input: str | None, disk_trouble: str | None
     ) -> None:
         """Take up orders, and what has become of the operator's controls and of the disk."""
         for command in commands:
-            if command.order in FAULTS:
+            if not isinstance(command, Command):
                 self._held.report(command)
             elif command.order is Order.DENIED:
                 self._note("page.denied", why=command.text, by=by_whom(command))

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from labcrane import rig
 from labcrane.choices import Choice
-from labcrane.console import Command, Order
+from labcrane.console import FeedbackLost, FeedbackReady
 from labcrane.delay_file import read_delays
 from labcrane.design.seeds import derive
 from labcrane.errors import DeviceError
@@ -28,7 +28,7 @@ class FeedbackCrew:
         policy = visit.study.protocol.on_fault.feedback_lost
         self._required = policy != "continue"
         self.keepers = [FeedbackKeeper(order, policy) for order in _orders_of(visit)]
-        self._news: list[Command] = []
+        self._news: list[FeedbackLost | FeedbackReady] = []
 
     def wait(self, say: Callable[[str], None], ended: Callable[[], bool]) -> bool:
         """Wait until all are ready or left out; whether the session may start.
@@ -48,20 +48,18 @@ class FeedbackCrew:
                         "{feedback_lost: continue} would go on without it)"
                     )
                 self._news += (news := keeper.watch())
-                for command in news:
-                    say(f"feedback {command.text}")
+                for report in news:
+                    say(f"feedback {report}")
             if ended():
                 return False
             time.sleep(LOOK_S)
         return True
 
-    def watch(self, say: Callable[[str], None]) -> list[Command]:
+    def watch(self, say: Callable[[str], None]) -> list[FeedbackLost | FeedbackReady]:
         """Look after all processes; return what the session is to be told, also of its start."""
-        news = [command for keeper in self.keepers for command in keeper.watch()]
-        for command in news:
-            word = "is ready" if command.order is Order.MENDED else "failed"
-            name, _, text = command.text.partition(": ")
-            say(f"feedback {name} {word}" + (f": {text}" if text else ""))
+        news = [report for keeper in self.keepers for report in keeper.watch()]
+        for report in news:
+            say(f"feedback {report}")
         before, self._news = self._news, []
         return before + news
 

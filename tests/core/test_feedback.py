@@ -18,7 +18,7 @@ from labcrane import (
     Situation,
     Targets,
 )
-from labcrane.console import Command, Order
+from labcrane.console import Command, FeedbackLost, FeedbackReady, Order
 from labcrane.design.fading import faded
 from labcrane.feedback_crew import FeedbackCrew
 from labcrane.plan import plan_session
@@ -136,8 +136,8 @@ def test_a_setting_that_cannot_be_is_refused(text: str, why: str, tmp_path: Path
 
 def test_a_failed_process_pauses_the_session_if_the_protocol_says_so(tmp_path: Path) -> None:
     orders = {
-        50: [Command(Order.FAILED, "tone: it hangs")],
-        90: [Command(Order.MENDED, "tone: driver jack")],
+        50: [FeedbackLost("tone", "it hangs")],
+        90: [FeedbackReady("tone", "driver jack")],
     }
     pausing = FED + "on_fault: {feedback_lost: pause}\n"
     seen = rehearse(a_study(tmp_path, pausing), orders)

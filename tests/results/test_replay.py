@@ -10,7 +10,7 @@ import labcrane
 from labcrane import Frame, ProtocolError, RecordingError
 from labcrane.analysis.measures import measure_session
 from labcrane.cli.app import main
-from labcrane.console import Command, Order
+from labcrane.console import Command, Order, StreamBack, StreamLost
 from labcrane.recording.recording import open_recording
 from labcrane.replay import replay
 from results.recorded import STUDY, record, study
@@ -90,8 +90,8 @@ def test_orders_are_given_again_at_their_ticks(tmp_path: Path) -> None:
         420: [Command(Order.START)],
         600: [Command(Order.REPEAT)],
         900: [Command(Order.SKIP), Command(Order.NOTE, "coughs")],
-        1500: [Command(Order.LOST, "eeg")],
-        1600: [Command(Order.BACK, "eeg")],
+        1500: [StreamLost("eeg")],
+        1600: [StreamBack("eeg")],
         4000: [Command(Order.END)],
     }
     path = record(study(tmp_path), tmp_path / "data", "P001", simulated=True, orders=orders)
