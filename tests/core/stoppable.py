@@ -128,9 +128,7 @@ def with_steps(study: Study, steps: Sequence[Step]) -> Study:
 
 def block(kind: str, items: int, ask: Sequence[str], until: tuple[int, int] | None) -> Step:
     criterion = Criterion(successes=until[0], rounds=until[1]) if until else None
-    return Step(
-        kind=kind, block=Block(task="count", item=items, ask=tuple(ask), until=criterion)
-    )
+    return Step(kind=kind, block=Block(task="count", item=items, ask=tuple(ask), until=criterion))
 
 
 def idle_rig(study: Study) -> Rig:
