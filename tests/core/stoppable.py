@@ -12,20 +12,20 @@ from labcrane import (
     Dynamics,
     InputDevice,
     Item,
-    Judgement,
     Phase,
-    Planned,
+    PlannedTrial,
     Questionnaire,
     Score,
     Signal,
     Task,
+    TrialStatus,
 )
-from labcrane.design.words import Criterion
-from labcrane.evaluation import StopRule
-from labcrane.protocol import OnFault
-from labcrane.rig import Rig
-from labcrane.steps import Block, Session, Step
-from labcrane.study import Study
+from labcrane.protocol.design import Criterion
+from labcrane.protocol.evaluation import StopRule
+from labcrane.protocol.protocol import OnFault
+from labcrane.protocol.rig import Rig
+from labcrane.protocol.steps import Block, Session, Step
+from labcrane.protocol.study import Study
 
 OUTCOMES = (Phase.SUCCESS, Phase.SUCCESS, Phase.FAILURE, Phase.TIMEOUT)
 
@@ -43,7 +43,7 @@ class Nothing(Controller):
     def command(self, axes, state):
         return np.zeros(1)
 
-    def steer(self, velocity, state):
+    def inverse(self, velocity, state):
         return np.zeros(1)
 
 
@@ -75,7 +75,7 @@ class Count(Task):
 
     def plan(self, levels):
         return [
-            Planned({"item": item}, expected_s=1.0, counted=number % 3 != 0)
+            PlannedTrial({"item": item}, expected_s=1.0, counted=number % 3 != 0)
             for number, item in enumerate(levels["item"])
         ]
 
@@ -83,12 +83,12 @@ class Count(Task):
         self._left = 1 + trial.seed % 4
         self._outcome = OUTCOMES[trial.seed // 7 % len(OUTCOMES)]
 
-    def judge(self, frame):
+    def evaluate(self, frame):
         self._left -= 1
         phase = Phase.RUNNING if self._left > 0 else self._outcome
-        return Judgement(phase, np.array([float(self._left)]))
+        return TrialStatus(phase, np.array([float(self._left)]))
 
-    def overrule(self) -> None:
+    def lift_limits(self) -> None:
         pass
 
 

@@ -21,17 +21,17 @@ from hypothesis.stateful import (
 )
 
 from labcrane import ProtocolError
-from labcrane import session as session_module
-from labcrane.console import Command, LauncherGone, Order
+from labcrane.design.plan import plan_session
 from labcrane.errors import DeviceError
-from labcrane.plan import plan_session
-from labcrane.progress import Progress, _with_closing, progress, remaining
+from labcrane.protocol.steps import Step
+from labcrane.protocol.study import Study
 from labcrane.recording.journal_reader import LoggedEvent, SessionLog, read_journal
-from labcrane.recording.parts import parts
-from labcrane.recording.session_group import _trial_rows
-from labcrane.session import Visit, record
-from labcrane.steps import Step
-from labcrane.study import Study
+from labcrane.recording.participant_file.session_group import _trial_rows
+from labcrane.recording.paths import parts
+from labcrane.session import session as session_module
+from labcrane.session.commands import Command, LauncherGone, Order
+from labcrane.session.resume import Progress, _with_closing, progress, remaining
+from labcrane.session.session import Visit, record
 
 RESULTS = {"success", "failure", "timeout", "skipped"}
 OPEN = ("ended", "interrupted")

@@ -1,0 +1,138 @@
+"""The session as a process of its own, talking to its launcher over one pipe.
+
+The pipe carries messages to the session, as JSON of a declared size, and events and how it ended
+from it, as pickled records.
+"""
+
+import queue
+import signal
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+
+from labcrane.core.records import Event
+from labcrane.errors import LabcraneError
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
+from labcrane.session.commands import (
+    MOST_BYTES,
+    Command,
+    LauncherGone,
+    Message,
+    MessageError,
+    Order,
+    decode,
+)
+from labcrane.session.resume import Policy
+from labcrane.session.session import Visit, record
+
+
+@dataclass(frozen=True, slots=True)
+class SessionConfig:
+    """What a session process is told: a visit by the names of things, so that it can be sent.
+
+    Attributes
+    ----------
+    feedback
+        Whether the launcher starts the views and sounds.
+    """
+
+    protocol: Path
+    participant: str
+    session: int
+    data: Path
+    simulated: bool = False
+    pilot: bool = False
+    resumed: bool = False
+    policy: Policy | None = None
+    feedback: bool = True
+
+    def visit(self) -> Visit:
+        """Load the study and return the visit."""
+        return Visit(
+            load(self.protocol, discover(study=self.protocol)),
+            self.participant,
+            self.session,
+            self.data,
+            simulated=self.simulated,
+            pilot=self.pilot,
+            resumed=self.resumed,
+            policy=self.policy,
+            feedback=self.feedback,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """The last thing a session process says; ``error`` is None when it ran to its end."""
+
+    error: LabcraneError | None = None
+
+
+class PipeConsole:
+    """The launcher at the other end of a pipe.
+
+    One thread sends and one receives, so that a launcher that does not read, or stops in the
+    middle of a message, never makes the loop wait. When the launcher is gone the session ends:
+    nobody could stop it any more.
+    """
+
+    def __init__(self, pipe: Connection) -> None:
+        self._pipe = pipe
+        self._incoming: queue.SimpleQueue[Message] = queue.SimpleQueue()
+        self._outgoing: queue.SimpleQueue[Event | Ended] = queue.SimpleQueue()
+        self._sender = threading.Thread(target=self._send, name="to-launcher", daemon=True)
+        self._sender.start()
+        threading.Thread(target=self._receive, name="from-launcher", daemon=True).start()
+
+    def commands(self) -> list[Message]:
+        given: list[Message] = []
+        while not self._incoming.empty():  # not in the usual tick
+            given.append(self._incoming.get_nowait())
+        return given
+
+    def report(self, event: Event) -> None:
+        self._outgoing.put(event)
+
+    def end(self, ended: Ended) -> None:
+        """Say how the session ended, after everything else, and wait until it is sent."""
+        self._outgoing.put(ended)
+        self._sender.join()
+
+    def _receive(self) -> None:
+        while True:
+            try:
+                self._incoming.put(decode(self._pipe.recv_bytes(MOST_BYTES)))
+            except MessageError as error:
+                self._incoming.put(Command(Order.DENIED, str(error)))
+            except (EOFError, OSError):
+                self._incoming.put(LauncherGone())
+                return
+
+    def _send(self) -> None:
+        while True:
+            message = self._outgoing.get()
+            try:
+                self._pipe.send(message)
+            except OSError:
+                return  # the launcher is gone; the record does not need it
+            if isinstance(message, Ended):
+                return
+
+
+def serve(order: SessionConfig, pipe: Connection) -> None:
+    """Run a session; the process's main function."""
+    # An interrupt from the keyboard reaches the launcher too, which ends the session in order.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    console = PipeConsole(pipe)
+    console.end(_ended(lambda: record(order.visit(), console)))
+
+
+def _ended(run: Callable[[], None]) -> Ended:
+    try:
+        run()
+    except LabcraneError as error:
+        return Ended(error)
+    return Ended()

@@ -1,0 +1,194 @@
+"""Messages to a session: what people order, and what processes report; and what it tells them.
+
+A message crosses the pipe to the session's process as JSON of a declared size, and is read back by
+its types, so that nothing else can come out of the pipe.
+"""
+
+import queue
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Literal, Protocol
+
+from pydantic import TypeAdapter, ValidationError
+
+from labcrane.core.records import Event
+from labcrane.errors import LabcraneError
+
+MOST_BYTES = 65_536
+"""Size of the largest message to a session, as JSON: about forty pages of text."""
+
+
+class Order(StrEnum):
+    """Everything that can be asked of a running session."""
+
+    START = "start"  # begin the step that waits, or go on after a pause
+    PAUSE = "pause"
+    REPEAT = "repeat"  # end the running trial and run it again as a new attempt
+    SKIP = "skip"  # end the running trial, or the break, and go on
+    END = "end"  # end the session
+    NOTE = "note"  # put words into the record
+    OVERRIDE = "override"  # let the running trial go on past its automatic ends
+    COMPLETION = "completion"  # set the completion flag of the running trial: 1 or 0
+    HINT = "hint"  # show words to the operator
+    ANSWER = "answer"  # to a question, as JSON: questionnaire, item, value
+    SUBMIT = "submit"  # hand in the questionnaire that is asked
+    CONSENT = "consent"  # to the text of this version, given before the session begins
+    DENIED = "denied"  # said by a page: somebody without the right asked for something
+    SETTING = "setting"  # change a setting of a cue or sound: tone.far=3
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One order, with its words if it has any."""
+
+    order: Order
+    text: str = ""
+    by: str = ""  # which page; empty for the terminal
+    kind: Literal["command"] = "command"
+
+
+@dataclass(frozen=True, slots=True)
+class StreamLost:
+    """A stream of somebody else, or the recorder of all, has failed."""
+
+    what: str
+    kind: Literal["stream lost"] = "stream lost"
+
+
+@dataclass(frozen=True, slots=True)
+class StreamBack:
+    """It works again."""
+
+    what: str
+    kind: Literal["stream back"] = "stream back"
+
+
+@dataclass(frozen=True, slots=True)
+class FeedbackLost:
+    """A view or sound has failed, and is left out or started again."""
+
+    what: str
+    why: str
+    left_out: bool = False
+    kind: Literal["feedback lost"] = "feedback lost"
+
+    def __str__(self) -> str:
+        return f"{self.what} failed: {self.why}"
+
+
+@dataclass(frozen=True, slots=True)
+class FeedbackReady:
+    """A view or sound presents; ``metadata`` is what it says of itself."""
+
+    what: str
+    facts: str = ""
+    kind: Literal["feedback ready"] = "feedback ready"
+
+    def __str__(self) -> str:
+        return f"{self.what} is ready" + (f": {self.facts}" if self.facts else "")
+
+
+@dataclass(frozen=True, slots=True)
+class LauncherGone:
+    """The launcher has died: nobody could stop the session any more, so it ends."""
+
+    kind: Literal["launcher gone"] = "launcher gone"
+
+
+ProcessReport = StreamLost | StreamBack | FeedbackLost | FeedbackReady | LauncherGone
+"""What becomes of the other processes of a run: said by the launcher, not by people."""
+
+Message = Command | ProcessReport
+
+MESSAGE: TypeAdapter[Message] = TypeAdapter(Message)
+
+
+class MessageError(LabcraneError):
+    """Something that cannot be sent to a session."""
+
+
+def encode(message: Message) -> bytes:
+    """Return a message as it crosses the pipe.
+
+    Raises
+    ------
+    MessageError
+        It is larger than a message may be.
+    """
+    # Half of a character that takes two cannot be written; it is shown as what it is.
+    if isinstance(message, Command):
+        text = message.text.encode("utf-8", "backslashreplace").decode("utf-8")
+        message = replace(message, text=text)
+    line = MESSAGE.dump_json(message)
+    if len(line) > MOST_BYTES:
+        what = message.order if isinstance(message, Command) else message.kind
+        raise MessageError(
+            f"{what}: {len(line):,} bytes, and a session takes {MOST_BYTES:,} at most; "
+            "say it shorter"
+        )
+    return line
+
+
+def decode(line: bytes) -> Message:
+    """Return the message that :func:`encode` wrote.
+
+    Raises
+    ------
+    MessageError
+        It is none.
+    """
+    try:
+        return MESSAGE.validate_json(line)
+    except ValidationError as error:
+        raise MessageError(f"{len(line)} bytes that are no message to a session") from error
+
+
+def by_whom(command: Command) -> str:
+    """Return who gave an order: a page by its name, or the terminal."""
+    return command.by or "terminal"
+
+
+class Console(Protocol):
+    """Whoever gives orders and looks on: the terminal and the pages, or a simulation."""
+
+    def commands(self) -> Sequence[Message]:
+        """Return what was said since the last call, without waiting."""
+        ...
+
+    def report(self, event: Event) -> None:
+        """Be told of an event, without making the session wait."""
+        ...
+
+
+class QueueConsole:
+    """Carries orders and events between threads; listeners must not wait."""
+
+    def __init__(self) -> None:
+        self._orders: queue.SimpleQueue[Command] = queue.SimpleQueue()
+        self.events: queue.SimpleQueue[Event | None] = queue.SimpleQueue()
+        self.listeners: list[Callable[[Event], None]] = []
+
+    def give(self, command: Command) -> None:
+        """Give an order; the session takes it up at its next tick.
+
+        One that is too large is refused, and what is recorded is that it was.
+        """
+        try:
+            encode(command)
+        except MessageError as error:
+            command = Command(Order.DENIED, str(error), command.by)
+        self._orders.put(command)
+
+    def commands(self) -> list[Command]:
+        if self._orders.empty():  # the usual tick
+            return []
+        given = []
+        while not self._orders.empty():
+            given.append(self._orders.get_nowait())
+        return given
+
+    def report(self, event: Event) -> None:
+        self.events.put(event)
+        for listen in self.listeners:
+            listen(event)

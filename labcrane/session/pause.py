@@ -1,0 +1,109 @@
+"""What holds a session: the examiner, a part in trouble, a stop rule."""
+
+from collections.abc import Callable, Iterable
+
+from labcrane.core.records import Value
+from labcrane.protocol.protocol import OnFault
+from labcrane.session.commands import (
+    FeedbackLost,
+    FeedbackReady,
+    LauncherGone,
+    ProcessReport,
+    StreamBack,
+    StreamLost,
+)
+
+INPUT, DISK = "input", "disk"
+"""What can hold a session beside people, lost streams and feedback."""
+
+
+class Suspenders:
+    """Holds a session while somebody or something has a reason to.
+
+    Parameters
+    ----------
+    on_fault
+        What the protocol wants done about each fault.
+    note
+        Takes an event's name and data; every reason that comes or goes is one.
+    awaits
+        Names of the views and sounds that are still to present their first frame.
+
+    Attributes
+    ----------
+    awaited
+        Those of them that have neither presented nor been left out.
+    by
+        Who holds the session.
+    ending
+        Why the session must end, reason by reason; empty while it may go on.
+    """
+
+    def __init__(
+        self,
+        on_fault: OnFault,
+        note: Callable[[str, dict[str, Value]], None],
+        awaits: Iterable[str] = (),
+    ) -> None:
+        self._on_fault = on_fault
+        self._note = note
+        self.by: set[str] = set()
+        self.ending: list[str] = []
+        self.awaited = set(awaits)
+        for name in sorted(self.awaited):
+            note("feedback.awaited", {"what": name})
+
+    def __contains__(self, who: str) -> bool:
+        return who in self.by
+
+    def hold(self, who: str) -> None:
+        """Hold the session for ``who``."""
+        self.by.add(who)
+        self._note("pause.start", {"by": who})
+
+    def release(self, who: str) -> None:
+        """Let the session go on as far as ``who`` is concerned."""
+        if who in self.by:
+            self.by.discard(who)
+            self._note("pause.end", {"by": who})
+
+    def watch(self, part: str, trouble: str | None) -> None:
+        """Hold the session while a part is in trouble; None is none."""
+        held = part in self.by
+        if trouble is not None and not held:
+            self._note(f"{part}.lost", {"why": trouble})
+            self.hold(part)
+            if part == INPUT and self._on_fault.input_lost == "end":
+                self.ending.append("input lost")
+        elif trouble is None and held:
+            self._note(f"{part}.back", {})
+            self.release(part)
+
+    def report(self, report: ProcessReport) -> None:
+        """Take up what the launcher says of another process."""
+        match report:
+            case StreamLost(what):
+                self._note("stream.lost", {"what": what})
+                if self._on_fault.stream_lost == "pause":
+                    self.hold(what)
+            case StreamBack(what):
+                self._note("stream.back", {"what": what})
+                self.release(what)
+            case FeedbackReady(what, facts):
+                self._note("feedback.ready", {"what": what, "facts": facts})
+                self.awaited.discard(what)
+                self.release(f"feedback {what}")
+            case FeedbackLost():
+                self._feedback_lost(report)
+            case LauncherGone():
+                self._note("launcher.gone", {})
+                self.ending.append("the launcher is gone")
+
+    def _feedback_lost(self, lost: FeedbackLost) -> None:
+        who = f"feedback {lost.what}"
+        about: dict[str, Value] = {"what": lost.what, "why": lost.why, "left_out": lost.left_out}
+        self._note("feedback.lost", about)
+        if lost.left_out:
+            self.awaited.discard(lost.what)
+        if self._on_fault.feedback_lost == "pause" and who not in self.by:
+            self.hold(who)
