@@ -79,7 +79,7 @@ class FeedbackLost:
 
 @dataclass(frozen=True, slots=True)
 class FeedbackReady:
-    """A view or sound presents; ``metadata`` is what it says of itself."""
+    """A view or sound presents; ``facts`` is what it says of itself."""
 
     what: str
     facts: str = ""
