@@ -92,8 +92,12 @@ class Sequencer:
                 self._held.report(command)
             elif command.order is Order.DENIED:
                 self._note("page.denied", why=command.text, by=by_whom(command))
-            elif self._asking is not None and command.order in {Order.ANSWER, Order.SUBMIT}:
-                self._say(*self._asking.handle(command))
+            elif (
+                (asking := self._asking) is not None
+                and not asking.over  # and not handed in twice in one tick
+                and command.order in {Order.ANSWER, Order.SUBMIT}
+            ):
+                self._say(*asking.handle(command))
             else:
                 self._obey(command)
         self._held.watch(INPUT, lost_input)

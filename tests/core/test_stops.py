@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from core.stoppable import block, idle_rig, stoppable, with_steps
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
     RuleBasedStateMachine,
@@ -133,7 +133,7 @@ class Stops(RuleBasedStateMachine):
     def live(self, stop: str | None, after: int, seed: int, policy: str | None) -> None:
         """Run one process: the session's first, or one that goes on."""
         resumed = bool(parts(self.visit.journal))
-        before = self.owed("redo_trial") if resumed else None
+        before = self.owed if resumed else None
         held = resumed and self.stop_rule_is_open()
         visit = replace(self.visit, resumed=resumed, policy=policy)
         begun = len(parts(self.visit.journal))
@@ -154,6 +154,7 @@ class Stops(RuleBasedStateMachine):
             self.policies.add(policy or "redo_trial")
         if stop == "power cut":
             self.tear(seed)
+        self.look()
         self.check(resumed=resumed, before=before, held=held, policy=policy or "redo_trial")
 
     def tear(self, seed: int) -> None:
@@ -163,13 +164,11 @@ class Stops(RuleBasedStateMachine):
         first = whole.find(b"session.start")
         journal.write_bytes(whole[: random.Random(seed).randint(max(first, 0), len(whole))])
 
-    @property
-    def events(self) -> list[LoggedEvent]:
-        return read_journal(parts(self.visit.journal))[0].events
-
-    def owed(self, policy):
+    def look(self) -> None:
+        """Read the journal, as a resumption does."""
+        self.events: list[LoggedEvent] = read_journal(parts(self.visit.journal))[0].events
         so_far = progress(self.visit.journal, self.visit.study.machine.names)
-        return remaining(self.visit.study, self.whole, so_far, policy)
+        self.owed = remaining(self.visit.study, self.whole, so_far, "redo_trial")
 
     def stop_rule_is_open(self) -> bool:
         if self.visit.simulated:
@@ -203,10 +202,9 @@ class Stops(RuleBasedStateMachine):
             self.every_question_is_asked_to_its_end_once()
             self.every_other_step_is_done()
         for event in ends:
-            left = self.owed("redo_trial")
-            assert bool(event.data["owed"]) == bool(left.steps)
-            said = {trial.number for each in left.blocks for trial in each.trials}
-            assert said == numbers_in(event.data["owed"])
+            left = {trial.number for each in self.owed.blocks for trial in each.trials}
+            assert bool(event.data["owed"]) == bool(self.owed.steps)
+            assert numbers_in(event.data["owed"]) == left
 
     def every_counted_trial_is_recorded_once(self) -> None:
         events = self.events
@@ -302,7 +300,7 @@ class Stops(RuleBasedStateMachine):
             if event.name != "session.resumed":
                 old.take(event.name, data, closes=closes)
         left = remaining(self.visit.study, self.whole, old, "redo_trial")
-        assert left.steps == self.owed("redo_trial").steps
+        assert left.steps == self.owed.steps
 
     @property
     def torn(self) -> bool:
@@ -348,13 +346,14 @@ def play(stops: type[Stops], sequences: int) -> None:
             stateful_step_count=8,
             deadline=None,
             derandomize=True,
+            phases=[Phase.generate, Phase.shrink],
             suppress_health_check=list(HealthCheck),
         ),
     )
 
 
 def test_whatever_stops_a_session_it_owes_what_is_left_and_no_more(stops: type[Stops]) -> None:
-    play(stops, 30)
+    play(stops, 250)
 
 
 @pytest.mark.soak
