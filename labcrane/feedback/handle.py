@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from labcrane.feedback.config import FeedbackConfig
-from labcrane.session.commands import Command, Order
+from labcrane.session.commands import FeedbackLost, FeedbackReady
 
 READY_S = 60.0
 """How long a feedback process may take until it is ready: windows and sound servers are slow."""
@@ -97,7 +97,7 @@ class FeedbackHandle:
             return f"it has not been heard of for {silent:.0f} s"
         return None
 
-    def watch(self) -> list[Command]:
+    def watch(self) -> list[FeedbackLost | FeedbackReady]:
         """Look after the process; return what the session is to be told."""
         if self.given_up:
             return []
@@ -106,7 +106,7 @@ class FeedbackHandle:
         if self._life.presents and not self._told:
             self._told = True
             self._fruitless = 0
-            return [Command(Order.MENDED, f"{self.name}: {self.facts}")]
+            return [FeedbackReady(self.name, self.facts)]
         return []
 
     def stop(self) -> None:
@@ -120,7 +120,7 @@ class FeedbackHandle:
             process.wait()
         self._life.listener.join()
 
-    def _replace(self, why: str) -> list[Command]:
+    def _replace(self, why: str) -> list[FeedbackLost | FeedbackReady]:
         life = self._life
         life.process.kill()
         life.process.wait()
@@ -128,10 +128,10 @@ class FeedbackHandle:
         self._fruitless = 0 if life.presents else self._fruitless + 1
         if self._policy == "continue" or self._fruitless >= ATTEMPTS:
             self.given_up = True
-            return [Command(Order.LEFT_OUT, f"{self.name}: {why}; it is left out")]
+            return [FeedbackLost(self.name, f"{why}; it is left out", left_out=True)]
         self._told = False
         self._life = self._start()
-        return [Command(Order.FAILED, f"{self.name}: {why}")]
+        return [FeedbackLost(self.name, why)]
 
     def _start(self) -> Life:
         process = subprocess.Popen(
