@@ -24,9 +24,6 @@ from labcrane.recording.xdf import XdfWriter
 from labcrane.streams.probes import Probe
 from labcrane.streams.raw import RawStream
 
-OPENED = "opened"
-"""The first note of every part: counts of samples start anew with it."""
-
 RESET = "reset"
 """A note of a source that was replaced."""
 
@@ -96,15 +93,10 @@ def raw_of(recorded: RecordedStream) -> RawStream:
 
 
 def _resets(recorded: RecordedStream) -> FloatArray:
-    """Return when the source was replaced, and among which samples of all parts together."""
-    found: list[list[float]] = []
-    part = -1
-    for note in recorded.notes:
-        event = note.data.get("event")
-        if event == OPENED:
-            part += 1
-        elif event == RESET:
-            first = recorded.starts[max(part, 0)]
-            low, high = note.data["samples"]
-            found.append([note.time, first + low, first + high])
+    """Return when the source was replaced, and among which samples of the whole stream."""
+    found = [
+        [note.time, *map(float, note.data["samples"])]
+        for note in recorded.notes
+        if note.data.get("event") == RESET
+    ]
     return np.array(found, dtype=np.float64).reshape(-1, 3)

@@ -11,9 +11,10 @@ import numpy as np
 
 from labcrane.arrays import FloatArray
 from labcrane.errors import RecordingError
+from labcrane.recording.foreign_streams import OPENED
 from labcrane.recording.stream_header import StreamHeader
 from labcrane.recording.xdf import XdfWriter
-from labcrane.streams.companions import COUNTER_GAP, OPENED, RESET, Companions
+from labcrane.streams.companions import COUNTER_GAP, RESET, Companions
 from labcrane.streams.probes import ClockProbe, Probe, was_reset
 from labcrane.streams.watchdog import Counter
 
