@@ -202,7 +202,7 @@ class Launcher:
         if recorder is None:
             return
         if recorder.watch():
-            self._say("the recorder died and was started again")
+            self._say("a recorder died: the other one has all streams, and a new one was started")
         lost = recorder.lost() if recorder.status else {RECORDER}
         for what in sorted(lost - self._lost):
             self._send(pipe, Command(Order.LOST, what))
