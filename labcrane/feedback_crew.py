@@ -1,7 +1,7 @@
 """All feedback processes of a run."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from labcrane import rig
@@ -64,6 +64,11 @@ class FeedbackCrew:
             say(f"feedback {name} {word}" + (f": {text}" if text else ""))
         before, self._news = self._news, []
         return before + news
+
+    def offer(self, streams: Mapping[str, str]) -> None:
+        """Tell all processes the session's streams, by name and description."""
+        for keeper in self.keepers:
+            keeper.offer(streams)
 
     def stop(self) -> None:
         """Stop all processes."""

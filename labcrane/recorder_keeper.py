@@ -1,8 +1,8 @@
-"""Recorder processes that run for as long as a recording lasts: two write, one more waits.
+"""Recorder processes that run for as long as a recording lasts: two write, two more wait.
 
 Both write all streams, each into its own part of the journal, so that what is lost with one is in
-the other (:mod:`labcrane.recording.overlap`). A third process has loaded everything and takes over
-at once when one of them dies.
+the other (:mod:`labcrane.recording.overlap`). As many have loaded everything and wait: they take
+over at once, even when both die in one moment.
 """
 
 import time
@@ -21,6 +21,7 @@ PATIENCE_S = 15.0
 """How long a recorder may take to close its journal when it is told to stop, or a spare to end."""
 
 RECORDERS = 2
+SPARES = 2
 
 
 class RecorderKeeper:
@@ -38,7 +39,7 @@ class RecorderKeeper:
         self._requests = tuple(requests)
         self._part = max((part_number(part) for part in parts(journal)), default=0)
         self._known: tuple[str, ...] = ()
-        self._spare = _Recorder()
+        self._spares = [_Recorder() for _ in range(RECORDERS + SPARES)]
         self._recorders = [self._began() for _ in range(RECORDERS)]
 
     @property
@@ -74,6 +75,9 @@ class RecorderKeeper:
 
     def watch(self) -> bool:
         """Replace recorders that have died; whether one had."""
+        for spare in [one for one in self._spares if one.exit_code is not None]:
+            spare.kill()
+            self._spares[self._spares.index(spare)] = _Recorder()
         dead = [one for one in self._recorders if one.exit_code is not None]
         for recorder in dead:
             recorder.kill()
@@ -88,15 +92,16 @@ class RecorderKeeper:
         for recorder in self._recorders:
             recorder.tell(STOP)
         deadline = time.monotonic() + PATIENCE_S
-        for recorder in (*self._recorders, self._spare):
+        for recorder in (*self._recorders, *self._spares):
             recorder.stop(max(deadline - time.monotonic(), 1.0))
 
     def _began(self) -> "_Recorder":
-        """Give the waiting recorder its orders, and have another one ready."""
-        recorder = self._spare if self._spare.exit_code is None else _Recorder()
+        """Give a recorder that waits its orders, and have another one ready."""
+        recorder = self._spares.pop(0)
         self._part += 1
         recorder.tell(Orders(self._journal, self._requests, part=self._part, known=self._known))
-        self._spare = _Recorder()
+        if len(self._spares) < SPARES:
+            self._spares.append(_Recorder())
         return recorder
 
 

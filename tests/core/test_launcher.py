@@ -91,7 +91,7 @@ def test_a_spare_recorder_that_hangs_keeps_no_recorder_from_closing_its_journal(
     keeper.stop()
     assert [(tmp_path / f"heard-{part}").read_text() for part in (1, 2)] == ["stop", "stop"]
     assert [one.exit_code for one in keeper._recorders] == [0, 0]
-    assert keeper._spare.exit_code == -9
+    assert [one.exit_code for one in keeper._spares] == [-9, -9]
 
 
 def test_a_recorder_that_dies_as_it_is_given_its_orders_is_replaced(
