@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from labcrane.arrays import FloatArray
-from labcrane.recording.samples import Texts
+from labcrane.recording.xdf.samples import Texts
+from labcrane.types import FloatArray
 
 IntArray = npt.NDArray[np.int64]
 Keys = npt.NDArray[np.uint64]

@@ -14,9 +14,9 @@ import psutil
 import pytest
 from faults.sessions import unique, wait_for
 
-from labcrane.recorder_keeper import RecorderKeeper
 from labcrane.recording.foreign_streams import RecordedStream, read_streams
-from labcrane.recording.parts import parts
+from labcrane.recording.paths import parts
+from labcrane.streams.recorder.handle import RecorderHandle
 from labcrane.streams.request import StreamRequest
 
 HERE = Path(__file__).parent
@@ -73,7 +73,7 @@ def kill_at_random(folder: Path, kills: int, seed: int) -> tuple[list[float], li
         program("counting_witness.py", source, into=witnesses[0]),
         program("counting_witness.py", source, into=witnesses[1]),
     ):
-        keeper = RecorderKeeper(journal, requests)
+        keeper = RecorderHandle(journal, requests)
         try:
 
             def look(until) -> None:

@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from labcrane.recording.foreign_streams import OPENED, read_streams
-from labcrane.recording.parts import part_path
-from labcrane.recording.stream_header import Channel, StreamHeader
-from labcrane.recording.xdf import XdfWriter
-from labcrane.streams.companions import RESET, Companions, raw_of
+from labcrane.recording.paths import part_path
+from labcrane.recording.xdf.header import Channel, StreamHeader
+from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.streams.probes import Probe
+from labcrane.streams.recorder.companions import RESET, RecordedStreamWriter, raw_of
 
 EEG = StreamHeader("EEG", "EEG", (Channel("count"), Channel("E1")), "float32", 500.0, "amp")
 KEYS = StreamHeader("Keys", "Markers", (Channel("key"),), "string", 0.0, "kb")
@@ -23,7 +23,7 @@ def record(path, header, whole, lives, random):
     stamps, data, texts = whole
     mine = np.flatnonzero((stamps >= born) & (stamps < died))
     with XdfWriter(path) as writer:
-        stream = Companions(writer, header)
+        stream = RecordedStreamWriter(writer, header)
         stream.note(born, OPENED)
         done, now = 0, born
         while now < died:
@@ -102,7 +102,7 @@ def test_recorders_one_after_the_other_are_joined_as_they_are(tmp_path) -> None:
     paths = [part_path(first, 1), part_path(first, 2)]
     for number, path in enumerate(paths):
         with XdfWriter(path) as writer:
-            stream = Companions(writer, EEG)
+            stream = RecordedStreamWriter(writer, EEG)
             stream.note(100.0 * number, OPENED)
             stream.samples(np.arange(50.0), np.zeros((50, 2)))
             stream.arrival(50, 100.0 * number + 60.0)
@@ -120,7 +120,7 @@ def test_a_program_without_a_source_id_is_one_stream_while_it_runs(tmp_path) -> 
     paths = [part_path(first, number) for number in (1, 2, 3)]
     for path, uid in zip(paths, ("one", "one", "two"), strict=True):
         with XdfWriter(path) as writer:
-            stream = Companions(writer, StreamHeader.from_xml(text.format(uid)))
+            stream = RecordedStreamWriter(writer, StreamHeader.from_xml(text.format(uid)))
             stream.note(0.0, OPENED)
             stream.samples(np.arange(5.0), np.zeros((5, 2)))
             stream.arrival(5, 5.0)

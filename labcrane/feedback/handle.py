@@ -1,0 +1,109 @@
+"""Handle of one feedback process, which is kept running as the protocol says."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, Literal
+
+from labcrane.feedback.config import FeedbackConfig
+from labcrane.processes.handle import Patience, ProcessHandle
+from labcrane.session.commands import Command, Order
+
+MODULE = "labcrane.feedback_host"
+
+READY_S = 60.0
+"""How long a feedback process may take until it is ready: windows and sound servers are slow."""
+
+SILENT_S = 3.0
+"""A process that has not been heard of for so long hangs, and is killed."""
+
+STOP_S = 5.0
+"""How long it may take to stop when told to."""
+
+ATTEMPTS = 3
+"""After so many starts in a row without one frame presented, it is left out."""
+
+
+class FeedbackHandle:
+    """Starts a feedback process, finds out when it dies or hangs, and starts it again.
+
+    Attributes
+    ----------
+    given_up
+        Whether it has been left out.
+    facts
+        What it has said of itself since it is ready: renderer, device, delay.
+    presented
+        How many frames the present process has presented.
+    """
+
+    def __init__(
+        self, order: FeedbackConfig, policy: Literal["restart", "continue", "pause"]
+    ) -> None:
+        self._order = order
+        self.given_up = False
+        attempts = 1 if policy == "continue" else ATTEMPTS
+        patience = Patience(READY_S, SILENT_S, STOP_S, restarts=attempts - 1)
+        self._process = ProcessHandle(MODULE, f"feedback {order.name}", patience, self._take)
+        self._begin_anew()
+        self._process.start(order)
+
+    def _begin_anew(self) -> None:
+        self._presents = False
+        self._told = False
+        self._failed: str | None = None
+        self.facts = ""
+        self.presented = 0
+
+    @property
+    def name(self) -> str:
+        """The protocol's name for it."""
+        return self._order.name
+
+    @property
+    def ready(self) -> bool:
+        """Whether it could present: its windows and devices are open."""
+        return self._process.ready
+
+    @property
+    def failure(self) -> str | None:
+        """Return why the present process is of no use, in words; None while all is well."""
+        return self._failed or self._process.failure
+
+    def offer(self, streams: Mapping[str, str]) -> None:
+        """Tell it the session's streams by their descriptions: it need not search for them."""
+        self._order = replace(self._order, streams=streams)
+        self._process.tell(streams)
+
+    def watch(self) -> list[Command]:
+        """Look after the process; return what the session is to be told."""
+        if self.given_up:
+            return []
+        if (why := self.failure) is not None:
+            return self._replace(why)
+        if self._presents and not self._told:
+            self._told = True
+            self._process.worked()
+            return [Command(Order.MENDED, f"{self.name}: {self.facts}")]
+        return []
+
+    def stop(self) -> None:
+        """Let it close its windows and devices."""
+        self._process.stop()
+
+    def _replace(self, why: str) -> list[Command]:
+        self._process.kill()
+        why = self._failed or why  # what it said with its last breath
+        self._begin_anew()
+        if not self._process.restart(self._order):
+            self.given_up = True
+            return [Command(Order.LEFT_OUT, f"{self.name}: {why}; it is left out")]
+        return [Command(Order.FAILED, f"{self.name}: {why}")]
+
+    def _take(self, message: Mapping[str, Any]) -> None:
+        self.presented = message.get("beat", self.presented)
+        self._failed = message.get("failed", self._failed)
+        if message.get("ready"):
+            self.facts = ", ".join(f"{name} {value}" for name, value in message["facts"].items())
+            self._process.ready = True
+        if message.get("presents"):
+            self._presents = True

@@ -1,0 +1,181 @@
+"""A feedback process: one view or sound, fed with the newest frame.
+
+It is started by a :class:`labcrane.processes.handle.ProcessHandle` with a
+:class:`labcrane.feedback.config.FeedbackConfig`, is told the session's streams when there are any, and ends
+when its parent does. It reports ``ready`` with the component's facts, ``presents`` from the first
+frame on, ``beat`` while it lives, ``failed`` with the reason.
+"""
+
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from labcrane.core.records import Frame
+from labcrane.errors import LabcraneError
+from labcrane.feedback.config import FeedbackConfig
+from labcrane.feedback.presenter import Presenter
+from labcrane.processes.parent import Parent
+from labcrane.registry.registry import discover
+from labcrane.registry.traceback import told
+
+if TYPE_CHECKING:
+    import pylsl
+
+    from labcrane.streams.context import ContextInlet
+    from labcrane.streams.feedback_log import FeedbackLog
+    from labcrane.streams.frames import FrameInlet
+    from labcrane.streams.pictures import PictureOutlet
+
+WAIT_S = 0.05
+BEAT_S = 0.2
+LISTEN_S = 1.0
+
+
+class FeedbackProcess:
+    """Follows a session's streams until it is told to stop."""
+
+    def __init__(self, order: FeedbackConfig, say: Callable[[dict[str, Any]], None]) -> None:
+        self._order = order
+        self._say = say
+        self._stop = threading.Event()
+        self._beaten = 0.0
+        self._presented = 0
+        self._presents = False
+        self._offered = order.streams
+        self._pictures: PictureOutlet | None = None
+
+    def stop(self) -> None:
+        """Stop after the frame under way."""
+        self._stop.set()
+
+    def offer(self, streams: Mapping[str, str]) -> None:
+        """Take the session's streams, by name and description."""
+        self._offered = streams
+
+    def run(self) -> None:
+        """Present until stopped; raises what the component raises."""
+        from labcrane.streams.context import CONTEXT, ContextInlet  # noqa: PLC0415 - liblsl
+        from labcrane.streams.feedback_log import FeedbackLog  # noqa: PLC0415
+        from labcrane.streams.frames import FRAME, FrameInlet  # noqa: PLC0415
+        from labcrane.streams.pictures import PictureOutlet  # noqa: PLC0415
+
+        presenter = Presenter(self._order, discover(study=self._order.study))
+        try:
+            presenter.open()
+            log = FeedbackLog(self._order.name, self._order.source, presenter)
+            if presenter.feedback.cameras:
+                self._pictures = PictureOutlet(self._order.name, self._order.source)
+            self._say({"ready": True, "facts": presenter.facts})
+            found = self._found(CONTEXT, FRAME)
+            if not found:
+                return
+            context = ContextInlet(found[CONTEXT])
+            frames = FrameInlet(found[FRAME], self._order.run)
+            self._join(context, log)
+            presenter.update(context.situation)
+            self._follow(presenter, context, frames, log)
+            log.close()
+            if self._pictures:
+                self._pictures.close()
+        finally:
+            presenter.close()
+
+    def _join(self, context: "ContextInlet", log: "FeedbackLog") -> None:
+        """Wait for what belongs to the first frame: what it is about, and who records it."""
+        recorded = self._order.recorded
+        while not (self._stop.is_set() or (context.text and (log.taken or not recorded))):
+            context.changed(WAIT_S)
+            self._beat()
+
+    def _follow(
+        self,
+        presenter: Presenter,
+        context: "ContextInlet",
+        frames: "FrameInlet",
+        log: "FeedbackLog",
+    ) -> None:
+        """Present until stopped."""
+        while not self._stop.is_set():
+            if context.changed():
+                presenter.update(context.situation)
+            if (frame := frames.newest(WAIT_S)) is not None:
+                self._present(presenter, frame, log, frames.skipped)
+                if not self._presents:
+                    self._presents = True
+                    self._say({"presents": True})
+            self._beat()
+
+    def _present(
+        self, presenter: Presenter, frame: Frame, log: "FeedbackLog", skipped: int
+    ) -> None:
+        values = presenter.present(frame)
+        if values is None:
+            return
+        log.push(frame, values, skipped, presenter.feedback.samples())
+        self._presented += 1
+        if self._pictures and self._pictures.wanted:
+            self._pictures.push(presenter.feedback.pictures(), frame.tick.due)
+
+    def _found(self, *names: str) -> "dict[str, pylsl.StreamInfo]":
+        """Wait for the session's streams of these names; none when stopped first.
+
+        The launcher tells them; where there is none, as in a preview, they are searched for.
+        """
+        from labcrane.streams.outlets import source_id  # noqa: PLC0415 - liblsl
+        from labcrane.streams.search import Search, known_stream  # noqa: PLC0415
+
+        ours = source_id(self._order.source, "")
+        search = None if self._order.recorded else Search(f"starts-with(source_id, '{ours}')")
+        try:
+            while not self._stop.wait(WAIT_S):
+                self._beat()
+                told = {name: known_stream(text) for name, text in self._offered.items()}
+                found = {name: info for name, info in told.items() if info is not None}
+                found |= {info.name(): info for info in (search.results() if search else ())}
+                if all(name in found for name in names):
+                    return found
+        finally:
+            if search:
+                search.close()
+        return {}
+
+    def _beat(self) -> None:
+        now = time.monotonic()
+        if now - self._beaten >= BEAT_S:
+            self._beaten = now
+            self._say({"beat": self._presented})
+
+
+def main() -> int:
+    """Run one feedback process; return its exit status."""
+    parent = Parent()
+    order = parent.order()
+    if order is None:
+        return 0
+    process = FeedbackProcess(order, parent.tell)
+
+    def listen() -> None:
+        while not parent.gone.is_set():
+            parent.wait(LISTEN_S)
+            for streams in parent.messages():
+                process.offer(streams)
+        process.stop()
+
+    threading.Thread(target=listen, name="from-launcher", daemon=True).start()
+    try:
+        process.run()
+    except LabcraneError as error:
+        parent.tell({"failed": str(error)})
+        return 1
+    except Exception as error:
+        parent.tell({"failed": told(error)})
+        raise  # a plugin's mistake: its author needs the traceback
+    finally:
+        parent.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
