@@ -18,9 +18,9 @@ from pathlib import Path
 
 from benchmarks.bare_engine import BareEngine
 from benchmarks.table import Row, show
-from labcrane.registry import discover
-from labcrane.simulation import SimulationOrder, simulate
-from labcrane.study import Study, load
+from labcrane.protocol.study import Study, load
+from labcrane.registry.registry import discover
+from labcrane.simulation.simulation import SimulationOrder, simulate
 
 AIMING = Path(__file__).parents[1] / "protocols" / "aiming" / "protocol.yaml"
 PASSES = (200, 400)

@@ -15,10 +15,10 @@ import numpy as np
 
 from benchmarks.table import Row
 from labcrane import Dynamics
-from labcrane.oversight import Oversight
-from labcrane.registry import discover
+from labcrane.registry.call_monitor import Oversight
+from labcrane.registry.proxies import watched
+from labcrane.registry.registry import discover
 from labcrane.testing import RATE_HZ, a_run, ch8
-from labcrane.watched import watched
 
 ROUNDS, CALLS, CALLS_PER_TICK = 200, 500, 6
 

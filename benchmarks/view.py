@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks.table import Row
 from labcrane import Ball, Run, Situation
-from labcrane.machine import Body
+from labcrane.machines.machine import Body
 from labcrane.streams.pictures import png
 from labcrane.testing import TARGETS, a_run, a_target, ch8
 from labcrane_view.settings import ViewSettings

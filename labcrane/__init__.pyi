@@ -1,31 +1,15 @@
 """The public names, and the modules from which they are imported."""
 
-from .actuator import PRESETS, Actuator, ActuatorSettings
+from .analysis.codebook import codebook_of
 from .analysis.cohort import Participant
+from .analysis.exporter import Exporter
+from .analysis.measures import measures_of
 from .analysis.movements import Movement, movements
-from .arrays import FloatArray
-from .boxes import link_boxes
-from .clock import Tick
-from .errors import (
-    DeviceError,
-    LabcraneError,
-    PluginError,
-    ProtocolError,
-    RecordingError,
-)
-from .finding import Finding, Verdict
-from .hookspecs import hookimpl
-from .kinematics import Arm, frames, jacobian
-from .machine import Body, Joint, Machine
-from .mesh_file import MeshFile
-from .offers import Ask, CommandOffer, Offer, Settings, StudyPath, offer
-from .questions import AnswerError, Answers, Item, Score, numbers
-from .quiet_import import quietly_imported
-from .reachability import reach
-from .recording.recording import SessionRecord, Stream, open_recording
-from .recording.stream_header import Channel, StreamHeader
-from .recording.xdf import XdfWriter
-from .records import (
+from .core.clock import Tick
+from .core.findings import Finding, Verdict
+from .core.items import AnswerError, Answers, Item, Score, numbers
+from .core.primitives import Ball, Beam, Shape, Targets
+from .core.records import (
     Event,
     Frame,
     Judgement,
@@ -37,21 +21,32 @@ from .records import (
     Trial,
     Value,
 )
-from .roles import (
-    Controller,
-    Cue,
-    Dynamics,
-    Exporter,
-    Feedback,
-    InputDevice,
-    Questionnaire,
-    Task,
+from .core.roles import Controller, Cue, Dynamics, Feedback, InputDevice, Questionnaire, Task
+from .core.settings import Settings, StudyPath
+from .core.signals import Layout, Signal, signals_of
+from .errors import (
+    DeviceError,
+    LabcraneError,
+    PluginError,
+    ProtocolError,
+    RecordingError,
 )
-from .scene import Form, Part, Placed, Scene, load_scene, place
-from .scene_text import SCENE_PLACED, read_placed, write_placed
-from .shapes import Ball, Beam, Shape, Targets
-from .signals import Layout, Signal, signals_of
-from .urdf_text import urdf, urdf_joint, urdf_link
+from .machines.actuator import PRESETS, Actuator, ActuatorSettings
+from .machines.inverse_kinematics import reach
+from .machines.kinematics import Arm, frames, jacobian
+from .machines.links import link_boxes
+from .machines.machine import Body, Joint, Machine
+from .machines.mesh import MeshFile
+from .machines.scene import Form, Part, Placed, Scene, load_scene, place
+from .machines.scene_codec import SCENE_PLACED, read_placed, write_placed
+from .machines.urdf import urdf, urdf_joint, urdf_link
+from .recording.participant_file.reader import SessionRecord, Stream, open_recording
+from .recording.xdf.header import Channel, StreamHeader
+from .recording.xdf.writer import XdfWriter
+from .registry.hookspecs import hookimpl
+from .registry.offers import Ask, CommandOffer, Offer, offer
+from .registry.quiet_import import quietly_imported
+from .types import FloatArray
 
 __version__: str
 
@@ -118,11 +113,13 @@ __all__ = [
     "Value",
     "Verdict",
     "XdfWriter",
+    "codebook_of",
     "frames",
     "hookimpl",
     "jacobian",
     "link_boxes",
     "load_scene",
+    "measures_of",
     "movements",
     "numbers",
     "offer",

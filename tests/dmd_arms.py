@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from labcrane import Dynamics, Planned, Signal
-from labcrane.machine_file import load_machine
+from labcrane.machines.library import load_machine
 from labcrane.testing import RATE_HZ, a_run, a_trial
 from labcrane_dmd import labcrane_dynamics
 from labcrane_dmd.arm_settings import ArmSettings, JawsSettings

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labcrane import Controller, FloatArray, Machine
-from labcrane.machine_file import load_machine
+from labcrane.machines.library import load_machine
 from labcrane.testing import (
     a_run,
     a_trial,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from labcrane import Arm, FloatArray, Machine, frames, jacobian
-from labcrane.kinematics import dh_matrix
-from labcrane.machine_file import load_machine
+from labcrane.machines.kinematics import dh_matrix
+from labcrane.machines.library import load_machine
 
 MACHINES = ("ch8", "ch8_cranelike")
 SCALE = 22.3107  # from the OpenManipulator-X to the crane

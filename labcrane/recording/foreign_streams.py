@@ -14,15 +14,24 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from labcrane.arrays import FloatArray
 from labcrane.recording.journal_reader import JournalState, SessionLog, state
-from labcrane.recording.samples import Texts
-from labcrane.recording.stream_header import Channel, StreamHeader
-from labcrane.recording.xdf_reader import XdfFile, XdfStream, read_xdf
+from labcrane.recording.xdf.header import Channel, StreamHeader
+from labcrane.recording.xdf.reader import XdfFile, XdfStream, read_xdf
+from labcrane.recording.xdf.samples import Texts
+from labcrane.types import FloatArray
 
 PROBES = "probes"
 ARRIVALS = "arrivals"
 NOTES = "notes"
+
+OPENED = "opened"
+"""The first note of every part: counts of samples start anew with it."""
+
+RESET = "reset"
+"""A note of a source that was replaced."""
+
+COUNTER_GAP = "counter gap"
+"""A note of samples that the source's own counter left out; ``missing`` says how many."""
 PROBE_CHANNELS = tuple(Channel(label, "s") for label in ("remote_time", "offset", "rtt", "local"))
 ARRIVAL_CHANNELS = (Channel("count", "1"), Channel("time", "s"))
 

@@ -1,8 +1,9 @@
 """The session's whole context as a string stream: LSL keeps no history, so it is sent again.
 
 A sample of ``labcrane.context`` is a JSON object of two parts: ``scene``, which never changes
-(:func:`labcrane.run_text.read_run`), and ``situation`` (:class:`labcrane.records.Situation`). It is
-sent at every change and once a second: whoever starts late, or again, draws from one sample alone.
+(:func:`labcrane.recording.run_codec.read_run`), and ``situation``
+(:class:`labcrane.core.records.Situation`). It is sent at every change and once a second: whoever
+starts late, or again, draws from one sample alone.
 """
 
 import json
@@ -10,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
-from labcrane.records import Event, Frame, Run, Situation
-from labcrane.run_text import write_run
+from labcrane.core.records import Event, Frame, Run, Situation
+from labcrane.recording.run_codec import write_run
 from labcrane.streams.outlets import channel, stream_info
 
 if TYPE_CHECKING:

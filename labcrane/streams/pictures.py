@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from labcrane.records import Picture
+from labcrane.core.records import Picture
 from labcrane.streams.outlets import channel, source_id, stream_info
 
 if TYPE_CHECKING:

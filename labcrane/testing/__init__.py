@@ -10,7 +10,7 @@ stand-ins for the other roles, and runs it.
 """
 
 from labcrane.testing.commands import CommandContract
-from labcrane.testing.every_role import PluginContract, check_closes_after_failed_open, check_soon
+from labcrane.testing.components import PluginContract, check_closes_after_failed_open, check_soon
 from labcrane.testing.examinations import ExaminationContract
 from labcrane.testing.exporters import ExporterContract
 from labcrane.testing.presentation import TARGETS, CueContract, FeedbackContract, a_target

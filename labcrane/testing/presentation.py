@@ -5,11 +5,11 @@ import copy
 import numpy as np
 from pydantic import BaseModel
 
-from labcrane.records import Frame, Run, Situation
-from labcrane.roles import Cue, Feedback
-from labcrane.shapes import Ball, Shape
-from labcrane.signals import Layout, Signal
-from labcrane.testing.every_role import check_closes_after_failed_open, check_soon
+from labcrane.core.primitives import Ball, Shape
+from labcrane.core.records import Frame, Run, Situation
+from labcrane.core.roles import Cue, Feedback
+from labcrane.core.signals import Layout, Signal
+from labcrane.testing.components import check_closes_after_failed_open, check_soon
 from labcrane.testing.roles import a_frame, a_run, a_trial, ch8, check_signals, crane_at, opened
 
 TARGETS = (

@@ -5,15 +5,15 @@ from contextlib import closing, contextmanager
 
 import numpy as np
 
-from labcrane.arrays import FloatArray
-from labcrane.clock import Tick
-from labcrane.kinematics import Arm
-from labcrane.machine import Machine
-from labcrane.machine_file import load_machine
-from labcrane.records import Frame, Phase, Planned, Run, Trial
-from labcrane.roles import Component, Controller, Dynamics, InputDevice
-from labcrane.signals import Layout, Signal
-from labcrane.testing.every_role import check_closes_after_failed_open, check_soon
+from labcrane.core.clock import Tick
+from labcrane.core.records import Frame, Phase, Planned, Run, Trial
+from labcrane.core.roles import Component, Controller, Dynamics, InputDevice
+from labcrane.core.signals import Layout, Signal
+from labcrane.machines.kinematics import Arm
+from labcrane.machines.library import load_machine
+from labcrane.machines.machine import Machine
+from labcrane.testing.components import check_closes_after_failed_open, check_soon
+from labcrane.types import FloatArray
 
 RATE_HZ = 240.0
 """Ticks a second of a run made by :func:`a_run`."""

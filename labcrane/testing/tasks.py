@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from labcrane.records import Frame, Phase, Run
-from labcrane.roles import Task
-from labcrane.signals import Signal
-from labcrane.testing.every_role import check_closes_after_failed_open, check_soon
+from labcrane.core.records import Frame, Phase, Run
+from labcrane.core.roles import Task
+from labcrane.core.signals import Signal
+from labcrane.testing.components import check_closes_after_failed_open, check_soon
 from labcrane.testing.roles import (
     RATE_HZ,
     a_frame,

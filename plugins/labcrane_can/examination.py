@@ -4,7 +4,7 @@ import time
 from collections import Counter
 
 from labcrane import Ask, DeviceError, Finding, ProtocolError, Verdict
-from labcrane_can.asked import PanelCommands
+from labcrane_can.command_state import PanelCommands
 from labcrane_can.listener import open_bus
 from labcrane_can.settings import CanSettings
 

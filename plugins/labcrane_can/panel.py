@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 
 from labcrane import FloatArray, Frame, InputDevice, Machine, Run, Tick, Value
-from labcrane_can.asked import PanelCommands
 from labcrane_can.avc import ESTIMATED, FULL, MEASURED, encode_flow
 from labcrane_can.axes import PanelAxes
+from labcrane_can.command_state import PanelCommands
 from labcrane_can.listener import Listener
 from labcrane_can.settings import CanSettings
 

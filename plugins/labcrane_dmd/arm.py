@@ -21,10 +21,10 @@ from labcrane_dmd.arm_settings import ArmSettings
 from labcrane_dmd.arm_state import ArmState, arm_signals, scene_parts
 from labcrane_dmd.contacts import Window
 from labcrane_dmd.drive import drives
-from labcrane_dmd.looks import boxes
 from labcrane_dmd.model_file import load
 from labcrane_dmd.overload import overloads
 from labcrane_dmd.recordings import FULL
+from labcrane_dmd.visual import boxes
 from labcrane_dmd.world import World
 
 ROUNDING_S = 1e-9

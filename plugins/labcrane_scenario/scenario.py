@@ -26,10 +26,10 @@ from labcrane import (
     place,
     write_placed,
 )
+from labcrane_scenario.goals import Way
 from labcrane_scenario.mistakes import KINDS
 from labcrane_scenario.observation import Observation
 from labcrane_scenario.settings import ScenarioSettings
-from labcrane_scenario.way import Way
 
 PRESSED = 0.5  # a button is 0 or 1
 

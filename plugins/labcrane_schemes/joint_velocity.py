@@ -7,10 +7,10 @@ import numpy as np
 
 from labcrane import Controller, FloatArray, Machine, Run
 from labcrane_schemes.axis_map import Axis, check_joints, find_axes
-from labcrane_schemes.log import rest, scheme_signals
 from labcrane_schemes.resolved_rate import NOTHING, ResolvedRate
 from labcrane_schemes.settings import JointVelocitySettings
 from labcrane_schemes.shaping import Shaping
+from labcrane_schemes.signals import rest, scheme_signals
 from labcrane_schemes.soft_stops import soft_stops
 
 

@@ -6,8 +6,8 @@ from labcrane import Controller, FloatArray, Machine, Run, Signal, Trial
 from labcrane_schemes.axis_map import find_axis
 from labcrane_schemes.end_effector import EndEffector
 from labcrane_schemes.joint_velocity import JointVelocity
-from labcrane_schemes.log import scheme_signals
 from labcrane_schemes.settings import SwitchableSettings
+from labcrane_schemes.signals import scheme_signals
 
 PRESSED = 0.5
 """Value of a button above which it is down."""

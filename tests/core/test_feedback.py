@@ -18,14 +18,14 @@ from labcrane import (
     Situation,
     Targets,
 )
-from labcrane.console import Command, Order
-from labcrane.design.fading import faded
-from labcrane.feedback_crew import FeedbackCrew
-from labcrane.plan import plan_session
-from labcrane.run_text import read_run, write_run
-from labcrane.session import Visit, run
+from labcrane.design.order import faded
+from labcrane.design.plan import plan_session
+from labcrane.feedback.processes import FeedbackCrew
+from labcrane.protocol.study import Study
+from labcrane.recording.run_codec import read_run, write_run
+from labcrane.session.commands import Command, Order
+from labcrane.session.session import Visit, run
 from labcrane.streams.context import situation_after
-from labcrane.study import Study
 from labcrane.testing import TARGETS, a_run, ch8
 
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from labcrane import Event, Frame, PluginError, RecordingError, Tick
-from labcrane.frame_log import FrameLog, columns
-from labcrane.oversight import Overrun, Oversight
+from labcrane.recording.frame_log import FrameLog, columns
 from labcrane.recording.journal import SessionJournal
 from labcrane.recording.journal_reader import SessionLog, read_journal
-from labcrane.slowness import FEW, Slowness
+from labcrane.registry.call_monitor import Overrun, Oversight
+from labcrane.session.overruns import FEW, Slowness
 from labcrane.testing import RATE_HZ, a_frame, a_run, ch8
 
 RUN = a_run(ch8())

@@ -12,13 +12,13 @@ import pytest
 from faults.sessions import unique, wait_for
 
 from labcrane import Event, Frame, Tick
-from labcrane.feedback_host import FeedbackProcess
-from labcrane.host_order import HostOrder, Part
+from labcrane.feedback.config import HostOrder, Part
+from labcrane.feedback.process import FeedbackProcess
 from labcrane.streams.context import ContextOutlet
 from labcrane.streams.feedback_log import log_source
 from labcrane.streams.frames import FrameOutlet
-from labcrane.supervisor.pictures import Pictures
 from labcrane.testing import TARGETS, a_run, a_target, ch8
+from labcrane.web.pictures import Pictures
 
 PLUGIN = """\
 from pathlib import Path

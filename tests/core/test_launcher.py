@@ -7,12 +7,13 @@ from pathlib import Path
 import pytest
 from faults.sessions import STUDY, unique, wait_for
 
-from labcrane import launcher as launcher_module
-from labcrane import open_recording, recorder_keeper
-from labcrane.console import Command, Order, QueueConsole
-from labcrane.launcher import Launcher
-from labcrane.recorder_keeper import RecorderKeeper
-from labcrane.session_process import VisitOrder
+from labcrane import open_recording
+from labcrane.launcher import launcher as launcher_module
+from labcrane.launcher.launcher import Launcher
+from labcrane.launcher.session_process import VisitOrder
+from labcrane.session.commands import Command, Order, QueueConsole
+from labcrane.streams.recorder import handle as recorder_keeper
+from labcrane.streams.recorder.handle import RecorderKeeper
 
 
 class LateRecorder:

@@ -13,8 +13,8 @@ from rehearsal import SHORT
 from labcrane import Cue, PluginError, ProtocolError, open_recording
 from labcrane.approval.decision import Grant, amend, approve, verify
 from labcrane.cli.app import main
-from labcrane.registry import Registry, discover
-from labcrane.study import Study, load
+from labcrane.protocol.study import Study, load
+from labcrane.registry.registry import Registry, discover
 
 ARROW = """\
 import os

@@ -16,9 +16,9 @@ from labcrane import (
     Situation,
     offer,
 )
-from labcrane.host_order import HostOrder, Part
-from labcrane.presenter import Presenter
-from labcrane.registry import discover
+from labcrane.feedback.config import HostOrder, Part
+from labcrane.feedback.presenter import Presenter
+from labcrane.registry.registry import discover
 from labcrane.testing import TARGETS, a_run, a_target, ch8
 
 

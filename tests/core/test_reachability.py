@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from labcrane import Machine, frames, reach
-from labcrane.machine_file import load_machine, machine_names
+from labcrane.machines.library import load_machine, machine_names
 
 
 @pytest.fixture(params=machine_names())

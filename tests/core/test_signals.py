@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from labcrane import Layout, ProtocolError, Signal, signals_of
-from labcrane.rig import Rig, describe
+from labcrane.protocol.rig import Rig, describe
 
 SIGNALS = (
     Signal("left", "1", ("x", "trigger")),

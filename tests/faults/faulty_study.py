@@ -7,13 +7,13 @@ import numpy as np
 from rehearsal import ScriptedConsole
 
 from labcrane import open_recording
-from labcrane import session as session_module
-from labcrane.console import Command, Order
-from labcrane.frame_log import FrameLog
-from labcrane.recording.recording import SessionRecord
-from labcrane.registry import discover
-from labcrane.session import Visit, run
-from labcrane.study import load
+from labcrane.protocol.study import load
+from labcrane.recording.frame_log import FrameLog
+from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.registry.registry import discover
+from labcrane.session import session as session_module
+from labcrane.session.commands import Command, Order
+from labcrane.session.session import Visit, run
 
 STUDY = """\
 labcrane: 1

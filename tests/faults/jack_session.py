@@ -6,9 +6,9 @@ import pytest
 from jack_server import a_jack_server, underruns
 
 from labcrane import SessionRecord, open_recording
-from labcrane.console import QueueConsole
-from labcrane.launcher import Launcher
-from labcrane.session_process import VisitOrder
+from labcrane.launcher.launcher import Launcher
+from labcrane.launcher.session_process import VisitOrder
+from labcrane.session.commands import QueueConsole
 
 
 class Examiner(QueueConsole):

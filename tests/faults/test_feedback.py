@@ -11,11 +11,11 @@ from faults.sessions import unique, wait_for
 from simple_crane import FORM
 
 import labcrane as lab
-from labcrane.console import Command, Order, QueueConsole
-from labcrane.launcher import Launcher
-from labcrane.recording.recording import SessionRecord
-from labcrane.records import Event
-from labcrane.session_process import VisitOrder
+from labcrane.core.records import Event
+from labcrane.launcher.launcher import Launcher
+from labcrane.launcher.session_process import VisitOrder
+from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.session.commands import Command, Order, QueueConsole
 
 STUDY = (
     """\

@@ -9,8 +9,8 @@ from rehearsal import SHORT, a_study
 from windows import an_x_server
 
 from labcrane.errors import DeviceError
-from labcrane.feedback_crew import FeedbackCrew
-from labcrane.session import Visit
+from labcrane.feedback.processes import FeedbackCrew
+from labcrane.session.session import Visit
 
 STUDY = """\
 feedback:

@@ -15,13 +15,14 @@ from faults.faulty_study import (
     run_through,
 )
 
-from labcrane import LabcraneError, feedback_keeper, open_recording
-from labcrane import stillness as stillness_module
+from labcrane import LabcraneError, open_recording
 from labcrane.cli.app import main
-from labcrane.console import QueueConsole
-from labcrane.launcher import Launcher, Outcome
-from labcrane.recording.recording import SessionRecord
-from labcrane.session_process import VisitOrder
+from labcrane.feedback import handle as feedback_keeper
+from labcrane.launcher import hang_detector as stillness_module
+from labcrane.launcher.launcher import Launcher, Outcome
+from labcrane.launcher.session_process import VisitOrder
+from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.session.commands import QueueConsole
 
 
 @pytest.mark.long

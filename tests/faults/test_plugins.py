@@ -10,9 +10,9 @@ from rehearsal import ScriptedConsole
 
 from labcrane import PluginError
 from labcrane.cli.app import main
-from labcrane.registry import discover
-from labcrane.session import Visit, run
-from labcrane.study import load
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
+from labcrane.session.session import Visit, run
 
 
 @pytest.mark.parametrize(

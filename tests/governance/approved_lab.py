@@ -5,9 +5,9 @@ from pathlib import Path
 from governed import Lab
 
 from labcrane import ProtocolError
-from labcrane.admission import gate
+from labcrane.session.eligibility import gate
 
-MACHINE = (Path(__file__).parents[2] / "labcrane" / "machines" / "ch8.yaml").read_text()
+MACHINE = (Path(__file__).parents[2] / "labcrane" / "machines" / "data" / "ch8.yaml").read_text()
 
 
 def approved_lab(folder: Path) -> Lab:

@@ -9,10 +9,10 @@ from governance.approved_lab import approved_lab, refusal
 from governed import TODAY, Lab, edit
 
 from labcrane import ProtocolError
-from labcrane.admission import gate
 from labcrane.approval.decision import Grant, amend, approve
 from labcrane.approval.lock import lock_path, read_lock
-from labcrane.registry import discover
+from labcrane.registry.registry import discover
+from labcrane.session.eligibility import gate
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_pilots_run_whatever_has_drifted_and_stamp_it(lab: Lab) -> None:
     from rehearsal import ScriptedConsole
 
     import labcrane
-    from labcrane.session import run
+    from labcrane.session.session import run
 
     edit(lab.protocol, "movements: 1", "movements: 2")
     path = run(lab.visit("P001", pilot=True, simulated=True, fast=True), ScriptedConsole())

@@ -10,9 +10,9 @@ import pytest
 from governed import Lab, edit
 
 from labcrane import ProtocolError
-from labcrane.admission import gate
 from labcrane.approval.lock import lock_path
-from labcrane.participants.places import Places
+from labcrane.participants.folders import Places
+from labcrane.session.eligibility import gate
 
 RESCUE = Path(__file__).parents[2] / "protocols" / "retrieval"
 ASKED = """

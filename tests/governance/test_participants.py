@@ -12,12 +12,12 @@ from governed import GOVERNED, GROUPED, TODAY, Lab, Willing
 
 import labcrane
 from labcrane import DeviceError, ProtocolError
-from labcrane.admission import gate
-from labcrane.console import Command, Order
 from labcrane.participants import enrolment
 from labcrane.participants.deviations import all_deviations
+from labcrane.participants.personal_data import personal
 from labcrane.participants.register import changed, read
-from labcrane.privacy import personal
+from labcrane.session.commands import Command, Order
+from labcrane.session.eligibility import gate
 
 TWO_SESSIONS = GOVERNED + (
     "  - name: retention\n    after_days: [1, 3]\n    steps:\n"
@@ -85,7 +85,7 @@ def test_the_deviations_of_a_session_that_was_killed_come_from_its_journal(lab: 
     lab.consent("P001")
     child = os.fork()
     if child == 0:
-        from labcrane.session import run
+        from labcrane.session.session import run
 
         class Killer(Willing):
             def commands(self):
@@ -224,7 +224,7 @@ def test_people_need_joysticks_and_leave_no_session_when_there_are_none(tmp_path
     lab = Lab(tmp_path, GOVERNED.replace("{use: simulated_operator}", "{use: dual_joystick}"))
     lab.approve()
     lab.consent("P001")
-    from labcrane.session import run
+    from labcrane.session.session import run
 
     with desk(), pytest.raises(DeviceError, match="joystick"):
         run(lab.visit("P001"), Willing())

@@ -11,9 +11,9 @@ import pytest
 from governed import GROUPED, Lab
 
 from labcrane import ProtocolError, RecordingError
-from labcrane.admission import gate
-from labcrane.participants.places import Places
+from labcrane.participants.folders import Places
 from labcrane.participants.register import changed, read
+from labcrane.session.eligibility import gate
 
 
 @pytest.fixture
@@ -80,7 +80,7 @@ def test_processes_that_write_at_once_lose_nothing_and_share_no_slot(tmp_path: P
 WRITER = """
 import sys
 from pathlib import Path
-from labcrane.participants.places import Places
+from labcrane.participants.folders import Places
 from labcrane.participants.register import Entry, changed
 number = 0
 while True:

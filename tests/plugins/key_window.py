@@ -4,9 +4,9 @@ import select
 import sys
 from pathlib import Path
 
-from labcrane.host_order import HostOrder, Part
-from labcrane.presenter import Presenter
-from labcrane.registry import discover
+from labcrane.feedback.config import HostOrder, Part
+from labcrane.feedback.presenter import Presenter
+from labcrane.registry.registry import discover
 from labcrane.streams.feedback_log import FeedbackLog
 from labcrane.testing import TARGETS, a_run, a_target, ch8
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from labcrane import Phase, ProtocolError, Task, reach
-from labcrane.machine_file import load_machine
+from labcrane.machines.library import load_machine
 from labcrane.testing import TaskContract, a_frame, a_run, a_trial, ch8, crane_at, opened
 from labcrane_aiming import labcrane_tasks
 from labcrane_aiming.aiming import Aiming

@@ -23,7 +23,7 @@ from cranes import (
 from rehearsal import SHORT, a_study, rehearse
 
 from labcrane import PRESETS, Arm, FloatArray, Machine, frames
-from labcrane.machine_file import load_machine
+from labcrane.machines.library import load_machine
 from labcrane.testing import RATE_HZ, ch8
 
 

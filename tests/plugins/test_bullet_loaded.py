@@ -7,8 +7,8 @@ import pytest
 from cranes import build, drive, needs_bullet, random_poses, standing
 
 from labcrane import Arm, Dynamics, FloatArray, ProtocolError, frames
-from labcrane.registry import discover
-from labcrane.study import load
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
 from labcrane.testing import RATE_HZ, DynamicsContract, ch8
 
 pytestmark = needs_bullet

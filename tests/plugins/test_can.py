@@ -12,8 +12,8 @@ from labcrane import InputDevice, ProtocolError, Tick
 from labcrane.testing import InputContract, a_frame, a_run, ch8
 from labcrane.testing.commands import CommandContract
 from labcrane_can import labcrane_commands
-from labcrane_can.asked import PanelCommands
 from labcrane_can.avc import ESTIMATED, FULL, FrameError, State, decode, encode, encode_flow
+from labcrane_can.command_state import PanelCommands
 from labcrane_can.panel import CanPanel
 from labcrane_can.replay import CanReplay
 from labcrane_can.settings import CanSettings, ReplaySettings, ValveMap

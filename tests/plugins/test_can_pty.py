@@ -10,13 +10,14 @@ import pytest
 from cranes import needs_bullet
 from rehearsal import NoLog, ScriptedConsole
 
-from labcrane import loop, rig
-from labcrane.clock import SystemClock
-from labcrane.console import Command, Order
-from labcrane.course import Course
-from labcrane.plan import plan_session
-from labcrane.registry import discover
-from labcrane.study import load
+from labcrane.core.clock import SystemClock
+from labcrane.design.plan import plan_session
+from labcrane.protocol import rig
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
+from labcrane.session import loop
+from labcrane.session.commands import Command, Order
+from labcrane.session.sequencer import Course
 
 pytestmark = needs_bullet
 

@@ -9,7 +9,7 @@ from dmd_arms import MAP, MODEL, RETRIEVAL, build, standing, step
 
 import labcrane_dmd
 from labcrane import Arm, Controller, Dynamics, ProtocolError, Signal
-from labcrane.machine_file import load_machine
+from labcrane.machines.library import load_machine
 from labcrane.testing import (
     RATE_HZ,
     ControllerContract,

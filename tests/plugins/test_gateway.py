@@ -13,13 +13,15 @@ from cranes import needs_bullet
 from gone_stream import goes_once
 from rehearsal import NoLog, ScriptedConsole
 
-from labcrane import FloatArray, InputDevice, Run, Tick, loop, rig
-from labcrane.clock import SystemClock
-from labcrane.console import Command, Order
-from labcrane.course import Course
-from labcrane.plan import plan_session
-from labcrane.registry import discover
-from labcrane.study import load
+from labcrane import FloatArray, InputDevice, Run, Tick
+from labcrane.core.clock import SystemClock
+from labcrane.design.plan import plan_session
+from labcrane.protocol import rig
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
+from labcrane.session import loop
+from labcrane.session.commands import Command, Order
+from labcrane.session.sequencer import Course
 from labcrane.testing import InputContract, a_frame, a_run, ch8
 from labcrane_gateway.settings import GatewaySettings
 from labcrane_gateway.station import Station

@@ -17,7 +17,7 @@ from pydantic import ValidationError
 from windows import an_x_server
 
 from labcrane import InputDevice, ProtocolError
-from labcrane.clock import Tick
+from labcrane.core.clock import Tick
 from labcrane.testing import RATE_HZ, InputContract, a_frame, a_run, ch8
 from labcrane_keyboard.keyboard import Keyboard
 from labcrane_keyboard.settings import KeyboardSettings

@@ -14,7 +14,7 @@ from labcrane import (
     Planned,
     Trial,
 )
-from labcrane.machine_file import load_machine
+from labcrane.machines.library import load_machine
 from labcrane.testing import RATE_HZ, InputContract, ch8
 from labcrane_operator import labcrane_inputs
 from labcrane_operator.aimer import Aimer

@@ -23,7 +23,7 @@ from windows import (
 )
 
 from labcrane import Ball, DeviceError, Feedback, ProtocolError, Situation
-from labcrane.kinematics import Arm
+from labcrane.machines.kinematics import Arm
 from labcrane.testing import FeedbackContract, crane_at
 from labcrane_view.monitors import parse
 from labcrane_view.settings import CAMERAS, CameraSettings, ViewSettings

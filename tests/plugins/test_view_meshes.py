@@ -27,8 +27,8 @@ from labcrane import (
     write_placed,
 )
 from labcrane.approval.materials import referred
-from labcrane.run_text import read_run, write_run
-from labcrane.scene import load_scene, place
+from labcrane.machines.scene import load_scene, place
+from labcrane.recording.run_codec import read_run, write_run
 from labcrane.testing import TARGETS, a_run, crane_state
 from labcrane_view.mesh_reader import read_mesh
 from labcrane_view.settings import CameraSettings, ViewSettings
@@ -140,7 +140,7 @@ def test_a_mesh_that_cannot_be_read_is_named(
         read_mesh(MeshFile(file=tmp_path / name))
 
 
-CRANE = Path(__file__).parents[2] / "labcrane" / "machines" / "ch8.yaml"
+CRANE = Path(__file__).parents[2] / "labcrane" / "machines" / "data" / "ch8.yaml"
 
 
 def a_machine_study(folder: Path, mesh: str) -> Path:

@@ -23,12 +23,12 @@ from labcrane import (
     load_scene,
     place,
     read_placed,
-    rig,
     write_placed,
 )
-from labcrane.registry import discover
+from labcrane.protocol import rig
+from labcrane.protocol.study import Study, load
+from labcrane.registry.registry import discover
 from labcrane.streams.context import situation_after, situation_of
-from labcrane.study import Study, load
 from labcrane.testing import a_trial
 from labcrane_view.areas import Projection
 from labcrane_view.settings import CameraSettings, ViewSettings

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labcrane.clock import Tick
+from labcrane.core.clock import Tick
+from labcrane.core.records import Event, Frame
 from labcrane.errors import StreamError
-from labcrane.machine_file import load_machine
+from labcrane.machines.library import load_machine
 from labcrane.recording.journal import event_text
-from labcrane.records import Event, Frame
 from labcrane.streams.markers import CODES, OTHER
 from labcrane.streams.outlets import Outlets, check_clock
 from labcrane.testing import a_frame, a_run

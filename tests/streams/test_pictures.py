@@ -13,7 +13,7 @@ from faults.sessions import unique, wait_for
 
 from labcrane import Picture
 from labcrane.streams.pictures import PictureOutlet
-from labcrane.supervisor.pictures import Pictures
+from labcrane.web.pictures import Pictures
 
 GREYS = np.arange(60, dtype=np.uint8).reshape(6, 10)
 
