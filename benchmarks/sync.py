@@ -1,4 +1,4 @@
-"""How far markers fall from the right samples, with real processes and wrong clocks.
+"""Synchronisation: how far markers fall from the right samples, with wrong clocks.
 
     python -m benchmarks.sync [--seconds 240] [--restarts 8]
 

@@ -32,7 +32,7 @@ from labcrane.recording.journal import SessionJournal
 from labcrane.registry.registry import discover
 from labcrane.session import loop
 from labcrane.session.commands import Command, Order
-from labcrane.session.sequencer import Course
+from labcrane.session.sequencer import Sequencer
 from labcrane.streams.network import use_loopback
 
 ROUNDS = 7
@@ -108,11 +108,11 @@ def whole(study: Study, folder: Path, clock: Clock, count: int, *, lsl: bool) ->
         seen.append(frame)
 
     with rig.opened(the_rig, study, plan.seed) as run:
-        course = Course(study, plan, the_rig, waits=False)
+        course = Sequencer(study, plan, the_rig, waits=False)
         path = folder / f"{time.perf_counter_ns()}.xdf"
         with SessionJournal(path, columns(run), run.rate_hz) as journal, outlets(run, lsl) as push:
-            log, onlookers = FrameLog(journal, run), (*push, end_of_tick)
-            loop.run(the_rig, run, course, clock, UntilTick(count), log, onlookers)
+            log, sinks = FrameLog(journal, run), (*push, end_of_tick)
+            loop.run(the_rig, run, course, clock, UntilTick(count), log, sinks)
         path.unlink()
     return seen
 

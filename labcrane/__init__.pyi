@@ -7,18 +7,18 @@ from .analysis.measures import measures_of
 from .analysis.movements import Movement, movements
 from .core.clock import Tick
 from .core.findings import Finding, Verdict
-from .core.items import AnswerError, Answers, Item, Score, numbers
-from .core.primitives import Ball, Beam, Shape, Targets
+from .core.items import AnswerError, Answers, Item, Score, numeric_answers
+from .core.primitives import Cylinder, Shape, Sphere, TargetFinder
 from .core.records import (
+    CameraImage,
     Event,
     Frame,
-    Judgement,
     Phase,
-    Picture,
-    Planned,
+    PlannedTrial,
     Run,
-    Situation,
+    SessionState,
     Trial,
+    TrialStatus,
     Value,
 )
 from .core.roles import Controller, Cue, Dynamics, Feedback, InputDevice, Questionnaire, Task
@@ -31,41 +31,40 @@ from .errors import (
     ProtocolError,
     RecordingError,
 )
-from .machines.actuator import PRESETS, Actuator, ActuatorSettings
+from .machines.actuator import ACTUATOR_PRESETS, Actuator, ActuatorSettings
 from .machines.inverse_kinematics import reach
-from .machines.kinematics import Arm, frames, jacobian
+from .machines.kinematics import Arm, jacobian, link_frames
 from .machines.links import link_boxes
 from .machines.machine import Body, Joint, Machine
 from .machines.mesh import MeshFile
-from .machines.scene import Form, Part, Placed, Scene, load_scene, place
+from .machines.scene import Geom, PlacedObject, Scene, ShapeKind, load_scene, place_objects
 from .machines.scene_codec import SCENE_PLACED, read_placed, write_placed
 from .machines.urdf import urdf, urdf_joint, urdf_link
 from .recording.participant_file.reader import SessionRecord, Stream, open_recording
 from .recording.xdf.header import Channel, StreamHeader
 from .recording.xdf.writer import XdfWriter
 from .registry.hookspecs import hookimpl
-from .registry.offers import Ask, CommandOffer, Offer, offer
+from .registry.offers import CommandOffer, Offer, Prompt, offer
 from .registry.quiet_import import quietly_imported
 from .types import FloatArray
 
 __version__: str
 
 __all__ = [
-    "PRESETS",
+    "ACTUATOR_PRESETS",
     "SCENE_PLACED",
     "Actuator",
     "ActuatorSettings",
     "AnswerError",
     "Answers",
     "Arm",
-    "Ask",
-    "Ball",
-    "Beam",
     "Body",
+    "CameraImage",
     "Channel",
     "CommandOffer",
     "Controller",
     "Cue",
+    "Cylinder",
     "DeviceError",
     "Dynamics",
     "Event",
@@ -73,25 +72,23 @@ __all__ = [
     "Feedback",
     "Finding",
     "FloatArray",
-    "Form",
     "Frame",
+    "Geom",
     "InputDevice",
     "Item",
     "Joint",
-    "Judgement",
     "LabcraneError",
     "Layout",
     "Machine",
     "MeshFile",
     "Movement",
     "Offer",
-    "Part",
     "Participant",
     "Phase",
-    "Picture",
-    "Placed",
-    "Planned",
+    "PlacedObject",
+    "PlannedTrial",
     "PluginError",
+    "Prompt",
     "ProtocolError",
     "Questionnaire",
     "RecordingError",
@@ -99,32 +96,35 @@ __all__ = [
     "Scene",
     "Score",
     "SessionRecord",
+    "SessionState",
     "Settings",
     "Shape",
+    "ShapeKind",
     "Signal",
-    "Situation",
+    "Sphere",
     "Stream",
     "StreamHeader",
     "StudyPath",
-    "Targets",
+    "TargetFinder",
     "Task",
     "Tick",
     "Trial",
+    "TrialStatus",
     "Value",
     "Verdict",
     "XdfWriter",
     "codebook_of",
-    "frames",
     "hookimpl",
     "jacobian",
     "link_boxes",
+    "link_frames",
     "load_scene",
     "measures_of",
     "movements",
-    "numbers",
+    "numeric_answers",
     "offer",
     "open_recording",
-    "place",
+    "place_objects",
     "quietly_imported",
     "reach",
     "read_placed",

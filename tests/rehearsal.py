@@ -15,7 +15,7 @@ from labcrane.protocol.study import Study, load
 from labcrane.registry.registry import discover
 from labcrane.session import loop
 from labcrane.session.commands import Command
-from labcrane.session.sequencer import Course
+from labcrane.session.sequencer import Sequencer
 
 SHORT = (
     """\
@@ -97,7 +97,7 @@ def rehearse(
     plan = plan_session(study, "P001", 1)
     the_rig = the_rig or rig.build(study, simulated=True)
     with rig.opened(the_rig, study, plan.seed) as run:
-        course = Course(study, plan, the_rig, waits=waits, awaits=awaits)
+        course = Sequencer(study, plan, the_rig, waits=waits, awaits=awaits)
         seen = Rehearsal(run)
         console = ScriptedConsole(orders)
         keep = [lambda frame: seen.frames.append(copy.deepcopy(frame))]

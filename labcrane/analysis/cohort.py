@@ -1,4 +1,4 @@
-"""Who is in a data folder, and who counts."""
+"""Cohort of a data folder: who is in it, and who counts."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -4,12 +4,12 @@ from typing import Literal
 
 from pydantic import NonNegativeFloat, PositiveInt, model_validator
 
-from labcrane.files.model import Documented
+from labcrane.files.model import StrictModel
 
 Reading = Literal["separate_overloads", "shared_overloads"]
 
 
-class Weights(Documented):
+class Weights(StrictModel):
     """Most points of each component of the performance indicator."""
 
     duration: NonNegativeFloat = 20.0
@@ -40,7 +40,7 @@ class Weights(Documented):
         return self
 
 
-class IndicatorSettings(Documented):
+class IndicatorSettings(StrictModel):
     """How the performance indicator is worked out (Typiak 2024, as reconstructed)."""
 
     weights: Weights = Weights()

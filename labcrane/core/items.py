@@ -1,4 +1,4 @@
-"""What a questionnaire asks, and what may be answered."""
+"""Items of a questionnaire, and what may be answered."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -114,7 +114,7 @@ Answers = Mapping[str, Value]
 """Answers by the items' names; a declined or unanswered item is None, or missing."""
 
 
-def numbers(answers: Answers, names: Sequence[str]) -> list[float]:
+def numeric_answers(answers: Answers, names: Sequence[str]) -> list[float]:
     """Return the named answers as numbers, NaN for those that are missing.
 
     Nothing is imputed: a sum with a missing answer is NaN, and says so.

@@ -1,4 +1,4 @@
-"""What a cue draws: plain shapes in the machine's base frame, the same for every view."""
+"""Primitives that a cue draws, in the machine's base frame, the same for every view."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Colour = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Ball:
+class Sphere:
     """A sphere.
 
     Attributes
@@ -37,7 +37,7 @@ class Ball:
 
 
 @dataclass(frozen=True, slots=True)
-class Beam:
+class Cylinder:
     """A round bar.
 
     Attributes
@@ -59,7 +59,7 @@ class Beam:
     colour: Colour
 
 
-Shape = Ball | Beam
+Shape = Sphere | Cylinder
 """What a cue may draw."""
 
 TARGET: Colour = (0.90, 0.12, 0.10, 0.85)
@@ -70,7 +70,7 @@ SMALL = 0.15
 """Radius in metres of a target whose task says none."""
 
 
-class Targets:
+class TargetFinder:
     """Finds a task's targets among its signals.
 
     Every signal ``name.position`` in metres is the centre of a target, ``name.radius`` its radius;
@@ -94,11 +94,11 @@ class Targets:
         """The targets there can be."""
         return tuple(self._places)
 
-    def find(self, task: FloatArray) -> Iterator[Ball]:
+    def find(self, task: FloatArray) -> Iterator[Sphere]:
         """Yield the targets in a task's values, shape ``(n_task,)``; none between trials."""
         usual = next((float(task[index]) for index in self._radii.values()), SMALL)
         for name, place in self._places.items():
             x, y, z = (float(value) for value in task[place])
             if math.isfinite(x + y + z):
                 radius = float(task[self._radii[name]]) if name in self._radii else usual
-                yield Ball(name, (x, y, z), radius, TARGET if name == "target" else OTHER)
+                yield Sphere(name, (x, y, z), radius, TARGET if name == "target" else OTHER)

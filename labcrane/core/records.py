@@ -61,7 +61,7 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True)
-class Planned:
+class PlannedTrial:
     """One trial as a task plans it.
 
     Attributes
@@ -102,11 +102,11 @@ class Trial:
     number: int
     attempt: int
     seed: int
-    planned: Planned
+    planned: PlannedTrial
 
 
 @dataclass(frozen=True, slots=True)
-class Judgement:
+class TrialStatus:
     """What a task makes of a frame.
 
     Attributes
@@ -155,7 +155,7 @@ class Run:
     command: Layout
     state: Layout
     task: Layout
-    steer: Callable[[FloatArray, FloatArray], FloatArray]
+    inverse: Callable[[FloatArray, FloatArray], FloatArray]
     bodies: tuple[Body, ...] = ()
 
 
@@ -201,7 +201,7 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True)
-class Situation:
+class SessionState:
     """What a session is about now, for whoever presents it.
 
     Attributes
@@ -247,7 +247,7 @@ class Situation:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Picture:
+class CameraImage:
     """What a camera shows, for the supervisor's page.
 
     Attributes

@@ -24,13 +24,13 @@ if TYPE_CHECKING:  # a protocol is checked without loading what it does not need
     from labcrane.core.items import Answers, Item, Score
     from labcrane.core.primitives import Shape
     from labcrane.core.records import (
+        CameraImage,
         Frame,
-        Judgement,
-        Picture,
-        Planned,
+        PlannedTrial,
         Run,
-        Situation,
+        SessionState,
         Trial,
+        TrialStatus,
         Value,
     )
     from labcrane.core.signals import Signal
@@ -53,7 +53,7 @@ class Component(ABC):
     def close(self) -> None:
         """Release what ``open`` acquired. Runs even when ``open`` failed."""
 
-    def facts(self) -> Mapping[str, Value]:
+    def metadata(self) -> Mapping[str, Value]:
         """Return what the record should know of the open component: calibration, versions."""
         return {}
 
@@ -83,14 +83,14 @@ class Controller(Component):
     def command(self, axes: FloatArray, state: FloatArray) -> FloatArray:
         """Return the command, shape ``(n_command,)``: actuators first, then what else to log."""
 
-    def rest(self) -> FloatArray:
+    def idle(self) -> FloatArray:
         """Return the command that holds the machine still, shape ``(n_command,)``."""
         import numpy as np  # noqa: PLC0415
 
         return np.zeros(sum(len(signal.columns) for signal in self.signals))
 
     @abstractmethod
-    def steer(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
+    def inverse(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
         """Return the axes, shape ``(n_axes,)``, that ask for a tip velocity.
 
         What a practised hand does; simulated operators use it. ``velocity`` is in m/s, shape
@@ -133,15 +133,15 @@ class Task(Component):
         """Return what the design may order: the levels of each factor, as written."""
 
     @abstractmethod
-    def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[Planned]:
+    def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[PlannedTrial]:
         """Return a block's trials, for the levels of each factor in the order given."""
 
     @abstractmethod
-    def judge(self, frame: Frame) -> Judgement:
+    def evaluate(self, frame: Frame) -> TrialStatus:
         """Say where the trial stands after this tick. Not called between trials or in a pause."""
 
     @abstractmethod
-    def overrule(self) -> None:
+    def lift_limits(self) -> None:
         """Let the running trial go on past its automatic ends: a time-out, too many mistakes.
 
         The supervisor's decision. It holds for this trial only.
@@ -206,7 +206,7 @@ class Feedback(Component):
     cameras: tuple[str, ...] = ()
     """Names of the cameras whose pictures the supervisor's page shows; see ``pictures``."""
 
-    def hear(self, situation: Situation) -> None:
+    def update(self, situation: SessionState) -> None:
         """Be told what the session is about, before the first frame and whenever it changes."""
 
     @abstractmethod
@@ -217,7 +217,7 @@ class Feedback(Component):
         recorded as the moment of presentation.
         """
 
-    def rest(self) -> None:
+    def idle(self) -> None:
         """Present nothing: between trials, and where the protocol switches it off."""
 
     def adjust(self, settings: BaseModel) -> bool:
@@ -243,7 +243,7 @@ class Feedback(Component):
         """
         return {}
 
-    def pictures(self) -> Mapping[str, Picture]:
+    def pictures(self) -> Mapping[str, CameraImage]:
         """Return what ``cameras`` show, as of the last ``present``; none while none is due.
 
         Asked for after a ``present`` while somebody watches.

@@ -5,10 +5,10 @@ from typing import Annotated
 
 from pydantic import AfterValidator, ValidationInfo
 
-from labcrane.files.model import Documented
+from labcrane.files.model import StrictModel
 
 
-class Settings(Documented):
+class Settings(StrictModel):
     """Base of every plugin's settings: unknown keys are errors, values never change."""
 
 

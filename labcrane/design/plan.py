@@ -1,10 +1,10 @@
-"""What a session of one participant consists of, before anything is opened."""
+"""Plan of one participant's session, before anything is opened."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from labcrane.core.records import Planned, Trial, Value
+from labcrane.core.records import PlannedTrial, Trial, Value
 from labcrane.design.order import RULES, SQUARES, Turn, faded
 from labcrane.design.seeds import derive
 from labcrane.design.slots import group_of, place_of
@@ -240,7 +240,7 @@ class Planner:
                 waiting.clear()
         return shown | dict.fromkeys(waiting, names)
 
-    def _trial(self, planned: Planned) -> Trial:
+    def _trial(self, planned: PlannedTrial) -> Trial:
         self._trials += 1
         return Trial(self._trials, 1, derive(*self._words, "trial", self._trials, 1), planned)
 

@@ -1,4 +1,4 @@
-"""What a feedback process is told, as a line of text."""
+"""Configuration of a feedback process, as a line of text."""
 
 import json
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class HostOrder:
+class FeedbackConfig:
     """What a feedback process is told.
 
     Attributes
@@ -69,7 +69,7 @@ class HostOrder:
         return json.dumps(fields)
 
     @classmethod
-    def from_json(cls, text: str) -> "HostOrder":
+    def from_json(cls, text: str) -> "FeedbackConfig":
         """Return the order that :meth:`as_json` wrote."""
         found = json.loads(text)
         return cls(

@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from labcrane.feedback.config import HostOrder
+from labcrane.feedback.config import FeedbackConfig
 from labcrane.session.commands import Command, Order
 
 READY_S = 60.0
@@ -46,7 +46,7 @@ class Life:
                 self.process.stdin.close()
 
 
-class FeedbackKeeper:
+class FeedbackHandle:
     """Starts a feedback process, finds out when it dies or hangs, and starts it again.
 
     Attributes
@@ -55,7 +55,9 @@ class FeedbackKeeper:
         Whether it has been left out.
     """
 
-    def __init__(self, order: HostOrder, policy: Literal["restart", "continue", "pause"]) -> None:
+    def __init__(
+        self, order: FeedbackConfig, policy: Literal["restart", "continue", "pause"]
+    ) -> None:
         self._order = order
         self._policy = policy
         self._fruitless = 0

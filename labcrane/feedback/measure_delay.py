@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from labcrane.core.clock import Tick
-from labcrane.core.records import Frame, Phase, Run, Situation
+from labcrane.core.records import Frame, Phase, Run, SessionState
 from labcrane.errors import ProtocolError, StreamError
-from labcrane.feedback.config import HostOrder
+from labcrane.feedback.config import FeedbackConfig
 from labcrane.feedback.delay_analysis import Change, Kind, delay, onsets, steps
 from labcrane.feedback.delays import Measured
 from labcrane.feedback.presenter import Presenter
@@ -83,13 +83,13 @@ class Sensor:
 class Stage:
     """Presents one frame over and over, and changes it when it is told to."""
 
-    def __init__(self, order: HostOrder, frame: Frame, kind: Kind, event: str) -> None:
+    def __init__(self, order: FeedbackConfig, frame: Frame, kind: Kind, event: str) -> None:
         self._kind, self._event, self._frame = kind, event, frame
         self._presenter = Presenter(order, discover(study=order.study))
         self._name = order.name
         self._count = self._number = 0
         self._order = order
-        self.facts = self._presenter.feedback.facts
+        self.facts = self._presenter.feedback.metadata
         self._log: FeedbackLog | None = None
 
     def open(self) -> None:
@@ -109,10 +109,10 @@ class Stage:
         """Let the patch turn over, or the sound begin or end, with the next frame."""
         self._count += 1
         if self._kind == "display":
-            now = Situation(trial=1, counts={self._event: self._count})
+            now = SessionState(trial=1, counts={self._event: self._count})
         else:
-            now = Situation(trial=1, active=(self._name,) if self._count % 2 else ())
-        self._presenter.hear(now)
+            now = SessionState(trial=1, active=(self._name,) if self._count % 2 else ())
+        self._presenter.update(now)
 
     def present(self) -> float | None:
         """Present the frame; return when that was, None for silence."""

@@ -9,7 +9,7 @@ from functools import partial
 from labcrane.core.clock import Tick
 from labcrane.core.records import Event, Frame, Run, Value
 from labcrane.errors import DeviceError
-from labcrane.feedback.handle import FeedbackKeeper
+from labcrane.feedback.handle import FeedbackHandle
 from labcrane.feedback.processes import host_orders
 from labcrane.machines.scene_codec import SCENE_PLACED
 from labcrane.protocol import rig
@@ -44,7 +44,7 @@ def play(study: Study, frames: Sequence[Frame], scene: str, say: Callable[[str],
     run = rig.describe(rig.build(study, simulated=True), study, participant_seed=0)
     source = f"{study.protocol.study}/preview-{os.getpid()}"
     orders = [replace(order, recorded=False) for order in host_orders(study, run, source)]
-    keepers = [FeedbackKeeper(order, "continue") for order in orders]
+    keepers = [FeedbackHandle(order, "continue") for order in orders]
     try:
         _wait(keepers, say)
         _present(run, source, frames, scene, [*study.cues, *study.sounds], keepers)
@@ -53,7 +53,7 @@ def play(study: Study, frames: Sequence[Frame], scene: str, say: Callable[[str],
             keeper.stop()
 
 
-def _wait(keepers: Sequence[FeedbackKeeper], say: Callable[[str], None]) -> None:
+def _wait(keepers: Sequence[FeedbackHandle], say: Callable[[str], None]) -> None:
     """Wait until each is ready or left out."""
     while not all(keeper.ready or keeper.given_up for keeper in keepers):
         for keeper in keepers:
@@ -70,7 +70,7 @@ def _present(
     frames: Sequence[Frame],
     scene: str,
     active: Sequence[str],
-    keepers: Sequence[FeedbackKeeper],
+    keepers: Sequence[FeedbackHandle],
 ) -> None:
     from labcrane.streams.context import ContextOutlet  # noqa: PLC0415 - loads liblsl
     from labcrane.streams.frames import FrameOutlet  # noqa: PLC0415
@@ -102,7 +102,7 @@ def _send(pushes: Sequence[Callable[[Frame], None]], frame: Frame, *events: Even
         push(sent)
 
 
-def _hold(show: Callable[[], None], keepers: Sequence[FeedbackKeeper]) -> None:
+def _hold(show: Callable[[], None], keepers: Sequence[FeedbackHandle]) -> None:
     """Show the first frame until all present it, and for a while.
 
     Whoever finds the streams now is told what is switched on within the second.

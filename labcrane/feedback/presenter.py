@@ -5,11 +5,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from labcrane.core.records import Frame, Situation, Value
+from labcrane.core.records import Frame, SessionState, Value
 from labcrane.core.roles import Component, Cue, Feedback
 from labcrane.core.settings import Settings
 from labcrane.core.signals import Layout
-from labcrane.feedback.config import HostOrder, Part
+from labcrane.feedback.config import FeedbackConfig, Part
 from labcrane.feedback.delays import delay_in_words
 from labcrane.registry.call_monitor import promised
 from labcrane.registry.offers import Offer
@@ -25,10 +25,10 @@ class Presenter:
     Used by the feedback process, and without it by previews, measurements of delays and tests.
     """
 
-    def __init__(self, order: HostOrder, registry: Registry) -> None:
+    def __init__(self, order: FeedbackConfig, registry: Registry) -> None:
         self._order = order
         self._registry = registry
-        self._situation = Situation()
+        self._situation = SessionState()
         self._resting = True
         self.feedback = self._built(Feedback, order.name, order.part)
         self.cues = {name: self._built(Cue, name, part) for name, part in order.cues.items()}
@@ -46,34 +46,34 @@ class Presenter:
     @property
     def facts(self) -> dict[str, Value]:
         """What the record should know of the open component, and of its delay."""
-        facts = dict(self.feedback.facts())
+        facts = dict(self.feedback.metadata())
         return {**facts, "delay": delay_in_words(self._order.measured, facts)}
 
     def open(self) -> None:
         """Open everything; raises what the components raise."""
         for component in (*self.cues.values(), self.feedback):
             component.open(self._order.run)
-        self.feedback.hear(self._situation)
+        self.feedback.update(self._situation)
 
     def close(self) -> None:
         """Close everything."""
         for component in (self.feedback, *self.cues.values()):
             component.close()
 
-    def hear(self, situation: Situation) -> None:
+    def update(self, situation: SessionState) -> None:
         """Take up a new situation; what has new settings takes them, or is built anew with them."""
         before, self._situation = self._situation, situation
         for name in {*situation.settings, *before.settings}:
             if situation.settings.get(name) != before.settings.get(name):
                 self._rebuild(name)
-        self.feedback.hear(situation)
+        self.feedback.update(situation)
 
     def present(self, frame: Frame) -> FloatArray | None:
         """Present a frame; return what was presented, or None while switched off."""
         active = self._situation.active
         if not self._order.always and self._order.name not in active:
             if not self._resting:
-                self.feedback.rest()
+                self.feedback.idle()
                 self._resting = True
             return None
         self._resting = False

@@ -1,4 +1,4 @@
-"""What a movement looks and sounds like, as files: without session, display or device."""
+"""Preview of a movement as pictures and sound files, without session, display or device."""
 
 import tempfile
 from dataclasses import replace
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from labcrane.core.records import Event, Frame, Situation
+from labcrane.core.records import Event, Frame, SessionState
 from labcrane.design.pseudonyms import pseudonyms
 from labcrane.errors import ProtocolError
 from labcrane.feedback.presenter import Presenter
@@ -53,7 +53,7 @@ def write_preview(
             for cue in presenter.cues.values():
                 cue.open(run)
             drawn = [_drawn(presenter, frame) for frame in frames]
-            presenter.hear(Situation(scene=scene))
+            presenter.update(SessionState(scene=scene))
             written += presenter.feedback.preview(run, drawn, folder / order.name)
         finally:
             presenter.close()

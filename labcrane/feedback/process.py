@@ -2,8 +2,8 @@
 
 ``python -m labcrane.feedback.process`` reads its order, one line of JSON, from the standard input
 and ends when that is closed or says ``stop``. It reports on its standard output, a line of JSON
-each time: ``ready`` with the component's facts, ``presents`` from the first frame on, ``beat`` while it
-lives, ``failed`` with the reason.
+each time: ``ready`` with the component's metadata, ``presents`` from the first frame on, ``beat``
+while it lives, ``failed`` with the reason.
 """
 
 import json
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from labcrane.core.records import Frame
 from labcrane.errors import LabcraneError
-from labcrane.feedback.config import HostOrder
+from labcrane.feedback.config import FeedbackConfig
 from labcrane.feedback.presenter import Presenter
 from labcrane.registry.registry import discover
 from labcrane.registry.traceback import told
@@ -36,7 +36,7 @@ BEAT_S = 0.2
 class FeedbackProcess:
     """Follows a session's streams until it is told to stop."""
 
-    def __init__(self, order: HostOrder, say: Callable[[dict[str, Any]], None]) -> None:
+    def __init__(self, order: FeedbackConfig, say: Callable[[dict[str, Any]], None]) -> None:
         self._order = order
         self._say = say
         self._stop = threading.Event()
@@ -70,7 +70,7 @@ class FeedbackProcess:
             context = ContextInlet(found[CONTEXT])
             frames = FrameInlet(found[FRAME], self._order.run)
             self._join(context, log)
-            presenter.hear(context.situation)
+            presenter.update(context.situation)
             self._follow(presenter, context, frames, log)
             log.close()
             if self._pictures:
@@ -95,7 +95,7 @@ class FeedbackProcess:
         """Present until stopped."""
         while not self._stop.is_set():
             if context.changed():
-                presenter.hear(context.situation)
+                presenter.update(context.situation)
             if (frame := frames.newest(WAIT_S)) is not None:
                 self._present(presenter, frame, log, frames.skipped)
                 if not self._presents:
@@ -158,7 +158,7 @@ def main() -> int:
     status = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
     say = _reporter(status)
-    process = FeedbackProcess(HostOrder.from_json(sys.stdin.readline()), say)
+    process = FeedbackProcess(FeedbackConfig.from_json(sys.stdin.readline()), say)
 
     def listen() -> None:
         sys.stdin.readline()

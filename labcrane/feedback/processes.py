@@ -7,11 +7,11 @@ from dataclasses import replace
 from labcrane.core.records import Run
 from labcrane.design.seeds import derive
 from labcrane.errors import DeviceError
-from labcrane.feedback.config import HostOrder, Part
+from labcrane.feedback.config import FeedbackConfig, Part
 from labcrane.feedback.delays import read_delays
-from labcrane.feedback.handle import FeedbackKeeper
+from labcrane.feedback.handle import FeedbackHandle
 from labcrane.protocol import rig
-from labcrane.protocol.components import Choice
+from labcrane.protocol.components import ComponentSpec
 from labcrane.protocol.study import Study
 from labcrane.session.commands import Command, Order
 from labcrane.session.session import Visit
@@ -21,13 +21,13 @@ from labcrane.streams.request import StreamRequest
 LOOK_S = 0.05
 
 
-class FeedbackCrew:
+class FeedbackProcesses:
     """Starts, watches and stops the views and sounds of a visit."""
 
     def __init__(self, visit: Visit) -> None:
         policy = visit.study.protocol.on_fault.feedback_lost
         self._required = policy != "continue"
-        self.keepers = [FeedbackKeeper(order, policy) for order in _orders_of(visit)]
+        self.keepers = [FeedbackHandle(order, policy) for order in _orders_of(visit)]
         self._news: list[Command] = []
 
     def wait(self, say: Callable[[str], None], ended: Callable[[], bool]) -> bool:
@@ -71,22 +71,22 @@ class FeedbackCrew:
             keeper.stop()
 
 
-def host_orders(study: Study, run: Run, source: str) -> list[HostOrder]:
+def host_orders(study: Study, run: Run, source: str) -> list[FeedbackConfig]:
     """Return what the feedback processes of a study are to be told; ``source`` is whose streams."""
     cues = {name: _part(choice) for name, choice in study.cues.items()}
     return [
         *(
-            HostOrder(name, _part(choice), run, source, study.path, always=True, cues=cues)
+            FeedbackConfig(name, _part(choice), run, source, study.path, always=True, cues=cues)
             for name, choice in study.views.items()
         ),
         *(
-            HostOrder(name, _part(choice), run, source, study.path, always=False)
+            FeedbackConfig(name, _part(choice), run, source, study.path, always=False)
             for name, choice in study.sounds.items()
         ),
     ]
 
 
-def _orders_of(visit: Visit) -> list[HostOrder]:
+def _orders_of(visit: Visit) -> list[FeedbackConfig]:
     study = visit.study
     if not (study.sounds or study.views):
         return []
@@ -119,5 +119,5 @@ def cameras_of(study: Study) -> dict[str, tuple[str, ...]]:
     return {name: cameras for name, cameras in named.items() if cameras}
 
 
-def _part(choice: Choice) -> Part:
+def _part(choice: ComponentSpec) -> Part:
     return Part(choice.name, choice.settings.model_dump(mode="json"))

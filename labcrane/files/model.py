@@ -1,4 +1,4 @@
-"""What is written in YAML: strict models, whose schema says what the docstring under a key says."""
+"""Models of YAML: strict, with a schema that says what the docstring under a key says."""
 
 import ast
 import inspect
@@ -9,7 +9,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 
-class Documented(BaseModel):
+class StrictModel(BaseModel):
     """A part of a file: unknown keys are errors, values never change.
 
     The docstring under a key describes it in the JSON Schema. It is read from the source when a
@@ -36,7 +36,7 @@ def descriptions(model: type[BaseModel]) -> dict[str, str]:
     """Return the docstrings under a model's keys, inherited ones included, by key."""
     found: dict[str, str] = {}
     for each in reversed(model.__mro__):
-        if issubclass(each, Documented) and each is not Documented:
+        if issubclass(each, StrictModel) and each is not StrictModel:
             found |= _own(each)
     return found
 

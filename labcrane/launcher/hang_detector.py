@@ -16,7 +16,7 @@ OPEN_S = 60.0
 """The same before the first tick, when engines and devices are opened."""
 
 
-class Stillness:
+class HangDetector:
     """Watches the file in which a session says where it is."""
 
     def __init__(self, path: Path, say: Callable[[str], None]) -> None:

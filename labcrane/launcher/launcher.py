@@ -12,15 +12,15 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import TYPE_CHECKING, Any
 
-from labcrane.feedback.processes import FeedbackCrew, log_requests
-from labcrane.launcher.hang_detector import Stillness
-from labcrane.launcher.session_process import Ended, VisitOrder, serve
+from labcrane.feedback.processes import FeedbackProcesses, log_requests
+from labcrane.launcher.hang_detector import HangDetector
+from labcrane.launcher.session_process import Ended, SessionConfig, serve
 from labcrane.recording.crash_marker import read_whereabouts
 from labcrane.recording.paths import parts
 from labcrane.session.commands import Command, Order, QueueConsole
-from labcrane.session.eligibility import gate
+from labcrane.session.eligibility import check_eligibility
 from labcrane.session.session import Visit, finish
-from labcrane.streams.recorder.handle import RecorderKeeper
+from labcrane.streams.recorder.handle import RecorderHandle
 from labcrane.streams.sync.sync_report import SyncReport
 
 if TYPE_CHECKING:
@@ -66,14 +66,14 @@ class Launcher:
     """
 
     def __init__(
-        self, order: VisitOrder, console: QueueConsole, say: Callable[[str], None]
+        self, order: SessionConfig, console: QueueConsole, say: Callable[[str], None]
     ) -> None:
         self._order = order
         self._visit: Visit = order.visit()
         self._console = console
         self._say = say
-        self._recorder: RecorderKeeper | None = None
-        self._crew: FeedbackCrew | None = None
+        self._recorder: RecorderHandle | None = None
+        self._crew: FeedbackProcesses | None = None
         self._lost: set[str] = set()
         self._kept: list[Command] = []
         self.sync_report: SyncReport | None = None
@@ -87,7 +87,7 @@ class Launcher:
             The session could not be run, in the session process's own words.
         """
         visit = self._visit
-        gate(visit)
+        check_eligibility(visit)
         if not visit.resumed:
             visit.folder.claim(visit.session)
         requests = [
@@ -97,11 +97,11 @@ class Launcher:
         if self._order.feedback:
             requests += log_requests(visit)
         if requests:
-            self._recorder = RecorderKeeper(visit.streams_journal, requests)
+            self._recorder = RecorderHandle(visit.streams_journal, requests)
         report = None
         try:
             if self._order.feedback:
-                self._crew = FeedbackCrew(visit)
+                self._crew = FeedbackProcesses(visit)
             died = self._run() if self._gate() else None
         finally:
             if self._crew:
@@ -160,7 +160,7 @@ class Launcher:
 
     def _watch(self, process: "SpawnProcess", pipe: Connection) -> int | None:
         """Return the exit code of a session that died, None of one that ended in order."""
-        stillness = Stillness(self._visit.whereabouts, self._say)
+        stillness = HangDetector(self._visit.whereabouts, self._say)
         while True:
             try:
                 for command in (*self._kept, *self._console.commands()):

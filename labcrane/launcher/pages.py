@@ -25,11 +25,11 @@ def pages(
     ``feedback`` is whether views and sounds are started.
     """
     from labcrane.feedback.processes import cameras_of
-    from labcrane.web.handle import PageKeeper, free_port
-    from labcrane.web.service import PageOrder
+    from labcrane.web.handle import PageHandle, free_port
+    from labcrane.web.service import PageConfig
 
     where = visit.study.protocol.page
-    order = PageOrder(
+    order = PageConfig(
         visit.study.path,
         visit.participant,
         visit.folder.name,
@@ -39,7 +39,7 @@ def pages(
         free_port(where.host, where.port),
         cameras_of(visit.study) if feedback else {},
     )
-    keeper = PageKeeper(order, console.give, say, lambda: launcher.streams_status)
+    keeper = PageHandle(order, console.give, say, lambda: launcher.streams_status)
     console.listeners.append(keeper.tell)
     for page, link in keeper.links().items():
         say(f"{page} page: {link}")

@@ -21,7 +21,7 @@ from labcrane.session.session import Visit, record
 
 
 @dataclass(frozen=True, slots=True)
-class VisitOrder:
+class SessionConfig:
     """What a session process is told: a visit by the names of things, so that it can be sent.
 
     Attributes
@@ -107,7 +107,7 @@ class PipeConsole:
                 return
 
 
-def serve(order: VisitOrder, pipe: Connection) -> None:
+def serve(order: SessionConfig, pipe: Connection) -> None:
     """Run a session; the process's main function."""
     # An interrupt from the keyboard reaches the launcher too, which ends the session in order.
     signal.signal(signal.SIGINT, signal.SIG_IGN)

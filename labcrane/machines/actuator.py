@@ -1,4 +1,4 @@
-"""What lies between a commanded speed and the joint: dead time, lag and a rate limit."""
+"""Actuator model between commanded and joint speed: dead time, lag and a rate limit."""
 
 import math
 from collections import deque
@@ -15,11 +15,11 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from labcrane.errors import suggestion
-from labcrane.files.model import Documented
+from labcrane.files.model import StrictModel
 
 
-class ActuatorSettings(Documented):
-    """How a drive follows its command: written out, or the name of one of :data:`PRESETS`."""
+class ActuatorSettings(StrictModel):
+    """How a drive follows its command: written out, or a name in :data:`ACTUATOR_PRESETS`."""
 
     dead_time_s: NonNegativeFloat = 0.0
     """Time before a command has any effect, in seconds; rounded to whole ticks."""
@@ -36,25 +36,25 @@ class ActuatorSettings(Documented):
     ) -> JsonSchemaValue:
         """Say that a name will do."""
         written = super().__get_pydantic_json_schema__(core, handler)
-        return {"anyOf": [{"enum": list(PRESETS)}, written]}
+        return {"anyOf": [{"enum": list(ACTUATOR_PRESETS)}, written]}
 
     @model_validator(mode="before")
     @classmethod
     def _may_be_a_name(cls, value: Any) -> Any:
         if isinstance(value, Mapping | ActuatorSettings):
             return value
-        if isinstance(value, str) and value in PRESETS:
-            return PRESETS[value].model_dump()
+        if isinstance(value, str) and value in ACTUATOR_PRESETS:
+            return ACTUATOR_PRESETS[value].model_dump()
         if isinstance(value, str):
-            message = f"no actuator is called {value!r}; {suggestion(value, PRESETS)}"
+            message = f"no actuator is called {value!r}; {suggestion(value, ACTUATOR_PRESETS)}"
             raise ValueError(message)  # noqa: TRY004 - pydantic reports no TypeError
         raise ValueError(
-            f"{value!r} is no actuator; write a name ({', '.join(PRESETS)}) or a mapping of "
-            f"{', '.join(cls.model_fields)}"
+            f"{value!r} is no actuator; write a name ({', '.join(ACTUATOR_PRESETS)}) or a mapping "
+            f"of {', '.join(cls.model_fields)}"
         )
 
 
-PRESETS: dict[str, ActuatorSettings] = {
+ACTUATOR_PRESETS: dict[str, ActuatorSettings] = {
     "ideal": ActuatorSettings(),
     "electric": ActuatorSettings(dead_time_s=0.01, lag_s=0.03),
     "hydraulic": ActuatorSettings(dead_time_s=0.06, lag_s=0.15, rate_limit=4.0),
@@ -81,7 +81,7 @@ class Actuator:
     """
 
     def __init__(self, settings: ActuatorSettings, speeds: Sequence[float], dt: float) -> None:
-        self.ideal = settings == PRESETS["ideal"]
+        self.ideal = settings == ACTUATOR_PRESETS["ideal"]
         self._still = (0.0,) * len(speeds)
         self._delay = round(settings.dead_time_s / dt)
         self._share = 1.0 - math.exp(-dt / settings.lag_s) if settings.lag_s else 1.0

@@ -7,14 +7,14 @@ from enum import StrEnum
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from labcrane.files.model import Documented
+from labcrane.files.model import StrictModel
 from labcrane.machines.mesh import MeshFile
 
 Point = tuple[float, float, float]
 Extent = tuple[float, float]
 
 
-class Form(StrEnum):
+class ShapeKind(StrEnum):
     """What a part is; capsules lie along x."""
 
     BOX = "box"
@@ -24,7 +24,7 @@ class Form(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class Geom:
     """One shape of a thing.
 
     Attributes
@@ -40,7 +40,7 @@ class Part:
     """
 
     name: str
-    shape: Form
+    shape: ShapeKind
     size: Point
     centre: Point
     yaw: float
@@ -61,9 +61,9 @@ LIMBS: dict[str, tuple[str | None, float, float, Point]] = {
 x goes from the chest to the feet."""
 
 TRUNK = (
-    Part("torso", Form.BOX, (0.55, 0.36, 0.22), (0.0, 0.0, 0.0), 0.0),
-    Part("head", Form.SPHERE, (0.20, 0.20, 0.20), (-0.46, 0.0, 0.0), 0.0),
-    Part("pelvis", Form.BOX, (0.22, 0.34, 0.20), (0.40, 0.0, 0.0), 0.0),
+    Geom("torso", ShapeKind.BOX, (0.55, 0.36, 0.22), (0.0, 0.0, 0.0), 0.0),
+    Geom("head", ShapeKind.SPHERE, (0.20, 0.20, 0.20), (-0.46, 0.0, 0.0), 0.0),
+    Geom("pelvis", ShapeKind.BOX, (0.22, 0.34, 0.20), (0.40, 0.0, 0.0), 0.0),
 )
 
 HEIGHT_M = 0.22
@@ -72,7 +72,7 @@ HEIGHT_M = 0.22
 REGIONS = (*(part.name for part in TRUNK), *LIMBS)
 
 
-class Deformity(Documented):
+class Deformity(StrictModel):
     """A limb that is bent where it should be straight."""
 
     limbs: tuple[str, ...] = Field(min_length=1)
@@ -82,7 +82,7 @@ class Deformity(Documented):
     """By how much it is bent, in degrees; drawn evenly."""
 
 
-class Figure(Documented):
+class Figure(StrictModel):
     """A person of simple shapes, lying on the back."""
 
     position: Point
@@ -133,7 +133,7 @@ class Figure(Documented):
 
 def figure_parts(
     figure: Figure, random: np.random.Generator
-) -> tuple[tuple[Part, ...], str | None, float]:
+) -> tuple[tuple[Geom, ...], str | None, float]:
     """Return a figure's parts, its deformed limb if it has one, and its yaw in rad."""
     yaw = math.radians(_draw(figure.yaw_deg, random))
     turned = {name: math.radians(_draw(figure.limbs_deg.get(name, 0.0), random)) for name in LIMBS}
@@ -152,7 +152,9 @@ def figure_parts(
             heading += outward * more
             step = (share * length * math.cos(heading), share * length * math.sin(heading), 0.0)
             middle = (at[0] + step[0] / 2, at[1] + step[1] / 2, at[2])
-            parts.append(Part(name, Form.CAPSULE, (share * length, thick, thick), middle, heading))
+            parts.append(
+                Geom(name, ShapeKind.CAPSULE, (share * length, thick, thick), middle, heading)
+            )
             at = (at[0] + step[0], at[1] + step[1], at[2])
         ends[name] = (at, heading)
     return tuple(parts), bent, yaw

@@ -1,4 +1,4 @@
-"""Where the tip is, and how the joints must move to move it.
+"""Kinematics: where the tip is, and how the joints must move to move it.
 
 ``dh_matrix`` and ``frames`` are the reference: the product of standard Denavit-Hartenberg
 matrices (facts of the crane study; the printed matrix has two misprints, see
@@ -31,7 +31,7 @@ def dh_matrix(a: float, alpha: float, d: float, theta: float) -> "FloatArray":
     )
 
 
-def frames(machine: Machine, angles: Sequence[float]) -> "FloatArray":
+def link_frames(machine: Machine, angles: Sequence[float]) -> "FloatArray":
     """Return the base frame's and every joint's frame, shape ``(n_joints + 1, 4, 4)``.
 
     ``angles`` are joint angles in rad. Frame ``i`` sits at the far end of link ``i``; the last
@@ -52,7 +52,7 @@ def jacobian(machine: Machine, angles: Sequence[float]) -> "FloatArray":
     """Return the tip velocity per joint speed, shape ``(3, n_joints)``, in m/rad."""
     import numpy as np  # noqa: PLC0415
 
-    poses = frames(machine, angles)
+    poses = link_frames(machine, angles)
     tip = poses[-1, :3, 3]
     return np.column_stack([np.cross(pose[:3, 2], tip - pose[:3, 3]) for pose in poses[:-1]])
 

@@ -1,4 +1,4 @@
-"""What is operated: joints, link lengths, limits and speeds.
+"""Machine that is operated: joints, link lengths, limits and speeds.
 
 A machine is a slewing base that carries a chain of pitch joints, written as a standard
 Denavit-Hartenberg table. Angles are degrees in YAML, and radians everywhere else.
@@ -10,7 +10,7 @@ from functools import cached_property
 
 from pydantic import Field, PositiveFloat, model_validator
 
-from labcrane.files.model import Documented
+from labcrane.files.model import StrictModel
 from labcrane.machines.mesh import Looks, MeshFile
 
 FEWEST_JOINTS = 3
@@ -19,7 +19,7 @@ UPWARD_TO_LEVEL = -90.0
 """Twist in degrees from a slew axis to the pitch axes behind it."""
 
 
-class Joint(Documented):
+class Joint(StrictModel):
     """One joint and the link behind it, as a row of a standard DH table."""
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
@@ -90,7 +90,7 @@ class Joint(Documented):
         return math.radians(self.offset_deg)
 
 
-class Machine(Documented):
+class Machine(StrictModel):
     """A slewing base and a chain of pitch joints; positive pitch is down."""
 
     title: str

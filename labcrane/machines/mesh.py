@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, PositiveFloat, ValidationInfo
 
-from labcrane.files.model import Documented
+from labcrane.files.model import StrictModel
 
 FORMATS = (".stl", ".obj", ".gltf", ".glb")
 
@@ -22,7 +22,7 @@ def _beside(path: Path, info: ValidationInfo) -> Path:
     return file
 
 
-class MeshFile(Documented):
+class MeshFile(StrictModel):
     """What something looks like; what it touches is not changed by it."""
 
     file: Annotated[Path, AfterValidator(_beside)]

@@ -1,4 +1,4 @@
-"""What stands around a machine: objects, obstacles and a human figure, from a YAML file.
+"""Scenes: objects, obstacles and a human figure around a machine, from a YAML file.
 
 The machine that touches a scene and the task that judges it read the same file, and place what is
 drawn from a seed in the same way.
@@ -13,21 +13,30 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from labcrane.errors import ProtocolError
-from labcrane.files.model import Documented
+from labcrane.files.model import StrictModel
 from labcrane.files.yaml import YamlFile
-from labcrane.machines.human_figure import Figure, Form, Part, figure_parts
+from labcrane.machines.human_figure import Figure, Geom, ShapeKind, figure_parts
 from labcrane.machines.mesh import Looks
 
 Point = tuple[float, float, float]
 Extent = tuple[float, float]
 
-__all__ = ["Form", "Goal", "Part", "Placed", "Scene", "Thing", "load_scene", "place"]
+__all__ = [
+    "Geom",
+    "Goal",
+    "PlacedObject",
+    "Scene",
+    "SceneObject",
+    "ShapeKind",
+    "load_scene",
+    "place_objects",
+]
 
 SUNK_M = 0.001
 """Depth in the ground, in metres, from which on a scene is impossible."""
 
 
-class Scatter(Documented):
+class Scatter(StrictModel):
     """How far from its place a thing may stand; drawn evenly from the trial's seed."""
 
     x: Extent = (0.0, 0.0)
@@ -40,7 +49,7 @@ class Scatter(Documented):
     """Degrees, turned to the left."""
 
 
-class Thing(Documented):
+class SceneObject(StrictModel):
     """An object, or an obstacle when it is fixed."""
 
     shape: Literal["box", "cylinder", "sphere"]
@@ -78,7 +87,7 @@ class Thing(Documented):
     """What it looks like instead of its shape, in a frame at its centre; its touch is the same."""
 
 
-class Goal(Documented):
+class Goal(StrictModel):
     """A region in which something must come to be, and the way there.
 
     Each is reached in its turn.
@@ -106,7 +115,7 @@ class Goal(Documented):
     """Whether something must be in the grip (true), or nothing may be (false), to be there."""
 
 
-class Scene(Documented):
+class Scene(StrictModel):
     """Everything around the machine, and what is to be done with it."""
 
     labcrane_scene: Literal[1]
@@ -115,7 +124,7 @@ class Scene(Documented):
     title: str
     """What it is, for people."""
 
-    things: dict[str, Thing] = Field(default_factory=dict)
+    things: dict[str, SceneObject] = Field(default_factory=dict)
     """Objects and obstacles by name."""
 
     figure: Figure | None = None
@@ -132,7 +141,7 @@ class Scene(Documented):
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class PlacedObject:
     """A thing where it stands in one trial.
 
     Attributes
@@ -153,7 +162,7 @@ class Placed:
 
     name: str
     kind: str
-    parts: tuple[Part, ...]
+    parts: tuple[Geom, ...]
     position: Point
     yaw: float
     mass: float
@@ -207,14 +216,14 @@ def _check_goals(scene: Scene, source: YamlFile) -> None:
                 )
 
 
-def place(scene: Scene, seed: int) -> tuple[Placed, ...]:
+def place_objects(scene: Scene, seed: int) -> tuple[PlacedObject, ...]:
     """Return where everything stands in a trial with this seed; the same seed, the same places."""
     random = np.random.default_rng([seed, 0x5CE])
     placed = [_placed(name, thing, random) for name, thing in scene.things.items()]
     if scene.figure is not None:
         parts, deformed, yaw = figure_parts(scene.figure, random)
         placed.append(
-            Placed(
+            PlacedObject(
                 name="figure",
                 kind="body",
                 parts=parts,
@@ -230,13 +239,13 @@ def place(scene: Scene, seed: int) -> tuple[Placed, ...]:
     return tuple(placed)
 
 
-def _placed(name: str, thing: Thing, random: np.random.Generator) -> Placed:
+def _placed(name: str, thing: SceneObject, random: np.random.Generator) -> PlacedObject:
     x, y, z = thing.position
     scatter = thing.scatter
-    return Placed(
+    return PlacedObject(
         name=name,
         kind="obstacle" if thing.fixed else "object",
-        parts=(Part(name, Form(thing.shape), thing.size, (0.0, 0.0, 0.0), 0.0, thing.mesh),),
+        parts=(Geom(name, ShapeKind(thing.shape), thing.size, (0.0, 0.0, 0.0), 0.0, thing.mesh),),
         position=(x + random.uniform(*scatter.x), y + random.uniform(*scatter.y), z),
         yaw=math.radians(thing.yaw_deg + random.uniform(*scatter.yaw_deg)),
         mass=thing.mass_kg,
@@ -246,5 +255,5 @@ def _placed(name: str, thing: Thing, random: np.random.Generator) -> Placed:
     )
 
 
-def _below(thing: Thing) -> float:
+def _below(thing: SceneObject) -> float:
     return thing.size[0] / 2 if thing.shape == "sphere" else thing.size[2] / 2

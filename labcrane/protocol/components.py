@@ -1,4 +1,4 @@
-"""Which components a protocol uses, found among those installed."""
+"""Components that a protocol uses, found among those installed."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ from labcrane.machines.library import find_machine, load_machine
 from labcrane.machines.machine import Machine
 from labcrane.protocol.protocol import Protocol, Use
 from labcrane.protocol.referenced_files import plain_settings
-from labcrane.registry.call_monitor import Oversight
+from labcrane.registry.call_monitor import CallMonitor
 from labcrane.registry.offers import Offer
 from labcrane.registry.proxies import watched
 from labcrane.registry.registry import Registry
@@ -23,14 +23,14 @@ RoleT = TypeVar("RoleT", bound=Component)
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class ComponentSpec:
     """A component that a protocol names, and its settings."""
 
     name: str
     plugin: str
     offer: Offer[Component]
     settings: Settings
-    oversight: Oversight = field(default_factory=Oversight, compare=False)
+    oversight: CallMonitor = field(default_factory=CallMonitor, compare=False)
 
     def described(self, folder: Path) -> dict[str, Any]:
         """Return it ready for JSON, with the study's files named from its ``folder``."""
@@ -44,15 +44,17 @@ class Choice:
         return watched(component, self.name, self.plugin, self.oversight)
 
 
-class Chooser:
+class ComponentResolver:
     """Finds what a protocol names, and notes every mistake in its file."""
 
     def __init__(self, source: YamlFile, registry: Registry) -> None:
         self._source = source
         self._registry = registry
-        self.oversight = Oversight()
+        self.oversight = CallMonitor()
 
-    def choose(self, role: type[RoleT], place: Place, default: Use | None = None) -> Choice | None:
+    def choose(
+        self, role: type[RoleT], place: Place, default: Use | None = None
+    ) -> ComponentSpec | None:
         """Return the component that the protocol uses at ``place``, or note why there is none."""
         written = self._at(place)
         if written is None and default is not None:
@@ -63,14 +65,14 @@ class Chooser:
             return None  # noted by the protocol's own check
         return self._choice(role, use, place, (*place, "use"))
 
-    def choose_tasks(self) -> dict[str, Choice]:
+    def choose_tasks(self) -> dict[str, ComponentSpec]:
         """Return the tasks that can be chosen, by the protocol's names for them."""
         written = self._at(("tasks",))
         names = written if isinstance(written, dict) else {}
         chosen = {name: self.choose(Task, ("tasks", name)) for name in names}
         return {name: choice for name, choice in chosen.items() if choice}
 
-    def choose_questionnaires(self, protocol: Protocol) -> dict[str, Choice]:
+    def choose_questionnaires(self, protocol: Protocol) -> dict[str, ComponentSpec]:
         """Return the questionnaires that the protocol asks, noting those that there are not."""
         chosen = {
             name: self.choose(Questionnaire, ("questionnaires", name))
@@ -90,7 +92,9 @@ class Chooser:
         for number, rule in enumerate(protocol.stop_rules):
             yield ("stop_rules", number, "questionnaire"), rule.questionnaire
 
-    def _choice(self, role: type[RoleT], use: Use, place: Place, named: Place) -> Choice | None:
+    def _choice(
+        self, role: type[RoleT], use: Use, place: Place, named: Place
+    ) -> ComponentSpec | None:
         """Return what is used at ``place``; its name stands at ``named``."""
         try:
             offer = self._registry.find(role, use.use)
@@ -101,9 +105,11 @@ class Chooser:
         if settings is None:
             return None
         plugin = self._registry.plugin(role, use.use)
-        return Choice(use.use, plugin, offer, settings, self.oversight)
+        return ComponentSpec(use.use, plugin, offer, settings, self.oversight)
 
-    def choose_feedback(self) -> tuple[dict[str, Choice], dict[str, Choice], dict[str, Choice]]:
+    def choose_feedback(
+        self,
+    ) -> tuple[dict[str, ComponentSpec], dict[str, ComponentSpec], dict[str, ComponentSpec]]:
         """Return cues, sounds and views by the protocol's names for them."""
         cues, sounds = {}, {}
         written = self._at(("feedback",))
@@ -143,7 +149,11 @@ class Chooser:
             return None
 
     def build(
-        self, role: type[RoleT], section: str, choices: Mapping[str, Choice], machine: Machine
+        self,
+        role: type[RoleT],
+        section: str,
+        choices: Mapping[str, ComponentSpec],
+        machine: Machine,
     ) -> dict[str, RoleT]:
         """Return what a section of the protocol names, built, noting what cannot be as written."""
         built: dict[str, RoleT] = {}

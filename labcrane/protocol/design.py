@@ -1,4 +1,4 @@
-"""What a protocol may say about its design."""
+"""Design section of a protocol."""
 
 from typing import Annotated, Any
 

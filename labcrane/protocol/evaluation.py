@@ -1,9 +1,9 @@
 """Stop rules: scores above which a session pauses."""
 
-from labcrane.files.model import Documented
+from labcrane.files.model import StrictModel
 
 
-class StopRule(Documented):
+class StopRule(StrictModel):
     """A score above which the session pauses and the examiner decides."""
 
     questionnaire: str

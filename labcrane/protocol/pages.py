@@ -1,4 +1,4 @@
-"""Where pages are served."""
+"""Settings of the pages: where they are served."""
 
 from typing import Literal
 

@@ -31,13 +31,13 @@ class Rig:
         """What every trial begins with, the operator's controls last; its task comes after."""
         return (self.dynamics, self.controller, self.input)
 
-    def facts(self) -> dict[str, Value]:
+    def metadata(self) -> dict[str, Value]:
         """Return what the open components want to have recorded, by dotted name."""
         parts = {"input": self.input, "scheme": self.controller, "dynamics": self.dynamics}
         return {
             f"{part}.{name}": value
             for part, component in parts.items()
-            for name, value in component.facts().items()
+            for name, value in component.metadata().items()
         }
 
 
@@ -64,7 +64,7 @@ def describe(rig: Rig, study: Study, participant_seed: int) -> Run:
         command=Layout("the scheme", rig.controller.signals),
         state=Layout("the machine", rig.dynamics.signals),
         task=Layout("the tasks", _task_signals(rig.tasks)),
-        steer=rig.controller.steer,
+        inverse=rig.controller.inverse,
         bodies=tuple(rig.dynamics.bodies()),
     )
 

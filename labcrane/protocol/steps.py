@@ -1,4 +1,4 @@
-"""What a session consists of, as a protocol writes it."""
+"""Steps of a session, as a protocol writes them."""
 
 from typing import Annotated, Any, Literal
 

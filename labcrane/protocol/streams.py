@@ -1,4 +1,4 @@
-"""What a protocol says of the streams of others: which, and how right their time must be."""
+"""Streams of others that a protocol asks for, and how right their time must be."""
 
 from typing import TYPE_CHECKING
 

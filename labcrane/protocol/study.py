@@ -10,10 +10,10 @@ from labcrane.core.roles import Controller, Dynamics, InputDevice, Questionnaire
 from labcrane.errors import ProtocolError
 from labcrane.files.yaml import Place, YamlFile
 from labcrane.machines.machine import Machine
-from labcrane.protocol.components import Choice, Chooser
+from labcrane.protocol.components import ComponentResolver, ComponentSpec
 from labcrane.protocol.protocol import DEFAULT_OPERATOR, Protocol, read
 from labcrane.protocol.steps import Block
-from labcrane.registry.call_monitor import Oversight
+from labcrane.registry.call_monitor import CallMonitor
 from labcrane.registry.registry import Registry
 
 
@@ -47,18 +47,18 @@ class Study:
     protocol: Protocol
     machine: Machine
     machine_text: str
-    input: Choice
-    operator: Choice
-    scheme: Choice
-    dynamics: Choice
+    input: ComponentSpec
+    operator: ComponentSpec
+    scheme: ComponentSpec
+    dynamics: ComponentSpec
     tasks: Mapping[str, Task]
-    task_choices: Mapping[str, Choice]
+    task_choices: Mapping[str, ComponentSpec]
     questionnaires: Mapping[str, Questionnaire] = field(default_factory=dict)
-    questionnaire_choices: Mapping[str, Choice] = field(default_factory=dict)
-    cues: dict[str, Choice] = field(default_factory=dict)
-    sounds: dict[str, Choice] = field(default_factory=dict)
-    views: dict[str, Choice] = field(default_factory=dict)
-    oversight: Oversight = field(default_factory=Oversight)
+    questionnaire_choices: Mapping[str, ComponentSpec] = field(default_factory=dict)
+    cues: dict[str, ComponentSpec] = field(default_factory=dict)
+    sounds: dict[str, ComponentSpec] = field(default_factory=dict)
+    views: dict[str, ComponentSpec] = field(default_factory=dict)
+    oversight: CallMonitor = field(default_factory=CallMonitor)
 
     @property
     def sha256(self) -> str:
@@ -66,7 +66,7 @@ class Study:
         return hashlib.sha256(self.text.encode()).hexdigest()
 
     @property
-    def choices(self) -> dict[str, Choice]:
+    def choices(self) -> dict[str, ComponentSpec]:
         """The components for people, by the part they play: ``scheme``, ``tasks.NAME``."""
         named = {
             "tasks": self.task_choices,
@@ -192,7 +192,7 @@ def load(path: Path, registry: Registry) -> Study:
         With one line for every mistake: file, line, what was written, what is possible.
     """
     protocol, source = read(path)
-    chooser = Chooser(source, registry)
+    chooser = ComponentResolver(source, registry)
     machine = chooser.machine()
     device = chooser.choose(InputDevice, ("input",))
     operator = chooser.choose(InputDevice, ("operator",), DEFAULT_OPERATOR)

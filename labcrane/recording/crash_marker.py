@@ -1,4 +1,4 @@
-"""Which component a session is in, in a small file that outlives its process.
+"""Crash marker: which component a session is in, in a small file that outlives it.
 
 A process that exits or hangs in a plugin cannot say so any more. The session therefore stores one
 number before it enters a component and one after: a store into memory that the operating system
@@ -45,7 +45,7 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
-class Whereabouts:
+class CrashMarker:
     """Where a session was.
 
     Attributes
@@ -105,11 +105,11 @@ def read_number(path: Path) -> int | None:
     return int.from_bytes(raw, sys.byteorder) if len(raw) == BYTES else None
 
 
-def read_whereabouts(path: Path) -> Whereabouts | None:
+def read_whereabouts(path: Path) -> CrashMarker | None:
     """Return where a session is, or was when its process died; None when there is no file."""
     number = read_number(path)
     if number is None:
         return None
     places = [Place(**fields) for fields in json.loads(path.read_bytes()[BYTES:])]
     index = number % (1 << SHIFT)
-    return Whereabouts((number >> SHIFT) - 1, places[index - 1] if index else None)
+    return CrashMarker((number >> SHIFT) - 1, places[index - 1] if index else None)

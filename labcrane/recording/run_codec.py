@@ -35,7 +35,7 @@ def read_run(text: str) -> Run:
         rate_hz=found["rate_hz"],
         machine=Machine.model_validate(found["machine"]),
         participant_seed=found["seed"],
-        steer=_nobody,
+        inverse=_nobody,
         bodies=tuple(_body(body) for body in found["bodies"]),
         **layouts,
     )

@@ -38,7 +38,7 @@ class Overrun:
     worst_s: float = 0.0
 
 
-class Oversight:
+class CallMonitor:
     """What is known of all components of one study.
 
     Attributes

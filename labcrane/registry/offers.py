@@ -1,4 +1,4 @@
-"""How a plugin says what it has: a name, its settings, and how to build it."""
+"""Offers of plugins: a name, its settings, and how to build it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ API = 1
 plugin says ``labcrane_api = 1`` in its module; ``docs/compatibility.md`` says when it rises."""
 
 
-Ask = Callable[[str], None]
+Prompt = Callable[[str], None]
 """Tells the person at the machine what to do next."""
 
 
@@ -46,14 +46,14 @@ class Offer(Generic[RoleT_co]):
     name: str
     settings: type[Settings]
     build: Callable[[Any, Machine], RoleT_co]
-    examine: Callable[[Any, Ask | None], Sequence[Finding]] | None = None
+    examine: Callable[[Any, Prompt | None], Sequence[Finding]] | None = None
 
 
 def offer(
     name: str,
     settings: type[SettingsT],
     build: Callable[[SettingsT, Machine], RoleT],
-    examine: Callable[[SettingsT, Ask | None], Sequence[Finding]] | None = None,
+    examine: Callable[[SettingsT, Prompt | None], Sequence[Finding]] | None = None,
 ) -> Offer[RoleT]:
     """Offer what ``build`` makes as ``name``, the word a protocol writes after ``use:``.
 

@@ -6,22 +6,22 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from labcrane.core.records import Judgement
+from labcrane.core.records import TrialStatus
 from labcrane.core.roles import Component, Controller, Dynamics, InputDevice, Questionnaire, Task
 from labcrane.core.signals import Layout
 from labcrane.errors import PluginError
-from labcrane.registry.call_monitor import Oversight
+from labcrane.registry.call_monitor import CallMonitor
 from labcrane.registry.registry import ROLES
 
 if TYPE_CHECKING:
     from labcrane.core.clock import Tick
     from labcrane.core.items import Answers, Item
-    from labcrane.core.records import Frame, Planned, Run, Trial, Value
+    from labcrane.core.records import Frame, PlannedTrial, Run, Trial, Value
     from labcrane.machines.machine import Body
     from labcrane.types import FloatArray
 
 
-def watched(component: Component, name: str, plugin: str, oversight: Oversight) -> Component:
+def watched(component: Component, name: str, plugin: str, oversight: CallMonitor) -> Component:
     """Return ``component`` under oversight; what runs in a process of its own as it is."""
     for role, made in WATCHED.items():
         if isinstance(component, role):
@@ -49,7 +49,7 @@ def hurried(components: Iterable[Component]) -> Iterator[None]:
 class _Watched(Component):
     """What every role has."""
 
-    def __init__(self, component: Any, called: str, plugin: str, oversight: Oversight) -> None:
+    def __init__(self, component: Any, called: str, plugin: str, oversight: CallMonitor) -> None:
         self._inner = component
         self._oversight = oversight
         self._call = oversight.call
@@ -75,8 +75,8 @@ class _Watched(Component):
     def close(self) -> None:
         self._call(self._number["close"], self._inner.close)
 
-    def facts(self) -> Mapping[str, Value]:
-        facts: Mapping[str, Value] = self._call(self._number["facts"], self._inner.facts)
+    def metadata(self) -> Mapping[str, Value]:
+        facts: Mapping[str, Value] = self._call(self._number["metadata"], self._inner.metadata)
         return facts
 
     def brisk(self) -> Mapping[str, Callable[..., Any]]:
@@ -122,17 +122,17 @@ class WatchedController(_Watched, Controller):
         number = self._number["command"]
         return self._checked(number, self._call(number, self._inner.command, axes, state))
 
-    def rest(self) -> FloatArray:
-        number = self._number["rest"]
-        return self._checked(number, self._call(number, self._inner.rest))
+    def idle(self) -> FloatArray:
+        number = self._number["idle"]
+        return self._checked(number, self._call(number, self._inner.idle))
 
-    def steer(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
-        axes: FloatArray = self._call(self._number["steer"], self._inner.steer, velocity, state)
+    def inverse(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
+        axes: FloatArray = self._call(self._number["inverse"], self._inner.inverse, velocity, state)
         return axes
 
     def brisk(self) -> Mapping[str, Callable[..., Any]]:
-        checked = {method: self._brisk(method, self._layout) for method in ("command", "rest")}
-        return {**checked, "steer": self._brisk("steer")}
+        checked = {method: self._brisk(method, self._layout) for method in ("command", "idle")}
+        return {**checked, "inverse": self._brisk("inverse")}
 
 
 class WatchedDynamics(_Watched, Dynamics):
@@ -185,32 +185,32 @@ class WatchedTask(_Watched, Task):
         factors = self._call(self._number["factors"], self._inner.factors)
         return factors
 
-    def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[Planned]:
-        planned: Sequence[Planned] = self._call(self._number["plan"], self._inner.plan, levels)
+    def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[PlannedTrial]:
+        planned: Sequence[PlannedTrial] = self._call(self._number["plan"], self._inner.plan, levels)
         return planned
 
-    def judge(self, frame: Frame) -> Judgement:
-        return self._sound(self._call(self._number["judge"], self._inner.judge, frame))
+    def evaluate(self, frame: Frame) -> TrialStatus:
+        return self._sound(self._call(self._number["evaluate"], self._inner.evaluate, frame))
 
-    def overrule(self) -> None:
-        self._call(self._number["overrule"], self._inner.overrule)
+    def lift_limits(self) -> None:
+        self._call(self._number["lift_limits"], self._inner.lift_limits)
 
     def brisk(self) -> Mapping[str, Callable[..., Any]]:
-        judge, sound = self._brisk("judge"), self._sound
-        last: Judgement | None = None
+        evaluate, sound = self._brisk("evaluate"), self._sound
+        last: TrialStatus | None = None
 
-        def judged(frame: Frame) -> Judgement:
+        def judged(frame: Frame) -> TrialStatus:
             nonlocal last
-            judgement: Judgement = judge(frame)
+            judgement: TrialStatus = evaluate(frame)
             if judgement is not last:  # while nothing happens, most tasks say the same again
                 last = sound(judgement)
             return judgement
 
-        return {"judge": judged}
+        return {"evaluate": judged}
 
-    def _sound(self, judgement: Judgement) -> Judgement:
-        number = self._number["judge"]
-        if not isinstance(judgement, Judgement):
+    def _sound(self, judgement: TrialStatus) -> TrialStatus:
+        number = self._number["evaluate"]
+        if not isinstance(judgement, TrialStatus):
             raise PluginError(self._oversight.complaint(number, f"returned {judgement!r}"))
         self._oversight.check(number, judgement.values, self._layout, finite=False)
         return judgement

@@ -29,7 +29,7 @@ from labcrane.registry.registry import discover
 from labcrane.replay.restore import differing_parts, restore
 from labcrane.replay.script import RecordOver, Script
 from labcrane.session import loop
-from labcrane.session.sequencer import Course
+from labcrane.session.sequencer import Sequencer
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -144,7 +144,7 @@ def _run(
         this_run = closing.enter_context(rig.opened(the_rig, study, plan.seed))
         log = _Log(this_run, script)
         waits = not bool(record.context["simulated"])
-        course = Course(study, plan, the_rig, waits=waits, awaits=script.awaited)
+        course = Sequencer(study, plan, the_rig, waits=waits, awaits=script.awaited)
         shown: list[Callable[[Frame], None]] = []
         if speed is not None:
             show = _Show(this_run, f"replay/{participant}/ses-{session:02}", speed)

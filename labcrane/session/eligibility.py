@@ -1,7 +1,7 @@
-"""Whether a session may be run, and what the register keeps of it.
+"""Eligibility of a session, and what the register keeps of it.
 
-Two calls where a session is run: :func:`gate` before anything opens, which may be repeated, and
-:func:`dismiss` when its participant file is written.
+Two calls where a session is run: :func:`check_eligibility` before anything opens, which may be
+repeated, and :func:`close_visit` when its participant file is written.
 """
 
 from dataclasses import dataclass
@@ -61,7 +61,7 @@ EXEMPT = Admission(None, {"approval": "none"})
 """Pilots and simulations need no approval: what they leave is stamped PILOT or SIMULATED."""
 
 
-def gate(visit: Visiting, today: date | None = None) -> Admission:
+def check_eligibility(visit: Visiting, today: date | None = None) -> Admission:
     """Let a visit pass, or say why not; enter it in the register.
 
     Raises
@@ -110,7 +110,7 @@ def gate(visit: Visiting, today: date | None = None) -> Admission:
     )
 
 
-def dismiss(visit: Visiting) -> None:
+def close_visit(visit: Visiting) -> None:
     """Write into the register how the session went, and keep its files to the user."""
     if visit.folder.path.is_dir():
         keep_private(visit.folder.path)

@@ -9,7 +9,7 @@ from ruamel.yaml.error import YAMLError
 
 from labcrane.core.records import Value
 from labcrane.core.settings import Settings
-from labcrane.protocol.components import Choice
+from labcrane.protocol.components import ComponentSpec
 
 
 class FeedbackSettings:
@@ -18,7 +18,7 @@ class FeedbackSettings:
     A change is written as in a protocol: ``tone.far=3``, ``ball.at=tip``.
     """
 
-    def __init__(self, choices: Mapping[str, Choice]) -> None:
+    def __init__(self, choices: Mapping[str, ComponentSpec]) -> None:
         self._now: dict[str, Settings] = {name: each.settings for name, each in choices.items()}
 
     def refusal(self, text: str) -> str | None:

@@ -9,49 +9,49 @@ from labcrane.core.records import Frame, Run
 from labcrane.protocol.rig import Rig
 from labcrane.recording.frame_log import FrameLog
 from labcrane.session.commands import Console
-from labcrane.session.sequencer import Course
+from labcrane.session.sequencer import Sequencer
 
 
 def run(
     rig: Rig,
-    this_run: Run,
-    course: Course,
+    run: Run,
+    course: Sequencer,
     clock: Clock,
     console: Console,
     log: FrameLog,
-    onlookers: Sequence[Callable[[Frame], None]],
+    sinks: Sequence[Callable[[Frame], None]],
 ) -> None:
     """Tick until the course is over.
 
-    Every frame is written to the journal first, and only then shown to the ``onlookers``.
+    Every frame is written to the journal first, and only then shown to the ``sinks``.
     """
-    dt = 1.0 / this_run.rate_hz
-    read, control, rest = rig.input.read, rig.controller.command, rig.controller.rest
+    dt = 1.0 / run.rate_hz
+    read, control, rest = rig.input.read, rig.controller.command, rig.controller.idle
     state, step = rig.dynamics.state, rig.dynamics.step
-    heed, judge, write = course.heed, course.judge, log.write
-    no_task = np.full(this_run.task.size, np.nan)
+    handle, evaluate, write = course.handle, course.evaluate, log.write
+    no_task = np.full(run.task.size, np.nan)
 
-    frame = _before(rig, this_run)
-    for tick in ticks(clock, this_run.rate_hz):
+    frame = _before(rig, run)
+    for tick in ticks(clock, run.rate_hz):
         axes = read(tick, frame)
-        heed(console.commands(), rig.input.fault, log.trouble)
+        handle(console.commands(), rig.input.fault, log.trouble)
         command = control(axes, state()) if course.moving else rest()
         frame = Frame(tick, 0.0, axes, command, step(command, dt), no_task)
-        judge(frame)
+        evaluate(frame)
         write(frame)
-        for show in onlookers:
+        for show in sinks:
             show(frame)
         if course.over:
             return
 
 
-def _before(rig: Rig, this_run: Run) -> Frame:
+def _before(rig: Rig, run: Run) -> Frame:
     """Return what a person sees before anything has happened."""
     return Frame(
         tick=Tick(-1, 0.0, 0.0),
         elapsed=0.0,
-        axes=np.zeros(this_run.axes.size),
-        command=rig.controller.rest(),
+        axes=np.zeros(run.axes.size),
+        command=rig.controller.idle(),
         state=rig.dynamics.state(),
-        task=np.full(this_run.task.size, np.nan),
+        task=np.full(run.task.size, np.nan),
     )

@@ -1,4 +1,4 @@
-"""What whoever reads a recording must know, written at its start."""
+"""Metadata written at the start of a recording for whoever reads it."""
 
 import hashlib
 import platform
@@ -55,7 +55,7 @@ def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> 
         **_of_visit(visit, plan),
         "rate_hz": this_run.rate_hz,
         **_of_study(visit.study, simulated=visit.simulated),
-        "facts": the_rig.facts(),
+        "facts": the_rig.metadata(),
         "versions": _versions(),
         # What a simulation records does not depend on the computer that it is made on.
         "doctor": None if visit.fast else at_start(visit.folder.root),

@@ -2,7 +2,7 @@
 
 from labcrane.core.records import Event, Frame
 from labcrane.recording.frame_log import FrameLog
-from labcrane.registry.call_monitor import Oversight
+from labcrane.registry.call_monitor import CallMonitor
 from labcrane.session.commands import Console
 
 FEW = 3
@@ -12,11 +12,11 @@ AGAIN_S = 60.0
 """A component that stays slow is told of this often."""
 
 
-class Slowness:
+class OverrunReporter:
     """Looks once a second which components were slow, and notes it as an event."""
 
     def __init__(
-        self, oversight: Oversight, rate_hz: float, log: FrameLog, console: Console
+        self, oversight: CallMonitor, rate_hz: float, log: FrameLog, console: Console
     ) -> None:
         self._oversight = oversight
         self._log = log

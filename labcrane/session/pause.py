@@ -1,4 +1,4 @@
-"""What holds a session: the examiner, a part in trouble, a stop rule."""
+"""Pause of a session: held by the examiner, a part in trouble, or a stop rule."""
 
 from collections.abc import Callable, Iterable
 
@@ -10,7 +10,7 @@ EXAMINER, INPUT, DISK, STOP = "examiner", "input", "disk", "stop rule"
 """Who can hold a session, beside lost streams and feedback: it goes on when nobody does."""
 
 
-class Holding:
+class Suspenders:
     """Holds a session while somebody or something has a reason to.
 
     Parameters

@@ -1,4 +1,4 @@
-"""What is worked out of a session when it has ended: corrected clocks, and the sync report."""
+"""Postprocessing of a session that has ended: corrected clocks, and the sync report."""
 
 from collections.abc import Mapping
 from typing import Any

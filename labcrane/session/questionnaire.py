@@ -1,4 +1,4 @@
-"""A questionnaire while it is asked: what has been answered, and what comes of it."""
+"""Questionnaires asked in a session: answers as they come, and stop rules after them."""
 
 import json
 import math
@@ -25,7 +25,7 @@ SIMULATION = "simulation"
 START, REFUSED = "questionnaire.start", "questionnaire.refused"
 
 
-class Inquiry:
+class QuestionnaireForm:
     """Takes answers one by one; each becomes an event at once.
 
     Parameters
@@ -153,7 +153,7 @@ def _any(item: Item, dice: random.Random) -> Value:
     return item.lowest + step * dice.randint(0, round((item.highest - item.lowest) / step))
 
 
-class Asking:
+class QuestionnaireRun:
     """Asks one questionnaire and looks at the study's stop rules.
 
     Parameters
@@ -181,7 +181,7 @@ class Asking:
         about: dict[str, Value] = {"step": step}
         if after is not None:
             about["trial"] = after.number
-        self._inquiry = Inquiry(name, study.questionnaires[name], about, answered)
+        self._inquiry = QuestionnaireForm(name, study.questionnaires[name], about, answered)
         self._name = name
         self._rules = [rule for rule in study.protocol.stop_rules if rule.questionnaire == name]
         self._seed = derive("answers", after.seed if after else plan.seed, step, name)
@@ -198,7 +198,7 @@ class Asking:
         if simulated:
             yield from self._inquiry.simulated(self._seed)
 
-    def heed(self, command: Command) -> Said:
+    def handle(self, command: Command) -> Said:
         """Take an answer, or hand the questionnaire in; return what is said of it."""
         if command.order is Order.SUBMIT:
             return self._inquiry.hand_in(by_whom(command))

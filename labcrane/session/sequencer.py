@@ -13,10 +13,10 @@ from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.session.commands import FAULTS, Command, Order, by_whom
 from labcrane.session.live_settings import FeedbackSettings
-from labcrane.session.pause import DISK, EXAMINER, INPUT, STOP, Holding
+from labcrane.session.pause import DISK, EXAMINER, INPUT, STOP, Suspenders
 from labcrane.session.practice import WarmUp
-from labcrane.session.questionnaire import Asking
-from labcrane.session.trial import Attempt
+from labcrane.session.questionnaire import QuestionnaireRun
+from labcrane.session.trial import TrialRun
 
 Ticks = Generator[None, Frame, None]
 
@@ -27,10 +27,10 @@ NOT_ASKED = {
 }
 
 
-class Course:
+class Sequencer:
     """Leads a session through its plan.
 
-    The loop calls :meth:`heed` before the machine moves and :meth:`judge` after.
+    The loop calls :meth:`handle` before the machine moves and :meth:`evaluate` after.
 
     Parameters
     ----------
@@ -62,13 +62,13 @@ class Course:
         self._rate_hz = study.protocol.rate_hz
         self._settings = FeedbackSettings({**study.cues, **study.sounds})
         self._notes: list[tuple[str, dict[str, Value]]] = []  # stamped with the tick they fall in
-        self._held = Holding(
+        self._held = Suspenders(
             study.protocol.on_fault, lambda *note: self._notes.append(note), awaits
         )
-        self._attempt: Attempt | None = None
+        self._attempt: TrialRun | None = None
         self._stage = ""
         self._step = 0
-        self._asking: Asking | None = None
+        self._asking: QuestionnaireRun | None = None
         self._wishes: set[Order] = set()  # to start, skip or repeat what runs now
         self._warm_up = WarmUp()
         self.over = False
@@ -80,7 +80,7 @@ class Course:
         """Whether the operator's command reaches the machine in this tick."""
         return self._attempt is not None and not self._held.by
 
-    def heed(
+    def handle(
         self, commands: Sequence[Command], lost_input: str | None, disk_trouble: str | None
     ) -> None:
         """Take up orders, and what has become of the operator's controls and of the disk."""
@@ -90,13 +90,13 @@ class Course:
             elif command.order is Order.DENIED:
                 self._note("page.denied", why=command.text, by=by_whom(command))
             elif self._asking is not None and command.order in {Order.ANSWER, Order.SUBMIT}:
-                self._notes.append(self._asking.heed(command))
+                self._notes.append(self._asking.handle(command))
             else:
                 self._obey(command)
         self._held.watch(INPUT, lost_input)
         self._held.watch(DISK, disk_trouble)
 
-    def judge(self, frame: Frame) -> None:
+    def evaluate(self, frame: Frame) -> None:
         """Complete ``frame``: trial, phase, the task's values, and everything that happened."""
         frame.paused = bool(self._held.by)
         frame.events = self._stamped(frame)
@@ -178,7 +178,7 @@ class Course:
 
     def _trial(self, block: PlannedBlock, trial: Trial) -> Ticks:
         task = self._study.tasks[block.task]
-        attempt = Attempt(task, block, trial, self._rate_hz)
+        attempt = TrialRun(task, block, trial, self._rate_hz)
         for component in (*self._rig.components, task):
             component.begin_trial(trial)
         if trial.planned.start_pose is not None:
@@ -187,7 +187,7 @@ class Course:
         self._enter("trial", attempt)
         while not attempt.phase.over:
             frame = yield
-            attempt.judge(frame, self._wished_end())
+            attempt.evaluate(frame, self._wished_end())
         self._enter("")
         if trial.planned.counted:
             self._warm_up.count(block, attempt.phase)
@@ -197,7 +197,9 @@ class Course:
     def _ask(self, name: str, answered: Mapping[str, Value], after: Trial | None = None) -> Ticks:
         if self._held.ending:
             return
-        asking = self._asking = Asking(self._study, self._plan, name, self._step, answered, after)
+        asking = self._asking = QuestionnaireRun(
+            self._study, self._plan, name, self._step, answered, after
+        )
         self._enter("questionnaire")
         self._notes.extend(asking.begin(simulated=not self._waits))
         yield
@@ -220,7 +222,7 @@ class Course:
             return Phase.SKIPPED
         return Phase.REPEATED if Order.REPEAT in self._wishes else None
 
-    def _enter(self, stage: str, attempt: Attempt | None = None) -> None:
+    def _enter(self, stage: str, attempt: TrialRun | None = None) -> None:
         self._stage, self._attempt = stage, attempt
         self._wishes.clear()
 
@@ -245,7 +247,7 @@ class Course:
             case Order.END:
                 self._held.ending.append("by order")
             case Order.OVERRIDE:
-                self._running().overrule()
+                self._running().lift_limits()
             case Order.COMPLETION:
                 self._running().completion = command.text == "1"
             case Order.SETTING:
@@ -278,7 +280,7 @@ class Course:
                 return self._settings.refusal(command.text)
         return None
 
-    def _running(self) -> Attempt:
+    def _running(self) -> TrialRun:
         if self._attempt is None:
             raise AssertionError("orders that need a trial are refused without one")
         return self._attempt

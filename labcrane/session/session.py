@@ -13,7 +13,7 @@ from labcrane.design.plan import SessionPlan, plan_session
 from labcrane.errors import DeviceError, PluginError, ProtocolError
 from labcrane.protocol import rig
 from labcrane.protocol.study import Study
-from labcrane.recording.crash_marker import Whereabouts, read_whereabouts, whereabouts_path
+from labcrane.recording.crash_marker import CrashMarker, read_whereabouts, whereabouts_path
 from labcrane.recording.data_folder import DataFolder
 from labcrane.recording.foreign_streams import Conclusion
 from labcrane.recording.frame_log import BatchLog, FrameLog, columns, frame_bytes
@@ -23,12 +23,12 @@ from labcrane.recording.paths import journal_path, next_part, parts
 from labcrane.registry.proxies import hurried
 from labcrane.session import loop
 from labcrane.session.commands import Console
-from labcrane.session.eligibility import dismiss, gate
+from labcrane.session.eligibility import check_eligibility, close_visit
 from labcrane.session.metadata import context
-from labcrane.session.overruns import Slowness
+from labcrane.session.overruns import OverrunReporter
 from labcrane.session.postprocess import SessionConclusion
 from labcrane.session.resume import Policy, Progress, progress, remaining, within_limits
-from labcrane.session.sequencer import Course
+from labcrane.session.sequencer import Sequencer
 from labcrane.streams.sync.sync_report import SyncReport
 
 RESERVE_S = 60.0
@@ -122,7 +122,7 @@ def finish(visit: Visit) -> SyncReport | None:
         return Conclusion(made[-1].correct, made[-1].report)
 
     consolidate(visit.folder.participant_file, journals, conclude)
-    dismiss(visit)
+    close_visit(visit)
     return made[-1].sync_report
 
 
@@ -135,7 +135,7 @@ def record(visit: Visit, console: Console) -> None:
         Before anything is recorded: the session cannot be run.
     """
     study = visit.study
-    admission = gate(visit)
+    admission = check_eligibility(visit)
     whole = plan_session(study, visit.participant, visit.session, admission.slot)
     so_far, plan = _go_on(visit, whole) if visit.resumed else (None, whole)
     if so_far is None:
@@ -153,17 +153,17 @@ def record(visit: Visit, console: Console) -> None:
         visit.folder.check_space(plan.expected_s, second, RESERVE_S)
         about = context(visit, plan, the_rig, this_run) | admission.context
         awaits = (*study.views, *study.sounds) if visit.feedback else ()
-        course = Course(study, plan, the_rig, waits=not visit.simulated, awaits=awaits)
+        course = Sequencer(study, plan, the_rig, waits=not visit.simulated, awaits=awaits)
         log = _log(visit, this_run, clock, reserve=round(RESERVE_S * second))
         try:
             for event in _opening(about, so_far, died, clock.now()):
                 log.note(event)
             with _outlets(visit, plan, this_run) as outlets:
-                onlookers = [*outlets, _teller(console)]
+                sinks = [*outlets, _teller(console)]
                 if not visit.fast:
-                    onlookers.append(Slowness(study.oversight, this_run.rate_hz, log, console))
+                    sinks.append(OverrunReporter(study.oversight, this_run.rate_hz, log, console))
                 with _settled():
-                    loop.run(the_rig, this_run, course, clock, console, log, onlookers)
+                    loop.run(the_rig, this_run, course, clock, console, log, sinks)
         except (PluginError, DeviceError) as error:
             log.note(Event("session.failed", clock.now(), {"why": str(error)}))
             error.add_note(
@@ -201,7 +201,7 @@ def _go_on(visit: Visit, whole: SessionPlan) -> tuple[Progress, SessionPlan]:
 
 
 def _opening(
-    about: Mapping[str, Any], so_far: Progress | None, died: Whereabouts | None, now: float
+    about: Mapping[str, Any], so_far: Progress | None, died: CrashMarker | None, now: float
 ) -> Iterator[Event]:
     """Yield what is to be known before the first tick."""
     yield Event("session.start", now, about)

@@ -1,11 +1,11 @@
 """One attempt at a trial, from its start to its row in the trial table."""
 
-from labcrane.core.records import Event, Frame, Judgement, Phase, Trial, Value
+from labcrane.core.records import Event, Frame, Phase, Trial, TrialStatus, Value
 from labcrane.core.roles import Task
 from labcrane.design.plan import PlannedBlock
 
 
-class Attempt:
+class TrialRun:
     """Runs beside the loop while a trial is under way.
 
     Attributes
@@ -42,11 +42,11 @@ class Attempt:
         self._worst_s = 0.0
         self._began: float | None = None
 
-    def overrule(self) -> None:
+    def lift_limits(self) -> None:
         """Let the trial go on past its automatic ends."""
-        self._task.overrule()
+        self._task.lift_limits()
 
-    def judge(self, frame: Frame, wish: Phase | None) -> None:
+    def evaluate(self, frame: Frame, wish: Phase | None) -> None:
         """Complete ``frame``; ``wish`` ends the trial whatever the task thinks."""
         if self._began is None:
             self._began = frame.tick.due
@@ -60,7 +60,7 @@ class Attempt:
             self._paused_ticks += 1
         else:
             self._ticks += 1
-            judgement = self._task.judge(frame)
+            judgement = self._task.evaluate(frame)
             frame.task = judgement.values
             if judgement.events:
                 frame.events += tuple(self._of_this_trial(event) for event in judgement.events)
@@ -74,7 +74,7 @@ class Attempt:
     def _of_this_trial(self, event: Event) -> Event:
         return Event(event.name, event.time, {"trial": self._trial.number, **event.data})
 
-    def _row(self, frame: Frame, judgement: Judgement | None) -> dict[str, Value]:
+    def _row(self, frame: Frame, judgement: TrialStatus | None) -> dict[str, Value]:
         results: dict[str, Value] = {
             column: None for signal in self._task.results for column in signal.columns
         }

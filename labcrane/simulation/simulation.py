@@ -32,7 +32,7 @@ thrown away."""
 
 
 @dataclass(frozen=True, slots=True)
-class SimulationOrder:
+class SimulationJob:
     """One participant to be simulated, by the names of things, so that it can be sent.
 
     Attributes
@@ -72,7 +72,7 @@ class Attendance:
             self._orders = [Command(Order.END, "the simulated participant leaves")]
 
 
-def simulate(order: SimulationOrder) -> DataFolder:
+def simulate(order: SimulationJob) -> DataFolder:
     """Simulate every session of one participant, and return the folder; a worker's function.
 
     A participant who is there already is left as they are.
@@ -109,7 +109,7 @@ def _keep(done: Path, path: Path) -> None:
 
 
 def simulate_study(
-    orders: Sequence[SimulationOrder], workers: int = 1, scheduler: str | None = None
+    orders: Sequence[SimulationJob], workers: int = 1, scheduler: str | None = None
 ) -> Iterator[DataFolder]:
     """Simulate the participants who are not there yet; yield each folder when it is finished.
 
@@ -133,7 +133,7 @@ def simulate_study(
         shutil.rmtree(first.data / UNFINISHED, ignore_errors=True)
 
 
-def _check_same(order: SimulationOrder, study: Study) -> None:
+def _check_same(order: SimulationJob, study: Study) -> None:
     """Note what is simulated here; refuse to mix it with something else."""
     cohort = order.cohort.read_text(encoding="utf-8") if order.cohort else None
     about = {

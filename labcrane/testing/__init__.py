@@ -5,15 +5,15 @@
         def device(self) -> InputDevice:
             return MyStick(MySettings(), ch8())
 
-The fixture returns a component that is built and not yet open. Each contract opens it beside
-stand-ins for the other roles, and runs it.
+In comes a component that is built and not yet open, which the fixture returns; out go failures that
+name the promise it breaks. Each contract opens it beside stand-ins for the other roles.
 """
 
 from labcrane.testing.commands import CommandContract
 from labcrane.testing.components import PluginContract, check_closes_after_failed_open, check_soon
 from labcrane.testing.examinations import ExaminationContract
 from labcrane.testing.exporters import ExporterContract
-from labcrane.testing.presentation import TARGETS, CueContract, FeedbackContract, a_target
+from labcrane.testing.presentation import TARGETS, CueContract, FeedbackContract, make_target
 from labcrane.testing.questionnaires import QuestionnaireContract
 from labcrane.testing.roles import (
     RATE_HZ,
@@ -21,14 +21,14 @@ from labcrane.testing.roles import (
     ControllerContract,
     DynamicsContract,
     InputContract,
-    a_frame,
-    a_run,
-    a_trial,
     ch8,
     check_array,
     check_signals,
     crane_at,
     crane_state,
+    make_frame,
+    make_run,
+    make_trial,
     opened,
 )
 from labcrane.testing.tasks import TaskContract
@@ -48,10 +48,6 @@ __all__ = [
     "PluginContract",
     "QuestionnaireContract",
     "TaskContract",
-    "a_frame",
-    "a_run",
-    "a_target",
-    "a_trial",
     "ch8",
     "check_array",
     "check_closes_after_failed_open",
@@ -59,5 +55,9 @@ __all__ = [
     "check_soon",
     "crane_at",
     "crane_state",
+    "make_frame",
+    "make_run",
+    "make_target",
+    "make_trial",
     "opened",
 ]

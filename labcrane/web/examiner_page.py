@@ -7,7 +7,7 @@ from labcrane.core.records import Event
 from labcrane.session.commands import Order
 from labcrane.web.access import SUPERVISOR
 from labcrane.web.form import ConsentCard, Form
-from labcrane.web.page import PRIMARY, Desk
+from labcrane.web.page import PRIMARY, PageContext
 from labcrane.web.panels import Cameras, Loads
 from labcrane.web.scene import Scene
 
@@ -25,7 +25,7 @@ AXIS = {"axisLine": {"onZero": False}, "axisLabel": {"color": "#333"}}
 RATE_S = 0.25
 
 
-def supervisor_page(desk: Desk) -> None:
+def supervisor_page(desk: PageContext) -> None:
     """Build the page."""
     from nicegui import ui  # noqa: PLC0415 - loads for a second
 
@@ -50,7 +50,7 @@ def supervisor_page(desk: Desk) -> None:
                 Form(desk, SUPERVISOR).build()
 
 
-def _status(desk: Desk) -> None:
+def _status(desk: PageContext) -> None:
     from nicegui import ui  # noqa: PLC0415
 
     title = f"{desk.study.protocol.title}: {desk.participant}, session {desk.plan.number}"
@@ -69,7 +69,7 @@ def _status(desk: Desk) -> None:
     ui.timer(RATE_S, update)
 
 
-def _facts(desk: Desk) -> list[str]:
+def _facts(desk: PageContext) -> list[str]:
     board, live = desk.board, desk.live
     trials = [
         trial for block in desk.plan.blocks for trial in block.trials if trial.planned.counted
@@ -89,7 +89,7 @@ def _facts(desk: Desk) -> list[str]:
     return found
 
 
-def _orders(desk: Desk) -> None:
+def _orders(desk: PageContext) -> None:
     from nicegui import ui  # noqa: PLC0415
 
     def give(order: Order, text: str = "") -> Callable[[], object]:
@@ -115,7 +115,7 @@ def _orders(desk: Desk) -> None:
                 _words(desk, order, label)
 
 
-def _words(desk: Desk, order: Order, label: str) -> None:
+def _words(desk: PageContext, order: Order, label: str) -> None:
     from nicegui import ui  # noqa: PLC0415
 
     field = ui.input(label).props(f'outlined dense for="{order.value}-field"').classes("w-72")
@@ -128,7 +128,7 @@ def _words(desk: Desk, order: Order, label: str) -> None:
     ui.button("Send", on_click=send).props(f'no-caps color=blue-10 id="order-{order.value}"')
 
 
-def _chart(desk: Desk) -> None:
+def _chart(desk: PageContext) -> None:
     from nicegui import ui  # noqa: PLC0415
 
     choice = ui.select([], label="Signal").classes("w-full").props('id="signal"')
@@ -154,7 +154,7 @@ def _chart(desk: Desk) -> None:
     ui.timer(RATE_S, update)
 
 
-def _log(desk: Desk) -> None:
+def _log(desk: PageContext) -> None:
     from nicegui import ui  # noqa: PLC0415
 
     ui.label("Events").classes("font-medium")
@@ -171,7 +171,7 @@ def _line(event: Event) -> str:
     return f"{event.time:.1f}  {event.name}  {json.dumps(data, ensure_ascii=False)[:160]}"
 
 
-def _streams(desk: Desk) -> None:
+def _streams(desk: PageContext) -> None:
     from nicegui import ui  # noqa: PLC0415
 
     ui.label("Streams and clocks").classes("font-medium")
@@ -179,7 +179,7 @@ def _streams(desk: Desk) -> None:
     ui.timer(RATE_S, lambda: text.set_text("\n".join(_health(desk))))
 
 
-def _health(desk: Desk) -> list[str]:
+def _health(desk: PageContext) -> list[str]:
     board = desk.board
     if board.sync_report:
         return board.sync_report

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from labcrane.core.items import Item
 from labcrane.core.records import Value
 from labcrane.session.commands import Order
-from labcrane.web.page import Desk
+from labcrane.web.page import PageContext
 
 if TYPE_CHECKING:
     from nicegui import ui
@@ -25,7 +25,7 @@ class Form:
     as given, also after a reload.
     """
 
-    def __init__(self, desk: Desk, page: str) -> None:
+    def __init__(self, desk: PageContext, page: str) -> None:
         self._desk = desk
         self._page = page
         self._words = desk.words(page)
@@ -181,7 +181,7 @@ SIGNED = "The participant has signed this text"
 class ConsentCard:
     """Shows the approved text and its version for as long as a consent to it is missing."""
 
-    def __init__(self, desk: Desk, page: str) -> None:
+    def __init__(self, desk: PageContext, page: str) -> None:
         self._desk = desk
         self._page = page
         self._shown = ""

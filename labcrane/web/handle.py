@@ -11,7 +11,7 @@ from typing import Any
 from labcrane.core.records import Event
 from labcrane.errors import DeviceError
 from labcrane.session.commands import Command
-from labcrane.web.service import PageOrder, Report, Streams, Used, serve
+from labcrane.web.service import PageConfig, Report, Streams, Used, serve
 
 LOOK_S = 0.2
 MOST_RESTARTS = 5
@@ -22,7 +22,7 @@ LAST_LOOK_S = 0.5
 """How long a page has to show the end before its process ends."""
 
 
-class PageKeeper:
+class PageHandle:
     """Keeps the page process running for as long as the run lasts.
 
     Its own threads talk to the page, so a page that hangs never makes the launcher wait. Events are
@@ -40,7 +40,7 @@ class PageKeeper:
 
     def __init__(
         self,
-        order: PageOrder,
+        order: PageConfig,
         give: Callable[[Command], None],
         say: Callable[[str], None],
         streams: Callable[[], dict[str, Any]],

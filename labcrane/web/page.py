@@ -1,4 +1,4 @@
-"""What a page knows, and how it asks: shared by everything that is shown."""
+"""Page context: what every page knows, and how it asks."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from labcrane.session.commands import Command, Order
 from labcrane.web.access import PARTICIPANT, RIGHTS
 from labcrane.web.live import Live
 from labcrane.web.pictures import Pictures
-from labcrane.web.state import Board
+from labcrane.web.state import SessionView
 from labcrane.web.translations import WORDS, Words
 
 PRIMARY = "#0d47a1"
@@ -17,7 +17,7 @@ PRIMARY = "#0d47a1"
 
 
 @dataclass(frozen=True)
-class Desk:
+class PageContext:
     """The session as pages see it.
 
     Attributes
@@ -31,7 +31,7 @@ class Desk:
     study: Study
     plan: SessionPlan
     participant: str
-    board: Board
+    board: SessionView
     live: Live
     pictures: Pictures
     send: Callable[[Command], None]

@@ -1,11 +1,11 @@
-"""How hard the joints work: torques, as the machine reports them."""
+"""Panels of the supervisor's page: joint torques, and the views' cameras."""
 
 import math
 from functools import partial
 from typing import TYPE_CHECKING
 
 from labcrane.machines.machine import Joint
-from labcrane.web.page import Desk
+from labcrane.web.page import PageContext
 
 if TYPE_CHECKING:
     from nicegui import ui
@@ -19,7 +19,7 @@ SHARE = "1"
 class Loads:
     """A line for each joint, as long as the machine's state has loads; nothing otherwise."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: PageContext) -> None:
         self._desk = desk
 
     def build(self) -> None:
@@ -61,7 +61,7 @@ RATE_S = 0.1
 class Cameras:
     """A picture for each camera that a view sends, with its age; none that is out of date."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: PageContext) -> None:
         self._pictures = desk.pictures
 
     def build(self) -> None:

@@ -2,10 +2,10 @@
 
 from labcrane.web.access import PARTICIPANT
 from labcrane.web.form import ConsentCard, Form
-from labcrane.web.page import PRIMARY, Desk
+from labcrane.web.page import PRIMARY, PageContext
 
 
-def participant_page(desk: Desk) -> None:
+def participant_page(desk: PageContext) -> None:
     """Build the page."""
     from nicegui import ui  # noqa: PLC0415 - loads for a second
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labcrane.machines.kinematics import frames
+from labcrane.machines.kinematics import link_frames
 from labcrane.machines.machine import Machine
-from labcrane.web.page import Desk
+from labcrane.web.page import PageContext
 from labcrane.web.surroundings import Surroundings
 
 RATE_S = 0.1
@@ -24,7 +24,7 @@ TARGET = tuple(f"task.target.position.{axis}" for axis in "xyz")
 class Scene:
     """Draws a beam for each link, the tip, the target if there is one, and what stands around."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: PageContext) -> None:
         self._desk = desk
 
     def build(self) -> None:
@@ -74,7 +74,7 @@ class Scene:
 
 def _points(machine: Machine, angles: Sequence[float]) -> "list[np.ndarray]":
     """Return where the joints are, shape ``(3,)`` each, in m, base first."""
-    return [pose[:3, 3] for pose in frames(machine, angles)]
+    return [pose[:3, 3] for pose in link_frames(machine, angles)]
 
 
 def _along(way: "np.ndarray") -> list[list[float]]:

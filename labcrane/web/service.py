@@ -19,9 +19,9 @@ from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
 from labcrane.web.access import SCOPE, SUPERVISOR, Gate, Keys
 from labcrane.web.live import Live
-from labcrane.web.page import Desk
+from labcrane.web.page import PageContext
 from labcrane.web.pictures import Pictures
-from labcrane.web.state import Board
+from labcrane.web.state import SessionView
 
 FORBIDDEN, NOT_FOUND = 403, 404
 NICENESS = 15
@@ -29,7 +29,7 @@ NICENESS = 15
 
 
 @dataclass(frozen=True)
-class PageOrder:
+class PageConfig:
     """What the page process is told.
 
     Attributes
@@ -74,7 +74,7 @@ class Report:
     lines: list[str]
 
 
-def serve(order: PageOrder, pipe: Connection) -> None:
+def serve(order: PageConfig, pipe: Connection) -> None:
     """Serve both pages until the launcher closes the pipe; the process's main function."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the launcher says when it is over
     if hasattr(os, "nice"):
@@ -95,7 +95,7 @@ def serve(order: PageOrder, pipe: Connection) -> None:
                 return  # the launcher is gone, and this process is about to end
 
     live, pictures = Live(order.source), Pictures(order.source, order.cameras)
-    desk = Desk(study, plan, order.folder_name, Board(), live, pictures, send)
+    desk = PageContext(study, plan, order.folder_name, SessionView(), live, pictures, send)
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     _routes(app, desk)
     ui.run_with(app, title="labcrane", show_welcome_message=False)
@@ -115,7 +115,7 @@ def serve(order: PageOrder, pipe: Connection) -> None:
     pictures.close()
 
 
-def _listen(pipe: Connection, board: Board, end: Callable[[], None]) -> None:
+def _listen(pipe: Connection, board: SessionView, end: Callable[[], None]) -> None:
     while True:
         try:
             message = pipe.recv()
@@ -130,7 +130,7 @@ def _listen(pipe: Connection, board: Board, end: Callable[[], None]) -> None:
             board.sync_report = message.lines
 
 
-def _routes(app: Any, desk: Desk) -> None:
+def _routes(app: Any, desk: PageContext) -> None:
     from fastapi import Request, Response  # noqa: PLC0415
     from nicegui import ui  # noqa: PLC0415
 

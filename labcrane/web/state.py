@@ -1,4 +1,4 @@
-"""What is known of a session, from its events: what both pages show."""
+"""State of a session as both pages show it, from its events."""
 
 import json
 from collections import Counter, deque
@@ -14,7 +14,7 @@ ROUTINE = ("trial.", "order.", "questionnaire.", "step.", "block.", "pause.", "s
 """Beginnings of event names that are no counts of a trial."""
 
 
-class Board:
+class SessionView:
     """Follows the events. A thread writes, pages look at ``version`` and read.
 
     Attributes

@@ -1,4 +1,4 @@
-"""What stands around the machine in a scenario: things and the human figure, where they are now."""
+"""Surroundings of the machine: objects and the human figure, where they are now."""
 
 import math
 from collections.abc import Sequence
@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane.machines.human_figure import Form, Part
-from labcrane.machines.scene import Placed
+from labcrane.machines.human_figure import Geom, ShapeKind
+from labcrane.machines.scene import PlacedObject
 from labcrane.machines.scene_codec import read_placed
-from labcrane.web.page import Desk
+from labcrane.web.page import PageContext
 
 if TYPE_CHECKING:
     from nicegui import ui
@@ -32,7 +32,7 @@ class Surroundings:
     ``scene.NAME.position`` and ``.orientation``. What has none stays where it was placed.
     """
 
-    def __init__(self, desk: Desk, canvas: "ui.scene") -> None:
+    def __init__(self, desk: PageContext, canvas: "ui.scene") -> None:
         self._desk = desk
         self._canvas = canvas
         self._drawn = ""
@@ -54,7 +54,7 @@ class Surroundings:
                 group.move(*where)
                 group.rotate_R(_rotation(turn))
 
-    def _draw(self, placed: Placed) -> "Group":
+    def _draw(self, placed: PlacedObject) -> "Group":
         with self._canvas, self._canvas.group() as group:
             for part in placed.parts:
                 self._part(part, PAINT[placed.kind])
@@ -62,15 +62,15 @@ class Surroundings:
         group.rotate_R(_about_z(placed.yaw))
         return group
 
-    def _part(self, part: Part, colour: str) -> None:
+    def _part(self, part: Geom, colour: str) -> None:
         canvas, (x, y, z) = self._canvas, part.size
         turn = np.array(_about_z(part.yaw))
         match part.shape:
-            case Form.BOX:
+            case ShapeKind.BOX:
                 shape: Object3D = canvas.box(x, y, z)
-            case Form.SPHERE:
+            case ShapeKind.SPHERE:
                 shape = canvas.sphere(x / 2)
-            case Form.CYLINDER:
+            case ShapeKind.CYLINDER:
                 shape, turn = canvas.cylinder(x / 2, x / 2, z, 24), turn @ UPRIGHT
             case _:
                 shape, turn = canvas.cylinder(y / 2, y / 2, x, 16), turn @ LYING

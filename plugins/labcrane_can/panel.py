@@ -49,7 +49,7 @@ class CanPanel(InputDevice):
             self._listener.close()
             self._listener = None
 
-    def facts(self) -> Mapping[str, Value]:
+    def metadata(self) -> Mapping[str, Value]:
         from importlib.metadata import version  # noqa: PLC0415 - only in a session
 
         return {"bus": self._settings.bus, "python-can": version("python-can")}

@@ -63,5 +63,5 @@ class CanReplay(InputDevice):
             return self._axes.lost()
         return self._axes.given(signals, floats)
 
-    def facts(self) -> Mapping[str, Value]:
+    def metadata(self) -> Mapping[str, Value]:
         return {"file": self._settings.file.name, "frames": len(self._frames)}

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 
-from labcrane import Answers, Questionnaire, Score, numbers
+from labcrane import Answers, Questionnaire, Score, numeric_answers
 from labcrane_questionnaires.lab_scale import LabScale
 from labcrane_questionnaires.settings import LabText
 
@@ -13,7 +13,7 @@ class _Slot(LabScale):
     names = ("rating",)
 
     def score(self, answers: Answers) -> Mapping[str, float]:
-        return {"rating": numbers(answers, self.names)[0]}
+        return {"rating": numeric_answers(answers, self.names)[0]}
 
 
 class BorgCr10(_Slot):

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from labcrane import Event, FloatArray, Layout, Placed, Run, Scene
+from labcrane import Event, FloatArray, Layout, PlacedObject, Run, Scene
 
 Point = tuple[float, float, float]
 ANY = -1.0
@@ -18,7 +18,7 @@ OPEN_WITHIN = 0.1
 class Way:
     """Follows which goal is next."""
 
-    def __init__(self, scene: Scene, placed: tuple[Placed, ...], run: Run) -> None:
+    def __init__(self, scene: Scene, placed: tuple[PlacedObject, ...], run: Run) -> None:
         self._goals = scene.goals
         self._placed = {each.name: each for each in placed}
         self._positions = _of_things(run.state, "position")

@@ -62,10 +62,10 @@ class EndEffector(Controller):
             out[joints + 1 + joint] = factors[joint]
         return out
 
-    def rest(self) -> FloatArray:
+    def idle(self) -> FloatArray:
         return self._rest.copy()
 
-    def steer(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
+    def inverse(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
         x, y, z = velocity.tolist()
         if not self._base:
             bearing = self._arm.bearing(state[self._angle].tolist())

@@ -50,10 +50,10 @@ class JointVelocity(Controller):
         self._put(*speeds, 1.0, *limited)
         return self._out
 
-    def rest(self) -> FloatArray:
+    def idle(self) -> FloatArray:
         return self._rest.copy()
 
-    def steer(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
+    def inverse(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
         angles = state[self._angle].tolist()
         speeds, scale, factors = self._rate.solve_base(angles, *velocity.tolist())
         hands, unshape = self._hands, self._shaping.unshape

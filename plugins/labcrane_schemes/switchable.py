@@ -44,11 +44,11 @@ class Switchable(Controller):
         self._down = down
         return self._with_active(self._schemes[self._active].command(axes, state))
 
-    def rest(self) -> FloatArray:
-        return self._with_active(self._schemes[self._active].rest()).copy()
+    def idle(self) -> FloatArray:
+        return self._with_active(self._schemes[self._active].idle()).copy()
 
-    def steer(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
-        return self._schemes[self._active].steer(velocity, state)
+    def inverse(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
+        return self._schemes[self._active].inverse(velocity, state)
 
     def _with_active(self, command: FloatArray) -> FloatArray:
         self._out[:-1] = command

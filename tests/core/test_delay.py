@@ -19,7 +19,7 @@ from labcrane.errors import DeviceError, ProtocolError, StreamError
 from labcrane.feedback.delay_analysis import Change, delay, onsets, steps
 from labcrane.feedback.delays import delay_in_words, delay_path, read_delays
 from labcrane.feedback.measure_delay import measure
-from labcrane.feedback.processes import FeedbackCrew
+from labcrane.feedback.processes import FeedbackProcesses
 from labcrane.session.session import Visit
 
 STUDY = (
@@ -157,7 +157,7 @@ def test_the_doctor_measures_the_delay_of_a_sensor(
 
 def the_record_says_it(protocol: Path) -> None:
     study = a_study(protocol.parent, STUDY.replace("feedback:\n  tone: {use: click}", ""))
-    crew = FeedbackCrew(Visit(study, "P001", 1, protocol.parent, simulated=True))
+    crew = FeedbackProcesses(Visit(study, "P001", 1, protocol.parent, simulated=True))
     try:
         assert crew.wait(lambda said: None, lambda: False)
         (keeper,) = crew.keepers

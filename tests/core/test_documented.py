@@ -6,10 +6,10 @@ import sys
 import pytest
 from pydantic import Field, ValidationError
 
-from labcrane.files.model import Documented, descriptions
+from labcrane.files.model import StrictModel, descriptions
 
 
-class Link(Documented):
+class Link(StrictModel):
     """A link."""
 
     length: float
@@ -63,8 +63,8 @@ def test_descriptions_are_found_by_key_with_those_that_are_inherited() -> None:
 
 def test_a_model_whose_source_is_nowhere_has_a_schema_without_words() -> None:
     program = (
-        "from labcrane.files.model import Documented\n"
-        "class Typed(Documented):\n"
+        "from labcrane.files.model import StrictModel\n"
+        "class Typed(StrictModel):\n"
         "    length: float\n"
         "    'In metres.'\n"
         "print(Typed.model_json_schema()['properties'])\n"

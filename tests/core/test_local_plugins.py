@@ -21,7 +21,7 @@ import os
 
 import numpy as np
 
-from labcrane import Ball, Cue, Feedback, Settings, Signal, hookimpl, offer
+from labcrane import Sphere, Cue, Feedback, Settings, Signal, hookimpl, offer
 
 labcrane_api = 1
 
@@ -39,7 +39,7 @@ class Arrow(Cue):
         self._tip = run.state.find("tip.position")
 
     def draw(self, frame):
-        return [Ball("head", tuple(frame.state[self._tip]), self._radius, (1.0, 0.0, 0.0, 1.0))]
+        return [Sphere("head", tuple(frame.state[self._tip]), self._radius, (1.0, 0.0, 0.0, 1.0))]
 
 
 class Counter(Feedback):
@@ -138,7 +138,7 @@ def test_a_changed_file_is_not_what_was_approved(protocol: Path) -> None:
     today = date(2026, 3, 2)
     consent = protocol.parent / "consent.md"
     consent.write_text("I take part.\n")
-    grant = Grant("Board", "2026-1", date(2027, 3, 2), consent)
+    grant = Grant("SessionView", "2026-1", date(2027, 3, 2), consent)
     approve(*loaded(protocol), grant, today)
     verify(*loaded(protocol), today)
 

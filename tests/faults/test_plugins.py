@@ -70,8 +70,12 @@ NONSENSE = {
     ("dynamics", "state", "nan"): "returned joint.angle.shoulder nan in tick",
     ("dynamics", "step", "nan"): "returned joint.angle.shoulder nan in tick 49",
     ("dynamics", "step", "short"): "returned shape (13,), and its signals promise (14,) in tick 49",
-    ("task", "judge", "judged_short"): "returned shape (6,), and its signals promise (7,) in tick",
-    ("task", "judge", "nothing"): "returned None in tick",
+    (
+        "task",
+        "evaluate",
+        "judged_short",
+    ): "returned shape (6,), and its signals promise (7,) in tick",
+    ("task", "evaluate", "nothing"): "returned None in tick",
 }
 
 

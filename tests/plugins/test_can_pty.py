@@ -17,7 +17,7 @@ from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
 from labcrane.session import loop
 from labcrane.session.commands import Command, Order
-from labcrane.session.sequencer import Course
+from labcrane.session.sequencer import Sequencer
 
 pytestmark = needs_bullet
 
@@ -77,7 +77,7 @@ def session(folder: Path, controls: str, seconds: int) -> list:
             command = frame.command[signal].copy()
             frames.append((frame.tick.woke, command, frame.paused, frame.events))
 
-        course = Course(study, plan, the_rig, waits=False)
+        course = Sequencer(study, plan, the_rig, waits=False)
         console = ScriptedConsole({240 * seconds: [Command(Order.END)]})
         loop.run(the_rig, run, course, SystemClock(), console, NoLog(), [keep])
     return frames

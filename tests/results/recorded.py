@@ -22,7 +22,7 @@ from labcrane.session import loop
 from labcrane.session.commands import Command
 from labcrane.session.metadata import context
 from labcrane.session.postprocess import conclude
-from labcrane.session.sequencer import Course
+from labcrane.session.sequencer import Sequencer
 from labcrane.session.session import Visit
 
 STUDY = """\
@@ -71,7 +71,7 @@ def record(
     the_rig = rig.build(the_study, simulated=True)
     clock = ManualClock(start=100.0)
     with rig.opened(the_rig, the_study, plan.seed) as run:
-        course = Course(the_study, plan, the_rig, waits=False)
+        course = Sequencer(the_study, plan, the_rig, waits=False)
         with SessionJournal(visit.journal, columns(run), run.rate_hz) as journal:
             log = FrameLog(journal, run)
             log.note(Event("session.start", clock.now(), context(visit, plan, the_rig, run)))

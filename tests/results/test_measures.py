@@ -13,7 +13,7 @@ from labcrane.testing.exporters import MOVEMENT_S, a_participant
 
 
 def test_a_minimum_jerk_movement_has_its_closed_forms(tmp_path) -> None:
-    table = a_participant(tmp_path).measures()
+    table = measures_of(a_participant(tmp_path))
     assert len(table) == 4
     first = table.iloc[0]
     assert first["sub_movements"] == 1

@@ -18,7 +18,7 @@ from simple_crane import CRANE
 from labcrane.cli.app import main
 from labcrane.errors import LabcraneError, ProtocolError, RecordingError
 from labcrane.recording.participant_file.reader import open_recording
-from labcrane.simulation.simulation import SimulationOrder, simulate, simulate_study
+from labcrane.simulation.simulation import SimulationJob, simulate, simulate_study
 
 STUDY = (
     """\
@@ -67,7 +67,7 @@ def cohort(study: Path) -> Path:
 
 
 def orders(study: Path, cohort: Path | None, data: Path, names: tuple[str, ...] = NAMES):
-    return [SimulationOrder(study, cohort, data, name) for name in names]
+    return [SimulationJob(study, cohort, data, name) for name in names]
 
 
 def digests(folder: Path) -> dict[str, str]:
@@ -178,7 +178,7 @@ def test_two_simulations_do_not_share_a_folder(study: Path, tmp_path: Path) -> N
 def test_a_participant_who_leaves_has_no_later_session(study: Path, tmp_path: Path) -> None:
     cohort = study.with_name("leaving.yaml")
     cohort.write_text("labcrane_cohort: 1\ndropout: 1.0\n")
-    folder = simulate(SimulationOrder(study, cohort, tmp_path, "P001"))
+    folder = simulate(SimulationJob(study, cohort, tmp_path, "P001"))
     recording = open_recording(folder.participant_file)
     assert list(recording.sessions) == [1]
     ends = recording.session(1).events.query("name == 'session.end'")

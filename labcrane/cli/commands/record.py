@@ -11,7 +11,7 @@ from labcrane.cli.output import out
 from labcrane.errors import ProtocolError, RecordingError
 
 if TYPE_CHECKING:
-    from labcrane.streams.recorder.handle import RecorderKeeper
+    from labcrane.streams.recorder.handle import RecorderHandle
     from labcrane.streams.request import StreamRequest
 
 
@@ -60,14 +60,14 @@ def record(
     if local:
         stay_on_this_computer()
     from labcrane.recording.paths import journal_path
-    from labcrane.streams.recorder.handle import RecorderKeeper
+    from labcrane.streams.recorder.handle import RecorderHandle
 
     requests = [_wanted(text) for text in stream]
     try:
         folder.mkdir(parents=True)
     except FileExistsError:
         raise RecordingError(f"{folder} exists; give a new folder for the recording") from None
-    keeper = RecorderKeeper(journal_path(folder, 1, "streams"), requests)
+    keeper = RecorderHandle(journal_path(folder, 1, "streams"), requests)
     out.print("recording; Ctrl-C ends it")
     try:
         _wait(keeper, seconds)
@@ -85,7 +85,7 @@ def _wanted(text: str) -> "StreamRequest":
     return StreamRequest.of({"label": text, key: value})
 
 
-def _wait(keeper: "RecorderKeeper", seconds: float | None) -> None:
+def _wait(keeper: "RecorderHandle", seconds: float | None) -> None:
     ends = None if seconds is None else time.monotonic() + seconds
     told: list[str] = []
     try:

@@ -44,12 +44,12 @@ def export(
     """Export recordings for R, MATLAB, BIDS, Psych-DS or EEG programs."""
     from labcrane.analysis.exporter import Exporter
     from labcrane.analysis.movements import machine_of
-    from labcrane.registry.call_monitor import Oversight
+    from labcrane.registry.call_monitor import CallMonitor
     from labcrane.registry.registry import discover
 
     registry = discover()
     offer = registry.find(Exporter, to)
-    oversight = Oversight()
+    oversight = CallMonitor()
     plugin = registry.plugin(Exporter, to)
     place = oversight.place(f"exporter {to!r}", plugin, "export", offer.build)
     chosen = _settings(offer.settings, settings or [], to)

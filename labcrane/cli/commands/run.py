@@ -13,7 +13,7 @@ from labcrane.errors import LabcraneError, ProtocolError
 
 if TYPE_CHECKING:
     from labcrane.design.plan import SessionPlan
-    from labcrane.launcher.session_process import VisitOrder
+    from labcrane.launcher.session_process import SessionConfig
 
 Participant = Annotated[str, typer.Option(help="pseudonym: P001")]
 SessionNumber = Annotated[int, typer.Option(help="which of the protocol's sessions")]
@@ -51,9 +51,9 @@ def run(
     """Run a session of a study."""
     if fast and not simulate:
         raise ProtocolError("--fast needs --simulate: people cannot be hurried")
-    from labcrane.launcher.session_process import VisitOrder
+    from labcrane.launcher.session_process import SessionConfig
 
-    order = VisitOrder(
+    order = SessionConfig(
         protocol,
         participant,
         session,
@@ -86,13 +86,15 @@ def resume(
     feedback: WithFeedback = None,
 ) -> None:
     """Go on with a session whose process died."""
-    from labcrane.launcher.session_process import VisitOrder
+    from labcrane.launcher.session_process import SessionConfig
 
     folder = data_folder(data, protocol)
     if local or simulate:
         stay_on_this_computer()
     shown = not simulate if feedback is None else feedback
-    order = VisitOrder(protocol, participant, session, folder, simulate, pilot, True, policy, shown)
+    order = SessionConfig(
+        protocol, participant, session, folder, simulate, pilot, True, policy, shown
+    )
     _launch(order, page=not simulate if page is None else page)
 
 
@@ -104,10 +106,10 @@ def demo(
     from importlib.resources import files
 
     from labcrane.analysis.report.session_figure import draw
-    from labcrane.launcher.session_process import VisitOrder
+    from labcrane.launcher.session_process import SessionConfig
     from labcrane.recording.participant_file.reader import open_recording
 
-    order = VisitOrder(
+    order = SessionConfig(
         Path(str(files("labcrane.cli") / "demo.yaml")), "P001", 1, data, simulated=True
     )
     number = 1
@@ -121,7 +123,7 @@ def demo(
     out.print(f"the movements:    {picture}", markup=False)
 
 
-def _run_fast(order: "VisitOrder") -> Path:
+def _run_fast(order: "SessionConfig") -> Path:
     from labcrane.cli.terminal import Terminal
     from labcrane.design.plan import plan_session
     from labcrane.session.commands import QueueConsole
@@ -134,7 +136,7 @@ def _run_fast(order: "VisitOrder") -> Path:
         return run_session(visit, console)
 
 
-def _launch(order: "VisitOrder", *, page: bool) -> None:
+def _launch(order: "SessionConfig", *, page: bool) -> None:
     from labcrane.cli.consent import ask_for_consent, await_consent
     from labcrane.cli.sync import print_report
     from labcrane.cli.terminal import Terminal

@@ -57,7 +57,7 @@ def simulate_all(
 ) -> None:
     """Simulate whoever is not in ``folder`` yet, and say how far it is."""
     from labcrane.simulation.population import BESIDE
-    from labcrane.simulation.simulation import SimulationOrder, simulate_study
+    from labcrane.simulation.simulation import SimulationJob, simulate_study
 
     stay_on_this_computer()
     beside = protocol.resolve().with_name(BESIDE)
@@ -66,7 +66,7 @@ def simulate_all(
     # Workers may be in another folder than we are.
     place = folder.resolve()
     of = cohort.resolve() if cohort else None
-    orders = [SimulationOrder(protocol.resolve(), of, place, name) for name in names]
+    orders = [SimulationJob(protocol.resolve(), of, place, name) for name in names]
     with progress_bar("simulate", len(orders)) as advance:
         for _ in simulate_study(orders, workers, scheduler):
             advance()

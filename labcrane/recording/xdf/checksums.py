@@ -99,7 +99,7 @@ class _Block(NamedTuple):
     crcs: list[int]
 
 
-class Verdict(NamedTuple):
+class FileState(NamedTuple):
     """What is known of a file.
 
     Attributes
@@ -117,13 +117,13 @@ class Verdict(NamedTuple):
     checked: int
 
 
-def verify(data: bytes) -> Verdict:
+def verify(data: bytes) -> FileState:
     """Compare a file with the checks it holds."""
     last = _last_block(data)
     if last is None:
-        return Verdict([], [], 0)
+        return FileState([], [], 0)
     if _crc(data, 0, last.start, 0) == last.crcs[-1]:
-        return Verdict([], [], last.stop)
+        return FileState([], [], last.stop)
     damaged: list[Span] = []
     unchecked: list[Span] = []
     end, crc, follows = 0, 0, 0
@@ -133,7 +133,7 @@ def verify(data: bytes) -> Verdict:
             unchecked.append(bad.pop(0))  # the checks in between are missing: it is many chunks
         damaged += bad
         end, crc, follows = block.start, block.crcs[-1], block.stop
-    return Verdict(damaged, unchecked, last.stop)
+    return FileState(damaged, unchecked, last.stop)
 
 
 def _mismatches(data: bytes, block: _Block, end: int, crc: int) -> list[Span]:

@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.errors import RecordingError
-from labcrane.recording.xdf.checksums import CHECK_ID, Span, Verdict, verify
+from labcrane.recording.xdf.checksums import CHECK_ID, FileState, Span, verify
 from labcrane.recording.xdf.chunk import MAGIC, Tag
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.recording.xdf.samples import Texts, unpack
-from labcrane.recording.xdf.scanner import Chunk, Walk
+from labcrane.recording.xdf.scanner import Chunk, ChunkScanner
 from labcrane.types import FloatArray
 
 __all__ = ["Span", "Texts", "XdfFile", "XdfStream", "read_xdf"]
@@ -136,8 +136,8 @@ def read_xdf(path: Path) -> XdfFile:
     return _read(path, data, verdict)
 
 
-def _read(path: Path, data: bytes, verdict: Verdict) -> XdfFile:
-    walk = Walk(data, verdict.damaged, verdict.unchecked)
+def _read(path: Path, data: bytes, verdict: FileState) -> XdfFile:
+    walk = ChunkScanner(data, verdict.damaged, verdict.unchecked)
     parts = _sort(data, walk)
     streams = []
     for number, header in parts.headers.items():
@@ -158,7 +158,7 @@ def _read(path: Path, data: bytes, verdict: Verdict) -> XdfFile:
     )
 
 
-def _sort(data: bytes, walk: Walk) -> _Parts:
+def _sort(data: bytes, walk: ChunkScanner) -> _Parts:
     """Sort the chunks by stream and content; what makes no sense is added to ``walk.skipped``."""
     parts = _Parts()
     for chunk in walk:

@@ -36,7 +36,7 @@ class Chunk(NamedTuple):
     count: int = 1  # type: ignore[assignment]
 
 
-class Walk:
+class ChunkScanner:
     """The chunks of a file, and the stretches that hold none.
 
     Parameters

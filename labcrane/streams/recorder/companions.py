@@ -23,7 +23,7 @@ from labcrane.streams.probes import Probe
 from labcrane.types import FloatArray
 
 
-class Companions:
+class RecordedStreamWriter:
     """Writes a stream's samples and all that is known of their times. For several threads."""
 
     def __init__(self, writer: XdfWriter, header: StreamHeader) -> None:

@@ -20,7 +20,7 @@ PATIENCE_S = 15.0
 """How long a recorder may take to close its journal when it is told to stop, or a spare to end."""
 
 
-class RecorderKeeper:
+class RecorderHandle:
     """Starts the recorder, starts it again when it dies, and knows what it last said.
 
     Attributes

@@ -13,7 +13,7 @@ from labcrane.recording.foreign_streams import COUNTER_GAP, OPENED, RESET
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.streams.probes import ClockProbe, was_reset
-from labcrane.streams.recorder.companions import Companions
+from labcrane.streams.recorder.companions import RecordedStreamWriter
 from labcrane.streams.recorder.health import Counter, Flow
 from labcrane.types import FloatArray
 
@@ -62,7 +62,7 @@ class Inlet:
         self._warnings = warnings
         self._stop = threading.Event()
         self._give_up = threading.Event()
-        self._companions: Companions | None = None
+        self._companions: RecordedStreamWriter | None = None
         name = info.name()
         self._threads = [
             threading.Thread(target=self._watched, args=(self._receive,), name=f"pull {name}")
@@ -115,8 +115,8 @@ class Inlet:
         if header is None:
             return
         counter = Counter.of(header, self._counter_label)
-        opened: list[Companions] = []
-        self._insist(lambda: opened.append(Companions(self._writer, header)))
+        opened: list[RecordedStreamWriter] = []
+        self._insist(lambda: opened.append(RecordedStreamWriter(self._writer, header)))
         if not opened:
             return
         companions = self._companions = opened[0]
@@ -163,7 +163,7 @@ class Inlet:
             return
 
     def _pull(
-        self, inlet: "pylsl.StreamInlet", companions: Companions, counter: Counter | None
+        self, inlet: "pylsl.StreamInlet", companions: RecordedStreamWriter, counter: Counter | None
     ) -> bool:
         """Write down all that has come; whether anything had."""
         chunks = []
@@ -192,7 +192,7 @@ class Inlet:
         return any(len(stamps) for _, stamps, _ in chunks)
 
     def _take(
-        self, stamps: FloatArray, data: FloatArray, arrival: float, companions: Companions
+        self, stamps: FloatArray, data: FloatArray, arrival: float, companions: RecordedStreamWriter
     ) -> None:
         self._insist(lambda: companions.samples(stamps, data))
         self.flow.came(arrival, len(stamps))
@@ -217,7 +217,7 @@ class Inlet:
             return True
         return silent
 
-    def _probe(self, clock: ClockProbe, companions: Companions) -> None:
+    def _probe(self, clock: ClockProbe, companions: RecordedStreamWriter) -> None:
         while not self._stop.wait(PROBE_S):
             if (probe := clock.new()) is not None:
                 self.flow.probe = probe

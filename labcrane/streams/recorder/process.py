@@ -38,7 +38,7 @@ STATUS_FD = 1
 
 
 @dataclass(frozen=True, slots=True)
-class Orders:
+class RecorderConfig:
     """What a recorder is to do.
 
     Attributes
@@ -56,7 +56,7 @@ class Orders:
     grace_s: float = 3.0
 
     @classmethod
-    def of(cls, fields: Mapping[str, Any]) -> "Orders":
+    def of(cls, fields: Mapping[str, Any]) -> "RecorderConfig":
         """Return the orders that JSON holds."""
         known = cls.__dataclass_fields__
         if unknown := sorted(set(fields) - set(known)):
@@ -75,13 +75,13 @@ def main(arguments: Sequence[str]) -> int:
     orders, a line of JSON on the standard input: a spare recorder takes over at once.
     """
     if arguments:
-        return run(Orders.of(json.loads(arguments[0])))
+        return run(RecorderConfig.of(json.loads(arguments[0])))
     resolver = a_resolver()
     orders = await_orders()
-    return run(Orders.of(json.loads(orders)), resolver) if orders else 0
+    return run(RecorderConfig.of(json.loads(orders)), resolver) if orders else 0
 
 
-def run(orders: Orders, resolver: "pylsl.ContinuousResolver | None" = None) -> int:
+def run(orders: RecorderConfig, resolver: "pylsl.ContinuousResolver | None" = None) -> int:
     """Record until told to stop, or until whoever started it has died.
 
     ``resolver`` is one that has looked around already.
@@ -113,7 +113,7 @@ def await_orders() -> str:
     return line.decode()
 
 
-def _watch(orders: Orders) -> Iterator[bool]:
+def _watch(orders: RecorderConfig) -> Iterator[bool]:
     """Yield several times a second until it is time to end; True when a status is due."""
     stopped, inputs = _signals(), {0}
     ends = float("inf")

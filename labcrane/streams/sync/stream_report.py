@@ -1,4 +1,4 @@
-"""How right one stream's time stamps are, and what to do where they are not."""
+"""Report on one stream's time stamps, and what to do where they are not right."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
