@@ -8,7 +8,7 @@ from labcrane.feedback.config import FeedbackConfig
 from labcrane.processes.handle import Patience, ProcessHandle
 from labcrane.session.commands import Command, Order
 
-MODULE = "labcrane.feedback_host"
+MODULE = "labcrane.feedback.process"
 
 READY_S = 60.0
 """How long a feedback process may take until it is ready: windows and sound servers are slow."""

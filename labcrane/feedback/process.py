@@ -1,9 +1,9 @@
 """A feedback process: one view or sound, fed with the newest frame.
 
 It is started by a :class:`labcrane.processes.handle.ProcessHandle` with a
-:class:`labcrane.feedback.config.FeedbackConfig`, is told the session's streams when there are any, and ends
-when its parent does. It reports ``ready`` with the component's facts, ``presents`` from the first
-frame on, ``beat`` while it lives, ``failed`` with the reason.
+:class:`labcrane.feedback.config.FeedbackConfig`, is told the session's streams when there are any,
+and ends when its parent does. It reports ``ready`` with the component's metadata, ``presents`` from
+the first frame on, ``beat`` while it lives, ``failed`` with the reason.
 """
 
 import sys
@@ -131,8 +131,8 @@ class FeedbackProcess:
         try:
             while not self._stop.wait(WAIT_S):
                 self._beat()
-                told = {name: known_stream(text) for name, text in self._offered.items()}
-                found = {name: info for name, info in told.items() if info is not None}
+                known = {name: known_stream(text) for name, text in self._offered.items()}
+                found = {name: info for name, info in known.items() if info is not None}
                 found |= {info.name(): info for info in (search.results() if search else ())}
                 if all(name in found for name in names):
                     return found

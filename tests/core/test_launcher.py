@@ -11,7 +11,7 @@ from labcrane.launcher import launcher as launcher_module
 from labcrane.launcher.launcher import Launcher
 from labcrane.launcher.session_process import SessionConfig
 from labcrane.session.commands import Command, Order, QueueConsole
-from labcrane.streams.recorder import handle as recorder_keeper
+from labcrane.streams.recorder import handle as recorder_handle
 from labcrane.streams.recorder.handle import RecorderHandle
 
 
@@ -85,10 +85,10 @@ def test_a_spare_recorder_that_hangs_keeps_no_recorder_from_closing_its_journal(
 ) -> None:
     (tmp_path / "hanging_spare.py").write_text(STOPS_BUT_HANGS_AS_A_SPARE)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
-    monkeypatch.setattr(recorder_keeper, "MODULE", "hanging_spare")
+    monkeypatch.setattr(recorder_handle, "MODULE", "hanging_spare")
     keeper = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
     wait_for(lambda: keeper.ready, 60.0)
-    monkeypatch.setattr(recorder_keeper, "PATIENCE_S", 3.0)
+    monkeypatch.setattr(recorder_handle, "PATIENCE_S", 3.0)
     keeper.stop()
     assert [(tmp_path / f"heard-{part}").read_text() for part in (1, 2)] == ["stop", "stop"]
     assert [one.exit_code for one in keeper._recorders] == [0, 0]
@@ -98,9 +98,9 @@ def test_a_spare_recorder_that_hangs_keeps_no_recorder_from_closing_its_journal(
 def test_a_recorder_that_dies_as_it_is_given_its_orders_is_replaced(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recorder_keeper, "MODULE", "labcrane.errors")  # ends at once
+    monkeypatch.setattr(recorder_handle, "MODULE", "labcrane.errors")  # ends at once
     keeper = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
     wait_for(lambda: all(one.exit_code is not None for one in keeper._recorders))
     assert keeper.watch()
-    assert keeper.restarts == recorder_keeper.RECORDERS
+    assert keeper.restarts == recorder_handle.RECORDERS
     keeper.stop()

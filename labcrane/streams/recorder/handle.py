@@ -15,7 +15,7 @@ from labcrane.recording.paths import part_number, parts
 from labcrane.streams.recorder.process import STOP, RecorderConfig
 from labcrane.streams.request import StreamRequest
 
-MODULE = "labcrane.streams.recorder_process"
+MODULE = "labcrane.streams.recorder.process"
 
 PATIENCE_S = 15.0
 """How long a recorder may take to close its journal when it is told to stop, or a spare to end."""

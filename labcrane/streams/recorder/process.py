@@ -4,9 +4,9 @@ It finds whatever it was asked for, late or again after a restart. Its own journ
 seconds after whoever started it has died, so that nothing of the end is lost.
 
 A launcher starts it by a :class:`labcrane.processes.handle.ProcessHandle`, before there is anything
-to record: it has loaded everything and waits for its :class:`RecorderConfig`. It is told ``stop``, and
-tells every second how each stream is, and whether all that is required flows. By hand, its orders
-are JSON, ``stop`` is a line of its standard input, and a status a line of its standard output:
+to record: it has loaded everything and waits for its :class:`RecorderConfig`. It is told ``stop``,
+and tells every second how each stream is, and whether all that is required flows. By hand, its
+orders are JSON, ``stop`` is a line of its standard input, a status a line of its standard output:
 
     python -m labcrane.streams.recorder.process '{"journal": "ses-01_streams.xdf", "streams": []}'
 """
