@@ -68,6 +68,7 @@ class FeedbackConfig:
             "cues": {name: asdict(part) for name, part in self.cues.items()},
             "measured": asdict(self.measured) if self.measured else None,
             "recorded": self.recorded,
+            "streams": dict(self.streams),
         }
         return json.dumps(fields)
 
@@ -85,4 +86,5 @@ class FeedbackConfig:
             {name: Part(**part) for name, part in found["cues"].items()},
             measured_of(found["measured"]) if found["measured"] else None,
             found["recorded"],
+            found["streams"],
         )

@@ -45,7 +45,7 @@ class FeedbackHandle:
         patience = Patience(READY_S, SILENT_S, STOP_S, restarts=attempts - 1)
         self._process = ProcessHandle(MODULE, f"feedback {order.name}", patience, self._take)
         self._begin_anew()
-        self._process.start(order)
+        self._process.start(order.as_json())
 
     def _begin_anew(self) -> None:
         self._presents = False
@@ -94,7 +94,7 @@ class FeedbackHandle:
         self._process.kill()
         why = self._failed or why  # what it said with its last breath
         self._begin_anew()
-        if not self._process.restart(self._order):
+        if not self._process.restart(self._order.as_json()):
             self.given_up = True
             return [Command(Order.LEFT_OUT, f"{self.name}: {why}; it is left out")]
         return [Command(Order.FAILED, f"{self.name}: {why}")]

@@ -154,7 +154,7 @@ def main() -> int:
     order = parent.order()
     if order is None:
         return 0
-    process = FeedbackProcess(order, parent.tell)
+    process = FeedbackProcess(FeedbackConfig.from_json(order), parent.tell)
 
     def listen() -> None:
         while not parent.gone.is_set():

@@ -49,12 +49,8 @@ class _Life:
     input: IO[bytes]
     output: IO[bytes]
     heard: float = field(default_factory=time.monotonic)
-    outgoing: "queue.SimpleQueue[object]" = field(default_factory=queue.SimpleQueue)
+    outgoing: "queue.SimpleQueue[bytes | None]" = field(default_factory=queue.SimpleQueue)
     threads: list[threading.Thread] = field(default_factory=list)
-
-
-class _End:
-    """The last thing in a life's outgoing queue."""
 
 
 class ProcessHandle:
@@ -127,7 +123,7 @@ class ProcessHandle:
 
     def tell(self, message: object) -> None:
         """Tell the process something, without waiting for it; nobody hears it when it has died."""
-        self._present.outgoing.put(message)
+        self._present.outgoing.put(pickle.dumps(message))
 
     def messages(self) -> list[Any]:
         """Return what it has said since the last call."""
@@ -167,7 +163,7 @@ class ProcessHandle:
         ``patience_s`` is how long it may take, by default as its :class:`Patience` says.
         """
         life = self._present
-        life.outgoing.put(_End)
+        life.outgoing.put(None)
         try:
             life.process.wait(self._patience.stop_s if patience_s is None else patience_s)
         except subprocess.TimeoutExpired:
@@ -178,7 +174,7 @@ class ProcessHandle:
         """End the process at once; its exit code."""
         life = self._present
         life.process.kill()
-        life.outgoing.put(_End)
+        life.outgoing.put(None)
         return self._buried(life)
 
     @property
@@ -188,6 +184,7 @@ class ProcessHandle:
         return self._life
 
     def _begun(self, order: object) -> _Life:
+        first = None if order is None else pickle.dumps(order)
         process = subprocess.Popen(  # noqa: S603 - a module of ours
             [sys.executable, "-m", self._module],
             stdin=subprocess.PIPE,
@@ -197,8 +194,8 @@ class ProcessHandle:
         if process.stdin is None or process.stdout is None:
             raise AssertionError("it is started with pipes")
         life = _Life(process, process.stdin, process.stdout)
-        if order is not None:
-            life.outgoing.put(order)
+        if first is not None:
+            life.outgoing.put(first)
         life.threads = [
             threading.Thread(target=work, args=(life,), name=f"{word} {self.name}", daemon=True)
             for work, word in ((self._hear, "hear"), (_speak, "tell"))
@@ -234,8 +231,8 @@ class ProcessHandle:
 def _speak(life: _Life) -> None:
     """Write what there is to tell; after the last of it, or when nobody hears it, hang up."""
     with suppress(OSError):
-        while (message := life.outgoing.get()) is not _End:
-            life.input.write(pickle.dumps(message))
+        while (message := life.outgoing.get()) is not None:
+            life.input.write(message)
             life.input.flush()
     with suppress(OSError):
         life.input.close()

@@ -32,7 +32,7 @@ class Parent:
         os.dup2(2, 1)
         self.gone = threading.Event()
         self._incoming: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._outgoing: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._outgoing: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._news = threading.Event()
         self._closed = threading.Event()
         for work in (self._hear, self._speak):
@@ -51,7 +51,7 @@ class Parent:
 
     def tell(self, message: object) -> None:
         """Tell the parent something, without waiting for it."""
-        self._outgoing.put(message)
+        self._outgoing.put(pickle.dumps(message))
 
     def messages(self) -> list[Any]:
         """Return what the parent has said since the last call."""
@@ -68,7 +68,7 @@ class Parent:
 
     def close(self, patience_s: float = 5.0) -> None:
         """Wait until all that was told is on its way; call it last."""
-        self._outgoing.put(_End)
+        self._outgoing.put(None)
         self._closed.wait(patience_s)
 
     def _hear(self) -> None:
@@ -81,11 +81,7 @@ class Parent:
 
     def _speak(self) -> None:
         with suppress(OSError):  # the parent is gone; its end of the input says so too
-            while (message := self._outgoing.get()) is not _End:
-                self._output.write(pickle.dumps(message))
+            while (message := self._outgoing.get()) is not None:
+                self._output.write(message)
                 self._output.flush()
         self._closed.set()
-
-
-class _End:
-    """The last thing in the outgoing queue."""
