@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from labcrane.feedback.processes import FeedbackProcesses, log_requests
 from labcrane.launcher.hang_detector import HangDetector
-from labcrane.launcher.session_process import Ended, SessionConfig, serve
+from labcrane.launcher.session_process import Ended, Offered, SessionConfig, serve
 from labcrane.recording.crash_marker import read_whereabouts
 from labcrane.recording.paths import parts
 from labcrane.session.commands import (
@@ -248,7 +248,11 @@ class Launcher:
                 message = pipe.recv()
                 if isinstance(message, Ended):
                     return message
-                self._console.report(message)
+                if isinstance(message, Offered):
+                    if self._crew:
+                        self._crew.offer(message.streams)
+                else:
+                    self._console.report(message)
         except (EOFError, OSError):
             pass  # it died in the middle of a message; its exit code says how
         return None
@@ -258,7 +262,7 @@ class Launcher:
         if recorder is None:
             return
         if recorder.watch():
-            self._say("the recorder died and was started again")
+            self._say("a recorder died: the other one has all streams, and a new one was started")
         lost = recorder.lost() if recorder.status else {RECORDER}
         for what in sorted(lost - self._lost):
             send(StreamLost(what))
