@@ -15,11 +15,12 @@ from pydantic import BaseModel
 
 from labcrane import Settings
 from labcrane.errors import LabcraneError
+from labcrane.hookspecs import ROLES
 from labcrane.machine import Machine
 from labcrane.machine_file import load_machine
 from labcrane.offers import Offer
-from labcrane.protocol import Protocol
-from labcrane.registry import ROLES, Registry, discover
+from labcrane.protocol import protocol_model
+from labcrane.registry import Registry, discover
 from labcrane.roles import Component, Feedback, Questionnaire, Task
 from labcrane.signals import Signal
 from labcrane.steps import Block, Break
@@ -41,7 +42,7 @@ def pages() -> dict[str, str]:
 
 def protocol_page() -> str:
     """Return every key of a protocol with its type, default and meaning."""
-    schema = Protocol.model_json_schema()
+    schema = protocol_model().model_json_schema()
     parts = {name: part for name, part in schema["$defs"].items() if name not in OWN_WORDS}
     parts |= {"Block": Block.model_json_schema(), "Break": Break.model_json_schema()}
     lines = [

@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from labcrane.errors import PluginError, ProtocolError
+from labcrane.hookspecs import ROLES
 from labcrane.machine import Machine
 from labcrane.machine_file import find_machine, load_machine
 from labcrane.offers import Offer, Settings
 from labcrane.oversight import Oversight
 from labcrane.protocol import Protocol, Use
 from labcrane.registry import Registry
-from labcrane.roles import Component, Cue, Feedback, Questionnaire, Task
+from labcrane.roles import Component, Cue, Feedback, Questionnaire
 from labcrane.study_files import plain_settings
 from labcrane.watched import watched
 from labcrane.yaml_file import Place, YamlFile
@@ -62,19 +63,33 @@ class Chooser:
             return None  # noted by the protocol's own check
         return self._choice(role, use, place, (*place, "use"))
 
-    def choose_tasks(self) -> dict[str, Choice]:
-        """Return the tasks that can be chosen, by the protocol's names for them."""
-        written = self._at(("tasks",))
+    def choose_several(self, role: type[RoleT], key: str) -> dict[str, Choice]:
+        """Return the components under a key that can be chosen, by the protocol's names."""
+        written = self._at((key,))
         names = written if isinstance(written, dict) else {}
-        chosen = {name: self.choose(Task, ("tasks", name)) for name in names}
+        chosen = {name: self.choose(role, (key, name)) for name in names}
         return {name: choice for name, choice in chosen.items() if choice}
+
+    def choose_others(self) -> dict[str, Choice]:
+        """Return what the protocol uses of roles that have no place in a study of their own."""
+        found: dict[str, Choice] = {}
+        for role, entry in ROLES.items():
+            for key in entry.keys:
+                if key in Protocol.model_fields:
+                    continue
+                if entry.several:
+                    several = self.choose_several(role, key)
+                    found |= {f"{key}.{name}": choice for name, choice in several.items()}
+                elif choice := self.choose(role, (key,)):
+                    found[key] = choice
+        return found
 
     def choose_questionnaires(self, protocol: Protocol) -> dict[str, Choice]:
         """Return the questionnaires that the protocol asks, noting those that there are not."""
-        chosen = {
-            name: self.choose(Questionnaire, ("questionnaires", name))
-            for name in protocol.questionnaires
-        }
+        chosen: dict[str, Choice | None]
+        chosen = dict.fromkeys(protocol.questionnaires) | self.choose_several(
+            Questionnaire, "questionnaires"
+        )
         for place, name in self._asked(protocol):
             if name not in chosen:
                 chosen[name] = self._choice(Questionnaire, Use(use=name), place, place)
@@ -113,12 +128,10 @@ class Chooser:
                 cues[name] = choice
             elif not is_cue and (choice := self.choose(Feedback, place)):
                 sounds[name] = choice
-        written = self._at(("views",))
-        names = written if isinstance(written, dict) else {}
-        views = {name: self.choose(Feedback, ("views", name)) for name in names}
-        for name in set(names) & {*cues, *sounds}:
+        views = self.choose_several(Feedback, "views")
+        for name in views.keys() & {*cues, *sounds}:
             self._source.problem(("views", name), f"{name!r} is the name of a feedback already")
-        return cues, sounds, {name: choice for name, choice in views.items() if choice}
+        return cues, sounds, views
 
     def _is_cue(self, name: object) -> bool:
         """Whether what is named under ``feedback`` is a cue, or is one misspelt."""

@@ -8,14 +8,14 @@ from importlib.metadata import EntryPoint
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import CodeType, ModuleType
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import pluggy
 
-from labcrane import hookspecs
 from labcrane.culprit import told
 from labcrane.entry_points import PROJECT, declared
 from labcrane.errors import PluginError
+from labcrane.hookspecs import ROLES, labcrane_commands
 from labcrane.offers import API
 from labcrane.suggestion import suggestion
 
@@ -58,7 +58,7 @@ class PluginModules:
         self, installed: Iterable[EntryPoint] | None = None, study: Path | None = None
     ) -> None:
         self.manager = pluggy.PluginManager(PROJECT)
-        self.manager.add_hookspecs(hookspecs)
+        self.manager.add_hookspecs(type("Hooks", (), _hooks()))
         self.broken: dict[str, str] = {}
         self.local = own_plugins(study) if study else {}
         lines = list(declared()) if installed is None else ()
@@ -164,6 +164,12 @@ class _Source(SourceFileLoader):
         return module
 
 
+def _hooks() -> dict[str, Any]:
+    """Return every hook there is, by its name."""
+    hooks = [*(entry.hook for entry in ROLES.values()), labcrane_commands]
+    return {hook.__name__: hook for hook in hooks}
+
+
 def _check_interface(module: ModuleType) -> None:
     built_for = getattr(module, "labcrane_api", API)
     if built_for != API:
@@ -176,7 +182,6 @@ def _check_interface(module: ModuleType) -> None:
 
 
 def _check_hooks(manager: pluggy.PluginManager, module: ModuleType) -> None:
-    known = [name for name in vars(hookspecs) if name.startswith("labcrane_")]
     for caller in manager.get_hookcallers(module) or ():
         if not caller.has_spec():
-            raise PluginError(f"unknown hook {caller.name!r}; {suggestion(caller.name, known)}")
+            raise PluginError(f"unknown hook {caller.name!r}; {suggestion(caller.name, _hooks())}")

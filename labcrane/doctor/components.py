@@ -15,8 +15,9 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from labcrane.finding import Finding, Verdict
+from labcrane.hookspecs import ROLES
 from labcrane.offers import Settings
-from labcrane.registry import ROLES, Registry, discover
+from labcrane.registry import Registry, discover
 from labcrane.study import Study
 
 WAIT_S = 30.0

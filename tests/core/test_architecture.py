@@ -154,35 +154,3 @@ def test_nothing_is_defined_that_only_tests_use() -> None:
         if used[name] == 1 and not name.startswith(("__", "test_", "labcrane_"))
     }
     assert {entry.partition(": ")[2] for entry in idle} <= ASKED_FOR_BY_OTHERS, idle
-
-
-SCREEN = 40
-"""Lines that a reader has before their eyes at once; the docstring is read before."""
-
-
-def long_functions(module: Path) -> dict[str, int]:
-    """Return the functions that do not fit a screen, and their lines without the docstring."""
-    found = {}
-    for node in ast.walk(ast.parse(module.read_text())):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            first = node.body[0]
-            told = ast.get_docstring(node) is not None
-            docstring = 1 + first.end_lineno - first.lineno if told else 0
-            lines = 1 + node.end_lineno - node.lineno - docstring
-            if lines > SCREEN:
-                found[f"{module.relative_to(ROOT)}:{node.lineno} {node.name}"] = lines
-    return found
-
-
-def test_functions_fit_a_screen() -> None:
-    modules = [
-        module for folder in ("labcrane", "plugins") for module in (ROOT / folder).rglob("*.py")
-    ]
-    found = {name: lines for module in modules for name, lines in long_functions(module).items()}
-    assert not found, f"more than {SCREEN} lines: {found}"
-
-
-def test_files_stay_short() -> None:
-    for folder in ("labcrane", "plugins"):
-        for module in (ROOT / folder).rglob("*.py"):
-            assert len(module.read_text().splitlines()) <= 300, module.relative_to(ROOT)

@@ -9,7 +9,8 @@ from jsonschema import Draft202012Validator
 from ruamel.yaml import YAML
 
 from labcrane.cli.app import main
-from labcrane.registry import ROLES, discover
+from labcrane.hookspecs import ROLES
+from labcrane.registry import discover
 from labcrane.schema import protocol_schema
 from labcrane.study import load
 

@@ -11,8 +11,9 @@ import pytest
 from docs.page import ROOT
 
 from labcrane.cli.app import main
+from labcrane.hookspecs import ROLES
 from labcrane.protocol import Protocol
-from labcrane.registry import ROLES, discover
+from labcrane.registry import discover
 from labcrane.study import load
 
 
