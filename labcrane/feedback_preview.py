@@ -10,6 +10,7 @@ from labcrane import rig
 from labcrane.console import Command, Order, QueueConsole
 from labcrane.errors import ProtocolError
 from labcrane.feedback_crew import host_orders
+from labcrane.frame_log import LOOP, FrameRow
 from labcrane.presenter import Presenter
 from labcrane.pseudonyms import pseudonyms
 from labcrane.recording.recording import SessionRecord, open_recording
@@ -18,7 +19,6 @@ from labcrane.registry import discover
 from labcrane.scene_text import SCENE_PLACED
 from labcrane.session import Visit
 from labcrane.session import run as run_session
-from labcrane.streams.frames import HEAD, frame_of
 from labcrane.study import Study
 
 
@@ -98,8 +98,9 @@ def movement(record: SessionRecord, trial: int | None = None) -> list[Frame]:
         there = ", ".join(str(int(number)) for number in counted.unique()) or "none"
         raise ProtocolError(f"there is no trial {trial} in the recording; there is {there}")
     arrays = [parts[name].to_numpy() for name in ("input", "command", "state", "task")]
-    table = np.column_stack([loop[list(HEAD)].to_numpy(), *arrays])
-    return [frame_of(row, [array.shape[1] for array in arrays]) for row in table[rows]]
+    head = loop[[label for label, _ in LOOP]].to_numpy()
+    frame = FrameRow(array.shape[1] for array in arrays).frame
+    return [frame(row) for row in np.column_stack([head, *arrays])[rows]]
 
 
 def scene_of(record: SessionRecord, trial: int | None = None) -> str:

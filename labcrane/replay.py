@@ -20,7 +20,7 @@ from labcrane.clock import ManualClock, SystemClock, Tick
 from labcrane.course import Course
 from labcrane.data_folder import DataFolder
 from labcrane.errors import ProtocolError, RecordingError
-from labcrane.frame_log import FrameLog, FrameRow, columns
+from labcrane.frame_log import FrameLog, FrameRow, columns, sizes
 from labcrane.plan import plan_session
 from labcrane.recording.recording import SessionRecord, open_recording
 from labcrane.records import Frame, Run
@@ -161,7 +161,7 @@ class _Log(FrameLog):
     def __init__(self, run: Run, script: "Script") -> None:
         self._script = script
         self._columns = columns(run)
-        self._fill = FrameRow(run).fill
+        self._fill = FrameRow(sizes(run)).fill
         self._rows = np.full((script.ticks, len(self._columns)), np.nan)
         self.ticks = 0
 

@@ -8,7 +8,10 @@ sent at every change and once a second: whoever starts late, or again, draws fro
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
+
+from pydantic import TypeAdapter
 
 from labcrane.records import Event, Frame, Run, Situation
 from labcrane.run_text import write_run
@@ -127,6 +130,11 @@ class ContextInlet:
         return self.situation != before
 
 
+@cache
+def _codec() -> TypeAdapter[Situation]:
+    return TypeAdapter(Situation)
+
+
 def situation_of(found: Mapping[str, Any]) -> Situation:
     """Return the situation that JSON holds."""
-    return Situation(**{**found, "active": tuple(found["active"])})
+    return _codec().validate_python(found)
