@@ -7,11 +7,13 @@ from .arrays import FloatArray
 from .boxes import link_boxes
 from .clock import Tick
 from .errors import (
+    LAB,
     DeviceError,
     LabcraneError,
     PluginError,
     ProtocolError,
     RecordingError,
+    StreamError,
 )
 from .finding import Finding, Verdict
 from .hookspecs import hookimpl
@@ -56,6 +58,7 @@ from .urdf_text import urdf, urdf_joint, urdf_link
 __version__: str
 
 __all__ = [
+    "LAB",
     "PRESETS",
     "SCENE_PLACED",
     "Actuator",
@@ -109,6 +112,7 @@ __all__ = [
     "Signal",
     "Situation",
     "Stream",
+    "StreamError",
     "StreamHeader",
     "StudyPath",
     "Targets",

@@ -31,6 +31,8 @@ class Choice:
     offer: Offer[Component]
     settings: Settings
     oversight: Oversight = field(default_factory=Oversight, compare=False)
+    called: str = field(default="", compare=False)
+    """Where it is used, and what it is: ``study.yaml:7: input 'dual_joystick'``."""
 
     def described(self, folder: Path) -> dict[str, Any]:
         """Return it ready for JSON, with the study's files named from its ``folder``."""
@@ -38,7 +40,15 @@ class Choice:
         return {"use": self.name, "plugin": self.plugin, "settings": settings}
 
     def build(self, machine: Machine) -> Component:
-        """Build, but do not open, the component, under oversight."""
+        """Build, but do not open, the component, under oversight.
+
+        Raises
+        ------
+        PluginError
+            What it needs is not installed, or building fails.
+        """
+        if missing := self.offer.missing:
+            raise PluginError(f"{self.called or repr(self.name)} {missing}")
         build = self.oversight.place(repr(self.name), self.plugin, "build", self.offer.build)
         component = self.oversight.call(build, self.offer.build, self.settings, machine)
         return watched(component, self.name, self.plugin, self.oversight)
@@ -115,7 +125,9 @@ class Chooser:
         if settings is None:
             return None
         plugin = self._registry.plugin(role, use.use)
-        return Choice(use.use, plugin, offer, settings, self.oversight)
+        where = f"{self._source.path}:{self._source.line(named)}"
+        called = f"{where}: {ROLES[role].word} {use.use!r}"
+        return Choice(use.use, plugin, offer, settings, self.oversight, called)
 
     def choose_feedback(self) -> tuple[dict[str, Choice], dict[str, Choice], dict[str, Choice]]:
         """Return cues, sounds and views by the protocol's names for them."""

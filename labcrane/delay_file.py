@@ -60,7 +60,8 @@ def read_delays(protocol: Path) -> dict[str, Measured]:
         return _codec().validate_json(path.read_bytes())
     except ValidationError as error:
         raise ProtocolError(
-            f"{path} is damaged ({error.errors()[0]['msg']}); remove it and measure again with labcrane doctor"
+            f"{path} is damaged ({error.errors()[0]['msg']}); remove it and measure again with "
+            "labcrane doctor"
         ) from error
 
 

@@ -33,3 +33,7 @@ class StreamError(LabcraneError):
 
 class RecordingError(LabcraneError):
     """A recording cannot be written, found or read."""
+
+
+LAB = "pip install 'labcrane[lab]'"
+"""How to get everything that a laboratory runs."""

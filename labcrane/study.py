@@ -85,6 +85,24 @@ class Study:
             **self.others,
         }
 
+    def check_installed(self, *, simulated: bool = False, feedback: bool = True) -> None:
+        """Raise :class:`ProtocolError` unless all that a run of the study needs is installed.
+
+        Parameters
+        ----------
+        simulated
+            Whether the simulated operator takes the place of the input.
+        feedback
+            Whether views and sounds are shown.
+        """
+        used = self.choices | ({"input": self.operator} if simulated else {})
+        if not feedback:
+            shown = ("feedback.", "views.")
+            used = {part: each for part, each in used.items() if not part.startswith(shown)}
+        lacks = {each.called: each.offer.missing for each in used.values()}
+        if wrong := [f"{called} {what}" for called, what in lacks.items() if what]:
+            raise ProtocolError("\n".join(wrong))
+
     def check_participant(self, participant: str) -> None:
         """Raise :class:`ProtocolError` unless ``participant`` matches the protocol's pattern."""
         pattern = self.protocol.participants.pattern

@@ -10,7 +10,7 @@ import typer
 from labcrane.cli.arguments import DataBeside, ProtocolPath, data_folder
 from labcrane.cli.network import Local, stay_on_this_computer
 from labcrane.cli.output import out
-from labcrane.errors import LabcraneError, ProtocolError
+from labcrane.errors import LAB, LabcraneError, PluginError, ProtocolError
 
 if TYPE_CHECKING:
     from labcrane.plan import SessionPlan
@@ -127,6 +127,7 @@ def _run_fast(order: "VisitOrder") -> Path:
     from labcrane.session import run as run_session
 
     visit = replace(order.visit(), fast=True)
+    visit.study.check_installed(simulated=True, feedback=False)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
     with Terminal(console, out.console, _counted(plan), keys=False):
@@ -140,9 +141,14 @@ def _launch(order: "VisitOrder", *, page: bool) -> None:
     from labcrane.cli.terminal import Terminal
     from labcrane.console import QueueConsole
     from labcrane.launcher import Launcher
+    from labcrane.offers import not_installed
     from labcrane.plan import plan_session
 
     visit = order.visit()
+    visit.study.check_installed(simulated=visit.simulated, feedback=visit.feedback)
+    needs = {"pylsl": LAB, **({"nicegui": LAB} if page else {})}
+    if missing := not_installed(needs):
+        raise PluginError(f"a session {missing}")
     ask_for_consent(visit, page=page)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()

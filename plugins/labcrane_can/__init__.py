@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from labcrane import Ask, CommandOffer, Finding, InputDevice, Machine, Offer, hookimpl, offer
+from labcrane import LAB, Ask, CommandOffer, Finding, InputDevice, Machine, Offer, hookimpl, offer
 from labcrane_can.settings import CanSettings, ReplaySettings
 
 labcrane_api = 1
@@ -25,7 +25,11 @@ def labcrane_inputs() -> list[Offer[InputDevice]]:
 
         return examination.examine(settings, ask)
 
-    return [offer("can", CanSettings, panel, examine), offer("can_replay", ReplaySettings, replay)]
+    needs = {"can": LAB, "cantools": LAB}
+    return [
+        offer("can", CanSettings, panel, examine, needs=needs),
+        offer("can_replay", ReplaySettings, replay, needs=needs),
+    ]
 
 
 @hookimpl

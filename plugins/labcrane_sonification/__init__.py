@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from labcrane import Ask, Feedback, Finding, Machine, Offer, hookimpl, offer
+from labcrane import LAB, Ask, Feedback, Finding, Machine, Offer, hookimpl, offer
 from labcrane_sonification.settings import SonificationSettings
 
 labcrane_api = 1
@@ -21,4 +21,4 @@ def labcrane_feedback() -> list[Offer[Feedback]]:
 
         return examination.examine(settings, ask)
 
-    return [offer("sonification", SonificationSettings, build, examine)]
+    return [offer("sonification", SonificationSettings, build, examine, needs={"pyo": LAB})]

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from labcrane import Ask, Feedback, Finding, Machine, Offer, hookimpl, offer
+from labcrane import LAB, Ask, Feedback, Finding, Machine, Offer, hookimpl, offer
 from labcrane_view.settings import ViewSettings
 
 labcrane_api = 1
@@ -20,4 +20,4 @@ def labcrane_feedback() -> list[Offer[Feedback]]:
 
         return examination.examine(settings, ask)
 
-    return [offer("view", ViewSettings, build, examine)]
+    return [offer("view", ViewSettings, build, examine, needs={"panda3d": LAB})]
