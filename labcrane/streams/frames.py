@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane.frame_log import FrameRow, columns, sizes
+from labcrane.core.records import Frame, Run
+from labcrane.recording.frame_log import FrameRow, columns, sizes
 from labcrane.recording.journal import Column
-from labcrane.records import Frame, Run
 from labcrane.streams.outlets import Samples, channel, stream_info
 
 if TYPE_CHECKING:

@@ -15,16 +15,16 @@ import pytest
 
 import labcrane
 from labcrane import FloatArray, LabcraneError, Machine, Offer, PluginError
-from labcrane.hookspecs import NUMBERS, ROLES, RoleEntry, hookspec
-from labcrane.machine_file import load_machine
-from labcrane.offer_sheet import sheets
-from labcrane.offers import Settings, offer
-from labcrane.registry import Registry, discover
-from labcrane.roles import Component
-from labcrane.scaffold import write_plugin
-from labcrane.schema import protocol_schema
-from labcrane.signals import Signal
-from labcrane.study import load
+from labcrane.core.roles import Component
+from labcrane.core.signals import Signal
+from labcrane.machines.library import load_machine
+from labcrane.protocol.json_schema import protocol_schema
+from labcrane.protocol.study import load
+from labcrane.registry.description import sheets
+from labcrane.registry.hookspecs import NUMBERS, ROLES, RoleEntry, hookspec
+from labcrane.registry.offers import Settings, offer
+from labcrane.registry.registry import Registry, discover
+from labcrane.registry.scaffold import write_plugin
 
 ROOT = Path(__file__).parents[2]
 STUDY = ROOT / "tests" / "recording" / "before" / "protocol.yaml"

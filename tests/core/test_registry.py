@@ -8,9 +8,9 @@ import pytest
 
 import labcrane
 from labcrane import Cue, Dynamics, PluginError, Task
-from labcrane.hookspecs import ROLES
-from labcrane.plugin_commands import plugin_commands
-from labcrane.registry import discover
+from labcrane.registry.commands import plugin_commands
+from labcrane.registry.hookspecs import ROLES
+from labcrane.registry.registry import discover
 
 ROOT = Path(__file__).parents[2]
 

@@ -9,8 +9,8 @@ from fresh_environment import environment_with, run
 
 from labcrane import open_recording
 from labcrane.cli.app import main
-from labcrane.hookspecs import ROLES
-from labcrane.scaffold import TEMPLATES, kinds
+from labcrane.registry.hookspecs import ROLES
+from labcrane.registry.scaffold import TEMPLATES, kinds
 
 NAMES = {role: "mycounter" if role == "command" else f"my_{role}" for role in kinds()}
 

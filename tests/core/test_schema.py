@@ -9,10 +9,10 @@ from jsonschema import Draft202012Validator
 from ruamel.yaml import YAML
 
 from labcrane.cli.app import main
-from labcrane.hookspecs import ROLES
-from labcrane.registry import discover
-from labcrane.schema import protocol_schema
-from labcrane.study import load
+from labcrane.protocol.json_schema import protocol_schema
+from labcrane.protocol.study import load
+from labcrane.registry.hookspecs import ROLES
+from labcrane.registry.registry import discover
 
 ROOT = Path(__file__).parents[2]
 PROTOCOLS = sorted((ROOT / "protocols").glob("*/protocol.yaml"))

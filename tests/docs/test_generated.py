@@ -11,10 +11,10 @@ import pytest
 from docs.page import ROOT
 
 from labcrane.cli.app import main
-from labcrane.hookspecs import ROLES
-from labcrane.protocol import Protocol
-from labcrane.registry import discover
-from labcrane.study import load
+from labcrane.protocol.protocol import Protocol
+from labcrane.protocol.study import load
+from labcrane.registry.hookspecs import ROLES
+from labcrane.registry.registry import discover
 
 
 @pytest.fixture(scope="module")

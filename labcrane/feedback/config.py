@@ -1,0 +1,75 @@
+"""What a feedback process is told, as a line of text."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import GetPydanticSchema, PlainSerializer, TypeAdapter
+from pydantic_core import core_schema
+
+from labcrane.core.records import Run
+from labcrane.feedback.delays import Measured
+from labcrane.recording.run_codec import read_run, write_run
+
+_AS_TEXT = core_schema.no_info_plain_validator_function(
+    read_run, serialization=core_schema.plain_serializer_function_ser_schema(write_run)
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A component by its offer's name and its settings."""
+
+    use: str
+    settings: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class FeedbackConfig:
+    """What a feedback process is told.
+
+    Attributes
+    ----------
+    name
+        The protocol's name for it.
+    part, cues
+        What it runs, and which cues it draws, by the protocol's names.
+    run
+        What is presented.
+    source
+        Whose streams it follows (:attr:`labcrane.session.session.Visit.source`).
+    study
+        The protocol, beside which there may be plugins.
+    always
+        Whether it presents every frame, or only those of trials in which it is switched on.
+    measured
+        What was measured of its delay, if anything was.
+    recorded
+        Whether there is a recorder, without which it presents nothing; a preview has none.
+    """
+
+    name: str
+    part: Part
+    run: Annotated[Run, GetPydanticSchema(lambda _, __: _AS_TEXT)]
+    source: str
+    study: Annotated[Path, PlainSerializer(lambda path: str(path.resolve()))]
+    always: bool
+    cues: Mapping[str, Part] = field(default_factory=dict)
+    measured: Measured | None = None
+    recorded: bool = True
+
+    def as_json(self) -> str:
+        """Return the order as one line."""
+        return _codec().dump_json(self).decode()
+
+    @classmethod
+    def from_json(cls, text: str) -> "FeedbackConfig":
+        """Return the order that :meth:`as_json` wrote."""
+        return _codec().validate_json(text)
+
+
+@cache
+def _codec() -> TypeAdapter[FeedbackConfig]:
+    return TypeAdapter(FeedbackConfig)

@@ -1,0 +1,96 @@
+"""The JSON Schema of a protocol, with the settings of everything that is installed, for editors."""
+
+from collections.abc import Mapping
+from copy import deepcopy
+from typing import Any
+
+from pydantic.json_schema import models_json_schema
+
+from labcrane.core.roles import Component
+from labcrane.protocol.protocol import protocol_model
+from labcrane.protocol.steps import Block, Break, Session
+from labcrane.registry.hookspecs import roles_by_key
+from labcrane.registry.offers import Offer, Settings
+from labcrane.registry.registry import Registry
+
+Schema = dict[str, Any]
+
+
+def protocol_schema(registry: Registry) -> Schema:
+    """Return the JSON Schema (2020-12) of what a protocol may say with what is installed."""
+    one, by_name = roles_by_key(several=False), roles_by_key(several=True)
+    roles = [*one.values(), *by_name.values()]
+    settings = {
+        offer.settings: None
+        for group in roles
+        for role in group
+        for offer in registry.offers[role].values()
+    }
+    model = protocol_model()
+    models: list[type[Settings]] = [model, Session, Block, Break, *settings]
+    references, whole = models_json_schema([(each, "validation") for each in models])
+    shared: Schema = whole["$defs"]
+    named = {each: shared[ref["$ref"].split("/")[-1]] for (each, _), ref in references.items()}
+
+    protocol = named[model]
+    for key, of in one.items():
+        protocol["properties"][key] = _use(registry, of, named)
+    for key, of in by_name.items():
+        protocol["properties"][key] |= {"additionalProperties": _use(registry, of, named)}
+    named[Session]["properties"]["steps"]["items"] = _step(references[(Block, "validation")])
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **protocol,
+        "title": "A labcrane protocol",
+        "$defs": shared,
+    }
+
+
+def _use(
+    registry: Registry, roles: tuple[type[Component], ...], named: Mapping[Any, Schema]
+) -> Schema:
+    """Return the schema of ``{use: NAME, ...}``; the name decides which other keys there are."""
+    offers = {name: each for role in roles for name, each in registry.offers[role].items()}
+    return {
+        "type": "object",
+        "required": ["use"],
+        "properties": {"use": {"enum": sorted(offers)}},
+        "allOf": [
+            {
+                "if": {"properties": {"use": {"const": name}}, "required": ["use"]},
+                "then": _with_use(offer, named),
+            }
+            for name, offer in sorted(offers.items())
+        ],
+    }
+
+
+def _with_use(offer: Offer[Component], named: Mapping[Any, Schema]) -> Schema:
+    model = deepcopy(named[offer.settings])
+    model["properties"] = {"use": {"const": offer.name}, **model.get("properties", {})}
+    return model
+
+
+def _step(block: Schema) -> Schema:
+    """Return the schema of a step in the form in which it is written, one key and its value."""
+    name: Schema = {"type": "string"}
+    kinds: dict[str, Schema] = {
+        "instructions": {**name, "description": "A text file beside the protocol."},
+        "questionnaire": {"anyOf": [name, {"type": "array", "items": name, "minItems": 1}]},
+        "practice": block,
+        "reference": block,
+        "block": block,
+        "break": {"$ref": "#/$defs/Break"},
+    }
+    return {
+        "anyOf": [
+            {"const": "consent"},
+            {
+                "type": "object",
+                "properties": kinds,
+                "additionalProperties": False,
+                "minProperties": 1,
+                "maxProperties": 1,
+            },
+        ]
+    }

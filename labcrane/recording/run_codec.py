@@ -1,0 +1,53 @@
+"""A run in a form that can be sent to other processes."""
+
+import json
+from dataclasses import dataclass
+from functools import cache
+
+from pydantic import TypeAdapter
+
+from labcrane.core.records import Run
+from labcrane.core.signals import Layout
+from labcrane.errors import PluginError
+from labcrane.machines.machine import Body, Machine
+from labcrane.types import FloatArray
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What does not change in a session's context."""
+
+    rate_hz: float
+    seed: int
+    machine: Machine
+    layouts: dict[str, Layout]
+    bodies: tuple[Body, ...]
+
+
+@cache
+def _codec() -> TypeAdapter[Scene]:
+    return TypeAdapter(Scene)
+
+
+def write_run(run: Run) -> str:
+    """Return what does not change in a session's context, as JSON."""
+    layouts = {"axes": run.axes, "command": run.command, "state": run.state, "task": run.task}
+    scene = Scene(run.rate_hz, run.participant_seed, run.machine, layouts, run.bodies)
+    return json.dumps(_codec().dump_python(scene, mode="json"))
+
+
+def read_run(text: str) -> Run:
+    """Return the run that :func:`write_run` wrote, with nobody to steer."""
+    found = _codec().validate_json(text)
+    return Run(
+        rate_hz=found.rate_hz,
+        machine=found.machine,
+        participant_seed=found.seed,
+        inverse=_nobody,
+        bodies=found.bodies,
+        **found.layouts,
+    )
+
+
+def _nobody(velocity: FloatArray, state: FloatArray) -> FloatArray:
+    raise PluginError("feedback was asked to steer; only the session's process can do that")
