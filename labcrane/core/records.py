@@ -141,7 +141,7 @@ class Run:
         Seeds what belongs to the participant rather than to a trial.
     axes, command, state, task
         What the frame's arrays of the same names hold.
-    steer
+    inverse
         The axes, shape ``(n_axes,)``, with which a practised hand asks this controller for a tip
         velocity in m/s, shape ``(3,)``, in a state, shape ``(n_state,)``. For simulated operators.
     bodies

@@ -1,4 +1,4 @@
-"""What a feedback process is told, as a line of text."""
+"""Configuration of a feedback process, as a line of text."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -7,10 +7,11 @@ from typing import Any
 from pydantic.json_schema import models_json_schema
 
 from labcrane.core.roles import Component
+from labcrane.core.settings import Settings
 from labcrane.protocol.protocol import protocol_model
 from labcrane.protocol.steps import Block, Break, Session
 from labcrane.registry.hookspecs import roles_by_key
-from labcrane.registry.offers import Offer, Settings
+from labcrane.registry.offers import Offer
 from labcrane.registry.registry import Registry
 
 Schema = dict[str, Any]

@@ -1,4 +1,4 @@
-"""What there is to know of an offer before it is used: settings, signals, an example."""
+"""Description of an offer before it is used: settings, signals, an example."""
 
 import json
 from collections.abc import Mapping

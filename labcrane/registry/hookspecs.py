@@ -16,12 +16,12 @@ from typing import Any
 
 import pluggy
 
+from labcrane.analysis.exporter import Exporter
 from labcrane.core.roles import (
     Component,
     Controller,
     Cue,
     Dynamics,
-    Exporter,
     Feedback,
     InputDevice,
     Questionnaire,
