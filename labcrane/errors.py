@@ -37,10 +37,6 @@ class RecordingError(LabcraneError):
     """A recording cannot be written, found or read."""
 
 
-LAB = "pip install 'labcrane[lab]'"
-"""How to get everything that a laboratory runs."""
-
-
 def suggestion(word: str, known: Iterable[str], otherwise: str = "there is") -> str:
     """Return the known word that is closest, as a question; all of them when none is close."""
     from difflib import get_close_matches  # noqa: PLC0415 - only a mistake needs it

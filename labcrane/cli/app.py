@@ -13,7 +13,7 @@ from importlib import import_module
 import typer
 
 from labcrane.cli import plugin_groups as extension
-from labcrane.errors import LAB, LabcraneError, PluginError, ProtocolError
+from labcrane.errors import LabcraneError, PluginError, ProtocolError
 
 MODULES = {
     "run": ("demo", "run", "resume"),
@@ -53,6 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ModuleNotFoundError as error:
         if error.name is None or error.name.startswith("labcrane"):
             raise
+        from labcrane.registry.offers import LAB
+
         complain(PluginError(f"this needs {error.name}, which is not installed: {LAB}"))
         return 1
     except LabcraneError as error:

@@ -226,7 +226,8 @@ class SessionState:
     hint, hint_time
         The examiner's newest hint, empty before the first, and when it was given.
     scene
-        What stands around the machine, as of :func:`labcrane.read_placed`; empty for nothing.
+        What stands around the machine, as of :func:`labcrane.machines.read_placed`; empty for
+        nothing.
     """
 
     step: int = 0

@@ -25,6 +25,9 @@ API = 1
 plugin says ``labcrane_api = 1`` in its module; ``docs/compatibility.md`` says when it rises."""
 
 
+LAB = "pip install 'labcrane[lab]'"
+"""How to get everything that a laboratory runs."""
+
 Prompt = Callable[[str], None]
 """Tells the person at the machine what to do next."""
 

@@ -49,7 +49,7 @@ class Difference:
     column
         Which: ``state.joint.angle.slew``; "length" when one of them is longer.
     recorded, replayed
-        The two numbers; ticks for the length.
+        The two numbers, in the signals' units; ticks for the length.
     """
 
     tick: int
@@ -80,7 +80,7 @@ class Replayed:
     frames: Mapping[str, "pd.DataFrame"]
 
 
-def replay(
+def replay_session(
     path: Path,
     session: int,
     *,

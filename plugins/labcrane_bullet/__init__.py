@@ -1,6 +1,7 @@
 """The study's crane: moved by PyBullet, or by its velocity law alone."""
 
-from labcrane import LAB, Dynamics, Machine, Offer, hookimpl, offer
+from labcrane import Dynamics, Machine, Offer, hookimpl, offer
+from labcrane.registry import LAB
 from labcrane_bullet.settings import BulletSettings, CraneSettings
 
 labcrane_api = 1

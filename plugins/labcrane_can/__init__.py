@@ -2,17 +2,9 @@
 
 from collections.abc import Sequence
 
-from labcrane import (
-    LAB,
-    CommandOffer,
-    Finding,
-    InputDevice,
-    Machine,
-    Offer,
-    Prompt,
-    hookimpl,
-    offer,
-)
+from labcrane import InputDevice, Machine, Offer, hookimpl, offer
+from labcrane.core import Finding
+from labcrane.registry import LAB, CommandOffer, Prompt
 from labcrane_can.settings import CanSettings, ReplaySettings
 
 labcrane_api = 1

@@ -3,16 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from labcrane import (
-    LAB,
-    CommandOffer,
-    Controller,
-    Dynamics,
-    Machine,
-    Offer,
-    hookimpl,
-    offer,
-)
+from labcrane import Controller, Dynamics, Machine, Offer, hookimpl, offer
+from labcrane.registry import LAB, CommandOffer
 from labcrane_dmd.arm_settings import ArmSettings, ValveSettings
 
 if TYPE_CHECKING:

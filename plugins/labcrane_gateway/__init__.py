@@ -1,6 +1,7 @@
 """The open gateway protocol: any program with LSL can be the control station."""
 
-from labcrane import LAB, InputDevice, Machine, Offer, hookimpl, offer
+from labcrane import InputDevice, Machine, Offer, hookimpl, offer
+from labcrane.registry import LAB
 from labcrane_gateway.settings import GatewaySettings
 
 labcrane_api = 1

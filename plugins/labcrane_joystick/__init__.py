@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 
-from labcrane import LAB, Finding, InputDevice, Machine, Offer, Prompt, hookimpl, offer
+from labcrane import InputDevice, Machine, Offer, hookimpl, offer
+from labcrane.core import Finding
+from labcrane.registry import LAB, Prompt
 from labcrane_joystick.settings import JoystickSettings
 
 labcrane_api = 1

@@ -1,6 +1,7 @@
 """The keyboard as an input, through the window of a view."""
 
-from labcrane import LAB, InputDevice, Machine, Offer, hookimpl, offer
+from labcrane import InputDevice, Machine, Offer, hookimpl, offer
+from labcrane.registry import LAB
 from labcrane_keyboard.settings import KeyboardSettings
 
 labcrane_api = 1

@@ -7,7 +7,8 @@ from pydantic import ConfigDict, Field, ValidationInfo, field_validator, model_v
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from labcrane import Item, Settings, StudyPath
+from labcrane import Settings
+from labcrane.core import Item, StudyPath
 
 NAME = r"^[a-z][a-z0-9_]*$"
 

@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 
-from labcrane import LAB, Feedback, Finding, Machine, Offer, Prompt, hookimpl, offer
+from labcrane import Feedback, Machine, Offer, hookimpl, offer
+from labcrane.core import Finding
+from labcrane.registry import LAB, Prompt
 from labcrane_sonification.settings import SonificationSettings
 
 labcrane_api = 1

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 from slcan_adapter import SlcanAdapter
 
-from labcrane import Finding, Offer, Settings, Verdict
+from labcrane import Offer, Settings
+from labcrane.core import Finding, Verdict
 from labcrane.testing import ExaminationContract
 from labcrane_can import labcrane_inputs
 from labcrane_can.avc import encode

@@ -9,7 +9,7 @@ import typer
 
 from labcrane.cli.options import DataBeside, Local, ProtocolPath, data_folder, stay_on_this_computer
 from labcrane.cli.output import out
-from labcrane.errors import LAB, LabcraneError, PluginError, ProtocolError
+from labcrane.errors import LabcraneError, PluginError, ProtocolError
 
 if TYPE_CHECKING:
     from labcrane.design.plan import SessionPlan
@@ -144,7 +144,7 @@ def _launch(order: "SessionConfig", *, page: bool) -> None:
     from labcrane.design.plan import plan_session
     from labcrane.launcher.launcher import Launcher
     from labcrane.launcher.pages import pages
-    from labcrane.registry.offers import not_installed
+    from labcrane.registry.offers import LAB, not_installed
     from labcrane.session.commands import QueueConsole
 
     visit = order.visit()
