@@ -123,7 +123,7 @@ def replay(
     ] = None,
 ) -> None:
     """Run a recorded session again from its input, and compare every number."""
-    from labcrane.replay.replay import replay as run_again
+    from labcrane.replay.replay import replay_session as run_again
 
     if speed is not None:
         stay_on_this_computer()
