@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from labcrane import Participant, answers_of, asked_in, scores_of
+from labcrane.analysis import Participant, answers_of, asked_in, scores_of
 from labcrane_bids.files import label, write_json, write_tsv
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from labcrane import written_about
+from labcrane.participants import written_about
 
 out = Console(soft_wrap=True, highlight=False)
 

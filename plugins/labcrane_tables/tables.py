@@ -7,16 +7,9 @@ from pathlib import Path
 from shutil import copyfile
 from typing import TYPE_CHECKING, Any
 
-from labcrane import (
-    Exporter,
-    Participant,
-    SessionRecord,
-    answers_of,
-    codebook_of,
-    file_name_of,
-    measures_of,
-    scores_of,
-)
+from labcrane import Exporter
+from labcrane.analysis import Participant, answers_of, codebook_of, measures_of, scores_of
+from labcrane.recording import SessionRecord
 from labcrane_tables.frames import snake, stream_tables
 from labcrane_tables.settings import TableSettings
 
@@ -78,8 +71,7 @@ class Tables(Exporter):
         if forms == "none":
             return
         for name, table in stream_tables(session):
-            stream = file_name_of(name.replace("/", "-"))
-            path = folder / f"{participant.name}_ses-{number:02}_{stream}"
+            path = folder / f"{participant.name}_ses-{number:02}_{name.replace('/', '-')}"
             if forms in {"both", "parquet"}:
                 table.to_parquet(path.with_name(f"{path.name}.parquet"), index=False)
             if forms in {"both", "csv"}:

@@ -9,7 +9,7 @@ import typer
 
 from labcrane.cli.options import DataBeside, Local, ProtocolPath, data_folder, stay_on_this_computer
 from labcrane.cli.output import out
-from labcrane.errors import LabcraneError, ProtocolError
+from labcrane.errors import LabcraneError, PluginError, ProtocolError
 
 if TYPE_CHECKING:
     from labcrane.launcher.session_process import SessionConfig
@@ -129,6 +129,7 @@ def _run_fast(order: "SessionConfig") -> Path:
     from labcrane.session.session import run as run_session
 
     visit = replace(order.visit(), fast=True)
+    visit.study.check_installed(simulated=True, feedback=False)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
     with Terminal(console, out.console, len(plan.trials), keys=False):
@@ -142,11 +143,16 @@ def _launch(order: "SessionConfig", *, page: bool) -> None:
     from labcrane.design.plan import plan_session
     from labcrane.launcher.launcher import Launcher
     from labcrane.launcher.pages import pages
+    from labcrane.registry.offers import LAB, not_installed
     from labcrane.session.commands import QueueConsole
 
     visit = order.visit()
     if not order.resumed:
         visit.folder.check_new(order.session)  # before anything is shown
+    visit.study.check_installed(simulated=visit.simulated, feedback=visit.feedback)
+    needs = {"pylsl": LAB, **({"nicegui": LAB} if page else {})}
+    if missing := not_installed(needs):
+        raise PluginError(f"a session {missing}")
     ask_for_consent(visit, page=page)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
