@@ -116,7 +116,14 @@ def packages() -> list[Path]:
 
 def test_the_top_level_shows_packages() -> None:
     modules = {path.name for path in (ROOT / "labcrane").glob("*.py")}
-    assert modules == {"__init__.py", "__main__.py", "errors.py", "parallel.py", "types.py"}
+    assert modules == {
+        "__init__.py",
+        "__main__.py",
+        "errors.py",
+        "limits.py",
+        "parallel.py",
+        "types.py",
+    }
 
 
 @pytest.mark.parametrize("package", packages(), ids=lambda path: path.name)
