@@ -145,6 +145,20 @@ class SessionPlan:
         return tuple(step.block for step in self.steps if step.block)
 
     @property
+    def trials(self) -> tuple[Trial, ...]:
+        """The trials that a study is about, which whoever counts trials counts.
+
+        Practice and what only leads to the next trial are not among them.
+        """
+        return tuple(
+            trial
+            for block in self.blocks
+            if not block.practice
+            for trial in block.trials
+            if trial.planned.counted
+        )
+
+    @property
     def expected_s(self) -> float:
         """How long the session is likely to take, in seconds."""
         return sum(step.expected_s for step in self.steps)

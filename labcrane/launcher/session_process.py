@@ -28,6 +28,9 @@ from labcrane.session.commands import (
 from labcrane.session.resume import Policy
 from labcrane.session.session import Visit, record
 
+MOST_A_TICK = 16
+"""Orders taken up in one tick; what else has come waits for the next."""
+
 
 @dataclass(frozen=True, slots=True)
 class SessionConfig:
@@ -89,7 +92,7 @@ class PipeConsole:
 
     def commands(self) -> list[Message]:
         given: list[Message] = []
-        while not self._incoming.empty():  # not in the usual tick
+        while len(given) < MOST_A_TICK and not self._incoming.empty():  # not in the usual tick
             given.append(self._incoming.get_nowait())
         return given
 

@@ -79,7 +79,10 @@ class Script:
         """Note what an event says came from outside."""
         part, _, what = name.rpartition(".")
         if part == "order":
-            self._order(tick, Command(Order(what), data.get("text", ""), data.get("by", "")))
+            self._order(
+                tick,
+                Command(Order(what), data.get("text", ""), data.get("by", ""), data.get("at", "")),
+            )
         elif part == "questionnaire" and data.get("by", SIMULATION) != SIMULATION:
             self._answer(tick, what, data)
         elif name == "page.denied":

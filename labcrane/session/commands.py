@@ -12,8 +12,9 @@ from typing import Literal, Protocol
 
 from pydantic import TypeAdapter, ValidationError
 
-from labcrane.core.records import Event
+from labcrane.core.records import Event, Value
 from labcrane.errors import LabcraneError
+from labcrane.limits import LimitError, check_text
 
 MOST_BYTES = 65_536
 """Size of the largest message to a session, as JSON: about forty pages of text."""
@@ -38,6 +39,15 @@ class Order(StrEnum):
     SETTING = "setting"  # change a setting of a cue or sound: tone.far=3
 
 
+KINDS = {
+    Order.ANSWER: "answer",
+    Order.NOTE: "note",
+    Order.HINT: "hint",
+    Order.SETTING: "setting",
+}
+"""Which of the limits holds for an order's words; that of an order for the rest."""
+
+
 @dataclass(frozen=True, slots=True)
 class Command:
     """One order, with its words if it has any."""
@@ -45,6 +55,7 @@ class Command:
     order: Order
     text: str = ""
     by: str = ""  # which page; empty for the terminal
+    at: str = ""  # the address from which a page asked
     kind: Literal["command"] = "command"
 
 
@@ -149,6 +160,20 @@ def by_whom(command: Command) -> str:
     return command.by or "terminal"
 
 
+def whence(command: Command) -> dict[str, Value]:
+    """Return from which address a page ordered, as data of an event; nothing for the terminal."""
+    return {"at": command.at} if command.at else {}
+
+
+def beyond_limits(command: Command) -> str | None:
+    """Return why an order's words may not enter, or None when they may."""
+    try:
+        check_text(command.text, KINDS.get(command.order, "order"))
+    except LimitError as error:
+        return str(error)
+    return None
+
+
 class Console(Protocol):
     """Whoever gives orders and looks on: the terminal and the pages, or a simulation."""
 
@@ -172,12 +197,12 @@ class QueueConsole:
     def give(self, command: Command) -> None:
         """Give an order; the session takes it up at its next tick.
 
-        One that is too large is refused, and what is recorded is that it was.
+        What may not enter becomes the news that it was refused: it never reaches a pipe.
         """
-        try:
-            encode(command)
-        except MessageError as error:
-            command = Command(Order.DENIED, str(error), command.by)
+        why = beyond_limits(command)
+        if why is not None:
+            why = f"{command.order.value}: {why}"
+            command = Command(Order.DENIED, why, by_whom(command), command.at)
         self._orders.put(command)
 
     def commands(self) -> list[Command]:

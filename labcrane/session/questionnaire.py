@@ -11,10 +11,11 @@ from labcrane.core.records import Trial, Value
 from labcrane.core.roles import Questionnaire
 from labcrane.design.plan import SessionPlan
 from labcrane.design.seeds import derive
+from labcrane.limits import LimitError, read_json
 from labcrane.participants.personal_data import personal
 from labcrane.protocol.study import Study
 from labcrane.recording.participant_file.questionnaires import ANSWER, END, SCORE
-from labcrane.session.commands import Command, Order, by_whom
+from labcrane.session.commands import Command, Order, by_whom, whence
 
 Said = tuple[str, dict[str, Value]]
 """Name and data of an event that follows."""
@@ -23,6 +24,10 @@ SIMULATION = "simulation"
 """Who answers for a simulated participant."""
 
 START, REFUSED = "questionnaire.start", "questionnaire.refused"
+
+ANSWER_KIND = "answer"
+UNREAD = "unread"
+"""Item of an answer that was refused before it was read: beyond the limits, or no JSON."""
 
 
 class QuestionnaireForm:
@@ -65,14 +70,17 @@ class QuestionnaireForm:
         """Take an answer, as JSON of questionnaire, item and value; return what is to be said."""
         data: dict[str, Value] = {**self._about, "by": by}
         try:
-            given = json.loads(text)
+            given = read_json(text, ANSWER_KIND)
             item, value = self._find(given)
             answer = item.check(value)
             if isinstance(answer, str) and (found := personal(answer)):
                 # What names a person must not be in the record, not even as a refused answer.
                 why = f"an answer must not hold {found}; write it without"
                 return REFUSED, {**data, "given": "", "item": item.name, "why": why}
-        except (AnswerError, json.JSONDecodeError) as error:
+        except LimitError as error:
+            # Nor what no page could show.
+            return REFUSED, {**data, "given": "", "item": UNREAD, "why": str(error)}
+        except AnswerError as error:
             return REFUSED, {**data, "given": text, "item": _item_of(text), "why": str(error)}
         self._answers[item.name] = answer
         return ANSWER, {**data, "item": item.name, "value": answer}
@@ -205,8 +213,10 @@ class QuestionnaireRun:
     def handle(self, command: Command) -> Said:
         """Take an answer, or hand the questionnaire in; return what is said of it."""
         if command.order is Order.SUBMIT:
-            return self._inquiry.hand_in(by_whom(command))
-        return self._inquiry.take(command.text, by_whom(command))
+            name, data = self._inquiry.hand_in(by_whom(command))
+        else:
+            name, data = self._inquiry.take(command.text, by_whom(command))
+        return name, {**data, **whence(command)}
 
     def end(self, *, skipped: bool) -> Iterator[Said]:
         """Yield what is said at its end: that it was left, and the stop rules that it meets.

@@ -11,7 +11,14 @@ from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan, next_at
 from labcrane.participants.personal_data import personal
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
-from labcrane.session.commands import Command, Message, Order, by_whom
+from labcrane.session.commands import (
+    Command,
+    Message,
+    Order,
+    beyond_limits,
+    by_whom,
+    whence,
+)
 from labcrane.session.live_settings import FeedbackSettings
 from labcrane.session.pause import DISK, INPUT, Suspenders
 from labcrane.session.practice import WarmUp
@@ -20,6 +27,7 @@ from labcrane.session.resume import COMPLETE, EXAMINER, INCOMPLETE, STOP, Ledger
 from labcrane.session.trial import TrialRun
 
 Ticks = Generator[None, Frame, None]
+
 
 NOT_ASKED = {
     Order.ANSWER: "no questionnaire is asked",
@@ -91,7 +99,7 @@ class Sequencer:
             if not isinstance(command, Command):
                 self._held.report(command)
             elif command.order is Order.DENIED:
-                self._note("page.denied", why=command.text, by=by_whom(command))
+                self._note("page.denied", why=command.text, by=by_whom(command), **whence(command))
             elif (
                 (asking := self._asking) is not None
                 and not asking.over  # and not handed in twice in one tick
@@ -250,10 +258,16 @@ class Sequencer:
     # Orders
 
     def _obey(self, command: Command) -> None:
-        refused = self._refusal(command)
+        # Every door has looked already; the loop must not fall when one has not.
+        beyond = beyond_limits(command)
+        refused = beyond or self._refusal(command)
         # What names a person must not be in the record, not even as a refused note.
-        text = "" if personal(command.text) else command.text
-        about: dict[str, Value] = {"refused": refused, "by": by_whom(command)}
+        text = "" if beyond or personal(command.text) else command.text
+        about: dict[str, Value] = {
+            "refused": refused,
+            "by": by_whom(command),
+            **whence(command),
+        }
         self._note(f"order.{command.order}", text=text, **about)
         if refused is not None:
             return

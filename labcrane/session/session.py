@@ -295,11 +295,10 @@ def _outlets(
     from labcrane.streams.frames import FrameOutlet  # noqa: PLC0415
     from labcrane.streams.outlets import Outlets  # noqa: PLC0415 - loads liblsl
 
-    trials = sum(len(block.trials) for block in plan.blocks)
     outlets = (
         Outlets(this_run, visit.source),
         FrameOutlet(this_run, visit.source),
-        ContextOutlet(this_run, visit.source, trials),
+        ContextOutlet(this_run, visit.source, len(plan.trials)),
     )
     try:
         yield [outlet.push for outlet in outlets]
