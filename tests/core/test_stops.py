@@ -100,7 +100,7 @@ STEPS = st.one_of(
         st.just("practice"),
         st.integers(2, 4),
         ASKED,
-        st.none() | st.tuples(st.integers(1, 3), st.integers(1, 3)),
+        st.tuples(st.integers(1, 3), st.integers(1, 3)),
     ),
     st.builds(Step, kind=st.just("break"), seconds=st.sampled_from([0.0, 0.3, 0.5])),
     st.just(Step(kind="instructions", text="Read this")),
