@@ -1,7 +1,7 @@
 """All feedback processes of a run."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from labcrane.core.records import Run
@@ -62,6 +62,11 @@ class FeedbackProcesses:
             say(f"feedback {report}")
         before, self._news = self._news, []
         return before + news
+
+    def offer(self, streams: Mapping[str, str]) -> None:
+        """Tell all processes the session's streams, by name and description."""
+        for keeper in self.keepers:
+            keeper.offer(streams)
 
     def stop(self) -> None:
         """Stop all processes."""

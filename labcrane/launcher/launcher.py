@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from labcrane.feedback.processes import FeedbackProcesses, log_requests
 from labcrane.launcher.hang_detector import HangDetector
-from labcrane.launcher.session_process import Ended, SessionConfig, serve
+from labcrane.launcher.session_process import Ended, Offered, SessionConfig, serve
 from labcrane.recording.crash_marker import read_whereabouts
 from labcrane.recording.paths import parts
 from labcrane.session.commands import (
@@ -260,6 +260,10 @@ class Launcher:
                 message = pipe.recv()
                 if isinstance(message, Ended):
                     return message
+                if isinstance(message, Offered):
+                    if self._crew:
+                        self._crew.offer(message.streams)
+                    continue
                 if message.name == "session.end":
                     self._owed = str(message.data["owed"])
                 self._console.report(message)
@@ -272,7 +276,7 @@ class Launcher:
         if recorder is None:
             return
         if recorder.watch():
-            self._say("the recorder died and was started again")
+            self._say("a recorder died: the other one has all streams, and a new one was started")
         lost = recorder.lost() if recorder.status else {RECORDER}
         for what in sorted(lost - self._lost):
             send(StreamLost(what))

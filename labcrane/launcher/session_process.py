@@ -7,7 +7,7 @@ from it, as pickled records.
 import queue
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -74,6 +74,13 @@ class Ended:
     error: LabcraneError | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Offered:
+    """Said when the session's streams are there: their descriptions by name."""
+
+    streams: Mapping[str, str]
+
+
 class PipeConsole:
     """The launcher at the other end of a pipe.
 
@@ -85,7 +92,7 @@ class PipeConsole:
     def __init__(self, pipe: Connection) -> None:
         self._pipe = pipe
         self._incoming: queue.SimpleQueue[Message] = queue.SimpleQueue()
-        self._outgoing: queue.SimpleQueue[Event | Ended] = queue.SimpleQueue()
+        self._outgoing: queue.SimpleQueue[Event | Offered | Ended] = queue.SimpleQueue()
         self._sender = threading.Thread(target=self._send, name="to-launcher", daemon=True)
         self._sender.start()
         threading.Thread(target=self._receive, name="from-launcher", daemon=True).start()
@@ -98,6 +105,10 @@ class PipeConsole:
 
     def report(self, event: Event) -> None:
         self._outgoing.put(event)
+
+    def offer(self, streams: Mapping[str, str]) -> None:
+        """Say which streams there are, so that nobody on this computer searches for them."""
+        self._outgoing.put(Offered(streams))
 
     def end(self, ended: Ended) -> None:
         """Say how the session ended, after everything else, and wait until it is sent."""
@@ -130,7 +141,7 @@ def serve(order: SessionConfig, pipe: Connection) -> None:
     # An interrupt from the keyboard reaches the launcher too, which ends the session in order.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     console = PipeConsole(pipe)
-    console.end(_ended(lambda: record(order.visit(), console)))
+    console.end(_ended(lambda: record(order.visit(), console, console.offer)))
 
 
 def _ended(run: Callable[[], None]) -> Ended:

@@ -193,8 +193,15 @@ def finish(visit: Visit) -> SyncReport | None:
     return made[-1].sync_report
 
 
-def record(visit: Visit, console: Console) -> None:
+def record(
+    visit: Visit, console: Console, offer: Callable[[Mapping[str, str]], None] | None = None
+) -> None:
     """Run a session to its end and write its journal.
+
+    Parameters
+    ----------
+    offer
+        Is told the streams of frames and context, by name and description, once they are there.
 
     Raises
     ------
@@ -205,10 +212,16 @@ def record(visit: Visit, console: Console) -> None:
     admission = check_eligibility(visit)
     whole = plan_session(study, visit.participant, visit.session, admission.slot)
     with recording(visit):
-        _record(visit, console, admission, whole)
+        _record(visit, console, admission, whole, offer)
 
 
-def _record(visit: Visit, console: Console, admission: Admission, whole: SessionPlan) -> None:
+def _record(
+    visit: Visit,
+    console: Console,
+    admission: Admission,
+    whole: SessionPlan,
+    offer: Callable[[Mapping[str, str]], None] | None,
+) -> None:
     study = visit.study
     so_far, plan = go_on(visit, whole) if visit.resumed else (None, whole)
     if so_far is None:
@@ -239,7 +252,7 @@ def _record(visit: Visit, console: Console, admission: Admission, whole: Session
         try:
             for event in opening:
                 log.note(event)
-            with _outlets(visit, plan, this_run) as outlets:
+            with _outlets(visit, plan, this_run, offer) as outlets:
                 sinks = [*outlets, _teller(console)]
                 if not visit.fast:
                     sinks.append(OverrunReporter(study.oversight, this_run.rate_hz, log, console))
@@ -367,20 +380,23 @@ def _teller(console: Console) -> Callable[[Frame], None]:
 
 @contextmanager
 def _outlets(
-    visit: Visit, plan: SessionPlan, this_run: Run
+    visit: Visit,
+    plan: SessionPlan,
+    this_run: Run,
+    offer: Callable[[Mapping[str, str]], None] | None,
 ) -> Iterator[list[Callable[[Frame], None]]]:
     if visit.fast:  # its stamps are not the computer's time, so nobody could use the streams
         yield []
         return
-    from labcrane.streams.context import ContextOutlet  # noqa: PLC0415
-    from labcrane.streams.frames import FrameOutlet  # noqa: PLC0415
+    from labcrane.streams.context import CONTEXT, ContextOutlet  # noqa: PLC0415
+    from labcrane.streams.frames import FRAME, FrameOutlet  # noqa: PLC0415
     from labcrane.streams.outlets import Outlets  # noqa: PLC0415 - loads liblsl
 
-    outlets = (
-        Outlets(this_run, visit.source),
-        FrameOutlet(this_run, visit.source),
-        ContextOutlet(this_run, visit.source, len(plan.trials)),
-    )
+    frames = FrameOutlet(this_run, visit.source)
+    about = ContextOutlet(this_run, visit.source, len(plan.trials))
+    outlets = (Outlets(this_run, visit.source), frames, about)
+    if offer:
+        offer({FRAME: frames.description, CONTEXT: about.description})
     try:
         yield [outlet.push for outlet in outlets]
     finally:

@@ -81,6 +81,11 @@ class ContextOutlet:
         self._situation = SessionState(trials=trials)
         self._due = float("-inf")
 
+    @property
+    def description(self) -> str:
+        """The stream as XML: whoever has it needs no search."""
+        return "" if self._outlet is None else str(self._outlet.get_info().as_xml())
+
     def push(self, frame: Frame) -> None:
         """Take up what happened in a frame, and send the context if it changed or is due."""
         for event in frame.events:

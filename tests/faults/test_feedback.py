@@ -92,7 +92,7 @@ def hosts() -> list[psutil.Process]:
 
 
 def runs_feedback(process: psutil.Process) -> bool:
-    return "labcrane.feedback_host" in process.cmdline()
+    return "labcrane.feedback.process" in process.cmdline()
 
 
 @pytest.fixture
