@@ -49,6 +49,7 @@ from .registry.quiet_import import quietly_imported
 from .types import FloatArray
 
 __version__: str
+from .streams.newest import NewestSample
 
 __all__ = [
     "ACTUATOR_PRESETS",
@@ -82,6 +83,7 @@ __all__ = [
     "Machine",
     "MeshFile",
     "Movement",
+    "NewestSample",
     "Offer",
     "Participant",
     "Phase",
