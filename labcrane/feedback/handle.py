@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from labcrane.feedback.config import FeedbackConfig
 from labcrane.processes.handle import Patience, ProcessHandle
-from labcrane.session.commands import Command, Order
+from labcrane.session.commands import FeedbackLost, FeedbackReady
 
 MODULE = "labcrane.feedback.process"
 
@@ -75,7 +75,7 @@ class FeedbackHandle:
         self._order = replace(self._order, streams=streams)
         self._process.tell(streams)
 
-    def watch(self) -> list[Command]:
+    def watch(self) -> list[FeedbackLost | FeedbackReady]:
         """Look after the process; return what the session is to be told."""
         if self.given_up:
             return []
@@ -84,21 +84,21 @@ class FeedbackHandle:
         if self._presents and not self._told:
             self._told = True
             self._process.worked()
-            return [Command(Order.MENDED, f"{self.name}: {self.facts}")]
+            return [FeedbackReady(self.name, self.facts)]
         return []
 
     def stop(self) -> None:
         """Let it close its windows and devices."""
         self._process.stop()
 
-    def _replace(self, why: str) -> list[Command]:
+    def _replace(self, why: str) -> list[FeedbackLost | FeedbackReady]:
         self._process.kill()
         why = self._failed or why  # what it said with its last breath
         self._begin_anew()
         if not self._process.restart(self._order.as_json()):
             self.given_up = True
-            return [Command(Order.LEFT_OUT, f"{self.name}: {why}; it is left out")]
-        return [Command(Order.FAILED, f"{self.name}: {why}")]
+            return [FeedbackLost(self.name, f"{why}; it is left out", left_out=True)]
+        return [FeedbackLost(self.name, why)]
 
     def _take(self, message: Mapping[str, Any]) -> None:
         self.presented = message.get("beat", self.presented)

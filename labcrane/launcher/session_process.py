@@ -1,6 +1,7 @@
 """The session as a process of its own, talking to its launcher over one pipe.
 
-The pipe carries commands to the session, and events and how it ended from it, as pickled records.
+The pipe carries messages to the session, as JSON of a declared size, and events and how it ended
+from it, as pickled records.
 """
 
 import queue
@@ -15,9 +16,20 @@ from labcrane.core.records import Event
 from labcrane.errors import LabcraneError
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
-from labcrane.session.commands import Command, Order
+from labcrane.session.commands import (
+    MOST_BYTES,
+    Command,
+    LauncherGone,
+    Message,
+    MessageError,
+    Order,
+    decode,
+)
 from labcrane.session.resume import Policy
 from labcrane.session.session import Visit, record
+
+MOST_A_TICK = 16
+"""Orders taken up in one tick; what else has come waits for the next."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,27 +84,23 @@ class Offered:
 class PipeConsole:
     """The launcher at the other end of a pipe.
 
-    A thread sends, so that a launcher that does not read never makes the loop wait. When the
-    launcher is gone the session ends: nobody could stop it any more.
+    One thread sends and one receives, so that a launcher that does not read, or stops in the
+    middle of a message, never makes the loop wait. When the launcher is gone the session ends:
+    nobody could stop it any more.
     """
 
     def __init__(self, pipe: Connection) -> None:
         self._pipe = pipe
-        self._alone = False
+        self._incoming: queue.SimpleQueue[Message] = queue.SimpleQueue()
         self._outgoing: queue.SimpleQueue[Event | Offered | Ended] = queue.SimpleQueue()
         self._sender = threading.Thread(target=self._send, name="to-launcher", daemon=True)
         self._sender.start()
+        threading.Thread(target=self._receive, name="from-launcher", daemon=True).start()
 
-    def commands(self) -> list[Command]:
-        given: list[Command] = []
-        if self._alone:
-            return given
-        try:
-            while self._pipe.poll():
-                given.append(self._pipe.recv())
-        except (EOFError, OSError):
-            self._alone = True
-            given += [Command(Order.NOTE, "the launcher is gone"), Command(Order.END)]
+    def commands(self) -> list[Message]:
+        given: list[Message] = []
+        while len(given) < MOST_A_TICK and not self._incoming.empty():  # not in the usual tick
+            given.append(self._incoming.get_nowait())
         return given
 
     def report(self, event: Event) -> None:
@@ -106,6 +114,16 @@ class PipeConsole:
         """Say how the session ended, after everything else, and wait until it is sent."""
         self._outgoing.put(ended)
         self._sender.join()
+
+    def _receive(self) -> None:
+        while True:
+            try:
+                self._incoming.put(decode(self._pipe.recv_bytes(MOST_BYTES)))
+            except MessageError as error:
+                self._incoming.put(Command(Order.DENIED, str(error)))
+            except (EOFError, OSError):
+                self._incoming.put(LauncherGone())
+                return
 
     def _send(self) -> None:
         while True:

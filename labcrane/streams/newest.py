@@ -20,6 +20,7 @@ SILENT_S = 5.0
 """A stream that has sent nothing for so long is looked for: its program may have been replaced."""
 
 MOST = 4096
+MOST_A_TICK = 64
 
 Refusal = str
 """Why a stream that was found is of no use, for people."""
@@ -80,8 +81,13 @@ class NewestSample:
         """Wait until the stream is received, at most so long; whether it is."""
         return self._connected.wait(seconds)
 
-    def pull(self) -> tuple[Sequence[Sequence[Any]], Sequence[float]]:
+    def pull(self, most: int = MOST) -> tuple[Sequence[Sequence[Any]], Sequence[float]]:
         """Return the samples that have come since the last call, and their stamps; does not wait.
+
+        Parameters
+        ----------
+        most
+            More than that are left for the next call: no sender can make a call take long.
 
         Returns
         -------
@@ -90,27 +96,21 @@ class NewestSample:
         """
         import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
 
-        samples: list[Sequence[Any]] = []
-        stamps: list[float] = []
-        inlet = self._inlet
-        while inlet is not None:
-            try:
-                chunk, times = inlet.pull_chunk(timeout=0.0, max_samples=MOST)
-            except pylsl.util.LostError:
-                self._inlet = None
-                self._lost.set()
-                break
-            samples += chunk
-            stamps += times
-            if len(times) < MOST:
-                break
+        if (inlet := self._inlet) is None:
+            return [], []
+        try:
+            samples, stamps = inlet.pull_chunk(timeout=0.0, max_samples=most)
+        except pylsl.util.LostError:
+            self._inlet = None
+            self._lost.set()
+            return [], []
         if stamps:
             self._came = time.monotonic()
         return samples, stamps
 
     def newest(self) -> Sequence[Any] | None:
         """Return the newest sample since the last call; None when none has come. Does not wait."""
-        samples, _ = self.pull()
+        samples, _ = self.pull(MOST_A_TICK)
         return samples[-1] if samples else None
 
     def time_correction(self, wait_s: float) -> float:

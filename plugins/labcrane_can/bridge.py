@@ -1,5 +1,6 @@
 """From a CAN bus to the open gateway protocol and back (docs/gateway.md)."""
 
+import math
 import time
 from collections.abc import Callable
 from types import TracebackType
@@ -87,8 +88,8 @@ class Bridge:
     def _send_back(self) -> None:
         if (sample := self._flow.newest()) is None:
             return
-        for flow, valve in zip(sample, self._valves, strict=True):
-            if valve is not None:
+        for flow, valve in zip(sample, self._valves, strict=False):
+            if valve is not None and isinstance(flow, float) and math.isfinite(flow):
                 percent = flow * FULL_PERCENT
                 self._listener.send(
                     *encode_flow(ESTIMATED, valve, percent, self._settings.own_node)

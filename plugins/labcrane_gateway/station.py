@@ -93,7 +93,14 @@ class Station(InputDevice):
 
     def _accept(self, info: "pylsl.StreamInfo") -> str | None:
         """Return why a station's stream is of no use; None when it commands all joints."""
+        import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
+
         labels = info.get_channel_labels() or []
+        if info.channel_format() == pylsl.cf_string or len(labels) > info.channel_count():
+            return (
+                f"it has {info.channel_count()} channels of format {info.channel_format()}, and "
+                f"{len(labels)} names; send numbers, and a name for each channel"
+            )
         if missing := [joint for joint in self._joints if joint not in labels]:
             return (
                 f"its channels are {', '.join(map(str, labels)) or 'not named'}; the machine also "

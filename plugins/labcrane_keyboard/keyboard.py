@@ -36,6 +36,7 @@ class Keyboard(InputDevice):
         self._pairs: list[tuple[int, int]] = []
         self._came = -math.inf
         self._seen = False
+        self._complaint = ""
         self._keys: NewestSample | None = None
 
     def open(self, run: Run) -> None:
@@ -74,8 +75,8 @@ class Keyboard(InputDevice):
 
     def _trouble(self) -> str:
         view, wait = self._settings.view, self._settings.timeout_s
-        if self._keys is not None and self._keys.complaint:
-            return self._keys.complaint
+        if complaint := self._complaint or (self._keys.complaint if self._keys else ""):
+            return complaint
         if self._seen:
             return f"view {view!r} has sent no keys for {wait:g} s; its window may be closed"
         keys = ", ".join(key for pair in self._settings.axes.values() for key in pair)
@@ -87,13 +88,29 @@ class Keyboard(InputDevice):
             return
         if not self._seen:  # what there is now counts from now: the first sample is on its way
             self._seen, self._came = True, now
-        if (newest := keys.newest()) is not None:
-            self._came = now
-            self._wanted = [newest[more] - newest[less] for less, more in self._pairs]
+        if (newest := keys.newest()) is None:
+            return
+        states = [newest[key] for pair in self._pairs for key in pair]
+        wrong = [state for state in states if not 0.0 <= state <= 1.0]  # NaN too
+        if wrong:
+            self._complaint = (
+                f"view {self._settings.view!r} sent the key state {wrong[0]:g}, which is not "
+                "within 0 and 1"
+            )
+            return
+        self._came, self._complaint = now, ""
+        self._wanted = [newest[more] - newest[less] for less, more in self._pairs]
 
     def _accept(self, info: "pylsl.StreamInfo") -> str | None:
         """Return why a view's stream is of no use; None when it sends all the keys."""
+        import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
+
         labels = info.get_channel_labels() or []
+        if info.channel_format() == pylsl.cf_string or len(labels) > info.channel_count():
+            return (
+                f"stream {self._stream!r} has {info.channel_count()} channels of format "
+                f"{info.channel_format()}, and {len(labels)} names; it is no view's"
+            )
         sent = [label.removeprefix("key.") for label in labels if label.startswith("key.")]
         missing = [key for pair in self._settings.axes.values() for key in pair if key not in sent]
         if missing:
