@@ -37,14 +37,14 @@ def correction_of(corrected: Corrected, treatment: Treatment) -> Correction:
         for part in corrected.segments
     )
     quality: dict[str, float | str] = {
-        name: float(value) for name, value in asdict(corrected.quality).items()
+        name: value if isinstance(value, str) else float(value)
+        for name, value in asdict(corrected.quality).items()
     }
     quality |= {
         "segments": segments,
         "dejitter": treatment.way.value,
         "transport_s": treatment.transport_s,
         "latency_s": treatment.latency_s,
-        "bandwidth_s": treatment.bandwidth_s,
     }
     return Correction(corrected.time, quality)
 

@@ -77,7 +77,7 @@ def test_samples_that_a_sources_counter_left_out_are_judged():
     report = judged(recorded(clock=SourceClock(ppm=40.0), notes=notes))
     (finding,) = report.findings
     assert (finding.verdict, report.quality.dropped) == (Verdict.FAIL, 402)
-    assert finding.text == "402 samples are missing by the source's counter"
+    assert finding.text == "402 samples are missing, by its counter or between its stamps"
 
 
 def test_what_is_not_known_fails():
@@ -128,7 +128,7 @@ def test_consolidation_gets_times_and_flat_figures():
     correction = correction_of(resync(stream), treatment_of(stream.header))
     assert len(correction.time) == 30_000
     assert correction.quality["drift_ppm"] == pytest.approx(100.0, abs=0.5)
-    assert correction.quality["dejitter"] == "least_squares"
+    assert correction.quality["dejitter"] == "auto"
     assert all(isinstance(value, float | str) for value in correction.quality.values())
 
 
