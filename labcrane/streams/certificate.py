@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labcrane.streams.quality import Quality
+from labcrane.streams.sync.quality import Quality
 
 CARRIES = (
     (0.001, "single-trial ERP, averaged ERP, gaze, movement"),

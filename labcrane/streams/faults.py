@@ -5,7 +5,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from labcrane.streams.quality import Quality
+from labcrane.streams.sync.quality import Quality
 
 LONG_S = 1.0
 SILENT_S = 5.0

@@ -5,12 +5,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from labcrane.arrays import FloatArray
-from labcrane.streams.epochs import REMOTE, Epoch
-from labcrane.streams.offset import SURE, OffsetCurve, fit
-from labcrane.streams.quality import Basis, Segment
-from labcrane.streams.raw import RawStream
 from labcrane.streams.smoother import smooth
+from labcrane.streams.sync.epochs import REMOTE, Epoch
+from labcrane.streams.sync.offset import SURE, OffsetCurve, fit
+from labcrane.streams.sync.quality import Basis, Segment
+from labcrane.streams.sync.raw import RawStream
+from labcrane.types import FloatArray
 
 WRONG_CLOCK_S = 0.25
 """Samples that arrive this much sooner than others ever did were stamped by another clock."""
@@ -35,7 +35,7 @@ ARRIVAL_SCATTERS_S = (0.0005, 0.002, 0.01, 0.05)
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class PlacedObject:
     """Times on our clock before anything is evened.
 
     Attributes
@@ -64,7 +64,7 @@ class Placed:
 _Piece = tuple[int, int, Epoch, OffsetCurve | None]
 
 
-def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> Placed:
+def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> PlacedObject:
     """Place every sample, by its own clock's probes, else by arrivals, else not at all (NaN)."""
     curves = _curves(stretches)
     arrival = raw.arrival()
@@ -82,7 +82,7 @@ def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> Placed:
     segments = tuple(_segment(*piece, known=known) for piece in _joined(pieces))
     _blur_steps(segments, error)
     probed = tuple(curve for curve in curves if curve is not None)
-    return Placed(time, error, segments, probed, least, whose)
+    return PlacedObject(time, error, segments, probed, least, whose)
 
 
 def _curves(stretches: list[Epoch]) -> list[OffsetCurve | None]:

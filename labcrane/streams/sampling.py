@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from labcrane.arrays import FloatArray
+from labcrane.types import FloatArray
 
 FEW = 20
 BLOCKS = 200

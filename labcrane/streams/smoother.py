@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from labcrane.arrays import FloatArray
 from labcrane.streams.clock_curve import Smoothed
+from labcrane.types import FloatArray
 
 MICRO = 1e6
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from labcrane.streams.correction import Treatment
 from labcrane.streams.faults import Fault
-from labcrane.streams.raw import RawStream
+from labcrane.streams.sync.correction import Treatment
+from labcrane.streams.sync.raw import RawStream
 
 
 @dataclass(frozen=True)

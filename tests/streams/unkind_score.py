@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from streams.unkind import ROWS, Drawn
 
-from labcrane.finding import Verdict, worst
-from labcrane.streams.correction import correct
+from labcrane.core.findings import Verdict, worst
 from labcrane.streams.faults import Fault, faults
-from labcrane.streams.stream_report import judge_quality
-from labcrane.streams.verdict import Limits
+from labcrane.streams.sync.correction import correct
+from labcrane.streams.sync.limits import Limits
+from labcrane.streams.sync.stream_report import judge_quality
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,268 @@
+"""Time stamps of other clocks, mapped onto ours after the fact.
+
+The usual way pairs each clock offset with the time it was polled, fits one line through a whole
+recording, and is wrong by drift times age, by whatever a clock wanders, and by whole steps. Here,
+in this order:
+
+1. split where the clock changed (``epochs``),
+2. for each clock, follow its probes in the source's own time, each trusted by its round trip
+   (``offset``, ``smoother``), and place its samples (``placement``),
+3. see how it sampled and stamped (``sampling``), and even the stamps only where that is shown to
+   help (``dejitter``),
+4. subtract the stated transport delay and device latency.
+
+Each step adds what it leaves open to the uncertainty of every sample.
+
+Nothing recorded is altered, and nothing here depends on when it runs: it can be repeated for ever.
+"""
+
+import itertools
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from labcrane.errors import RecordingError
+from labcrane.streams.placement import PlacedObject, place
+from labcrane.streams.sampling import Sampling, examine
+from labcrane.streams.sync.dejitter import Dejitter, even, follow_sample_clock
+from labcrane.streams.sync.epochs import REMOTE, RTT, epochs
+from labcrane.streams.sync.quality import (
+    Basis,
+    Quality,
+    Segment,
+    clock_changes,
+    probe_age,
+    worst_second,
+)
+from labcrane.streams.sync.raw import RawStream
+from labcrane.types import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Treatment:
+    """How a stream's stamps are to be read.
+
+    Attributes
+    ----------
+    rate_hz
+        Nominal rate; 0 for irregular streams.
+    can_drop_samples
+        Whether the source may leave out samples, as cameras do.
+    dejitter
+        Whether stamps are made even; markers never are, nor streams that may drop samples.
+    transport_s
+        Least time from sampling to stamping, for sources stamped when sent. It cannot be observed.
+    latency_s
+        Stated fixed latency of the device.
+    """
+
+    rate_hz: float = 0.0
+    can_drop_samples: bool = False
+    dejitter: Dejitter = Dejitter.AUTO
+    transport_s: float = 0.0
+    latency_s: float = 0.0
+
+    @property
+    def way(self) -> Dejitter:
+        """The dejitter that takes place."""
+        if self.rate_hz <= 0.0 or self.can_drop_samples:
+            return Dejitter.NONE
+        return self.dejitter
+
+
+PAUSE_S = 0.5
+
+_Sampled = tuple[Segment, Sampling]
+
+
+@dataclass(frozen=True, slots=True)
+class Corrected:
+    """Times on our clock, and how right they are.
+
+    Attributes
+    ----------
+    time
+        In seconds, shape ``(n,)``; NaN where nothing is known.
+    error
+        How far each may be off at 95 %, in seconds, shape ``(n,)``.
+    uneven
+        The times as they are without evening, in seconds, shape ``(n,)``.
+    segments
+        Stretches of one clock, and what each rests on.
+    quality
+        The same summed up.
+    """
+
+    time: FloatArray
+    error: FloatArray
+    uneven: FloatArray
+    segments: tuple[Segment, ...] = field(default_factory=tuple)
+    quality: Quality = field(default_factory=Quality)
+
+    @property
+    def basis(self) -> npt.NDArray[np.uint8]:
+        """What each sample's time rests on, shape ``(n,)``: place in :class:`Basis`."""
+        order = list(Basis)
+        found = np.full(len(self.time), order.index(Basis.NOTHING), dtype=np.uint8)
+        for segment in self.segments:
+            found[segment.start : segment.stop] = order.index(segment.basis)
+        return found
+
+
+def correct(raw: RawStream, treatment: Treatment, end: float | None = None) -> Corrected:
+    """Map a stream's stamps onto our clock.
+
+    Parameters
+    ----------
+    end
+        When the recording ended, on our clock, if that is known: a source may have died before.
+    """
+    if treatment.transport_s and treatment.way is not Dejitter.ENVELOPE:
+        raise RecordingError(
+            f"a least transport delay of {treatment.transport_s} s needs dejitter 'envelope', "
+            "which finds the least delayed samples; give the mean delay as latency otherwise"
+        )
+    if not len(raw.stamps):
+        nothing = np.empty(0)
+        return Corrected(nothing, nothing, nothing, quality=Quality(**_trips(raw)))
+    regular = treatment.rate_hz > 0.0
+    placed = place(raw, epochs(raw, regular=regular), regular=regular)
+    sampled = _examined(raw, placed) if regular else []
+    time, error = _evened(raw, placed, sampled, treatment)
+    shift = treatment.transport_s + treatment.latency_s
+    quality = _summed(raw, placed, sampled, (time, error), end)
+    return Corrected(time - shift, error, placed.time - shift, placed.segments, quality)
+
+
+def _examined(raw: RawStream, placed: PlacedObject) -> list[_Sampled]:
+    """Return how each clock's samples were sampled."""
+    arrival = raw.arrival()
+    found = []
+    for segment in placed.segments:
+        part = slice(segment.start, segment.stop)
+        if segment.basis is not Basis.NOTHING:
+            sampling = examine(
+                raw.stamps[part],
+                placed.time[part],
+                None if arrival is None else arrival[part],
+                None if raw.index is None else raw.index[part],
+            )
+            found.append((segment, sampling))
+    return found
+
+
+def _evened(
+    raw: RawStream, placed: PlacedObject, sampled: list[_Sampled], treatment: Treatment
+) -> tuple[FloatArray, FloatArray]:
+    """Return times made even where that helps or is asked for, and errors with what remains."""
+    time, error = placed.time.copy(), placed.error.copy()
+    way = treatment.way
+    declared = treatment.transport_s != 0.0 or treatment.latency_s != 0.0
+    for segment, sampling in sampled:
+        part = slice(segment.start, segment.stop)
+        if way is Dejitter.AUTO and sampling.steady and segment.basis is Basis.PROBES:
+            time[part], doubt = follow_sample_clock(placed.time[part], sampling.index)
+            error[part] += doubt
+            if sampling.uncounted:
+                error[part] += sampling.noise_s / 2.0
+            if sampling.late_stamps and not declared:
+                error[part] += sampling.noise_s
+        elif way in {Dejitter.LEAST_SQUARES, Dejitter.ENVELOPE}:
+            index = sampling.index if raw.index is None else raw.index[part]
+            time[part] = even(placed.time[part], index, way)
+            error[part] += sampling.noise_s / 4.0  # asked for: how right it is was not tested
+        else:
+            error[part] += sampling.noise_s
+    return time, error
+
+
+def _trips(raw: RawStream) -> dict[str, Any]:
+    trips = raw.probes[:, RTT]
+    p50, p95 = np.quantile(trips, (0.5, 0.95)) if len(trips) else (np.nan, np.nan)
+    return {"rtt_p50_s": float(p50), "rtt_p95_s": float(p95)}
+
+
+def _summed(
+    raw: RawStream,
+    placed: PlacedObject,
+    sampled: list[_Sampled],
+    result: tuple[FloatArray, FloatArray],
+    end: float | None,
+) -> Quality:
+    """Sum up how right the corrected times are."""
+    time, error = result
+    segments, curves = placed.segments, placed.curves
+    longest = max(segments, key=lambda part: part.stop - part.start)
+    probed = longest.basis is Basis.PROBES
+    steps, restarts, sleeps = clock_changes(segments, placed.time)
+    known = [curve.probes[:, REMOTE] for curve in curves]
+    finite = placed.time[np.isfinite(placed.time)]
+    last = float(finite.max()) if len(finite) else np.nan
+    return Quality(
+        hidden_s=max((curve.least_rtt / 2.0 for curve in curves), default=np.nan),
+        drift_ppm=longest.drift_ppm if probed else np.nan,
+        residual_s=longest.residual_s if probed else np.nan,
+        probe_age_s=probe_age(raw.stamps, segments, np.concatenate([*known, np.empty(0)])),
+        lag_s=placed.least_lag,
+        steps=steps,
+        restarts=restarts,
+        sleeps=sleeps,
+        slews=sum(len(curve.slews()) for curve in curves),
+        congested_s=sum(curve.congested_s() for curve in curves),
+        silent_s=0.0 if end is None or np.isnan(last) else max(float(end - last), 0.0),
+        unsure=sum(segment.unsure for segment in segments),
+        unprobed=sum(s.stop - s.start for s in segments if s.basis is not Basis.PROBES),
+        whose=placed.whose,
+        **_trips(raw),
+        **_errors(time, error, placed.time),
+        **_flow(placed, sampled),
+    )
+
+
+def _errors(time: FloatArray, error: FloatArray, uneven: FloatArray) -> dict[str, Any]:
+    """Return how far the times may be off, and how far evening moved them."""
+    known = np.isfinite(time) & np.isfinite(error)
+    if not known.any():
+        return {}
+    p50, p95 = np.quantile(error[known], (0.5, 0.95))
+    moved, furthest = np.quantile(np.abs(time - uneven)[known], (0.95, 1.0))
+    worst, worst_at = worst_second(time, error)
+    return {
+        "error_p50_s": float(p50),
+        "error_p95_s": float(p95),
+        "worst_s": worst,
+        "worst_at_s": worst_at,
+        "moved_p95_s": float(moved),
+        "moved_max_s": float(furthest),
+    }
+
+
+def _flow(placed: PlacedObject, sampled: list[_Sampled]) -> dict[str, Any]:
+    """Return what the segments' sampling says together."""
+    if not sampled:
+        known = placed.time[np.isfinite(placed.time)]
+        span = float(np.ptp(known)) if len(known) else 0.0
+        return {"rate_hz": (len(known) - 1) / span if span > 0.0 else np.nan}
+    each = [sampling for _, sampling in sampled]
+    _, most = max(sampled, key=lambda pair: pair[0].stop - pair[0].start)
+    first, last = most.rates_hz or (np.nan, np.nan)
+    pauses = [
+        float(placed.time[after.start] - placed.time[before.stop - 1])
+        for before, after in itertools.pairwise(placed.segments)
+    ]
+    pauses = [pause for pause in pauses if pause > PAUSE_S]
+    return {
+        "rate_hz": 1.0 / most.period,
+        "first_rate_hz": first,
+        "last_rate_hz": last,
+        "gaps": sum(one.gaps for one in each) + len(pauses),
+        "longest_gap_s": max([*(one.longest_gap_s for one in each), *pauses]),
+        "dropped": sum(one.missing for one in each),
+        "disordered": sum(one.disordered for one in each),
+        "stalls": sum(one.stalls for one in each),
+        "longest_stall_s": max(one.longest_stall_s for one in each),
+        "noise_s": most.noise_s,
+        "late_stamps": int(most.late_stamps),
+    }

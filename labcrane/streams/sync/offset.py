@@ -1,0 +1,118 @@
+"""Offset of a clock as a smooth function of its own time, and how well it is known."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from labcrane.streams.clock_curve import Smoothed
+from labcrane.streams.smoother import smooth
+from labcrane.streams.sync.epochs import OFFSET, REMOTE, RTT
+from labcrane.types import FloatArray
+
+SURE = 1.96
+"""Standard deviations on each side of which 95 % lie."""
+
+SLEW = 1e-4
+"""A lasting change of rate beyond this, in seconds per second, no crystal does by itself."""
+
+AROUND = 5
+ONE_WAY = 0.15
+
+CONGESTED_S = 1e-3
+LONG = 5
+
+
+@dataclass(frozen=True, slots=True)
+class OffsetCurve:
+    """What must be added to a clock to have ours, at any of its times.
+
+    Attributes
+    ----------
+    smoothed
+        At the probes.
+    probes
+        What it rests on, in the order of the clock, shape ``(n, 4)``.
+    least_rtt
+        The shortest round trip: half of it bounds what a lasting asymmetry of the path can hide.
+    """
+
+    smoothed: Smoothed
+    probes: FloatArray
+    least_rtt: float
+
+    def __call__(self, times: FloatArray) -> FloatArray:
+        """Return the offset at times of the clock, shape ``(n,)``; goes on straight beyond."""
+        return self.smoothed.at(times)[0]
+
+    def with_error(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the offset, and how far it may be off at 95 %, in seconds, shape ``(n,)`` each."""
+        offset, deviation = self.smoothed.at(times)
+        # Where every exchange was long, what is known of the ways rests on a model of them.
+        around = np.minimum.reduceat(
+            np.pad(self.excess, AROUND, mode="edge"),
+            np.column_stack([k := np.arange(len(self.probes)), k + 2 * AROUND]).ravel(),
+        )[::2]
+        held_up = ONE_WAY * np.interp(times, self.smoothed.time, around)
+        return offset, SURE * deviation + self.least_rtt / 2.0 + held_up
+
+    @property
+    def slope(self) -> float:
+        """Usual change of the offset, in seconds per second."""
+        return float(np.median(self.smoothed.skew))
+
+    @property
+    def residuals(self) -> FloatArray:
+        """How far the probes lie from the curve, in seconds, shape ``(n,)``."""
+        return np.asarray(self.probes[:, OFFSET] - self.smoothed.offset)
+
+    @property
+    def excess(self) -> FloatArray:
+        """By how much each round trip was longer than the shortest, in seconds, shape ``(n,)``."""
+        return np.asarray(self.probes[:, RTT] - self.least_rtt)
+
+    def slews(self) -> list[tuple[float, float]]:
+        """Return when, in the clock's time, its rate was changed at once, and by how much."""
+        time, skew = self.smoothed.time, self.smoothed.skew
+        free = np.flatnonzero(self.smoothed.walk > 4.0 * np.median(self.smoothed.walk) + 1e-12)
+        found: list[tuple[float, float]] = []
+        last = -LONG
+        for k in map(int, free):
+            before, after = skew[max(k - LONG, 0) : k], skew[k + 2 : k + 2 + LONG]
+            if len(before) > 1 and len(after) > 1 and k - last >= LONG:
+                change = float(np.median(after) - np.median(before))
+                if abs(change) > SLEW:
+                    found.append((float(time[k]), change))
+                    last = k
+        return found
+
+    def congested_s(self) -> float:
+        """Return for how long round trips were far longer than usual, one probe after the other."""
+        excess = self.excess
+        long = excess > CONGESTED_S + LONG * float(np.quantile(excess, 0.1))
+        total = 0.0
+        edges = np.flatnonzero(np.diff(np.r_[0, long.astype(int), 0]))
+        for start, stop in edges.reshape(-1, 2):
+            if stop - start >= LONG:
+                total += float(self.probes[stop - 1, REMOTE] - self.probes[start, REMOTE])
+        return total
+
+
+def fit(probes: FloatArray, usual_slope: float) -> OffsetCurve:
+    """Fit a clock's offset to its probes.
+
+    In the clock's own time at the probe and not in the time when the probe was looked at: pairing
+    an offset with the moment it is read biases it by drift times age. A probe is trusted by how
+    much longer its round trip was than the shortest of all, as NTP's huff-n'-puff filter does:
+    that bounds what congestion on one way can have added.
+
+    Parameters
+    ----------
+    probes
+        Of one clock, at least one, shape ``(n, 4)``.
+    usual_slope
+        Of other clocks of this source: what a few probes in a short time leave open.
+    """
+    ordered = probes[np.argsort(probes[:, REMOTE], kind="stable")]
+    least = float(ordered[:, RTT].min())
+    smoothed = smooth(ordered[:, REMOTE], ordered[:, OFFSET], ordered[:, RTT] - least, usual_slope)
+    return OffsetCurve(smoothed, ordered, least)

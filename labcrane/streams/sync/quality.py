@@ -1,0 +1,176 @@
+"""How right a stream's corrected times are."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from labcrane.types import FloatArray
+
+ASLEEP_S = 1.0
+"""Shorter than this no computer sleeps."""
+
+LONG_PAUSE = 8.0
+
+
+class Basis(StrEnum):
+    """What a stretch's offset rests on."""
+
+    PROBES = "probes"
+    ARRIVALS = "arrivals"  # no probe of this clock: right within the travel time's scatter
+    NOTHING = "nothing"  # neither: times are NaN
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """Samples ``start`` to ``stop`` of one clock, and how well it is known.
+
+    ``unsure`` counts samples that may belong to the clock before. ``drift_ppm`` is positive for a
+    source whose clock is fast. Residuals are the median deviation of probes from the curve.
+    ``step_s`` is by how much the offset changed at its start, ``told`` whether liblsl said why.
+    """
+
+    start: int
+    stop: int
+    basis: Basis
+    probes: int = 0
+    unsure: int = 0
+    drift_ppm: float = 0.0
+    residual_s: float = 0.0
+    step_s: float = 0.0
+    told: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """How right a stream's corrected times are. NaN where it is not known. Times are seconds.
+
+    Attributes
+    ----------
+    error_p50_s, error_p95_s
+        The stated uncertainty, at 95 %, of half of the samples and of nearly all.
+    worst_s, worst_at_s
+        The largest uncertainty over a second, and when that second begins, on our clock.
+    hidden_s
+        Half of the shortest round trip, which a lasting asymmetry of the path may hide.
+    drift_ppm
+        Of the clock that stamped most samples; positive when it is fast.
+    residual_s
+        Median absolute deviation of its probes from the curve, as a standard deviation.
+    probe_age_s
+        Longest time from a sample to the nearest probe of its clock.
+    rtt_p50_s, rtt_p95_s
+        Round trips of all probes.
+    rate_hz
+        Samples per second while they flowed.
+    first_rate_hz, last_rate_hz
+        The rates before and after it changed; NaN where it did not.
+    lag_s
+        Shortest time from a stamp to its sample's arrival: far off when the stamps are of a clock
+        that LSL knows nothing of.
+    gaps, longest_gap_s
+        Interruptions of regular streams.
+    dropped
+        Samples that are missing, by the source's own counter or by whole periods between stamps.
+    disordered
+        Samples that came after one stamped later.
+    stalls, longest_stall_s
+        How often samples came in a burst after a pause, and how late.
+    noise_s
+        By how much stamps scatter that were not taken with the samples, at 95 %.
+    late_stamps
+        1 where chunks are stamped when they are sent.
+    moved_p95_s, moved_max_s
+        By how much evening moved samples.
+    steps, restarts, sleeps, slews
+        How often its clock jumped, its program began anew, its computer slept, its clock was turned
+        faster or slower.
+    congested_s
+        How long probes took far longer than usual, one after the other.
+    silent_s
+        From its last sample to the end of the recording.
+    unsure, unprobed
+        Samples near a step that may be of the other clock; samples of clocks never probed.
+    whose
+        Whose clock the stamps are of, where it is not the probed one: "receiver" or "foreign".
+    """
+
+    error_p50_s: float = np.nan
+    error_p95_s: float = np.nan
+    worst_s: float = np.nan
+    worst_at_s: float = np.nan
+    hidden_s: float = np.nan
+    drift_ppm: float = np.nan
+    residual_s: float = np.nan
+    probe_age_s: float = np.nan
+    rtt_p50_s: float = np.nan
+    rtt_p95_s: float = np.nan
+    rate_hz: float = np.nan
+    first_rate_hz: float = np.nan
+    last_rate_hz: float = np.nan
+    lag_s: float = np.nan
+    gaps: int = 0
+    longest_gap_s: float = 0.0
+    dropped: int = 0
+    disordered: int = 0
+    stalls: int = 0
+    longest_stall_s: float = 0.0
+    noise_s: float = 0.0
+    late_stamps: int = 0
+    moved_p95_s: float = 0.0
+    moved_max_s: float = 0.0
+    steps: int = 0
+    restarts: int = 0
+    sleeps: int = 0
+    slews: int = 0
+    congested_s: float = 0.0
+    silent_s: float = 0.0
+    unsure: int = 0
+    unprobed: int = 0
+    whose: str = ""
+
+
+def worst_second(time: FloatArray, error: FloatArray) -> tuple[float, float]:
+    """Return the largest error over a second, and when that second begins; NaN if unknown."""
+    known = np.isfinite(time) & np.isfinite(error)
+    if not known.any():
+        return np.nan, np.nan
+    k = int(np.argmax(np.where(known, error, -np.inf)))
+    return float(error[k]), float(np.floor(time[k]))
+
+
+def probe_age(stamps: FloatArray, segments: Sequence[Segment], known: FloatArray) -> float:
+    """Return the longest time from a sample to a probe of its clock; NaN without probes."""
+    probed = [segment for segment in segments if segment.basis is Basis.PROBES]
+    if not len(known) or not probed:
+        return np.nan
+    known = np.sort(known)
+    ages = []
+    for segment in probed:
+        part = stamps[segment.start : segment.stop]
+        k = np.clip(np.searchsorted(known, part), 1, max(len(known) - 1, 1))
+        after = known[np.minimum(k, len(known) - 1)]
+        ages.append(np.minimum(np.abs(part - known[k - 1]), np.abs(part - after)).max())
+    return float(max(ages))
+
+
+def clock_changes(segments: Sequence[Segment], time: FloatArray) -> tuple[int, int, int]:
+    """Return how often the clock stepped, its program began anew, its computer slept.
+
+    While a computer sleeps its clock stands still: it falls behind by as long as nothing comes.
+    """
+    steps = restarts = sleeps = 0
+    steps_s = np.diff(time)
+    steps_s = steps_s[np.isfinite(steps_s)]
+    usual = float(np.median(steps_s)) if len(steps_s) else np.nan
+    for segment in segments:
+        if segment.told:
+            restarts += 1
+        elif segment.step_s and segment.start:
+            pause = float(time[segment.start] - time[segment.start - 1])
+            if segment.step_s > ASLEEP_S and pause > max(segment.step_s - 0.5, LONG_PAUSE * usual):
+                sleeps += 1
+            else:
+                steps += 1
+    return steps, restarts, sleeps
