@@ -1,6 +1,9 @@
 """The public names, and the modules from which they are imported."""
 
+from .analysis.codebook import codebook_of
 from .analysis.cohort import Participant
+from .analysis.exporter import Exporter
+from .analysis.measures import measures_of
 from .analysis.movements import Movement, movements
 from .core.clock import Tick
 from .core.findings import Finding, Verdict
@@ -18,16 +21,8 @@ from .core.records import (
     TrialStatus,
     Value,
 )
-from .core.roles import (
-    Controller,
-    Cue,
-    Dynamics,
-    Exporter,
-    Feedback,
-    InputDevice,
-    Questionnaire,
-    Task,
-)
+from .core.roles import Controller, Cue, Dynamics, Feedback, InputDevice, Questionnaire, Task
+from .core.settings import Settings, StudyPath
 from .core.signals import Layout, Signal, signals_of
 from .errors import (
     DeviceError,
@@ -49,7 +44,7 @@ from .recording.participant_file.reader import SessionRecord, Stream, open_recor
 from .recording.xdf.header import Channel, StreamHeader
 from .recording.xdf.writer import XdfWriter
 from .registry.hookspecs import hookimpl
-from .registry.offers import CommandOffer, Offer, Prompt, Settings, StudyPath, offer
+from .registry.offers import CommandOffer, Offer, Prompt, offer
 from .registry.quiet_import import quietly_imported
 from .types import FloatArray
 
@@ -118,11 +113,13 @@ __all__ = [
     "Value",
     "Verdict",
     "XdfWriter",
+    "codebook_of",
     "hookimpl",
     "jacobian",
     "link_boxes",
     "link_frames",
     "load_scene",
+    "measures_of",
     "movements",
     "numeric_answers",
     "offer",

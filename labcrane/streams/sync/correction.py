@@ -24,10 +24,9 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.errors import RecordingError
-from labcrane.streams.placement import PlacedObject, place
-from labcrane.streams.sampling import Sampling, examine
 from labcrane.streams.sync.dejitter import Dejitter, even, follow_sample_clock
 from labcrane.streams.sync.epochs import REMOTE, RTT, epochs
+from labcrane.streams.sync.placement import Placement, place
 from labcrane.streams.sync.quality import (
     Basis,
     Quality,
@@ -37,6 +36,7 @@ from labcrane.streams.sync.quality import (
     worst_second,
 )
 from labcrane.streams.sync.raw import RawStream
+from labcrane.streams.sync.sampling import Sampling, examine
 from labcrane.types import FloatArray
 
 
@@ -136,7 +136,7 @@ def correct(raw: RawStream, treatment: Treatment, end: float | None = None) -> C
     return Corrected(time - shift, error, placed.time - shift, placed.segments, quality)
 
 
-def _examined(raw: RawStream, placed: PlacedObject) -> list[_Sampled]:
+def _examined(raw: RawStream, placed: Placement) -> list[_Sampled]:
     """Return how each clock's samples were sampled."""
     arrival = raw.arrival()
     found = []
@@ -154,7 +154,7 @@ def _examined(raw: RawStream, placed: PlacedObject) -> list[_Sampled]:
 
 
 def _evened(
-    raw: RawStream, placed: PlacedObject, sampled: list[_Sampled], treatment: Treatment
+    raw: RawStream, placed: Placement, sampled: list[_Sampled], treatment: Treatment
 ) -> tuple[FloatArray, FloatArray]:
     """Return times made even where that helps or is asked for, and errors with what remains."""
     time, error = placed.time.copy(), placed.error.copy()
@@ -186,7 +186,7 @@ def _trips(raw: RawStream) -> dict[str, Any]:
 
 def _summed(
     raw: RawStream,
-    placed: PlacedObject,
+    placed: Placement,
     sampled: list[_Sampled],
     result: tuple[FloatArray, FloatArray],
     end: float | None,
@@ -239,7 +239,7 @@ def _errors(time: FloatArray, error: FloatArray, uneven: FloatArray) -> dict[str
     }
 
 
-def _flow(placed: PlacedObject, sampled: list[_Sampled]) -> dict[str, Any]:
+def _flow(placed: Placement, sampled: list[_Sampled]) -> dict[str, Any]:
     """Return what the segments' sampling says together."""
     if not sampled:
         known = placed.time[np.isfinite(placed.time)]

@@ -12,8 +12,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from labcrane.streams.smoother import smooth
 from labcrane.streams.sync.offset import SURE
+from labcrane.streams.sync.smoother import smooth
 from labcrane.types import FloatArray
 
 CRYSTAL_WALK = 1e-6

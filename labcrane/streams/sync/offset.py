@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labcrane.streams.clock_curve import Smoothed
-from labcrane.streams.smoother import smooth
+from labcrane.streams.sync.clock_curve import Smoothed
 from labcrane.streams.sync.epochs import OFFSET, REMOTE, RTT
+from labcrane.streams.sync.smoother import smooth
 from labcrane.types import FloatArray
 
 SURE = 1.96

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from labcrane.streams.smoother import smooth
 from labcrane.streams.sync.epochs import REMOTE, Epoch
 from labcrane.streams.sync.offset import SURE, OffsetCurve, fit
 from labcrane.streams.sync.quality import Basis, Segment
 from labcrane.streams.sync.raw import RawStream
+from labcrane.streams.sync.smoother import smooth
 from labcrane.types import FloatArray
 
 WRONG_CLOCK_S = 0.25
@@ -35,7 +35,7 @@ ARRIVAL_SCATTERS_S = (0.0005, 0.002, 0.01, 0.05)
 
 
 @dataclass(frozen=True, slots=True)
-class PlacedObject:
+class Placement:
     """Times on our clock before anything is evened.
 
     Attributes
@@ -64,7 +64,7 @@ class PlacedObject:
 _Piece = tuple[int, int, Epoch, OffsetCurve | None]
 
 
-def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> PlacedObject:
+def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> Placement:
     """Place every sample, by its own clock's probes, else by arrivals, else not at all (NaN)."""
     curves = _curves(stretches)
     arrival = raw.arrival()
@@ -82,7 +82,7 @@ def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> PlacedObj
     segments = tuple(_segment(*piece, known=known) for piece in _joined(pieces))
     _blur_steps(segments, error)
     probed = tuple(curve for curve in curves if curve is not None)
-    return PlacedObject(time, error, segments, probed, least, whose)
+    return Placement(time, error, segments, probed, least, whose)
 
 
 def _curves(stretches: list[Epoch]) -> list[OffsetCurve | None]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from labcrane.streams.clock_curve import Smoothed
+from labcrane.streams.sync.clock_curve import Smoothed
 from labcrane.types import FloatArray
 
 MICRO = 1e6
