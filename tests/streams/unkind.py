@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from labcrane.streams.sync.certificate import Fault
 from labcrane.streams.sync.correction import Treatment
-from labcrane.streams.sync.faults import Fault
 from labcrane.streams.sync.raw import RawStream
 
 

@@ -6,8 +6,8 @@ import numpy as np
 from streams.unkind import ROWS, Drawn
 
 from labcrane.core.findings import Verdict, worst
+from labcrane.streams.sync.certificate import Fault, faults
 from labcrane.streams.sync.correction import correct
-from labcrane.streams.sync.faults import Fault, faults
 from labcrane.streams.sync.limits import Limits
 from labcrane.streams.sync.stream_report import judge_quality
 

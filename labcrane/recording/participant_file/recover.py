@@ -5,9 +5,14 @@ from pathlib import Path
 
 from labcrane.errors import RecordingError
 from labcrane.recording.crash_marker import read_whereabouts, whereabouts_path
-from labcrane.recording.foreign_streams import Conclude
 from labcrane.recording.participant_file.columns import texts_of
-from labcrane.recording.participant_file.writer import Consolidated, consolidate, group_name, opened
+from labcrane.recording.participant_file.writer import (
+    Conclude,
+    Consolidated,
+    consolidate,
+    group_name,
+    opened,
+)
 from labcrane.recording.paths import journal_path, participant_path, parts, session_of
 
 

@@ -1,5 +1,6 @@
 """Stream header: what a stream holds, as XDF and LSL describe it."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Union
@@ -88,6 +89,12 @@ class StreamHeader:
     def labels(self) -> tuple[str, ...]:
         """One label per channel."""
         return tuple(channel.label for channel in self.channels)
+
+    @property
+    def host(self) -> str:
+        """The computer that sent it, as LSL knows it; empty where it is not told."""
+        found = re.search(r"<hostname>([^<]*)</hostname>", self.text or "")
+        return found[1].strip() if found else ""
 
     @property
     def xml(self) -> str:
