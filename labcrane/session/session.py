@@ -16,7 +16,6 @@ from labcrane.protocol import rig
 from labcrane.protocol.study import Study
 from labcrane.recording.crash_marker import CrashMarker, read_whereabouts, whereabouts_path
 from labcrane.recording.data_folder import DataFolder
-from labcrane.recording.foreign_streams import Conclusion
 from labcrane.recording.frame_log import BatchLog, FrameLog, columns, frame_bytes
 from labcrane.recording.journal import SessionJournal
 from labcrane.recording.participant_file.writer import consolidate
@@ -27,7 +26,7 @@ from labcrane.session.commands import Console
 from labcrane.session.eligibility import Admission, check_eligibility, close_visit
 from labcrane.session.metadata import context
 from labcrane.session.overruns import OverrunReporter
-from labcrane.session.postprocess import SessionConclusion
+from labcrane.session.postprocess import conclude
 from labcrane.session.resume import (
     INCOMPLETE,
     Ledger,
@@ -176,21 +175,16 @@ def _sole(visit: Visit, name: str, patience_s: float) -> AbstractContextManager[
     return held(folder.path / name, refusal, patience_s)
 
 
-def finish(visit: Visit) -> SyncReport | None:
+def finish(visit: Visit) -> SyncReport:
     """Put what the journals hold into the participant file, with clocks corrected and judged.
 
     Returns the session's sync report.
     """
     journals = [first for first in (visit.journal, visit.streams_journal) if parts(first)]
-    made: list[SessionConclusion] = []
-
-    def conclude(about: Mapping[str, Any]) -> Conclusion:
-        made.append(SessionConclusion(about))
-        return Conclusion(made[-1].correct, made[-1].report)
-
-    consolidate(visit.folder.participant_file, journals, conclude)
+    made: list[SyncReport] = []
+    consolidate(visit.folder.participant_file, journals, lambda group: made.append(conclude(group)))
     close_visit(visit)
-    return made[-1].sync_report
+    return made[-1]
 
 
 def record(
