@@ -1,5 +1,6 @@
 """Quality of loop and clocks, one row per session and per stream."""
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -69,6 +70,26 @@ def sync_quality(participant: Participant) -> "pd.DataFrame":
                 }
             )
     return pd.DataFrame(rows)
+
+
+def unprobed(participants: Iterable[Participant]) -> list[str]:
+    """Return the streams whose times rest on no probe of their clock, all or in part, in words.
+
+    Their times are wrong by an amount that nobody knows.
+    """
+    found = []
+    for participant in participants:
+        for number, session in participant.sessions():
+            for name, stream in session.streams.items():
+                if "corrected" not in stream.attrs or not len(stream.time):
+                    continue  # our own: one clock
+                where = f"{name} of {participant.name}, session {number}"
+                missing = float(stream.attrs.get("unprobed", 0.0))
+                if not stream.attrs["corrected"]:
+                    found.append(f"{where} (not corrected)")
+                elif missing:
+                    found.append(f"{where} ({missing:.0f} of {len(stream.time)} samples)")
+    return found
 
 
 def exclusions(movements: "pd.DataFrame") -> "pd.DataFrame":

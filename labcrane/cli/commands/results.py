@@ -25,7 +25,12 @@ Workers = Annotated[int, typer.Option(help="processes on this computer", min=1)]
 Scheduler = Annotated[
     str | None, typer.Option(help="a Dask scheduler whose workers do it: tcp://host:8786")
 ]
+AcceptUnprobed = Annotated[
+    bool,
+    typer.Option("--accept-unprobed", help="use streams whose clock was never probed as well"),
+]
 MANIFEST = "labcrane_export.json"
+SHOWN = 5
 
 
 def export(
@@ -40,6 +45,7 @@ def export(
     ] = None,
     workers: Workers = 1,
     scheduler: Scheduler = None,
+    accept_unprobed: AcceptUnprobed = False,
 ) -> None:
     """Export recordings for R, MATLAB, BIDS, Psych-DS or EEG programs."""
     from labcrane.analysis.exporter import Exporter
@@ -56,15 +62,33 @@ def export(
     if folder.exists() and any(folder.iterdir()):
         raise ProtocolError(f"{folder} is not empty, and nothing is overwritten; give a new folder")
     cohort = cohort_of(data.resolve() if scheduler else data, include)
+    unknown = _unprobed(cohort, accept=accept_unprobed)
     _, first = next(cohort.included[0].sessions())
     exporter = oversight.call(place, offer.build, chosen, machine_of(first))
     folder.mkdir(parents=True, exist_ok=True)
     people = _measured(cohort, workers, scheduler)
     with progress_bar(f"export to {to}", len(cohort.included)) as advance:
         oversight.call(place, exporter.export, _counted(people, advance), folder)
-    _write_manifest(folder, to, chosen.model_dump(mode="json"), cohort)
+    _write_manifest(folder, to, chosen.model_dump(mode="json"), cohort, unknown)
     _keep_track(data, to, folder, cohort)
     out.print(f"{to}: {folder}", markup=False)
+
+
+def _unprobed(cohort: "Cohort", *, accept: bool) -> list[str]:
+    """Return the streams whose clock was never probed; refuse them unless they are accepted."""
+    from labcrane.analysis.quality import unprobed
+
+    found = unprobed(cohort.included)
+    if found and not accept:
+        more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
+        raise RecordingError(
+            f"nobody knows how right the times are of {'; '.join(found[:SHOWN])}{more}: their "
+            "clocks were not probed; leave those streams out of the study, or say "
+            "--accept-unprobed, which is noted in what is written"
+        )
+    for each in found:
+        out.print(f"used though its clock was never probed: {each}", markup=False)
+    return found
 
 
 def _measured(cohort: "Cohort", workers: int, scheduler: str | None) -> "Sequence[Participant]":
@@ -90,11 +114,13 @@ def report(
     include: Include = None,
     workers: Workers = 1,
     scheduler: Scheduler = None,
+    accept_unprobed: AcceptUnprobed = False,
 ) -> None:
     """Write an HTML report of a study: figures, measures, statistics, quality."""
     from labcrane.analysis.report.report import write_report
 
     cohort = cohort_of(data.resolve() if scheduler else data, include)
+    _unprobed(cohort, accept=accept_unprobed)
     with progress_bar("report", len(cohort.included)) as advance:
         page = write_report(
             cohort,
@@ -248,7 +274,9 @@ def _settings(model: Any, words: list[str], name: str) -> Any:
         raise ProtocolError(f"exporter {name!r} can set {known}; {problems}") from None
 
 
-def _write_manifest(folder: Path, to: str, settings: Any, cohort: "Cohort") -> None:
+def _write_manifest(
+    folder: Path, to: str, settings: Any, cohort: "Cohort", unprobed: list[str]
+) -> None:
     """Write what was exported and who was left out beside the export, for erasure and for readers.
 
     BIDS and Psych-DS allow no further files, so it is hidden from them under ``.labcrane``.
@@ -266,6 +294,7 @@ def _write_manifest(folder: Path, to: str, settings: Any, cohort: "Cohort") -> N
         "made": datetime.now(UTC).isoformat(timespec="seconds"),
         "data": cohort.folder.name,
         "participants": cohort.listing().to_dict("records"),
+        "unprobed": unprobed,
     }
     path = folder / ".labcrane" / MANIFEST
     path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
