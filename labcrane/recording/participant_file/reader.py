@@ -15,7 +15,7 @@ from labcrane.errors import RecordingError
 from labcrane.recording.journal import GROUPS
 from labcrane.recording.participant_file.columns import holds_texts, text_of, texts_of
 from labcrane.recording.participant_file.stream_group import BASES
-from labcrane.recording.participant_file.writer import SYNC_REPORT, group_name, opened
+from labcrane.recording.participant_file.writer import SYNC_REPORT, group_name, reading
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ class Stream:
         """One column per number, named by its dotted path; one row per time."""
         import pandas as pd  # noqa: PLC0415 - loads for a second
 
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             return pd.DataFrame(
                 {name: _values(dataset) for name, dataset in _columns(file[self._group])}
             )
@@ -99,18 +99,18 @@ class Stream:
     @cached_property
     def units(self) -> dict[str, str]:
         """The unit of each column."""
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             columns = _columns(file[self._group])
             return {name: str(dataset.attrs.get("unit", "")) for name, dataset in columns}
 
     def _beside(self, name: str) -> FloatArray | None:
         """Return a column beside the corrected time; None where there is none."""
         path = f"{self._time.rpartition('/')[0]}/{name}"
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             return np.asarray(file[path][:], np.float64) if path in file else None
 
     def _column(self, path: str) -> FloatArray:
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             return np.asarray(file[path][:], np.float64)
 
 
@@ -131,7 +131,7 @@ class SessionRecord:
     @cached_property
     def streams(self) -> dict[str, Stream]:
         """Frames as loop, input, command, state and task; streams of others by their names."""
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             group = file[self._group]
             own = {
                 name: Stream(name, {}, self._path, f"{self._group}/{name}", f"{self._group}/time")
@@ -152,19 +152,19 @@ class SessionRecord:
         """One row per event: time, tick, part, trial, name and data, a dict."""
         import pandas as pd  # noqa: PLC0415
 
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             group = file[f"{self._group}/events"]
             columns = ("time", "tick", "part", "trial", "name", "data")
             table = {name: _values(group[name]) for name in columns}
-        table["data"] = [json.loads(text) for text in table["data"]]
-        return pd.DataFrame(table)
+            table["data"] = [_mapping(text) for text in table["data"]]
+            return pd.DataFrame(table)
 
     @cached_property
     def trials(self) -> "pd.DataFrame":
         """One row per counted trial: its condition and its results."""
         import pandas as pd  # noqa: PLC0415
 
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             columns = _columns(file[f"{self._group}/trials"])
             return pd.DataFrame({name: _values(dataset) for name, dataset in columns})
 
@@ -176,7 +176,7 @@ class SessionRecord:
         """
         import pandas as pd  # noqa: PLC0415
 
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             group = file[self._group]  # sessions of older files have none
             columns = _columns(group["questionnaires"]) if "questionnaires" in group else []
             return pd.DataFrame({name: _values(dataset) for name, dataset in columns})
@@ -189,20 +189,22 @@ class SessionRecord:
     @cached_property
     def context(self) -> dict[str, Any]:
         """Everything that was known when the session started."""
-        content: dict[str, Any] = json.loads(self._text("context"))
-        return content
+        return self._json("context")
 
     @cached_property
     def sync_report(self) -> dict[str, Any]:
         """How right the time stamps are, and what to do where they are not; empty if unknown."""
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             if SYNC_REPORT not in file[self._group]:
                 return {}
-        content: dict[str, Any] = json.loads(self._text(SYNC_REPORT))
-        return content
+        return self._json(SYNC_REPORT)
+
+    def _json(self, name: str) -> dict[str, Any]:
+        with reading(self._path) as file:
+            return _mapping(text_of(file[f"{self._group}/{name}"]))
 
     def _text(self, name: str) -> str:
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             return text_of(file[f"{self._group}/{name}"])
 
 
@@ -223,11 +225,11 @@ class Recording:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        with opened(path) as file:
+        with reading(path) as file:
             self.attrs: Mapping[str, Any] = _attributes(file)
             found = (_SESSION.fullmatch(name) for name in file)
             self.sessions: list[int] = sorted(int(match[1]) for match in found if match)
-        self.participant: str = self.attrs["participant"]
+            self.participant: str = self.attrs["participant"]
 
     def session(self, number: int) -> SessionRecord:
         """Return a session by its number."""
@@ -235,7 +237,7 @@ class Recording:
             known = ", ".join(map(str, self.sessions)) or "none"
             raise RecordingError(f"{self.path} has no session {number}; it has {known}")
         name = group_name(number)
-        with opened(self.path) as file:
+        with reading(self.path) as file:
             return SessionRecord(_attributes(file[name]), self.path, name)
 
     def __iter__(self) -> Iterator[SessionRecord]:
@@ -257,6 +259,13 @@ def open_recording(path: Path | str) -> Recording:
             "journals, if there are any"
         )
     return Recording(path)
+
+
+def _mapping(text: str) -> dict[str, Any]:
+    content = json.loads(text)
+    if not isinstance(content, dict):
+        raise TypeError(f"{text[:40]!r} is no mapping of names")
+    return content
 
 
 def _attributes(node: "h5py.HLObject") -> dict[str, Any]:

@@ -11,7 +11,7 @@ from labcrane.recording.participant_file.writer import (
     Consolidated,
     consolidate,
     group_name,
-    opened,
+    reading,
 )
 from labcrane.recording.paths import journal_path, participant_path, parts, session_of
 
@@ -84,7 +84,7 @@ def is_recovered(folder: Path, session: int) -> bool:
         return False
     firsts = _journals_of(folder, session)
     on_disk = {part.name: part.stat().st_size for first in firsts for part in parts(first)}
-    with opened(path) as file:
+    with reading(path) as file:
         if group_name(session) not in file:
             return False
         made_of = file[f"{group_name(session)}/journals"]

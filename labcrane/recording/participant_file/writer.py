@@ -20,6 +20,7 @@ from labcrane.files.lock import alone_in
 from labcrane.recording.foreign_streams import RecordedStream, read_streams
 from labcrane.recording.journal_reader import JournalState, SessionLog, read_journal
 from labcrane.recording.participant_file.columns import node_names, write_attributes, write_text
+from labcrane.recording.participant_file.containment import check_containment, check_heaps
 from labcrane.recording.participant_file.session_group import write_session
 from labcrane.recording.participant_file.stream_group import write_streams
 from labcrane.recording.paths import parts, session_of
@@ -33,6 +34,11 @@ SYNC_REPORT = "sync_report"
 
 Conclude = Callable[["h5py.Group"], object]
 """Works something out of a session's group in a participant file, and writes it there."""
+
+DAMAGED = (
+    OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError,
+)  # fmt: skip
+"""What reading a damaged file raises somewhere below."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +148,7 @@ def renewed(path: Path, again: str) -> Iterator[Path]:
     with alone_in(path.parent), replacing(path) as beside:
         try:
             yield beside
-        except (OSError, RuntimeError, ValueError) as error:  # all of them h5py's
+        except DAMAGED as error:  # h5py's, and of an old file that is damaged
             raise RecordingError(
                 f"cannot write {path}: {_reason(error)}; it is as it was, and so are the journals: "
                 f"remove the cause and run {again}"
@@ -217,8 +223,9 @@ def opened(path: Path) -> Iterator["h5py.File"]:
     import h5py  # noqa: PLC0415
 
     try:
+        check_heaps(path)
         file = h5py.File(path, "r")
-    except OSError as error:
+    except (OSError, RuntimeError, ValueError) as error:  # ValueError: no name of a file
         raise RecordingError(f"cannot read {path}: {error}") from error
     with file:
         if file.attrs.get("format") != FORMAT:
@@ -231,7 +238,28 @@ def opened(path: Path) -> Iterator["h5py.File"]:
                 f"{path} has format version {file.attrs['format_version']!r}, this labcrane reads "
                 f"{VERSION!r}; install a newer labcrane"
             )
+        check_containment(file, path)
         yield file
+
+
+@contextmanager
+def reading(path: Path) -> Iterator["h5py.File"]:
+    """Open a participant file for reading alone: whatever is wrong with it is told in words.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be read, is none, or is damaged where it was read.
+    """
+    try:
+        with opened(path) as file:
+            yield file
+    # h5py, numpy, pandas and json raise what they like of damaged files.
+    except (*DAMAGED, MemoryError) as error:
+        raise RecordingError(
+            f"{path} is damaged: {error!r}; labcrane recover {path.parent} makes it "
+            "anew of the journals, if they are there"
+        ) from error
 
 
 def _refuse_less(path: Path, old: "h5py.File", session: _Session) -> None:
