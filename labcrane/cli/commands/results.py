@@ -26,6 +26,10 @@ Workers = Annotated[int, typer.Option(help="processes on this computer", min=1)]
 Scheduler = Annotated[
     str | None, typer.Option(help="a Dask scheduler whose workers do it: tcp://host:8786")
 ]
+AcceptUnprobed = Annotated[
+    bool,
+    typer.Option("--accept-unprobed", help="use streams whose clock was never probed as well"),
+]
 MANIFEST = "labcrane_export.json"
 
 LEFT_OUT = 3
@@ -44,10 +48,12 @@ def export(
     ] = None,
     workers: Workers = 1,
     scheduler: Scheduler = None,
+    accept_unprobed: AcceptUnprobed = False,
 ) -> None:
     """Export recordings for R, MATLAB, BIDS, Psych-DS or EEG programs."""
     from labcrane.analysis.exporter import Exporter
     from labcrane.analysis.movements import machine_of
+    from labcrane.analysis.quality import check_probed
     from labcrane.registry.call_monitor import CallMonitor
     from labcrane.registry.registry import discover
 
@@ -60,6 +66,7 @@ def export(
     if folder.exists() and any(folder.iterdir()):
         raise ProtocolError(f"{folder} is not empty, and nothing is overwritten; give a new folder")
     cohort = cohort_of(data.resolve() if scheduler else data, include)
+    unknown = check_probed(cohort.included, accept=accept_unprobed)
     _, first = next(cohort.included[0].sessions())
     exporter = oversight.call(place, offer.build, chosen, machine_of(first))
     folder.mkdir(parents=True, exist_ok=True)
@@ -75,7 +82,7 @@ def export(
                 raise _Unusable(people.now, str(error)) from error
 
     cohort = _without_bad(attempt, cohort, folder)
-    _write_manifest(folder, to, chosen.model_dump(mode="json"), cohort)
+    _write_manifest(folder, to, chosen.model_dump(mode="json"), cohort, unknown)
     _keep_track(data, to, folder, cohort)
     out.print(f"{to}: {folder}", markup=False)
     _tell_left_out(cohort)
@@ -159,11 +166,14 @@ def report(
     include: Include = None,
     workers: Workers = 1,
     scheduler: Scheduler = None,
+    accept_unprobed: AcceptUnprobed = False,
 ) -> None:
     """Write an HTML report of a study: figures, measures, statistics, quality."""
+    from labcrane.analysis.quality import check_probed
     from labcrane.analysis.report.report import write_report
 
     cohort = cohort_of(data.resolve() if scheduler else data, include)
+    check_probed(cohort.included, accept=accept_unprobed)
 
     def leave_out(name: str, why: str) -> None:
         nonlocal cohort
@@ -319,7 +329,9 @@ def _settings(model: Any, words: list[str], name: str) -> Any:
         raise ProtocolError(f"exporter {name!r} can set {known}; {problems}") from None
 
 
-def _write_manifest(folder: Path, to: str, settings: Any, cohort: "Cohort") -> None:
+def _write_manifest(
+    folder: Path, to: str, settings: Any, cohort: "Cohort", unprobed: list[str]
+) -> None:
     """Write what was exported and who was left out beside the export, for erasure and for readers.
 
     BIDS and Psych-DS allow no further files, so it is hidden from them under ``.labcrane``.
@@ -337,6 +349,7 @@ def _write_manifest(folder: Path, to: str, settings: Any, cohort: "Cohort") -> N
         "made": datetime.now(UTC).isoformat(timespec="seconds"),
         "data": cohort.folder.name,
         "participants": cohort.listing().to_dict("records"),
+        "unprobed": unprobed,
     }
     path = folder / ".labcrane" / MANIFEST
     path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
