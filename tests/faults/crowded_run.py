@@ -101,6 +101,18 @@ def taken() -> tuple[set[int], set[int], Counter[int]]:
     return udp, tcp, by
 
 
+def named(by: "Counter[int]") -> dict[str, int]:
+    """Return how many ports each process has, by what it runs."""
+    found = {}
+    for pid, count in by.items():
+        try:
+            line = psutil.Process(pid).cmdline()
+        except psutil.NoSuchProcess:
+            continue
+        found[f"{' '.join(line[1:3])[:60]} {pid}"] = count
+    return found
+
+
 def begin(folder: Path, number: int) -> dict[str, object]:
     word = f"crowd-{os.getpid()}-{number}"
     streams = "\n".join(f"  device{n}: {{source_id: {word}-{n}}}" for n in range(10))
@@ -121,10 +133,14 @@ def begin(folder: Path, number: int) -> dict[str, object]:
     )
     over = threading.Event()
     most = {"udp": 0, "tcp": 0}
+    holders: dict[str, int] = {}
 
     def count() -> None:
         while not over.wait(0.1):
-            udp, tcp, _ = taken()
+            udp, tcp, by = taken()
+            if len(udp) > most["udp"]:
+                holders.clear()
+                holders.update(named(by))
             most["udp"], most["tcp"] = max(most["udp"], len(udp)), max(most["tcp"], len(tcp))
 
     counter = threading.Thread(target=count)
@@ -140,7 +156,7 @@ def begin(folder: Path, number: int) -> dict[str, object]:
                 took = time.monotonic() - began
                 run.stdin.write("end\n")
                 run.stdin.flush()
-            if time.monotonic() - began > 120.0:
+            if time.monotonic() - began > 60.0:
                 break
     finally:
         over.set()
@@ -149,7 +165,7 @@ def begin(folder: Path, number: int) -> dict[str, object]:
         devices.kill()
         devices.wait()
         run.wait(30)
-    return {"took": took, **most, "said": said[-12:] if took is None else []}
+    return {"took": took, **most, "holders": holders, "said": said[-12:] if took is None else []}
 
 
 if __name__ == "__main__":
