@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane import FloatArray, Frame, InputDevice, NewestSample, Run, Signal, Tick, Value
+from labcrane import FloatArray, Frame, InputDevice, NewestSample, Run, Signal, Tick
+from labcrane.core import Value
 from labcrane_keyboard.settings import KeyboardSettings
 
 if TYPE_CHECKING:

@@ -25,7 +25,8 @@ from pathlib import Path
 
 import numpy as np
 
-from labcrane import Feedback, CameraImage, Settings, hookimpl, offer
+from labcrane import Feedback, Settings, hookimpl, offer
+from labcrane.core import CameraImage
 
 labcrane_api = 1
 
