@@ -40,7 +40,7 @@ class QuestionnaireForm:
     about
         Where in the session it is asked: step, and trial if it follows one.
     answered
-        What was answered before the session's process died.
+        What was answered before the session stopped.
 
     Attributes
     ----------
@@ -96,12 +96,15 @@ class QuestionnaireForm:
             why = f"{', '.join(open_items)} have no answer; answer or decline them"
             return REFUSED, {**self._about, "by": by, "given": "", "item": "", "why": why}
         self.over = True
-        return self._end(by, handed_in=True)
+        return self._end(by, handed_in=True, done=True)
 
-    def leave(self) -> Said:
-        """Return the event with which it ends without having been handed in."""
+    def leave(self, *, done: bool) -> Said:
+        """Return the event with which it ends without having been handed in.
+
+        ``done`` is whether it need not be asked again.
+        """
         self.over = True
-        return self._end("", handed_in=False)
+        return self._end("", handed_in=False, done=done)
 
     def scores(self) -> dict[str, float]:
         """Return every score; NaN where it needs an answer that is missing."""
@@ -115,7 +118,7 @@ class QuestionnaireForm:
             yield self.take(answer, SIMULATION)
         yield self.hand_in(SIMULATION)
 
-    def _end(self, by: str, *, handed_in: bool) -> Said:
+    def _end(self, by: str, *, handed_in: bool, done: bool) -> Said:
         missing = sum(self._answers.get(name) is None for name in self._items)
         scores: dict[str, Value] = {
             f"{SCORE}{name}": None if math.isnan(value) else value
@@ -125,6 +128,7 @@ class QuestionnaireForm:
             **self._about,
             "by": by,
             "handed_in": handed_in,
+            "done": done,
             "missing": missing,
             **scores,
         }
@@ -167,7 +171,7 @@ class QuestionnaireRun:
     Parameters
     ----------
     answered
-        What was answered before the session's process died.
+        What was answered before the session stopped.
     after
         The trial it follows; None when it is a step of its own.
 
@@ -214,10 +218,13 @@ class QuestionnaireRun:
             name, data = self._inquiry.take(command.text, by_whom(command))
         return name, {**data, **whence(command)}
 
-    def end(self) -> Iterator[Said]:
-        """Yield what is said at its end: that it was left, and the stop rules that it meets."""
+    def end(self, *, skipped: bool) -> Iterator[Said]:
+        """Yield what is said at its end: that it was left, and the stop rules that it meets.
+
+        One that was left and not skipped is owed: the session has ended.
+        """
         if not self.over:
-            yield self._inquiry.leave()
+            yield self._inquiry.leave(done=skipped)
         scores = self._inquiry.scores()
         for rule in self._rules:
             if scores[rule.score] > rule.above:  # a score that is NaN stops nobody

@@ -137,3 +137,15 @@ def test_a_refused_order_is_called_as_it_is_given() -> None:
     with Terminal(console, Console(file=printed), total=1, keys=False):
         console.report(Event("order.repeat", 1.0, refused))
     assert "repeat: no trial is running" in map(str.strip, printed.getvalue().splitlines())
+
+
+def test_a_line_is_short_and_says_nothing_of_what_is_not_known() -> None:
+    from labcrane.cli.terminal import _event_line, _trial_line
+
+    ended = {"trial": 3, "outcome": "timeout", "movement_time": float("nan"), "error": 0.25}
+    assert _trial_line(ended) == "trial 3: timeout, error 0.25 m"
+    place = "dynamics 'slow' of plugin 'p', in step (/home/someone/a/b/slow.py:12), took 9 ms"
+    slow = Event("plugin.slow", 0.0, {"why": place})
+    assert _event_line(slow) == (
+        "PLUGIN SLOW: dynamics 'slow' of plugin 'p', in step (slow.py:12), took 9 ms"
+    )

@@ -10,16 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cranes import needs_bullet
+from needs import GRAPHICS, needs
 
-from labcrane import (
-    FloatArray,
-    Frame,
+from labcrane import FloatArray, Frame, Run, Tick
+from labcrane.core import SessionState
+from labcrane.machines import (
     Geom,
     PlacedObject,
-    Run,
-    SessionState,
     ShapeKind,
-    Tick,
     load_scene,
     place_objects,
     read_placed,
@@ -34,7 +32,7 @@ from labcrane_view.areas import Projection
 from labcrane_view.settings import CameraSettings, ViewSettings
 from labcrane_view.view import View
 
-pytestmark = needs_bullet
+pytestmark = [needs_bullet, needs(*GRAPHICS)]
 
 RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"
 SCENES = ("carry", "casualty", "extract", "reach_over", "reach_through", "touch")

@@ -139,7 +139,7 @@ def _measured(cohort: "Cohort", workers: int, scheduler: str | None) -> "Sequenc
     if workers == 1 and scheduler is None:
         return cohort.included
     from labcrane.analysis.measures import measure_or_say_why
-    from labcrane.parallel import work
+    from labcrane.analysis.parallel import work
 
     with progress_bar("measure", len(cohort.included)) as advance:
         done = {}
@@ -199,7 +199,7 @@ def replay(
     ] = None,
 ) -> None:
     """Run a recorded session again from its input, and compare every number."""
-    from labcrane.replay.replay import replay as run_again
+    from labcrane.replay.replay import replay_session as run_again
 
     if speed is not None:
         stay_on_this_computer()

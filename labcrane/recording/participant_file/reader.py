@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from labcrane.errors import RecordingError
 from labcrane.recording.journal import GROUPS
 from labcrane.recording.participant_file.columns import holds_texts, text_of, texts_of
+from labcrane.recording.participant_file.stream_group import BASES
 from labcrane.recording.participant_file.writer import SYNC_REPORT, group_name, reading
 from labcrane.types import FloatArray
 
@@ -53,6 +55,38 @@ class Stream:
         return self._column(raw) if "rate_hz" in self.attrs else self.time
 
     @cached_property
+    def time_error(self) -> FloatArray:
+        """How far each time may be off at 95 %, in milliseconds, shape ``(n,)``.
+
+        Zero for the session's own signals, whose clock it is; NaN where it is not known, as in
+        files of before it was worked out: ``labcrane resync`` does.
+        """
+        if "rate_hz" not in self.attrs:
+            return np.zeros(len(self.time))
+        error = self._beside("time_error")
+        return np.full(len(self.time), np.nan) if error is None else 1e3 * error
+
+    @cached_property
+    def time_basis(self) -> npt.NDArray[np.str_]:
+        """What each time rests on, shape ``(n,)``.
+
+        ``own`` for the session's own clock, ``probes`` of another one, ``arrivals`` where it was
+        never probed, ``nothing`` where neither is known, ``unknown`` in files of before.
+        """
+        if "rate_hz" not in self.attrs:
+            return np.full(len(self.time), "own")
+        basis = self._beside("time_basis")
+        if basis is None:
+            return np.full(len(self.time), "unknown" if self.attrs["corrected"] else "nothing")
+        return np.asarray(np.array(BASES)[basis.astype(int)])
+
+    @cached_property
+    def time_uneven(self) -> FloatArray:
+        """The times without evening, in seconds, shape ``(n,)``; the same where nothing was."""
+        uneven = self._beside("time_uneven") if "rate_hz" in self.attrs else None
+        return self.time if uneven is None else uneven
+
+    @cached_property
     def data(self) -> "pd.DataFrame":
         """One column per number, named by its dotted path; one row per time."""
         import pandas as pd  # noqa: PLC0415 - loads for a second
@@ -68,6 +102,12 @@ class Stream:
         with reading(self._path) as file:
             columns = _columns(file[self._group])
             return {name: str(dataset.attrs.get("unit", "")) for name, dataset in columns}
+
+    def _beside(self, name: str) -> FloatArray | None:
+        """Return a column beside the corrected time; None where there is none."""
+        path = f"{self._time.rpartition('/')[0]}/{name}"
+        with reading(self._path) as file:
+            return np.asarray(file[path][:], np.float64) if path in file else None
 
     def _column(self, path: str) -> FloatArray:
         with reading(self._path) as file:

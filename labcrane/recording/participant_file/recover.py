@@ -5,9 +5,9 @@ from pathlib import Path
 
 from labcrane.errors import RecordingError
 from labcrane.recording.crash_marker import read_whereabouts, whereabouts_path
-from labcrane.recording.foreign_streams import Conclude
 from labcrane.recording.participant_file.columns import texts_of
 from labcrane.recording.participant_file.writer import (
+    Conclude,
     Consolidated,
     consolidate,
     group_name,

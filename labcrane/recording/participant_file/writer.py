@@ -6,18 +6,18 @@ the old one, which is brought to the disk, read again, and only then takes the o
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from labcrane.errors import RecordingError
 from labcrane.files.atomic import replacing
 from labcrane.files.lock import alone_in
-from labcrane.recording.foreign_streams import Conclude, RecordedStream, read_streams
+from labcrane.recording.foreign_streams import RecordedStream, read_streams
 from labcrane.recording.journal_reader import JournalState, SessionLog, read_journal
 from labcrane.recording.participant_file.columns import node_names, write_attributes, write_text
 from labcrane.recording.participant_file.containment import check_containment, check_heaps
@@ -36,6 +36,8 @@ DAMAGED = (
     OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError,
 )  # fmt: skip
 """What reading a damaged file raises somewhere below."""
+Conclude = Callable[["h5py.Group"], object]
+"""Works something out of a session's group in a participant file, and writes it there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +78,13 @@ class _Session:
         return group_name(self.number)
 
 
+def write_sync_report(group: "h5py.Group", report: Mapping[str, Any]) -> None:
+    """Write a session's sync report into its group, in place of an earlier one."""
+    if SYNC_REPORT in group:
+        del group[SYNC_REPORT]
+    write_text(group, SYNC_REPORT, json.dumps(report, ensure_ascii=False, allow_nan=False))
+
+
 def group_name(session: int) -> str:
     """Return the name of a session's group."""
     return f"ses-{session:02d}"
@@ -96,8 +105,8 @@ def consolidate(
     journals
         First parts of the session's journals; further parts beside them are found.
     conclude
-        Gives what corrects the stamps of other clocks and makes the sync report; without it,
-        streams hold raw stamps only.
+        Corrects the stamps of other clocks and makes the sync report, from what the session's group
+        holds; without it, streams hold raw stamps only.
 
     Raises
     ------
@@ -196,11 +205,9 @@ def _write(beside: Path, path: Path, session: _Session, conclude: Conclude | Non
         group = new.create_group(session.group)
         write_attributes(group, {"session": session.number, "participant": path.stem})
         write_session(group, session.log, session.journals)
-        conclusion = conclude(context) if conclude else None
-        write_streams(group, session.streams, conclusion.correct if conclusion else None)
-        if conclusion and conclusion.report:
-            report = conclusion.report(session.log)
-            write_text(group, SYNC_REPORT, json.dumps(report, ensure_ascii=False, allow_nan=False))
+        write_streams(group, session.streams)
+        if conclude is not None:
+            conclude(group)
 
 
 @contextmanager

@@ -97,6 +97,12 @@ class StreamHeader:
         return tuple(channel.label for channel in self.channels)
 
     @property
+    def host(self) -> str:
+        """The computer that sent it, as LSL knows it; empty where it is not told."""
+        found = re.search(r"<hostname>([^<]*)</hostname>", self.text or "")
+        return found[1].strip() if found else ""
+
+    @property
     def xml(self) -> str:
         """The header as it is written."""
         return self.text if self.text is not None else _compose(self)

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from labcrane.errors import RecordingError
-from labcrane.recording.paths import next_part
+from labcrane.recording.paths import next_part, part_path
 from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.streams.recorder.health import Condition, Health, complaints, condition, rate
 from labcrane.streams.recorder.inlet import Inlet
 from labcrane.streams.request import StreamRequest, unstable_id
+from labcrane.streams.search import Search, known_stream
 
 if TYPE_CHECKING:
     import pylsl
@@ -29,20 +30,37 @@ class _Recorded:
 
 
 class Recorder:
-    """Records what is asked for as soon as it is there. Call ``look`` several times a second."""
+    """Records what is asked for as soon as it is there. Call ``look`` several times a second.
+
+    Parameters
+    ----------
+    journal
+        The first part.
+    requests
+        What to record.
+    part
+        Which part is written, counted from 1; by default the first that there is not yet.
+    known
+        Descriptions of streams that another recorder has found: they are received at once.
+    """
 
     def __init__(
         self,
         journal: Path,
         requests: Sequence[StreamRequest],
-        resolver: "pylsl.ContinuousResolver | None" = None,
+        part: int | None = None,
+        known: Sequence[str] = (),
     ) -> None:
         self._requests = tuple(requests)
-        self._writer = XdfWriter(next_part(journal))
-        self._resolver = resolver or a_resolver()
+        self._writer = XdfWriter(next_part(journal) if part is None else part_path(journal, part))
         self._streams: dict[tuple[str, str, str], _Recorded] = {}
+        self._latest: dict[tuple[str, str, str], pylsl.StreamInfo] = {}
         self._since: dict[str, float] = {}
         self._fault: str | None = None
+        for info in map(known_stream, known):
+            if info is not None:
+                self._start(info)
+        self._search = Search(forget_s=FORGET_S)
 
     @property
     def path(self) -> Path:
@@ -51,13 +69,12 @@ class Recorder:
 
     def look(self) -> None:
         """Start to record what has appeared."""
-        found = [info for info in self._resolver.results() if self._wanted(info) is not None]
+        found = [info for info in self._search.results() if self._wanted(info) is not None]
         now = time.monotonic()
         self._since = {info.uid(): self._since.get(info.uid(), now) for info in found}
         for info in found:
-            key = (info.source_id() or info.uid(), info.name(), info.type())
-            if key not in self._streams:
-                self._start(key, info)
+            self._latest[_key(info)] = info  # a program that was started again has other ports
+            self._start(info)
         self._find_duplicates(found, now)
 
     def health(self) -> list[Health]:
@@ -69,7 +86,7 @@ class Recorder:
 
     def status(self) -> dict[str, Any]:
         """Return how the recording is, ready for JSON."""
-        streams = self.health()
+        streams, recorded = self.health(), self._streams.items()
         faults = {self._fault, *(one.inlet.flow.fault for one in self._streams.values())} - {None}
         return {
             "journal": str(self.path),
@@ -78,10 +95,12 @@ class Recorder:
             "ready": all(one.sane for one in streams if one.required) and not faults,
             "faults": sorted(str(fault) for fault in faults),
             "streams": [one.as_json() for one in streams],
+            "known": [self._latest.get(key, one.inlet.info).as_xml() for key, one in recorded],
         }
 
     def close(self) -> bool:
         """Write down all that has come and close the journal; whether all of it went in."""
+        self._search.close()
         whole = [one.inlet.close() for one in self._streams.values()]
         try:
             self._writer.close()
@@ -92,9 +111,11 @@ class Recorder:
     def _wanted(self, info: "pylsl.StreamInfo") -> StreamRequest | None:
         return next((one for one in self._requests if one.matches(info)), None)
 
-    def _start(self, key: tuple[str, str, str], info: "pylsl.StreamInfo") -> None:
+    def _start(self, info: "pylsl.StreamInfo") -> None:
+        """Record a stream, unless it is recorded already or nobody asked for it."""
+        key = _key(info)
         request = self._wanted(info)
-        if request is None:
+        if request is None or key in self._streams:
             return
         misfits = request.misfits(info.channel_count(), info.nominal_srate())
         warnings = list(misfits)
@@ -120,11 +141,9 @@ class Recorder:
                     recorded.inlet.note("warning", text=warning)
 
 
-def a_resolver() -> "pylsl.ContinuousResolver":
-    """Return a resolver that begins to look around at once, and goes on."""
-    import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
-
-    return pylsl.ContinuousResolver(forget_after=FORGET_S)
+def _key(info: "pylsl.StreamInfo") -> tuple[str, str, str]:
+    """Return what a stream is known again by when its program is started again."""
+    return info.source_id() or info.uid(), info.name(), info.type()
 
 
 def _health(recorded: _Recorded, now: float) -> Health:

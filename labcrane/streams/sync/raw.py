@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labcrane.errors import RecordingError
-from labcrane.recording.foreign_streams import OPENED, RESET, RecordedStream
+from labcrane.recording.foreign_streams import RESET, RecordedStream
 from labcrane.types import FloatArray
 
 
@@ -72,6 +72,23 @@ class RawStream:
         return np.asarray(times[np.minimum(chunk, len(times) - 1)])
 
 
+def unwrapped(counts: FloatArray) -> FloatArray | None:
+    """Return a source's counter without its wraps, shape ``(n,)``; None when it does not count.
+
+    A counter goes on by one nearly always. A step back is a wrap, to the power of two that the
+    highest number falls just short of, else to that number itself.
+    """
+    steps = np.diff(counts)
+    if len(steps) == 0 or float(np.median(steps)) != 1.0 or not np.isfinite(counts).all():
+        return None
+    back = steps < 0.0
+    if back.any():
+        highest = float(counts.max()) + 1.0
+        power = 2.0 ** np.ceil(np.log2(highest))
+        steps = np.where(back, steps + (power if highest > 0.98 * power else highest), steps)
+    return np.asarray(np.r_[0.0, np.cumsum(np.maximum(steps, 0.0))])
+
+
 def raw_of(recorded: RecordedStream) -> RawStream:
     """Return the times of a recorded stream, for correction.
 
@@ -94,15 +111,10 @@ def raw_of(recorded: RecordedStream) -> RawStream:
 
 
 def _resets(recorded: RecordedStream) -> FloatArray:
-    """Return when the source was replaced, and among which samples of all parts together."""
-    found: list[list[float]] = []
-    part = -1
-    for note in recorded.notes:
-        event = note.data.get("event")
-        if event == OPENED:
-            part += 1
-        elif event == RESET:
-            first = recorded.starts[max(part, 0)]
-            low, high = note.data["samples"]
-            found.append([note.time, first + low, first + high])
+    """Return when the source was replaced, and among which samples of the whole stream."""
+    found = [
+        [note.time, *map(float, note.data["samples"])]
+        for note in recorded.notes
+        if note.data.get("event") == RESET
+    ]
     return np.array(found, dtype=np.float64).reshape(-1, 3)
