@@ -56,7 +56,7 @@ class Desk:
 
     def read_until(self, condition: object) -> np.ndarray:
         """Read in real time until what is read is as wanted."""
-        deadline = time.monotonic() + 20.0
+        deadline = time.monotonic() + 240.0
         while not condition(row := self.read()[0]):
             assert time.monotonic() < deadline, f"last read {row}; {self.keyboard.fault}"
             time.sleep(1 / RATE_HZ)
@@ -87,7 +87,7 @@ def a_view_that_sends(
 def press(desk: Desk, outlet: pylsl.StreamOutlet, *states: float) -> None:
     """Send the keys' states, and wait until they have come: a ramp begins with the next tick."""
     outlet.push_sample([0.0, *states])
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 240.0
     while not desk.keyboard._inlet.samples_available():
         assert time.monotonic() < deadline
         time.sleep(0.001)
