@@ -20,11 +20,12 @@ from labcrane.core.signals import Signal
 from labcrane.errors import LabcraneError
 from labcrane.machines.library import load_machine
 from labcrane.machines.machine import Machine
-from labcrane.protocol.protocol import Protocol
+from labcrane.protocol.protocol import protocol_model
 from labcrane.protocol.steps import Block, Break
 from labcrane.protocol.study import load
+from labcrane.registry.hookspecs import ROLES
 from labcrane.registry.offers import Offer
-from labcrane.registry.registry import ROLES, Registry, discover
+from labcrane.registry.registry import Registry, discover
 
 HERE = Path(__file__).parent
 PROTOCOLS = HERE.parent / "protocols"
@@ -42,7 +43,7 @@ def pages() -> dict[str, str]:
 
 def protocol_page() -> str:
     """Return every key of a protocol with its type, default and meaning."""
-    schema = Protocol.model_json_schema()
+    schema = protocol_model().model_json_schema()
     parts = {name: part for name, part in schema["$defs"].items() if name not in OWN_WORDS}
     parts |= {"Block": Block.model_json_schema(), "Break": Break.model_json_schema()}
     lines = [

@@ -1,5 +1,6 @@
 """The study protocol: what its YAML may say."""
 
+import inspect
 import re
 from pathlib import Path
 from typing import Any, Literal
@@ -9,6 +10,7 @@ from pydantic import (
     Field,
     PositiveFloat,
     PositiveInt,
+    create_model,
     field_validator,
 )
 
@@ -19,6 +21,7 @@ from labcrane.protocol.evaluation import StopRule
 from labcrane.protocol.pages import PageSettings
 from labcrane.protocol.steps import Section, Session, read_sessions
 from labcrane.protocol.streams import StreamNeed, TimeLimits
+from labcrane.registry.hookspecs import ROLES
 
 
 class Use(Section):
@@ -147,6 +150,18 @@ class Protocol(Section):
     """What happens when something fails."""
 
 
+def protocol_model() -> type[Protocol]:
+    """Return the model of a protocol, with a key for every role that is on the table."""
+    more: dict[str, Any] = {}
+    for role, entry in ROLES.items():
+        for key in entry.keys:
+            kind, empty = (dict[str, Use], dict) if entry.several else (Use | None, lambda: None)
+            about = inspect.cleandoc(role.__doc__ or entry.about).splitlines()[0]
+            more[key] = (kind, Field(default_factory=empty, description=about))
+    more = {key: field for key, field in more.items() if key not in Protocol.model_fields}
+    return create_model("Protocol", __base__=Protocol, **more) if more else Protocol
+
+
 def read(path: Path) -> tuple[Protocol | None, YamlFile]:
     """Read a protocol file; mistakes are noted in the file that is returned.
 
@@ -160,4 +175,4 @@ def read(path: Path) -> tuple[Protocol | None, YamlFile]:
         source.problem((), "a protocol is a mapping of keys, beginning with 'labcrane: 1'")
         return None, source
     plain = {**source.data, "sessions": read_sessions(source)}
-    return source.check(Protocol, value=plain), source
+    return source.check(protocol_model(), value=plain), source

@@ -38,6 +38,8 @@ class Study:
     cues, sounds, views
         What presents the session to people, by the protocol's names: cues and sounds are switched
         on block by block, views are always there.
+    others
+        Components of roles that have no place of their own here, by the part they play.
     oversight
         Watches over all components that are built.
     """
@@ -58,6 +60,7 @@ class Study:
     cues: dict[str, ComponentSpec] = field(default_factory=dict)
     sounds: dict[str, ComponentSpec] = field(default_factory=dict)
     views: dict[str, ComponentSpec] = field(default_factory=dict)
+    others: Mapping[str, ComponentSpec] = field(default_factory=dict)
     oversight: CallMonitor = field(default_factory=CallMonitor)
 
     @property
@@ -79,7 +82,26 @@ class Study:
             "scheme": self.scheme,
             "dynamics": self.dynamics,
             **{f"{kind}.{name}": choice for kind in named for name, choice in named[kind].items()},
+            **self.others,
         }
+
+    def check_installed(self, *, simulated: bool = False, feedback: bool = True) -> None:
+        """Raise :class:`ProtocolError` unless all that a run of the study needs is installed.
+
+        Parameters
+        ----------
+        simulated
+            Whether the simulated operator takes the place of the input.
+        feedback
+            Whether views and sounds are shown.
+        """
+        used = self.choices | ({"input": self.operator} if simulated else {})
+        if not feedback:
+            shown = ("feedback.", "views.")
+            used = {part: each for part, each in used.items() if not part.startswith(shown)}
+        lacks = {each.called: each.offer.missing for each in used.values()}
+        if wrong := [f"{called} {what}" for called, what in lacks.items() if what]:
+            raise ProtocolError("\n".join(wrong))
 
     def check_participant(self, participant: str) -> None:
         """Raise :class:`ProtocolError` unless ``participant`` matches the protocol's pattern."""
@@ -198,7 +220,7 @@ def load(path: Path, registry: Registry) -> Study:
     operator = chooser.choose(InputDevice, ("operator",), DEFAULT_OPERATOR)
     scheme = chooser.choose(Controller, ("scheme",))
     dynamics = chooser.choose(Dynamics, ("dynamics",))
-    choices = chooser.choose_tasks()
+    choices = chooser.choose_several(Task, "tasks")
     tasks = chooser.build(Task, "tasks", choices, machine[0]) if machine else {}
     asked = chooser.choose_questionnaires(protocol) if protocol else {}
     questionnaires = (
@@ -207,6 +229,7 @@ def load(path: Path, registry: Registry) -> Study:
     cues, sounds, views = chooser.choose_feedback()
     if protocol is not None:
         Checker(source, protocol).check(tasks, questionnaires)
+    others = chooser.choose_others()
     source.raise_problems()
     if not (protocol and machine and device and operator and scheme and dynamics):
         raise AssertionError("a missing part is a problem, and problems were raised")
@@ -227,5 +250,6 @@ def load(path: Path, registry: Registry) -> Study:
         cues=cues,
         sounds=sounds,
         views=views,
+        others=others,
         oversight=chooser.oversight,
     )

@@ -9,7 +9,10 @@ starts late, or again, draws from one sample alone.
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
+
+from pydantic import TypeAdapter
 
 from labcrane.core.records import Event, Frame, Run, SessionState, is_counted, is_done
 from labcrane.recording.run_codec import write_run
@@ -134,6 +137,11 @@ class ContextInlet:
         return self.situation != before
 
 
+@cache
+def _codec() -> TypeAdapter[SessionState]:
+    return TypeAdapter(SessionState)
+
+
 def situation_of(found: Mapping[str, Any]) -> SessionState:
     """Return the situation that JSON holds."""
-    return SessionState(**{**found, "active": tuple(found["active"])})
+    return _codec().validate_python(found)

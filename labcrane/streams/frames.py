@@ -4,52 +4,39 @@ A sample of ``labcrane.frame`` is everything a frame holds but its events, in fl
 of :func:`frame_columns`, in order. Its time is the time the tick was due.
 """
 
-import itertools
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane.core.clock import Tick
-from labcrane.core.records import Frame, Phase, Run
-from labcrane.core.signals import Layout
+from labcrane.core.records import Frame, Run
+from labcrane.recording.frame_log import FrameRow, columns, sizes
+from labcrane.recording.journal import Column
 from labcrane.streams.outlets import Samples, channel, stream_info
-from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pylsl
 
 FRAME = "labcrane.frame"
 
-HEAD = ("tick", "due", "woke", "elapsed", "trial", "phase", "paused")
-HEAD_UNITS = ("1", "s", "s", "s", "1", "1", "1")
-PHASES = tuple(Phase)
-"""What the numbers in the phase column stand for."""
 
-
-def layouts(run: Run) -> tuple[Layout, Layout, Layout, Layout]:
-    """Return the layouts of a frame's arrays: axes, command, state, task."""
-    return run.axes, run.command, run.state, run.task
-
-
-def frame_columns(run: Run) -> tuple[str, ...]:
-    """Return what a sample holds, in order."""
-    parts = zip(("axes", "command", "state", "task"), layouts(run), strict=True)
-    return (*HEAD, *(f"{part}.{column}" for part, layout in parts for column in layout.columns))
+def frame_columns(run: Run) -> tuple[Column, ...]:
+    """Return what a sample holds, in order: the columns of the journal but for ``wrote``."""
+    return tuple(each for each in columns(run) if (each.group, each.label) != ("loop", "wrote"))
 
 
 class FrameOutlet:
     """Sends every frame whole."""
 
     def __init__(self, run: Run, source: str) -> None:
-        columns = frame_columns(run)
+        held = frame_columns(run)
         info = stream_info(
-            FRAME, "Frame", len(columns), "double64", rate_hz=run.rate_hz, source=source
+            FRAME, "Frame", len(held), "double64", rate_hz=run.rate_hz, source=source
         )
-        units = (*HEAD_UNITS, *(unit for layout in layouts(run) for unit in layout.units))
-        for column, unit in zip(columns, units, strict=True):
-            channel(info, label=column, unit=unit, type="Frame")
-        self._row = np.zeros(len(columns))
-        self._samples = Samples(info, len(columns))
+        for column in held:
+            channel(info, label=_label(column), unit=column.unit, type="Frame")
+        self._row = np.zeros(len(held))
+        self._fill = FrameRow(sizes(run), wrote=False).fill
+        self._samples = Samples(info, len(held))
 
     @property
     def description(self) -> str:
@@ -58,13 +45,8 @@ class FrameOutlet:
 
     def push(self, frame: Frame) -> None:
         """Send a frame. Does not wait for any receiver."""
-        row, start = self._row, len(HEAD)
-        row[:3] = frame.tick
-        row[3:start] = frame.elapsed, frame.trial, PHASES.index(frame.phase), frame.paused
-        for array in (frame.axes, frame.command, frame.state, frame.task):
-            row[start : start + len(array)] = array
-            start += len(array)
-        self._samples.push(row, frame.tick.due)
+        self._fill(self._row, frame)
+        self._samples.push(self._row, frame.tick.due)
 
     def close(self) -> None:
         """End the stream."""
@@ -94,7 +76,7 @@ class FrameInlet:
         self._inlet = pylsl.StreamInlet(
             info, max_buflen=self.BUFFER_S, recover=True, processing_flags=0, as_numpy=True
         )
-        self._sizes = [layout.size for layout in layouts(run)]
+        self._frame = FrameRow(sizes(run), wrote=False).frame
         self.skipped = 0
 
     def newest(self, wait_s: float) -> Frame | None:
@@ -108,22 +90,11 @@ class FrameInlet:
                 break
             self.skipped += len(rows)
             row = rows[-1]
-        return frame_of(np.asarray(row, dtype=np.float64), self._sizes)
+        return self._frame(np.asarray(row, dtype=np.float64))
 
 
-def frame_of(row: FloatArray, sizes: list[int]) -> Frame:
-    """Return the frame that a sample holds, shape ``(n_columns,)``."""
-    number, due, woke, elapsed, trial, phase, paused = row[: len(HEAD)].tolist()
-    ends = np.cumsum([len(HEAD), *sizes])
-    axes, command, state, task = (row[a:b] for a, b in itertools.pairwise(ends))
-    return Frame(
-        Tick(int(number), due, woke),
-        elapsed,
-        axes,
-        command,
-        state,
-        task,
-        PHASES[int(phase)],
-        int(trial),
-        bool(paused),
-    )
+def _label(column: Column) -> str:
+    """Return a channel's label: those of the loop stand alone, as ``tick``."""
+    if column.group == "loop":
+        return column.label
+    return f"{'axes' if column.group == 'input' else column.group}.{column.label}"

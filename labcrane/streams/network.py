@@ -40,7 +40,7 @@ MulticastMinRTT = 0.05
 UnicastMinRTT = 0.1
 MulticastMaxRTT = 1
 UnicastMaxRTT = 1
-ContinuousResolveInterval = 0.25
+ContinuousResolveInterval = 0.75
 TimeUpdateInterval = 1
 [log]
 level = -3

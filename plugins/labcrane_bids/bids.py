@@ -5,7 +5,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from labcrane import Exporter, Machine, Participant, SessionRecord
+from labcrane import Exporter, Machine
+from labcrane.analysis import Participant
+from labcrane.recording import SessionRecord
 from labcrane_bids.dataset import (
     copy_phenotype,
     describe_dataset,

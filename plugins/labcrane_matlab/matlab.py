@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from labcrane import Exporter, Participant, RecordingError, SessionRecord, codebook_of, measures_of
+from labcrane import Exporter, RecordingError
+from labcrane.analysis import Participant, codebook_of, measures_of
+from labcrane.recording import SessionRecord
 from labcrane_matlab.settings import MatlabSettings
 
 if TYPE_CHECKING:

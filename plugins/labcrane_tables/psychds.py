@@ -4,7 +4,8 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
-from labcrane import Exporter, Participant, codebook_of, measures_of
+from labcrane import Exporter
+from labcrane.analysis import Participant, codebook_of, measures_of
 from labcrane_tables.frames import snake
 from labcrane_tables.settings import PsychDsSettings
 from labcrane_tables.tables import write_csv

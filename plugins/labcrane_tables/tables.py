@@ -7,7 +7,9 @@ from pathlib import Path
 from shutil import copyfile
 from typing import TYPE_CHECKING, Any
 
-from labcrane import Exporter, Participant, SessionRecord, codebook_of, measures_of
+from labcrane import Exporter
+from labcrane.analysis import Participant, codebook_of, measures_of
+from labcrane.recording import SessionRecord
 from labcrane_tables.frames import snake, stream_tables
 from labcrane_tables.settings import TableSettings
 

@@ -4,7 +4,8 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
-from labcrane import Frame, Run, SessionState, TargetFinder
+from labcrane import Frame, Run
+from labcrane.core import SessionState, TargetFinder
 
 LOAD = "joint.load"
 ITEM = re.compile(r"([-*+•]|\d+[.)])\s")

@@ -11,7 +11,6 @@ import numpy.typing as npt
 from panda3d import core
 
 from labcrane import (
-    CameraImage,
     Cylinder,
     DeviceError,
     Feedback,
@@ -20,13 +19,10 @@ from labcrane import (
     Machine,
     PluginError,
     Run,
-    SessionState,
-    Shape,
     Signal,
-    TargetFinder,
-    Value,
-    link_frames,
 )
+from labcrane.core import CameraImage, SessionState, Shape, TargetFinder, Value
+from labcrane.machines import link_frames
 from labcrane_view.areas import Areas
 from labcrane_view.camera import Camera, Delay, Part
 from labcrane_view.hud import Hud, notice

@@ -1,0 +1,26 @@
+"""The public names of this package, and the modules from which they are imported."""
+
+from .findings import Finding, Verdict
+from .items import AnswerError, Answers, Item, Score, numeric_answers
+from .primitives import Shape, TargetFinder
+from .records import CameraImage, SessionState, Value
+from .settings import StudyPath
+from .signals import Layout, signals_of
+
+__all__ = [
+    "AnswerError",
+    "Answers",
+    "CameraImage",
+    "Finding",
+    "Item",
+    "Layout",
+    "Score",
+    "SessionState",
+    "Shape",
+    "StudyPath",
+    "TargetFinder",
+    "Value",
+    "Verdict",
+    "numeric_answers",
+    "signals_of",
+]
