@@ -174,4 +174,5 @@ if __name__ == "__main__":
     (where / "plugins").mkdir()
     (where / "plugins" / "plain.py").write_text(PLUGIN)
     for number in range(int(sys.argv[2])):
-        print(json.dumps(begin(where, number + 1)), flush=True)
+        sys.stdout.write(f"{json.dumps(begin(where, number + 1))}\n")
+        sys.stdout.flush()
