@@ -16,6 +16,7 @@ from .errors import (
     RecordingError,
     StreamError,
 )
+from .files.yaml import read_yaml
 from .machines.machine import Machine
 from .recording.participant_file.reader import open_recording
 from .registry.hookspecs import hookimpl
@@ -60,6 +61,7 @@ __all__ = [
     "machines",
     "offer",
     "open_recording",
+    "read_yaml",
     "recording",
     "registry",
     "replay",

@@ -48,6 +48,8 @@ class FeedbackConfig:
         What was measured of its delay, if anything was.
     recorded
         Whether there is a recorder, without which it presents nothing; a preview has none.
+    streams
+        Descriptions of the session's streams by name, when there are any yet.
     """
 
     name: str
@@ -59,6 +61,7 @@ class FeedbackConfig:
     cues: Mapping[str, Part] = field(default_factory=dict)
     measured: Measured | None = None
     recorded: bool = True
+    streams: Mapping[str, str] = field(default_factory=dict)
 
     def as_json(self) -> str:
         """Return the order as one line."""

@@ -4,10 +4,17 @@ from collections.abc import Callable, Iterable
 
 from labcrane.core.records import Value
 from labcrane.protocol.protocol import OnFault
-from labcrane.session.commands import Command, Order
+from labcrane.session.commands import (
+    FeedbackLost,
+    FeedbackReady,
+    LauncherGone,
+    ProcessReport,
+    StreamBack,
+    StreamLost,
+)
 
-EXAMINER, INPUT, DISK, STOP = "examiner", "input", "disk", "stop rule"
-"""Who can hold a session, beside lost streams and feedback: it goes on when nobody does."""
+INPUT, DISK = "input", "disk"
+"""What can hold a session beside people, lost streams and feedback."""
 
 
 class Suspenders:
@@ -72,29 +79,31 @@ class Suspenders:
             self._note(f"{part}.back", {})
             self.release(part)
 
-    def report(self, command: Command) -> None:
-        """Take up what the launcher says of a stream or a feedback process."""
-        if command.order is Order.LOST:
-            self._note("stream.lost", {"what": command.text})
-            if self._on_fault.stream_lost == "pause":
-                self.hold(command.text)
-        elif command.order is Order.BACK:
-            self._note("stream.back", {"what": command.text})
-            self.release(command.text)
-        else:
-            self._feedback(command)
+    def report(self, report: ProcessReport) -> None:
+        """Take up what the launcher says of another process."""
+        match report:
+            case StreamLost(what):
+                self._note("stream.lost", {"what": what})
+                if self._on_fault.stream_lost == "pause":
+                    self.hold(what)
+            case StreamBack(what):
+                self._note("stream.back", {"what": what})
+                self.release(what)
+            case FeedbackReady(what, facts):
+                self._note("feedback.ready", {"what": what, "facts": facts})
+                self.awaited.discard(what)
+                self.release(f"feedback {what}")
+            case FeedbackLost():
+                self._feedback_lost(report)
+            case LauncherGone():
+                self._note("launcher.gone", {})
+                self.ending.append("the launcher is gone")
 
-    def _feedback(self, command: Command) -> None:
-        name, _, why = command.text.partition(": ")
-        who = f"feedback {name}"
-        if command.order is Order.MENDED:
-            self._note("feedback.ready", {"what": name, "facts": why})
-            self.awaited.discard(name)
-            self.release(who)
-            return
-        left_out = command.order is Order.LEFT_OUT
-        self._note("feedback.lost", {"what": name, "why": why, "left_out": left_out})
-        if left_out:
-            self.awaited.discard(name)
+    def _feedback_lost(self, lost: FeedbackLost) -> None:
+        who = f"feedback {lost.what}"
+        about: dict[str, Value] = {"what": lost.what, "why": lost.why, "left_out": lost.left_out}
+        self._note("feedback.lost", about)
+        if lost.left_out:
+            self.awaited.discard(lost.what)
         if self._on_fault.feedback_lost == "pause" and who not in self.by:
             self.hold(who)

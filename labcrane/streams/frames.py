@@ -38,6 +38,11 @@ class FrameOutlet:
         self._fill = FrameRow(sizes(run), wrote=False).fill
         self._samples = Samples(info, len(held))
 
+    @property
+    def description(self) -> str:
+        """The stream as XML: whoever has it needs no search."""
+        return self._samples.description
+
     def push(self, frame: Frame) -> None:
         """Send a frame. Does not wait for any receiver."""
         self._fill(self._row, frame)

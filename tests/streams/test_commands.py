@@ -1,6 +1,7 @@
 """The commands about streams and recordings, as a user types them."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -48,12 +49,12 @@ def recorded(source: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_streams_lists_type_rate_units_host_and_offset(source: str) -> None:
     done = labcrane("streams")
-    (line,) = (line for line in done.stdout.splitlines() if source in line)
-    assert "Amplifier" in line
-    assert "EEG" in line
-    assert "100" in line
-    assert "microvolts" in line
-    assert "+0.000" in line or "-0.000" in line  # the same clock
+    name, channels, host, ident = done.stdout.partition(source)[0].splitlines()[-4:]
+    assert name == "Amplifier: EEG, 100 Hz"
+    assert channels.startswith("  channels: 2 (")
+    assert "microvolts" in channels
+    assert re.fullmatch(r"  host: \S+, clock offset [+-]\d\.\d{6} s", host)
+    assert ident == "  source id: "
 
 
 def test_streams_are_recorded_without_an_experiment(recorded: Path) -> None:

@@ -20,27 +20,22 @@ def streams(
     local: Local = False,
 ) -> None:
     """List the streams on the network."""
-    from rich.table import Table
-
     if local:
         stay_on_this_computer()
     from labcrane.streams.discovery import discover
 
     found = discover(wait)
-    table = Table("name", "type", "rate Hz", "channels", "units", "host", "offset s", "source id")
+    if not found:
+        out.print(f"no stream answered within {wait:g} s")
     for one in found:
-        table.add_row(
-            one.name,
-            one.type,
-            f"{one.rate_hz:g}" if one.rate_hz else "irregular",
-            str(one.channels),
-            ", ".join(one.units) or "-",
-            one.host,
-            "-" if one.offset_s is None else f"{one.offset_s:+.6f}",
-            one.source_id or "-",
-        )
-    out.print(table if found else f"no stream answered within {wait:g} s")
-    for one in found:
+        # No table: names and source ids are longer than a terminal's columns.
+        rate = f"{one.rate_hz:g} Hz" if one.rate_hz else "irregular"
+        clock = "unknown" if one.offset_s is None else f"{one.offset_s:+.6f} s"
+        units = ", ".join(dict.fromkeys(one.units)) or "no units"
+        out.print(f"{one.name}: {one.type or 'no type'}, {rate}", markup=False)
+        out.print(f"  channels: {one.channels} ({units})", markup=False)
+        out.print(f"  host: {one.host}, clock offset {clock}", markup=False)
+        out.print(f"  source id: {one.source_id or 'none'}", markup=False)
         for warning in one.warnings:
             out.print(f"{one.name}: {warning}", markup=False)
 

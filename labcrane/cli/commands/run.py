@@ -12,7 +12,6 @@ from labcrane.cli.output import out
 from labcrane.errors import LabcraneError, PluginError, ProtocolError
 
 if TYPE_CHECKING:
-    from labcrane.design.plan import SessionPlan
     from labcrane.launcher.session_process import SessionConfig
 
 Participant = Annotated[str, typer.Option(help="pseudonym: P001")]
@@ -133,7 +132,7 @@ def _run_fast(order: "SessionConfig") -> Path:
     visit.study.check_installed(simulated=True, feedback=False)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
-    with Terminal(console, out.console, _counted(plan), keys=False):
+    with Terminal(console, out.console, len(plan.trials), keys=False):
         return run_session(visit, console)
 
 
@@ -148,6 +147,8 @@ def _launch(order: "SessionConfig", *, page: bool) -> None:
     from labcrane.session.commands import QueueConsole
 
     visit = order.visit()
+    if not order.resumed:
+        visit.folder.check_new(order.session)  # before anything is shown
     visit.study.check_installed(simulated=visit.simulated, feedback=visit.feedback)
     needs = {"pylsl": LAB, **({"nicegui": LAB} if page else {})}
     if missing := not_installed(needs):
@@ -156,7 +157,7 @@ def _launch(order: "SessionConfig", *, page: bool) -> None:
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
     keys, asked = not visit.simulated, visit.study.questionnaires
-    shown, count = out.console, _counted(plan)
+    shown, count = out.console, len(plan.trials)
     with Terminal(console, shown, count, keys=keys, questionnaires=asked) as terminal:
         launcher = Launcher(order, console, terminal.say)
         with (
@@ -178,12 +179,3 @@ def _launch(order: "SessionConfig", *, page: bool) -> None:
             f"participant file; go on with: labcrane resume {order.protocol} --participant "
             f"{order.participant} --session {order.session}"
         )
-
-
-def _counted(plan: "SessionPlan") -> int:
-    return sum(
-        trial.planned.counted
-        for block in plan.blocks
-        if not block.practice
-        for trial in block.trials
-    )
