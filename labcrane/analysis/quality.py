@@ -73,10 +73,9 @@ def sync_quality(participant: Participant) -> "pd.DataFrame":
 
 def exclusions(movements: "pd.DataFrame") -> "pd.DataFrame":
     """Return the movements that count for no average, with the reason."""
+    names = ["participant", "session", "trial", "attempt", "outcome", "practice"]
     counted = is_result(movements)
-    out = movements.loc[
-        ~counted, ["participant", "session", "trial", "attempt", "outcome", "practice"]
-    ].copy()
+    out = movements.reindex(columns=names).loc[~counted].copy()
     out["why"] = [
         "practice" if row.practice else f"outcome {row.outcome}"
         for row in out.itertuples(index=False)
@@ -89,4 +88,8 @@ def is_result(movements: "pd.DataFrame") -> "pd.Series[bool]":
 
     A repeated trial's attempts before the last have the outcome ``repeated``.
     """
+    import pandas as pd
+
+    if movements.empty:  # sessions that ended before their first result have no columns either
+        return pd.Series([], index=movements.index, dtype=bool)
     return (movements["outcome"] == "success") & (movements["practice"].astype(float) == 0.0)

@@ -31,7 +31,7 @@ from labcrane.session.commands import (
     encode,
 )
 from labcrane.session.eligibility import check_eligibility
-from labcrane.session.session import Visit, finish
+from labcrane.session.session import Visit, finish, outlook, recording, running
 from labcrane.streams.recorder.handle import RecorderHandle
 from labcrane.streams.sync.sync_report import SyncReport
 
@@ -62,11 +62,14 @@ class Outcome:
         In which component it was when it died; empty when that is not known.
     sync_report
         How right the session's time stamps are; None when nothing was recorded.
+    owed
+        What the session still owes, in its own words; empty when it ran to its end or has died.
     """
 
     died: int | None = None
     where: str = ""
     sync_report: SyncReport | None = None
+    owed: str = ""
 
 
 class MessageSender:
@@ -128,6 +131,7 @@ class Launcher:
         self._crew: FeedbackProcesses | None = None
         self._lost: set[str] = set()
         self._kept: list[Command] = []
+        self._owed = ""
         self.sync_report: SyncReport | None = None
 
     def run(self) -> Outcome:
@@ -139,9 +143,17 @@ class Launcher:
             The session could not be run, in the session process's own words.
         """
         visit = self._visit
-        check_eligibility(visit)
-        if not visit.resumed:
-            visit.folder.claim(visit.session)
+        admission = check_eligibility(visit)
+        with running(visit):
+            if visit.resumed:
+                with recording(visit):  # of a launcher that died, the session may still be ending
+                    self._say(outlook(visit, admission))
+            else:
+                visit.folder.claim(visit.session)
+            return self._run_all()
+
+    def _run_all(self) -> Outcome:
+        visit = self._visit
         requests = [
             need.request(label, required=not visit.simulated)
             for label, need in visit.study.protocol.streams.items()
@@ -163,7 +175,7 @@ class Launcher:
             if parts(visit.journal):
                 report = self.sync_report = finish(visit)
         where = read_whereabouts(visit.whereabouts) if died is not None else None
-        return Outcome(died, str(where or ""), report)
+        return Outcome(died, str(where or ""), report, self._owed)
 
     @property
     def streams_status(self) -> dict[str, Any]:
@@ -251,8 +263,10 @@ class Launcher:
                 if isinstance(message, Offered):
                     if self._crew:
                         self._crew.offer(message.streams)
-                else:
-                    self._console.report(message)
+                    continue
+                if message.name == "session.end":
+                    self._owed = str(message.data["owed"])
+                self._console.report(message)
         except (EOFError, OSError):
             pass  # it died in the middle of a message; its exit code says how
         return None

@@ -74,13 +74,23 @@ class DataFolder:
         RecordingError
             The folder cannot be written.
         """
+        self.make()
+        self.check_new(session)
+
+    def make(self) -> None:
+        """Make the folder, if it is not there.
+
+        Raises
+        ------
+        RecordingError
+            It cannot be written.
+        """
         try:
             make_folder(self.path)
         except OSError as error:
             raise RecordingError(self._cannot_write(error.strerror)) from error
         if not os.access(self.path, os.W_OK | os.X_OK):
             raise RecordingError(self._cannot_write("permission denied"))
-        self.check_new(session)
 
     def check_new(self, session: int) -> None:
         """Make sure that ``session`` has not been begun.

@@ -14,9 +14,9 @@ from faults.sessions import unique, wait_for
 from labcrane import Event, Frame, Tick
 from labcrane.feedback.config import FeedbackConfig, Part
 from labcrane.feedback.process import FeedbackProcess
-from labcrane.streams.context import ContextOutlet
+from labcrane.streams.context import CONTEXT, ContextOutlet
 from labcrane.streams.feedback_log import log_source
-from labcrane.streams.frames import FrameOutlet
+from labcrane.streams.frames import FRAME, FrameOutlet
 from labcrane.testing import TARGETS, ch8, make_run, make_target
 from labcrane.web.pictures import Pictures
 
@@ -98,6 +98,12 @@ class Joined:
         )
         self.said: list[dict[str, Any]] = []
         self._process = FeedbackProcess(order, self.said.append)
+        self._process.offer(
+            {
+                FRAME: self.session.frames.description,
+                CONTEXT: self.session.context.description,
+            }
+        )
         self._thread = threading.Thread(target=self._process.run)
         self._thread.start()
 

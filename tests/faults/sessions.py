@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +76,19 @@ def recorders(launcher: "subprocess.Popen[str]") -> list[psutil.Process]:
         for child in _children(launcher)
         if any("_streams" in file.path for file in _files(child))
     ]
+
+
+def spares(launcher: "subprocess.Popen[str]") -> list[psutil.Process]:
+    """Return the recorder processes of a launcher that have loaded liblsl, and wait."""
+    found = []
+    writing = {one.pid for one in recorders(launcher)}
+    for child in _children(launcher):
+        with suppress(psutil.NoSuchProcess, psutil.ZombieProcess):
+            waits = "labcrane.streams.recorder.process" in child.cmdline()
+            maps = [each.path for each in child.memory_maps()]
+            if waits and child.pid not in writing and any("liblsl" in path for path in maps):
+                found.append(child)
+    return found
 
 
 def recorder_process(launcher: "subprocess.Popen[str]") -> psutil.Process | None:

@@ -1,6 +1,7 @@
 """Commands that work on recordings: export, report, replay."""
 
-from collections.abc import Iterator, Sequence
+import shutil
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +11,7 @@ import typer
 from labcrane.cli.commands.approval import today
 from labcrane.cli.options import stay_on_this_computer
 from labcrane.cli.output import out
-from labcrane.errors import ProtocolError, RecordingError
+from labcrane.errors import LabcraneError, ProtocolError, RecordingError
 
 if TYPE_CHECKING:
     from labcrane.analysis.cohort import Cohort, Participant, Struck
@@ -26,6 +27,9 @@ Scheduler = Annotated[
     str | None, typer.Option(help="a Dask scheduler whose workers do it: tcp://host:8786")
 ]
 MANIFEST = "labcrane_export.json"
+
+LEFT_OUT = 3
+"""Exit status of what was done, but without recordings that cannot be used."""
 
 
 def export(
@@ -59,25 +63,90 @@ def export(
     _, first = next(cohort.included[0].sessions())
     exporter = oversight.call(place, offer.build, chosen, machine_of(first))
     folder.mkdir(parents=True, exist_ok=True)
-    people = _measured(cohort, workers, scheduler)
-    with progress_bar(f"export to {to}", len(cohort.included)) as advance:
-        oversight.call(place, exporter.export, _counted(people, advance), folder)
+
+    def attempt(cohort: "Cohort") -> None:
+        people = _Read(_measured(cohort, workers, scheduler))
+        with progress_bar(f"export to {to}", len(cohort.included)) as advance:
+            try:
+                oversight.call(place, exporter.export, people.counted(advance), folder)
+            except LabcraneError as error:
+                if people.now is None:  # nobody's data were being read
+                    raise
+                raise _Unusable(people.now, str(error)) from error
+
+    cohort = _without_bad(attempt, cohort, folder)
     _write_manifest(folder, to, chosen.model_dump(mode="json"), cohort)
     _keep_track(data, to, folder, cohort)
     out.print(f"{to}: {folder}", markup=False)
+    _tell_left_out(cohort)
+
+
+class _Unusable(Exception):  # noqa: N818 - no error: the rest is done without
+    """Somebody's data stopped what was made of everybody's."""
+
+    def __init__(self, name: str, why: str) -> None:
+        super().__init__(name, why)
+        self.name, self.why = name, why
+
+
+class _Read:
+    """Participants as they are handed out, and whose data are being read now."""
+
+    def __init__(self, people: "Sequence[Participant]") -> None:
+        self._people = people
+        self.now: str | None = None
+
+    def counted(self, advance: Any) -> "Iterator[Participant]":
+        for person in self._people:
+            self.now = person.name
+            yield person
+            advance()
+        self.now = None
+
+
+def _without_bad(attempt: "Callable[[Cohort], None]", cohort: "Cohort", folder: Path) -> "Cohort":
+    """Do something with a cohort; without whoever's data cannot be used, who is named.
+
+    ``folder`` is new or was empty: what an attempt that failed has left in it is removed.
+    """
+    while True:
+        try:
+            attempt(cohort)
+        except _Unusable as bad:
+            cohort = _leave_out(cohort, bad.name, bad.why)
+            for entry in folder.iterdir():
+                shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+        else:
+            return cohort
+
+
+def _leave_out(cohort: "Cohort", name: str, why: str) -> "Cohort":
+    out.print(f"left out: {name}, unreadable: {why}", markup=False)
+    return cohort.without(name, why)
+
+
+def _tell_left_out(cohort: "Cohort") -> None:
+    """Say how many recordings cannot be used, and end with their exit code."""
+    if not cohort.unreadable:
+        return
+    names = ", ".join(person.name for person in cohort.unreadable)
+    out.print(f"{len(cohort.unreadable)} recordings cannot be used: {names}", markup=False)
+    raise typer.Exit(LEFT_OUT)
 
 
 def _measured(cohort: "Cohort", workers: int, scheduler: str | None) -> "Sequence[Participant]":
     """Return the participants; with many workers their measures, most of the work, are done."""
     if workers == 1 and scheduler is None:
         return cohort.included
-    from labcrane.analysis.measures import measure_ahead
+    from labcrane.analysis.measures import measure_or_say_why
     from labcrane.analysis.parallel import work
 
     with progress_bar("measure", len(cohort.included)) as advance:
         done = {}
-        for person in work(measure_ahead, cohort.included, workers, scheduler):
-            done[person.name] = person
+        for name, why, person in work(measure_or_say_why, cohort.included, workers, scheduler):
+            if person is None:
+                raise _Unusable(name, why)
+            done[name] = person
             advance()
     return [done[person.name] for person in cohort.included]
 
@@ -95,15 +164,22 @@ def report(
     from labcrane.analysis.report.report import write_report
 
     cohort = cohort_of(data.resolve() if scheduler else data, include)
+
+    def leave_out(name: str, why: str) -> None:
+        nonlocal cohort
+        cohort = _leave_out(cohort, name, why)
+
     with progress_bar("report", len(cohort.included)) as advance:
         page = write_report(
             cohort,
             folder,
+            leave_out=leave_out,
             progress=lambda done, of: advance(),
             workers=workers,
             scheduler=scheduler,
         )
     out.print(f"report: {page}", markup=False)
+    _tell_left_out(cohort)
 
 
 def replay(
@@ -219,12 +295,6 @@ def progress_bar(what: str, total: int) -> Iterator[Any]:
     with Progress(*parts, console=out.console) as progress:
         task = progress.add_task(what, total=total)
         yield lambda: progress.advance(task)
-
-
-def _counted(participants: "Sequence[Participant]", advance: Any) -> "Iterator[Participant]":
-    for participant in participants:
-        yield participant
-        advance()
 
 
 def _settings(model: Any, words: list[str], name: str) -> Any:

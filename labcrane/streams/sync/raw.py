@@ -72,6 +72,23 @@ class RawStream:
         return np.asarray(times[np.minimum(chunk, len(times) - 1)])
 
 
+def unwrapped(counts: FloatArray) -> FloatArray | None:
+    """Return a source's counter without its wraps, shape ``(n,)``; None when it does not count.
+
+    A counter goes on by one nearly always. A step back is a wrap, to the power of two that the
+    highest number falls just short of, else to that number itself.
+    """
+    steps = np.diff(counts)
+    if len(steps) == 0 or float(np.median(steps)) != 1.0 or not np.isfinite(counts).all():
+        return None
+    back = steps < 0.0
+    if back.any():
+        highest = float(counts.max()) + 1.0
+        power = 2.0 ** np.ceil(np.log2(highest))
+        steps = np.where(back, steps + (power if highest > 0.98 * power else highest), steps)
+    return np.asarray(np.r_[0.0, np.cumsum(np.maximum(steps, 0.0))])
+
+
 def raw_of(recorded: RecordedStream) -> RawStream:
     """Return the times of a recorded stream, for correction.
 
