@@ -24,6 +24,7 @@ from .registry.offers import Offer, offer
 from .types import FloatArray
 
 __version__: str
+from .streams.newest import NewestSample
 
 __all__ = [
     "Controller",
@@ -39,6 +40,7 @@ __all__ = [
     "InputDevice",
     "LabcraneError",
     "Machine",
+    "NewestSample",
     "Offer",
     "Phase",
     "PlannedTrial",

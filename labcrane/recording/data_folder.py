@@ -80,6 +80,17 @@ class DataFolder:
         RecordingError
             The folder cannot be written.
         """
+        self.make()
+        self.check_new(session)
+
+    def make(self) -> None:
+        """Make the folder, if it is not there.
+
+        Raises
+        ------
+        RecordingError
+            It cannot be written.
+        """
         check_name(self.participant, "participant")
         self._refuse_twin()
         if self.path.is_symlink():
@@ -93,7 +104,6 @@ class DataFolder:
             raise RecordingError(self._cannot_write(error.strerror)) from error
         if not os.access(self.path, os.W_OK | os.X_OK):
             raise RecordingError(self._cannot_write("permission denied"))
-        self.check_new(session)
 
     def check_new(self, session: int) -> None:
         """Make sure that ``session`` has not been begun.

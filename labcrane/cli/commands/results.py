@@ -1,6 +1,6 @@
 """Commands that work on recordings: export, report, replay."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +10,7 @@ import typer
 from labcrane.cli.commands.approval import today
 from labcrane.cli.options import stay_on_this_computer
 from labcrane.cli.output import out
-from labcrane.errors import ProtocolError, RecordingError
+from labcrane.errors import LabcraneError, ProtocolError, RecordingError
 
 if TYPE_CHECKING:
     from labcrane.analysis.cohort import Cohort, Participant, Struck
@@ -26,6 +26,13 @@ Workers = Annotated[int, typer.Option(help="processes on this computer", min=1)]
 Scheduler = Annotated[
     str | None, typer.Option(help="a Dask scheduler whose workers do it: tcp://host:8786")
 ]
+AcceptUnprobed = Annotated[
+    bool,
+    typer.Option("--accept-unprobed", help="use streams whose clock was never probed as well"),
+]
+
+LEFT_OUT = 3
+"""Exit status of what was done, but without recordings that cannot be used."""
 
 
 def export(
@@ -40,10 +47,12 @@ def export(
     ] = None,
     workers: Workers = 1,
     scheduler: Scheduler = None,
+    accept_unprobed: AcceptUnprobed = False,
 ) -> None:
     """Export recordings for R, MATLAB, BIDS, Psych-DS or EEG programs."""
     from labcrane.analysis.exporter import Exporter
     from labcrane.analysis.movements import machine_of
+    from labcrane.analysis.quality import check_probed
     from labcrane.registry.call_monitor import CallMonitor
     from labcrane.registry.registry import discover
 
@@ -56,28 +65,91 @@ def export(
     if folder.exists() and any(folder.iterdir()):
         raise ProtocolError(f"{folder} is not empty, and nothing is overwritten; give a new folder")
     cohort = cohort_of(data.resolve() if scheduler else data, include)
+    unknown = check_probed(cohort.included, accept=accept_unprobed)
     _, first = next(cohort.included[0].sessions())
     exporter = oversight.call(place, offer.build, chosen, machine_of(first))
-    people = _measured(cohort, workers, scheduler)
-    with _product(data, to, folder, cohort, shared=exporter.shared) as made:
-        handed = made.handing_out((person.name, person) for person in people)
-        with progress_bar(f"export to {to}", len(cohort.included)) as advance:
-            oversight.call(place, exporter.export, _counted(handed, advance), made.folder)
-        _write_manifest(made.folder, to, chosen.model_dump(mode="json"), cohort)
+
+    def attempt(cohort: "Cohort") -> None:
+        people = _Read(_measured(cohort, workers, scheduler))
+        with (
+            _product(data, to, folder, cohort, shared=exporter.shared) as made,
+            progress_bar(f"export to {to}", len(cohort.included)) as advance,
+        ):
+            handed = made.handing_out((person.name, person) for person in people.counted(advance))
+            try:
+                oversight.call(place, exporter.export, handed, made.folder)
+            except LabcraneError as error:
+                if people.now is None:  # nobody's data were being read
+                    raise
+                raise _Unusable(people.now, str(error)) from error
+            _write_manifest(made.folder, to, chosen.model_dump(mode="json"), cohort, unknown)
+
+    cohort = _without_bad(attempt, cohort)
     out.print(f"{to}: {folder}", markup=False)
+    _tell_left_out(cohort)
+
+
+class _Unusable(Exception):  # noqa: N818 - no error: the rest is done without
+    """Somebody's data stopped what was made of everybody's."""
+
+    def __init__(self, name: str, why: str) -> None:
+        super().__init__(name, why)
+        self.name, self.why = name, why
+
+
+class _Read:
+    """Participants as they are handed out, and whose data are being read now."""
+
+    def __init__(self, people: "Sequence[Participant]") -> None:
+        self._people = people
+        self.now: str | None = None
+
+    def counted(self, advance: Any) -> "Iterator[Participant]":
+        for person in self._people:
+            self.now = person.name
+            yield person
+            advance()
+        self.now = None
+
+
+def _without_bad(attempt: "Callable[[Cohort], None]", cohort: "Cohort") -> "Cohort":
+    """Do something with a cohort; without whoever's data cannot be used, who is named."""
+    while True:
+        try:
+            attempt(cohort)
+        except _Unusable as bad:
+            cohort = _leave_out(cohort, bad.name, bad.why)
+        else:
+            return cohort
+
+
+def _leave_out(cohort: "Cohort", name: str, why: str) -> "Cohort":
+    out.print(f"left out: {name}, unreadable: {why}", markup=False)
+    return cohort.without(name, why)
+
+
+def _tell_left_out(cohort: "Cohort") -> None:
+    """Say how many recordings cannot be used, and end with their exit code."""
+    if not cohort.unreadable:
+        return
+    names = ", ".join(person.name for person in cohort.unreadable)
+    out.print(f"{len(cohort.unreadable)} recordings cannot be used: {names}", markup=False)
+    raise typer.Exit(LEFT_OUT)
 
 
 def _measured(cohort: "Cohort", workers: int, scheduler: str | None) -> "Sequence[Participant]":
     """Return the participants; with many workers their measures, most of the work, are done."""
     if workers == 1 and scheduler is None:
         return cohort.included
-    from labcrane.analysis.measures import measure_ahead
+    from labcrane.analysis.measures import measure_or_say_why
     from labcrane.analysis.parallel import work
 
     with progress_bar("measure", len(cohort.included)) as advance:
         done = {}
-        for person in work(measure_ahead, cohort.included, workers, scheduler):
-            done[person.name] = person
+        for name, why, person in work(measure_or_say_why, cohort.included, workers, scheduler):
+            if person is None:
+                raise _Unusable(name, why)
+            done[name] = person
             advance()
     return [done[person.name] for person in cohort.included]
 
@@ -90,11 +162,19 @@ def report(
     include: Include = None,
     workers: Workers = 1,
     scheduler: Scheduler = None,
+    accept_unprobed: AcceptUnprobed = False,
 ) -> None:
     """Write an HTML report of a study: figures, measures, statistics, quality."""
+    from labcrane.analysis.quality import check_probed
     from labcrane.analysis.report.report import write_report
 
     cohort = cohort_of(data.resolve() if scheduler else data, include)
+    check_probed(cohort.included, accept=accept_unprobed)
+
+    def leave_out(name: str, why: str) -> None:
+        nonlocal cohort
+        cohort = _leave_out(cohort, name, why)
+
     with (
         _product(data, "report", folder, cohort, whole=True) as made,
         progress_bar("report", len(cohort.included)) as advance,
@@ -102,11 +182,13 @@ def report(
         page = write_report(
             cohort,
             made.folder,
+            leave_out=leave_out,
             progress=lambda done, of: advance(),
             workers=workers,
             scheduler=scheduler,
         )
     out.print(f"report: {folder / page.name}", markup=False)
+    _tell_left_out(cohort)
 
 
 def replay(
@@ -230,12 +312,6 @@ def progress_bar(what: str, total: int) -> Iterator[Any]:
         yield lambda: progress.advance(task)
 
 
-def _counted(participants: "Iterable[Participant]", advance: Any) -> "Iterator[Participant]":
-    for participant in participants:
-        yield participant
-        advance()
-
-
 def _settings(model: Any, words: list[str], name: str) -> Any:
     """Return an exporter's settings from NAME=VALUE; values are YAML, as in a protocol."""
     from pydantic import ValidationError
@@ -258,7 +334,9 @@ def _settings(model: Any, words: list[str], name: str) -> Any:
         raise ProtocolError(f"exporter {name!r} can set {known}; {problems}") from None
 
 
-def _write_manifest(folder: Path, to: str, settings: Any, cohort: "Cohort") -> None:
+def _write_manifest(
+    folder: Path, to: str, settings: Any, cohort: "Cohort", unprobed: list[str]
+) -> None:
     """Write what was exported and who was left out beside the export, for erasure and for readers.
 
     BIDS and Psych-DS allow no further files, so it is hidden from them under ``.labcrane``.
@@ -275,5 +353,6 @@ def _write_manifest(folder: Path, to: str, settings: Any, cohort: "Cohort") -> N
         "made": datetime.now(UTC).isoformat(timespec="seconds"),
         "data": cohort.folder.name,
         "participants": cohort.listing().to_dict("records"),
+        "unprobed": unprobed,
     }
     write_manifest(folder, content)
