@@ -8,7 +8,7 @@ from labcrane.session.commands import QueueConsole
 
 if TYPE_CHECKING:
     from labcrane.launcher.launcher import Launcher
-    from labcrane.session.session import Visit
+    from labcrane.session.visit import Visit
 
 
 @contextmanager

@@ -5,7 +5,7 @@ import platform
 from datetime import UTC, datetime
 from importlib.metadata import entry_points, version
 from importlib.util import find_spec
-from typing import Any, Protocol
+from typing import Any
 
 from labcrane.core.records import Run
 from labcrane.design.plan import SessionPlan
@@ -13,10 +13,10 @@ from labcrane.doctor.checks import at_start
 from labcrane.protocol.referenced_files import named_files
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
-from labcrane.recording.data_folder import DataFolder
 from labcrane.recording.trial_columns import trial_units
 from labcrane.registry.entry_points import PROJECT
 from labcrane.registry.loader import own_plugins
+from labcrane.session.visit import Visit
 
 RECORDED_PACKAGES = (
     "labcrane",
@@ -30,26 +30,7 @@ RECORDED_PACKAGES = (
 )
 
 
-class Recorded(Protocol):
-    """A session as far as its context goes."""
-
-    @property
-    def study(self) -> Study: ...
-    @property
-    def session(self) -> int: ...
-    @property
-    def simulated(self) -> bool: ...
-    @property
-    def fast(self) -> bool: ...
-    @property
-    def pilot(self) -> bool: ...
-    @property
-    def resumed(self) -> bool: ...
-    @property
-    def folder(self) -> DataFolder: ...
-
-
-def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> dict[str, Any]:
+def context(visit: Visit, plan: SessionPlan, the_rig: Rig, this_run: Run) -> dict[str, Any]:
     """Return everything that whoever reads the recording must know, ready for JSON."""
     return {
         **_of_visit(visit, plan),
@@ -66,7 +47,7 @@ def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> 
     }
 
 
-def _of_visit(visit: Recorded, plan: SessionPlan) -> dict[str, Any]:
+def _of_visit(visit: Visit, plan: SessionPlan) -> dict[str, Any]:
     """Return who and when this is, and whether it counts."""
     return {
         "study": visit.study.protocol.study,
@@ -115,7 +96,7 @@ def _of_study(study: Study, *, simulated: bool) -> dict[str, Any]:
     }
 
 
-def _started(visit: Recorded) -> datetime:
+def _started(visit: Visit) -> datetime:
     """Return when the session begins: with --fast on the simulation's clock, which starts at 0."""
     return datetime.fromtimestamp(0.0, UTC) if visit.fast else datetime.now(UTC)
 
