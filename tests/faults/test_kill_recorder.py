@@ -83,7 +83,7 @@ def kill_at_random(folder: Path, kills: int, seed: int) -> tuple[list[float], li
         try:
 
             def look(until) -> None:
-                deadline = time.monotonic() + 60.0
+                deadline = time.monotonic() + 240.0
                 while not until():
                     assert time.monotonic() < deadline, keeper.status
                     keeper.watch()
