@@ -11,8 +11,8 @@ import pylsl
 import pytest
 from faults.sessions import unique, wait_for
 
-from labcrane import NewestSample
 from labcrane.errors import StreamError
+from labcrane.streams import NewestSample
 from labcrane.streams.network import port_range
 from labcrane.streams.search import PORTS, Search, equal, find, known_stream
 
@@ -28,7 +28,7 @@ while True:
 
 LOSES = """
 import subprocess, sys, threading, time
-from labcrane import NewestSample
+from labcrane.streams import NewestSample
 from labcrane.streams.search import Search
 import pylsl
 stream, other = NewestSample({"name": sys.argv[1]}), Search()
