@@ -24,7 +24,6 @@ from .registry.offers import Offer, offer
 from .types import FloatArray
 
 __version__: str
-from .streams.newest import NewestSample
 
 __all__ = [
     "Controller",
@@ -40,7 +39,6 @@ __all__ = [
     "InputDevice",
     "LabcraneError",
     "Machine",
-    "NewestSample",
     "Offer",
     "Phase",
     "PlannedTrial",
