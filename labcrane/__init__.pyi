@@ -1,6 +1,6 @@
 """The public names, and the modules from which they are imported."""
 
-from . import analysis, core, machines, recording, registry, replay, testing
+from . import analysis, core, machines, participants, recording, registry, replay, testing
 from .analysis.exporter import Exporter
 from .core.clock import Tick
 from .core.primitives import Cylinder, Sphere
@@ -16,7 +16,6 @@ from .errors import (
     RecordingError,
     StreamError,
 )
-from .files.yaml import read_yaml
 from .machines.machine import Machine
 from .recording.participant_file.reader import open_recording
 from .registry.hookspecs import hookimpl
@@ -63,7 +62,7 @@ __all__ = [
     "machines",
     "offer",
     "open_recording",
-    "read_yaml",
+    "participants",
     "recording",
     "registry",
     "replay",

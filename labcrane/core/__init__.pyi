@@ -1,5 +1,6 @@
 """The public names of this package, and the modules from which they are imported."""
 
+from ..files.yaml import read_yaml
 from .findings import Finding, Verdict
 from .items import AnswerError, Answers, Item, Score, numeric_answers
 from .primitives import Shape, TargetFinder
@@ -22,5 +23,6 @@ __all__ = [
     "Value",
     "Verdict",
     "numeric_answers",
+    "read_yaml",
     "signals_of",
 ]

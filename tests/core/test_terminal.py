@@ -39,7 +39,7 @@ class TerminalUser:
                 return
 
     def until(self, words: str) -> None:
-        deadline = time.monotonic() + 40.0
+        deadline = time.monotonic() + 240.0
         while words.encode() not in self._seen:
             assert time.monotonic() < deadline, f"{words!r} was not printed"
             time.sleep(0.01)
@@ -48,7 +48,7 @@ class TerminalUser:
         os.write(self._keys, keys.encode())
 
     def leave(self) -> int:
-        status = self.process.wait(60)
+        status = self.process.wait(240)
         self._reader.join()
         os.close(self._keys)
         return status
