@@ -1,11 +1,10 @@
 """The public names of this package, and the modules from which they are imported."""
 
-from ..files.yaml import read_yaml
 from .findings import Finding, Verdict
 from .items import AnswerError, Answers, Item, Score, numeric_answers
 from .primitives import Shape, TargetFinder
 from .records import CameraImage, SessionState, Value
-from .settings import StudyPath
+from .settings import StudyPath, read_yaml
 from .signals import Layout, signals_of
 
 __all__ = [
