@@ -16,7 +16,6 @@ from .errors import (
     RecordingError,
     StreamError,
 )
-from .files.yaml import read_yaml
 from .machines.machine import Machine
 from .recording.participant_file.reader import open_recording
 from .registry.hookspecs import hookimpl
@@ -62,7 +61,6 @@ __all__ = [
     "offer",
     "open_recording",
     "participants",
-    "read_yaml",
     "recording",
     "registry",
     "replay",
