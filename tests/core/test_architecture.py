@@ -37,7 +37,9 @@ def imported_modules(source: str) -> set[str]:
     return names
 
 
-PUBLIC = ("core", "machines", "recording", "analysis", "replay", "registry", "testing")
+PUBLIC = (
+    "core", "machines", "recording", "analysis", "replay", "registry", "participants", "testing",
+)  # fmt: skip
 """Packages whose names are public beside those of ``labcrane`` itself."""
 
 

@@ -83,3 +83,43 @@ def as_pyxdf(drawn: Drawn) -> float:
     streams = theirs._jitter_removal(streams)
     times = streams[1].time_stamps - drawn.treatment.latency_s
     return 1e3 * float(np.quantile(np.abs(times - truth), 0.95))
+
+
+WORSE_MS = 0.1
+"""By how much the correction may be worse than none, or than pyxdf's."""
+
+
+def shortcomings(one: Score) -> list[str]:
+    """Return which promises a draw breaks."""
+    found = []
+    if one.clean and one.p95 > one.limit:
+        found.append(f"error beyond {one.limit} ms")
+    if one.p95 > one.untouched + WORSE_MS:
+        found.append("worse than no correction")
+    if one.p95 > one.usual + WORSE_MS:
+        found.append("worse than pyxdf")
+    if one.cover < 0.95:
+        found.append("not covered")
+    if one.clean and one.width > 0.3:
+        found.append("uncertainty wider than 0.3 ms")
+    if one.passed and one.most > 1.0:
+        found.append("PASS beyond 1 ms")
+    return found
+
+
+def coverage(scores: list[Score]) -> float:
+    """Return which part of all samples the stated uncertainty covers."""
+    total = sum(one.samples for one in scores)
+    return sum(one.cover * one.samples for one in scores) / total
+
+
+def misnamed(scores: list[Score]) -> dict[Fault, tuple[float, float]]:
+    """Return precision and recall of every fault that is present anywhere or named."""
+    found = {}
+    for fault in Fault:
+        named = sum(fault in one.named for one in scores)
+        present = sum(fault in one.present for one in scores)
+        both = sum(fault in one.named and fault in one.present for one in scores)
+        if named or present:
+            found[fault] = (both / named if named else 1.0, both / present if present else 1.0)
+    return found

@@ -32,12 +32,13 @@ FORMAT = "labcrane participant file"
 VERSION = "1"
 SYNC_REPORT = "sync_report"
 
+Conclude = Callable[["h5py.Group"], object]
+"""Works something out of a session's group in a participant file, and writes it there."""
+
 DAMAGED = (
     OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError,
 )  # fmt: skip
 """What reading a damaged file raises somewhere below."""
-Conclude = Callable[["h5py.Group"], object]
-"""Works something out of a session's group in a participant file, and writes it there."""
 
 
 @dataclass(frozen=True, slots=True)

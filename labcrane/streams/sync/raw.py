@@ -8,6 +8,13 @@ from labcrane.errors import RecordingError
 from labcrane.recording.foreign_streams import RESET, RecordedStream
 from labcrane.types import FloatArray
 
+POLL_AGE_S = 1.2
+"""LabRecorder pairs an offset with the time when it asks for it; liblsl measured it 0.2 to 2.2 s
+before."""
+
+ASSUMED_RTT_S = 1e-3
+"""Round trip of a probe that was recorded without: few cables need longer."""
+
 
 def _nothing(columns: int) -> FloatArray:
     return np.empty((0, columns))
@@ -96,12 +103,13 @@ def raw_of(recorded: RecordedStream) -> RawStream:
     ----------
     recorded
         As read from journals of labcrane or of another recorder, whose clock offsets count as
-        probes with an unknown round trip.
+        probes of :data:`POLL_AGE_S` before, with round trips that nobody wrote down.
     """
     probes = recorded.probes
     if not len(probes) and len(recorded.offsets):
         when, offset = recorded.offsets.T
-        probes = np.column_stack([when, offset, np.zeros(len(when)), when + offset])
+        trips = np.full(len(when), ASSUMED_RTT_S)
+        probes = np.column_stack([when - POLL_AGE_S, offset, trips, when + offset])
     return RawStream.of(
         recorded.time_raw,
         probes=probes,
