@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def installed(what: str, folder: Path) -> tuple[float, float, int]:
-    """Return how long installing takes in s, what it adds in MB, and how many projects it brings."""
+    """Return how long it takes in s, what it adds in MB, and how many projects it brings."""
     subprocess.run([sys.executable, "-m", "venv", folder], check=True)
     python = folder / "bin" / "python"
     (packages,) = folder.glob("lib/python*/site-packages")

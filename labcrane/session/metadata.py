@@ -18,7 +18,7 @@ from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.recording.data_folder import DataFolder
 from labcrane.recording.trial_columns import trial_units
-from labcrane.registry.entry_points import PROJECT
+from labcrane.registry.hookspecs import PROJECT
 from labcrane.registry.loader import own_plugins
 
 RECORDED_PACKAGES = (
