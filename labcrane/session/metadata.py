@@ -17,7 +17,7 @@ from labcrane.protocol.referenced_files import named_files
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.recording.trial_columns import trial_units
-from labcrane.registry.entry_points import PROJECT
+from labcrane.registry.hookspecs import PROJECT
 from labcrane.registry.loader import own_plugins
 from labcrane.session.visit import Visit
 
