@@ -45,12 +45,20 @@ from .roles import (
     Feedback,
     InputDevice,
     Questionnaire,
+    SignalMonitor,
     Task,
 )
 from .scene import Form, Part, Placed, Scene, load_scene, place
 from .scene_text import SCENE_PLACED, read_placed, write_placed
 from .shapes import Ball, Beam, Shape, Targets
-from .signals import Layout, Signal, signals_of
+from .signals import (
+    Layout,
+    Signal,
+    SignalChannel,
+    SignalFault,
+    SignalStream,
+    signals_of,
+)
 from .urdf_text import urdf, urdf_joint, urdf_link
 
 __version__: str
@@ -107,6 +115,10 @@ __all__ = [
     "Settings",
     "Shape",
     "Signal",
+    "SignalChannel",
+    "SignalFault",
+    "SignalMonitor",
+    "SignalStream",
     "Situation",
     "Stream",
     "StreamHeader",

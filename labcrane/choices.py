@@ -13,7 +13,7 @@ from labcrane.offers import Offer, Settings
 from labcrane.oversight import Oversight
 from labcrane.protocol import Protocol, Use
 from labcrane.registry import Registry
-from labcrane.roles import Component, Cue, Feedback, Questionnaire, Task
+from labcrane.roles import Component, Cue, Feedback, Questionnaire, SignalMonitor, Task
 from labcrane.study_files import plain_settings
 from labcrane.watched import watched
 from labcrane.yaml_file import Place, YamlFile
@@ -67,6 +67,15 @@ class Chooser:
         written = self._at(("tasks",))
         names = written if isinstance(written, dict) else {}
         chosen = {name: self.choose(Task, ("tasks", name)) for name in names}
+        return {name: choice for name, choice in chosen.items() if choice}
+
+    def choose_monitors(self) -> dict[str, Choice] | None:
+        """Return the monitors of signals by the protocol's names; None where it leaves them out."""
+        written = self._at(("monitors",))
+        if written is None:
+            return None
+        names = written if isinstance(written, dict) else {}
+        chosen = {name: self.choose(SignalMonitor, ("monitors", name)) for name in names}
         return {name: choice for name, choice in chosen.items() if choice}
 
     def choose_questionnaires(self, protocol: Protocol) -> dict[str, Choice]:

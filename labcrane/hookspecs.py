@@ -19,6 +19,7 @@ from labcrane.roles import (
     Feedback,
     InputDevice,
     Questionnaire,
+    SignalMonitor,
     Task,
 )
 
@@ -60,6 +61,12 @@ def labcrane_exporters() -> Sequence[Offer[Exporter]]:
 @hookspec
 def labcrane_questionnaires() -> Sequence[Offer[Questionnaire]]:
     """Offer questions for the participant."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_monitors() -> Sequence[Offer[SignalMonitor]]:
+    """Offer monitors that tell whether the signal of a stream is alive."""
     raise NotImplementedError
 
 

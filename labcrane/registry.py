@@ -19,6 +19,7 @@ from labcrane.roles import (
     Feedback,
     InputDevice,
     Questionnaire,
+    SignalMonitor,
     Task,
 )
 from labcrane.suggestion import suggestion
@@ -53,6 +54,7 @@ ROLES: Mapping[type[Component], RoleEntry] = {
     Questionnaire: RoleEntry(
         "labcrane_questionnaires", "questionnaire", ("questionnaires", "NAME")
     ),
+    SignalMonitor: RoleEntry("labcrane_monitors", "monitor", ("monitors", "NAME")),
     Cue: RoleEntry("labcrane_cues", "cue", ("feedback", "NAME")),
     Feedback: RoleEntry("labcrane_feedback", "feedback", ("feedback", "NAME")),
 }

@@ -25,6 +25,7 @@ A_ROLE: Mapping[str, str] = {
     "task": "a task for the operator",
     "exporter": "a format for recordings",
     "questionnaire": "questions for the participant",
+    "monitor": "a monitor of other programs' signals",
     "cue": "something to be seen in every view",
     "feedback": "a device that presents the session",
     "command": "a command of the command line",
@@ -56,6 +57,7 @@ USED: Mapping[str, tuple[str, str]] = {
         "      - block: {task: work}\n",
         "      - block: {task: work}\n      - questionnaire: my_part\n",
     ),
+    "monitor": ("sessions:", "monitors:\n  level: {use: my_part}\nsessions:"),
     "cue": ("sessions:", "feedback:\n  line: {use: my_part}\nsessions:"),
     "feedback": ("sessions:", "feedback:\n  lamp: {use: my_part}\nsessions:"),
 }

@@ -17,6 +17,7 @@ from labcrane.roles import (
     Feedback,
     InputDevice,
     Questionnaire,
+    SignalMonitor,
     Task,
 )
 from labcrane.steps import Block, Break, Session
@@ -34,6 +35,7 @@ ONE: Mapping[str, tuple[type[Component], ...]] = {
 BY_NAME: Mapping[str, tuple[type[Component], ...]] = {
     "tasks": (Task,),
     "questionnaires": (Questionnaire,),
+    "monitors": (SignalMonitor,),
     "feedback": (Cue, Feedback),
     "views": (Feedback,),
 }
@@ -58,7 +60,10 @@ def protocol_schema(registry: Registry) -> Schema:
     for key, of in ONE.items():
         protocol["properties"][key] = _use(registry, of, named)
     for key, of in BY_NAME.items():
-        protocol["properties"][key] |= {"additionalProperties": _use(registry, of, named)}
+        place = protocol["properties"][key]
+        for part in (place, *place.get("anyOf", ())):
+            if part.get("type") == "object":
+                part |= {"additionalProperties": _use(registry, of, named)}
     named[Session]["properties"]["steps"]["items"] = _step(references[(Block, "validation")])
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -38,6 +38,8 @@ class Study:
     cues, sounds, views
         What presents the session to people, by the protocol's names: cues and sounds are switched
         on block by block, views are always there.
+    monitors
+        What looks at the signals of streams; None for all that are installed.
     oversight
         Watches over all components that are built.
     """
@@ -58,6 +60,7 @@ class Study:
     cues: dict[str, Choice] = field(default_factory=dict)
     sounds: dict[str, Choice] = field(default_factory=dict)
     views: dict[str, Choice] = field(default_factory=dict)
+    monitors: dict[str, Choice] | None = None
     oversight: Oversight = field(default_factory=Oversight)
 
     @property
@@ -73,6 +76,7 @@ class Study:
             "questionnaires": self.questionnaire_choices,
             "feedback": self.cues | self.sounds,
             "views": self.views,
+            "monitors": self.monitors or {},
         }
         return {
             "input": self.input,
@@ -201,12 +205,11 @@ def load(path: Path, registry: Registry) -> Study:
     choices = chooser.choose_tasks()
     tasks = chooser.build(Task, "tasks", choices, machine[0]) if machine else {}
     asked = chooser.choose_questionnaires(protocol) if protocol else {}
-    questionnaires = (
-        chooser.build(Questionnaire, "questionnaires", asked, machine[0]) if machine else {}
-    )
+    built = chooser.build(Questionnaire, "questionnaires", asked, machine[0]) if machine else {}
     cues, sounds, views = chooser.choose_feedback()
+    monitors = chooser.choose_monitors()
     if protocol is not None:
-        Checker(source, protocol).check(tasks, questionnaires)
+        Checker(source, protocol).check(tasks, built)
     source.raise_problems()
     if not (protocol and machine and device and operator and scheme and dynamics):
         raise AssertionError("a missing part is a problem, and problems were raised")
@@ -222,10 +225,11 @@ def load(path: Path, registry: Registry) -> Study:
         dynamics=dynamics,
         tasks=tasks,
         task_choices=choices,
-        questionnaires=questionnaires,
+        questionnaires=built,
         questionnaire_choices=asked,
         cues=cues,
         sounds=sounds,
         views=views,
+        monitors=monitors,
         oversight=chooser.oversight,
     )
