@@ -18,9 +18,9 @@ from pathlib import Path
 
 from benchmarks.bare_engine import BareEngine
 from benchmarks.table import Row, show
-from labcrane.registry import discover
-from labcrane.simulation import SimulationOrder, simulate
-from labcrane.study import Study, load
+from labcrane.protocol.study import Study, load
+from labcrane.registry.registry import discover
+from labcrane.simulation.simulation import SimulationJob, simulate
 
 AIMING = Path(__file__).parents[1] / "protocols" / "aiming" / "protocol.yaml"
 PASSES = (200, 400)
@@ -42,7 +42,7 @@ def one_core(folder: Path, participants: int) -> list[Row]:
     ours, ticks = 0.0, 0
     bare = dict.fromkeys(PASSES, 0.0)
     for number in range(1, participants + 1):
-        order = SimulationOrder(AIMING, None, folder / "one", f"P{number:03}")
+        order = SimulationJob(AIMING, None, folder / "one", f"P{number:03}")
         began = time.process_time()
         simulate(order)
         ours += time.process_time() - began

@@ -15,10 +15,10 @@ import numpy as np
 
 from benchmarks.table import Row
 from labcrane import Dynamics
-from labcrane.oversight import Oversight
-from labcrane.registry import discover
-from labcrane.testing import RATE_HZ, a_run, ch8
-from labcrane.watched import watched
+from labcrane.registry.call_monitor import CallMonitor
+from labcrane.registry.proxies import watched
+from labcrane.registry.registry import discover
+from labcrane.testing import RATE_HZ, ch8, make_run
 
 ROUNDS, CALLS, CALLS_PER_TICK = 200, 500, 6
 
@@ -36,12 +36,12 @@ def fastest(step: Callable[[], object]) -> float:
 
 def steps() -> tuple[float, float]:
     """Return how long a step of a crane takes, bare and watched, in seconds."""
-    machine, oversight = ch8(), Oversight()
+    machine, oversight = ch8(), CallMonitor()
     offer = discover().find(Dynamics, "kinematic_crane")
     bare = offer.build(offer.settings(), machine)
     kept = watched(offer.build(offer.settings(), machine), "kinematic_crane", "bullet", oversight)
     assert isinstance(kept, Dynamics)
-    run, command = a_run(machine, state=bare.signals), np.full(4, 0.01)
+    run, command = make_run(machine, state=bare.signals), np.full(4, 0.01)
     bare.open(run)
     kept.open(run)
     with (

@@ -17,11 +17,11 @@ import numpy as np
 import pyxdf
 
 from benchmarks.table import Row
+from labcrane.core.records import Event
 from labcrane.recording.journal import Column, SessionJournal
-from labcrane.recording.participant_file import consolidate
-from labcrane.recording.recording import open_recording
-from labcrane.recording.xdf_reader import read_xdf
-from labcrane.records import Event
+from labcrane.recording.participant_file.reader import open_recording
+from labcrane.recording.participant_file.writer import consolidate
+from labcrane.recording.xdf.reader import read_xdf
 
 COLUMNS = tuple(Column("state", f"signal.{number}", "1") for number in range(40))
 RATE_HZ = 240.0

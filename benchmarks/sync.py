@@ -130,10 +130,10 @@ def judge(case: Case, streams: dict, folder: Path) -> bool:
     """Print a line of the table; whether the case is within its limit."""
     from streams.emulation import alignment, as_labrecorder, truth  # noqa: PLC0415
 
-    from labcrane.streams.companions import raw_of  # noqa: PLC0415
-    from labcrane.streams.correction import Treatment, correct  # noqa: PLC0415
-    from labcrane.streams.dejitter import Dejitter  # noqa: PLC0415
-    from labcrane.streams.resync import resync  # noqa: PLC0415
+    from labcrane.streams.recorder.companions import raw_of  # noqa: PLC0415
+    from labcrane.streams.sync.correction import Treatment, correct  # noqa: PLC0415
+    from labcrane.streams.sync.dejitter import Dejitter  # noqa: PLC0415
+    from labcrane.streams.sync.resync import resync  # noqa: PLC0415
 
     device, markers = streams[case.name], streams["Moments"]
     treatment = Treatment(rate_hz=1000.0)
@@ -161,7 +161,7 @@ def restarts(folder: Path, count: int) -> bool:
     """Kill a device and start it with another clock, again and again; count wrong stamps."""
     from streams.emulation import Lab, Skew, build, stop, truth, until_ready  # noqa: PLC0415
 
-    from labcrane.streams.resync import resync  # noqa: PLC0415
+    from labcrane.streams.sync.resync import resync  # noqa: PLC0415
 
     folder.mkdir()
     lab = Lab(folder, build(folder))

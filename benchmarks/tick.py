@@ -22,16 +22,18 @@ import numpy as np
 
 from benchmarks.bare_engine import PASSES, BareEngine
 from benchmarks.table import Row
-from labcrane import Frame, InputDevice, Signal, Tick, loop, rig
-from labcrane.clock import Clock, ManualClock, SystemClock, ticks
-from labcrane.console import Command, Order
-from labcrane.course import Course
-from labcrane.frame_log import FrameLog, columns
-from labcrane.plan import plan_session
+from labcrane import Frame, InputDevice, Signal, Tick
+from labcrane.core.clock import Clock, ManualClock, SystemClock, ticks
+from labcrane.design.plan import plan_session
+from labcrane.protocol import rig
+from labcrane.protocol.study import Study, load
+from labcrane.recording.frame_log import FrameLog, columns
 from labcrane.recording.journal import SessionJournal
-from labcrane.registry import discover
+from labcrane.registry.registry import discover
+from labcrane.session import loop
+from labcrane.session.commands import Command, Order
+from labcrane.session.sequencer import Sequencer
 from labcrane.streams.network import use_loopback
-from labcrane.study import Study, load
 
 ROUNDS = 7
 TICKS = 2400
@@ -106,11 +108,11 @@ def whole(study: Study, folder: Path, clock: Clock, count: int, *, lsl: bool) ->
         seen.append(frame)
 
     with rig.opened(the_rig, study, plan.seed) as run:
-        course = Course(study, plan, the_rig, waits=False)
+        course = Sequencer(study, plan, the_rig, waits=False)
         path = folder / f"{time.perf_counter_ns()}.xdf"
         with SessionJournal(path, columns(run), run.rate_hz) as journal, outlets(run, lsl) as push:
-            log, onlookers = FrameLog(journal, run), (*push, end_of_tick)
-            loop.run(the_rig, run, course, clock, UntilTick(count), log, onlookers)
+            log, sinks = FrameLog(journal, run), (*push, end_of_tick)
+            loop.run(the_rig, run, course, clock, UntilTick(count), log, sinks)
         path.unlink()
     return seen
 

@@ -16,10 +16,10 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.table import Row
-from labcrane import Ball, Run, Situation
-from labcrane.machine import Body
+from labcrane import Run, SessionState, Sphere
+from labcrane.machines.machine import Body
 from labcrane.streams.pictures import png
-from labcrane.testing import TARGETS, a_run, a_target, ch8
+from labcrane.testing import TARGETS, ch8, make_run, make_target
 from labcrane_view.settings import ViewSettings
 from labcrane_view.view import View
 
@@ -33,7 +33,7 @@ def a_scene() -> Run:
         Body(joint.name, frame, (joint.a or 0.5, 0.3, 0.3), (-0.5 * joint.a, 0.0, 0.0))
         for frame, joint in enumerate(machine.joints, start=1)
     ]
-    return replace(a_run(machine, task=TARGETS), bodies=tuple(boxes))
+    return replace(make_run(machine, task=TARGETS), bodies=tuple(boxes))
 
 
 def rows() -> list[Row]:
@@ -43,7 +43,7 @@ def rows() -> list[Row]:
         settings = ViewSettings(display="hidden", renderer=renderer, supervisor={"rate_hz": 10})
         view = View(settings, run.machine)
         view.open(run)
-        view.hear(Situation(block=1, block_name="benchmark", trial=1, trials=1))
+        view.update(SessionState(block=1, block_name="benchmark", trial=1, trials=1))
         print(f"{view.facts()['renderer']}, {view.facts()['size']}")
         shown = [_seconds(view, run, whole=True)]  # warms up
         shown, bare = [], []
@@ -71,7 +71,7 @@ def _seconds(view: View, run: Run, *, whole: bool) -> float:
     began = time.perf_counter()
     for number in range(PICTURES):
         if whole:
-            view.present(a_target(run, number))
+            view.present(make_target(run, number))
         else:
             view.redraw()
     return (time.perf_counter() - began) / PICTURES
@@ -81,7 +81,7 @@ def _sent(view: View, run: Run) -> tuple[float, float, float]:
     """Return how long a picture takes that is sent, one that is not, and the coding, in s."""
     seconds = []
     for number in range(PICTURES):
-        frame = a_target(run, 24 * number)  # a tenth of a second each: every one is due
+        frame = make_target(run, 24 * number)  # a tenth of a second each: every one is due
         moments = [time.perf_counter()]
         view.present(frame)
         moments.append(time.perf_counter())
@@ -100,9 +100,9 @@ def _delay(view: View, run: Run) -> int:
     levels, behind = [], []
     for repeat in (3, 1):  # first what each colour looks like, then whether it is there at once
         for number in range(16):
-            frame = a_target(run, number)
+            frame = make_target(run, number)
             wall = (0.0, 0.0, (number + 5) / 21, 1.0)
-            frame.shapes = (Ball("wall", (-1.0, 1.9, 3.0), 0.9, wall),)
+            frame.shapes = (Sphere("wall", (-1.0, 1.9, 3.0), 0.9, wall),)
             for _ in range(repeat):
                 view.present(frame)
             height, width, _ = view.picture().shape

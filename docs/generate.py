@@ -14,16 +14,16 @@ from typing import Any
 from pydantic import BaseModel
 
 from labcrane import Settings
+from labcrane.core.roles import Component, Feedback, Questionnaire, Task
+from labcrane.core.signals import Signal
 from labcrane.errors import LabcraneError
-from labcrane.machine import Machine
-from labcrane.machine_file import load_machine
-from labcrane.offers import Offer
-from labcrane.protocol import Protocol
-from labcrane.registry import ROLES, Registry, discover
-from labcrane.roles import Component, Feedback, Questionnaire, Task
-from labcrane.signals import Signal
-from labcrane.steps import Block, Break
-from labcrane.study import load
+from labcrane.machines.library import load_machine
+from labcrane.machines.machine import Machine
+from labcrane.protocol.protocol import Protocol
+from labcrane.protocol.steps import Block, Break
+from labcrane.protocol.study import load
+from labcrane.registry.offers import Offer
+from labcrane.registry.registry import ROLES, Registry, discover
 
 HERE = Path(__file__).parent
 PROTOCOLS = HERE.parent / "protocols"

@@ -1,43 +1,24 @@
 """The public names, and the modules from which they are imported."""
 
-from .actuator import PRESETS, Actuator, ActuatorSettings
 from .analysis.cohort import Participant
 from .analysis.movements import Movement, movements
-from .arrays import FloatArray
-from .boxes import link_boxes
-from .clock import Tick
-from .errors import (
-    DeviceError,
-    LabcraneError,
-    PluginError,
-    ProtocolError,
-    RecordingError,
-)
-from .finding import Finding, Verdict
-from .hookspecs import hookimpl
-from .kinematics import Arm, frames, jacobian
-from .machine import Body, Joint, Machine
-from .mesh_file import MeshFile
-from .offers import Ask, CommandOffer, Offer, Settings, StudyPath, offer
-from .questions import AnswerError, Answers, Item, Score, numbers
-from .quiet_import import quietly_imported
-from .reachability import reach
-from .recording.recording import SessionRecord, Stream, open_recording
-from .recording.stream_header import Channel, StreamHeader
-from .recording.xdf import XdfWriter
-from .records import (
+from .core.clock import Tick
+from .core.findings import Finding, Verdict
+from .core.items import AnswerError, Answers, Item, Score, numeric_answers
+from .core.primitives import Cylinder, Shape, Sphere, TargetFinder
+from .core.records import (
+    CameraImage,
     Event,
     Frame,
-    Judgement,
     Phase,
-    Picture,
-    Planned,
+    PlannedTrial,
     Run,
-    Situation,
+    SessionState,
     Trial,
+    TrialStatus,
     Value,
 )
-from .roles import (
+from .core.roles import (
     Controller,
     Cue,
     Dynamics,
@@ -48,10 +29,7 @@ from .roles import (
     SignalMonitor,
     Task,
 )
-from .scene import Form, Part, Placed, Scene, load_scene, place
-from .scene_text import SCENE_PLACED, read_placed, write_placed
-from .shapes import Ball, Beam, Shape, Targets
-from .signals import (
+from .core.signals import (
     Layout,
     Signal,
     SignalChannel,
@@ -59,26 +37,47 @@ from .signals import (
     SignalStream,
     signals_of,
 )
-from .urdf_text import urdf, urdf_joint, urdf_link
+from .errors import (
+    DeviceError,
+    LabcraneError,
+    PluginError,
+    ProtocolError,
+    RecordingError,
+)
+from .machines.actuator import ACTUATOR_PRESETS, Actuator, ActuatorSettings
+from .machines.inverse_kinematics import reach
+from .machines.kinematics import Arm, jacobian, link_frames
+from .machines.links import link_boxes
+from .machines.machine import Body, Joint, Machine
+from .machines.mesh import MeshFile
+from .machines.scene import Geom, PlacedObject, Scene, ShapeKind, load_scene, place_objects
+from .machines.scene_codec import SCENE_PLACED, read_placed, write_placed
+from .machines.urdf import urdf, urdf_joint, urdf_link
+from .recording.participant_file.reader import SessionRecord, Stream, open_recording
+from .recording.xdf.header import Channel, StreamHeader
+from .recording.xdf.writer import XdfWriter
+from .registry.hookspecs import hookimpl
+from .registry.offers import CommandOffer, Offer, Prompt, Settings, StudyPath, offer
+from .registry.quiet_import import quietly_imported
+from .types import FloatArray
 
 __version__: str
 
 __all__ = [
-    "PRESETS",
+    "ACTUATOR_PRESETS",
     "SCENE_PLACED",
     "Actuator",
     "ActuatorSettings",
     "AnswerError",
     "Answers",
     "Arm",
-    "Ask",
-    "Ball",
-    "Beam",
     "Body",
+    "CameraImage",
     "Channel",
     "CommandOffer",
     "Controller",
     "Cue",
+    "Cylinder",
     "DeviceError",
     "Dynamics",
     "Event",
@@ -86,25 +85,23 @@ __all__ = [
     "Feedback",
     "Finding",
     "FloatArray",
-    "Form",
     "Frame",
+    "Geom",
     "InputDevice",
     "Item",
     "Joint",
-    "Judgement",
     "LabcraneError",
     "Layout",
     "Machine",
     "MeshFile",
     "Movement",
     "Offer",
-    "Part",
     "Participant",
     "Phase",
-    "Picture",
-    "Placed",
-    "Planned",
+    "PlacedObject",
+    "PlannedTrial",
     "PluginError",
+    "Prompt",
     "ProtocolError",
     "Questionnaire",
     "RecordingError",
@@ -112,34 +109,37 @@ __all__ = [
     "Scene",
     "Score",
     "SessionRecord",
+    "SessionState",
     "Settings",
     "Shape",
+    "ShapeKind",
     "Signal",
     "SignalChannel",
     "SignalFault",
     "SignalMonitor",
     "SignalStream",
-    "Situation",
+    "Sphere",
     "Stream",
     "StreamHeader",
     "StudyPath",
-    "Targets",
+    "TargetFinder",
     "Task",
     "Tick",
     "Trial",
+    "TrialStatus",
     "Value",
     "Verdict",
     "XdfWriter",
-    "frames",
     "hookimpl",
     "jacobian",
     "link_boxes",
+    "link_frames",
     "load_scene",
     "movements",
-    "numbers",
+    "numeric_answers",
     "offer",
     "open_recording",
-    "place",
+    "place_objects",
     "quietly_imported",
     "reach",
     "read_placed",

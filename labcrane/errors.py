@@ -10,6 +10,8 @@ LabcraneError
 A late tick is not an error: it is data, and is recorded with the frame.
 """
 
+from collections.abc import Iterable
+
 
 class LabcraneError(Exception):
     """Base of every deliberate labcrane error; the CLI prints it without a traceback."""
@@ -33,3 +35,13 @@ class StreamError(LabcraneError):
 
 class RecordingError(LabcraneError):
     """A recording cannot be written, found or read."""
+
+
+def suggestion(word: str, known: Iterable[str], otherwise: str = "there is") -> str:
+    """Return the known word that is closest, as a question; all of them when none is close."""
+    from difflib import get_close_matches  # noqa: PLC0415 - only a mistake needs it
+
+    possible = list(known)
+    if close := get_close_matches(word, possible, n=1):
+        return f"did you mean {close[0]!r}?"
+    return f"{otherwise} {', '.join(possible) or 'none'}"

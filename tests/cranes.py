@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from labcrane import Dynamics, FloatArray, Machine
-from labcrane.testing import RATE_HZ, a_run
+from labcrane.testing import RATE_HZ, make_run
 from labcrane_bullet import labcrane_dynamics
 
 needs_bullet = pytest.mark.skipif(
@@ -42,7 +42,7 @@ def standing(
     """Yield an open crane at its pose of rest."""
     crane = build(name, machine, actuator, **hanging)
     try:
-        crane.open(replace(a_run(machine), rate_hz=rate_hz))
+        crane.open(replace(make_run(machine), rate_hz=rate_hz))
         yield crane
     finally:
         crane.close()

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from labcrane import Dynamics, Planned, Signal
-from labcrane.machine_file import load_machine
-from labcrane.testing import RATE_HZ, a_run, a_trial
+from labcrane import Dynamics, PlannedTrial, Signal
+from labcrane.machines.library import load_machine
+from labcrane.testing import RATE_HZ, make_run, make_trial
 from labcrane_dmd import labcrane_dynamics
 from labcrane_dmd.arm_settings import ArmSettings, JawsSettings
 
@@ -33,11 +33,11 @@ def standing(scene: str | None = None, folder: Path | None = None, **settings) -
         settings["scenes"] = (folder / "scene.yaml",)
     arm = build(machine, **settings)
     signal = Signal("valve.signal", "1", machine.names)
-    run = a_run(machine, command=(signal,), state=arm.signals)
+    run = make_run(machine, command=(signal,), state=arm.signals)
     try:
         arm.open(run)
         if scene is not None:
-            arm.begin_trial(a_trial(Planned({"scenario": "scene"}, expected_s=1.0)))
+            arm.begin_trial(make_trial(PlannedTrial({"scenario": "scene"}, expected_s=1.0)))
         yield arm, run.state
     finally:
         arm.close()

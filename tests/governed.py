@@ -9,10 +9,10 @@ from rehearsal import SHORT, ScriptedConsole
 from labcrane.approval.decision import Grant, approve
 from labcrane.approval.lock import Lock
 from labcrane.participants.enrolment import confirm_consent
-from labcrane.participants.places import Places
-from labcrane.registry import discover
-from labcrane.session import Visit, run
-from labcrane.study import Study, load
+from labcrane.participants.folders import Places
+from labcrane.protocol.study import Study, load
+from labcrane.registry.registry import discover
+from labcrane.session.session import Visit, run
 
 TODAY = date.today()
 PERSON = "{use: simulated_operator}"
@@ -79,6 +79,6 @@ class Willing(ScriptedConsole):
     """Starts whatever waits, and gives the orders of a script."""
 
     def commands(self):
-        from labcrane.console import Command, Order
+        from labcrane.session.commands import Command, Order
 
         return [Command(Order.START), *super().commands()]

@@ -8,19 +8,19 @@ import numpy as np
 from ideal_crane import IdealCrane
 
 from labcrane import (
-    PRESETS,
+    ACTUATOR_PRESETS,
     Controller,
     FloatArray,
     Frame,
     Machine,
     Phase,
-    Planned,
+    PlannedTrial,
     Run,
     Signal,
     Tick,
     Trial,
 )
-from labcrane.testing import RATE_HZ, a_run, ch8
+from labcrane.testing import RATE_HZ, ch8, make_run
 from labcrane_bullet.kinematic_crane import KinematicCrane
 from labcrane_bullet.settings import CraneSettings
 from labcrane_operator.operator import SimulatedOperator
@@ -58,7 +58,9 @@ class DelayedCrane:
     """The kinematic crane, which follows its commands late."""
 
     def __init__(self, run: Run, actuator: str) -> None:
-        self.dynamics = KinematicCrane(CraneSettings(actuator=PRESETS[actuator]), run.machine)
+        self.dynamics = KinematicCrane(
+            CraneSettings(actuator=ACTUATOR_PRESETS[actuator]), run.machine
+        )
         self.dynamics.open(run)
         self.dynamics.reset(run.machine.rest)
 
@@ -97,12 +99,12 @@ class Loop:
     def __post_init__(self) -> None:
         self.controller = SCHEMES[self.scheme](self.machine)
         self.operator = SimulatedOperator(OperatorSettings(**self.settings))
-        bare = a_run(
+        bare = make_run(
             self.machine,
             axes=self.operator.signals,
             command=self.controller.signals,
             task=TASK,
-            steer=self.controller.steer,
+            inverse=self.controller.inverse,
         )
         self.run = Run(**(vars(bare) | {"participant_seed": self.participant_seed}))
         self.controller.open(self.run)
@@ -134,7 +136,7 @@ class Loop:
         rest_s: float = 0.2,
     ) -> Done:
         """Run until the tip has rested inside the target, as the aiming task asks."""
-        trial = Trial(number, 1, seed, Planned({}, expected_s=10.0))
+        trial = Trial(number, 1, seed, PlannedTrial({}, expected_s=10.0))
         self.operator.begin_trial(trial)
         self.controller.begin_trial(trial)
         shown = NOTHING_SHOWN if target is None else (*target, RADIUS)
@@ -147,7 +149,7 @@ class Loop:
             if math.isnan(pushed) and hands[[0, 1, 6, 7]].any():
                 pushed = tick / RATE_HZ
             command = self.controller.command(hands, self.crane.state)
-            state = self.crane.step(self.controller.rest() if paused else command)
+            state = self.crane.step(self.controller.idle() if paused else command)
             path.append(self.crane.tip.copy())
             seen = self.show(tick, NOTHING_SHOWN if paused else shown, trial=number, paused=paused)
             inside = target is not None and math.dist(path[-1], target) <= RADIUS

@@ -7,14 +7,15 @@ from pathlib import Path
 
 from simple_crane import CRANE
 
-from labcrane import loop, rig
-from labcrane.clock import ManualClock
-from labcrane.console import Command
-from labcrane.course import Course
-from labcrane.plan import plan_session
-from labcrane.records import Event, Frame, Run
-from labcrane.registry import discover
-from labcrane.study import Study, load
+from labcrane.core.clock import ManualClock
+from labcrane.core.records import Event, Frame, Run
+from labcrane.design.plan import plan_session
+from labcrane.protocol import rig
+from labcrane.protocol.study import Study, load
+from labcrane.registry.registry import discover
+from labcrane.session import loop
+from labcrane.session.commands import Command
+from labcrane.session.sequencer import Sequencer
 
 SHORT = (
     """\
@@ -96,7 +97,7 @@ def rehearse(
     plan = plan_session(study, "P001", 1)
     the_rig = the_rig or rig.build(study, simulated=True)
     with rig.opened(the_rig, study, plan.seed) as run:
-        course = Course(study, plan, the_rig, waits=waits, awaits=awaits)
+        course = Sequencer(study, plan, the_rig, waits=waits, awaits=awaits)
         seen = Rehearsal(run)
         console = ScriptedConsole(orders)
         keep = [lambda frame: seen.frames.append(copy.deepcopy(frame))]

@@ -3,11 +3,11 @@
 import numpy as np
 
 from labcrane import Controller, FloatArray, Machine
-from labcrane.machine_file import load_machine
+from labcrane.machines.library import load_machine
 from labcrane.testing import (
-    a_run,
-    a_trial,
     ch8,
+    make_run,
+    make_trial,
 )
 from labcrane_schemes.settings import (
     EndEffectorSettings,
@@ -46,8 +46,8 @@ def switchable(**changes: object) -> SwitchableSettings:
 
 
 def ready(scheme: Controller, machine: Machine) -> Controller:
-    scheme.open(a_run(machine, command=scheme.signals))
-    scheme.begin_trial(a_trial())
+    scheme.open(make_run(machine, command=scheme.signals))
+    scheme.begin_trial(make_trial())
     return scheme
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import BaseModel, ValidationError
 
-from labcrane import PRESETS, Actuator, ActuatorSettings
+from labcrane import ACTUATOR_PRESETS, Actuator, ActuatorSettings
 from labcrane.testing import RATE_HZ
 
 FULL = (0.5, 0.25)
@@ -76,25 +76,25 @@ def test_commands_that_change_afterwards_are_remembered_as_they_were() -> None:
 
 
 def test_a_reset_actuator_answers_as_a_new_one() -> None:
-    actuator = Actuator(PRESETS["sluggish"], FULL, 1 / 240)
+    actuator = Actuator(ACTUATOR_PRESETS["sluggish"], FULL, 1 / 240)
     first = [actuator.follow(FULL) for _ in range(200)]
     actuator.reset()
     assert [actuator.follow(FULL) for _ in range(200)] == first
 
 
 def test_an_ideal_actuator_gives_what_it_is_given() -> None:
-    assert Actuator(PRESETS["ideal"], FULL, 1 / 240).follow((0.1, -0.2)) == (0.1, -0.2)
+    assert Actuator(ACTUATOR_PRESETS["ideal"], FULL, 1 / 240).follow((0.1, -0.2)) == (0.1, -0.2)
 
 
-@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("name", ACTUATOR_PRESETS)
 def test_every_preset_reaches_its_command(name: str) -> None:
-    speeds = step_response(PRESETS[name], 240.0, 8.0)
+    speeds = step_response(ACTUATOR_PRESETS[name], 240.0, 8.0)
     np.testing.assert_allclose(speeds[-1], FULL, rtol=1e-6)
     assert math.isclose(speeds.max(), FULL[0], rel_tol=1e-6), "it must not overshoot"
 
 
 def test_settings_are_a_name_or_written_out() -> None:
-    assert Drive.model_validate({"actuator": "hydraulic"}).actuator == PRESETS["hydraulic"]
+    assert Drive.model_validate({"actuator": "hydraulic"}).actuator == ACTUATOR_PRESETS["hydraulic"]
     written = Drive.model_validate({"actuator": {"lag_s": 0.3}}).actuator
     assert written == ActuatorSettings(dead_time_s=0.0, lag_s=0.3, rate_limit=None)
     assert Drive.model_validate({"actuator": written}).actuator == written

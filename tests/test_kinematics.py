@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from labcrane import Arm, FloatArray, Machine, frames, jacobian
-from labcrane.kinematics import dh_matrix
-from labcrane.machine_file import load_machine
+from labcrane import Arm, FloatArray, Machine, jacobian, link_frames
+from labcrane.machines.kinematics import dh_matrix
+from labcrane.machines.library import load_machine
 
 MACHINES = ("ch8", "ch8_cranelike")
 SCALE = 22.3107  # from the OpenManipulator-X to the crane
@@ -62,7 +62,7 @@ def test_scalar_and_matrix_tips_agree(name: str) -> None:
     machine = load_machine(name)
     arm = Arm(machine)
     for pose in poses(machine).tolist():
-        np.testing.assert_allclose(arm.tip(pose), frames(machine, pose)[-1, :3, 3], atol=1e-12)
+        np.testing.assert_allclose(arm.tip(pose), link_frames(machine, pose)[-1, :3, 3], atol=1e-12)
 
 
 @pytest.mark.parametrize("name", MACHINES)
@@ -93,13 +93,13 @@ def test_the_planar_jacobian_is_the_whole_one_seen_along_the_arm(name: str) -> N
         radius, height = arm.plane(pose)
         sideways = np.array([-outward[1], outward[0], 0.0])
         np.testing.assert_allclose(whole[:, 0], radius * sideways, atol=1e-12)
-        assert height == pytest.approx(frames(machine, pose)[-1, 2, 3], abs=1e-12)
+        assert height == pytest.approx(link_frames(machine, pose)[-1, 2, 3], abs=1e-12)
 
 
 def test_dh_and_urdf_products_of_the_open_manipulator_agree() -> None:
     machine = omx()
     for pose in poses(machine):
-        tip = frames(machine, pose.tolist())[-1, :3, 3]
+        tip = link_frames(machine, pose.tolist())[-1, :3, 3]
         np.testing.assert_allclose(tip, omx_tip(pose), atol=1e-15)
 
 
@@ -130,7 +130,7 @@ def test_positive_pitch_is_down_and_positive_slew_is_left(name: str) -> None:
 
 
 def test_the_shoulder_of_ch8_stands_where_the_study_puts_it() -> None:
-    elbow = frames(load_machine("ch8"), [0.0] * 4)[2, :3, 3]
+    elbow = link_frames(load_machine("ch8"), [0.0] * 4)[2, :3, 3]
     np.testing.assert_allclose(elbow, (0.2677 + 0.5355, 0.0, 1.7068 + 2.8558), atol=1e-4)
 
 

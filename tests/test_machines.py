@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from labcrane import ProtocolError
-from labcrane.machine_file import load_machine, machine_names
+from labcrane.machines.library import load_machine, machine_names
 
 GOOD = """\
 title: Digger

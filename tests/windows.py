@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from labcrane import Frame, Run, link_boxes
-from labcrane.testing import TARGETS, a_run, a_target, ch8, crane_at
+from labcrane.testing import TARGETS, ch8, crane_at, make_run, make_target
 from labcrane_view.settings import CameraSettings, ViewSettings
 from labcrane_view.view import View
 
@@ -21,11 +21,11 @@ MACHINE = ch8()
 
 
 def a_scene() -> Run:
-    return replace(a_run(MACHINE, task=TARGETS), bodies=link_boxes(MACHINE))
+    return replace(make_run(MACHINE, task=TARGETS), bodies=link_boxes(MACHINE))
 
 
-def a_frame(number: int = 0) -> Frame:
-    frame = a_target(a_scene(), number)
+def make_frame(number: int = 0) -> Frame:
+    frame = make_target(a_scene(), number)
     frame.state = crane_at(MACHINE, POSE)
     frame.task = np.array([4.5, 0.2, 0.8, 0.25, 6.5, 2.4, 0.8])
     return frame

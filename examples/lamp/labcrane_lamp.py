@@ -75,13 +75,13 @@ class Lamp(Feedback):
                 "port: in the protocol"
             )
 
-    def facts(self) -> Mapping[str, Value]:
+    def metadata(self) -> Mapping[str, Value]:
         return {"device": self._name}
 
     def present(self, frame: Frame) -> FloatArray:
         distance = float(np.linalg.norm(frame.task[self._target] - frame.state[self._tip]))
         if math.isnan(distance):  # between trials there is no target
-            self.rest()
+            self.idle()
             return np.zeros(2)
         light = max(0.0, 1.0 - distance / self._settings.far)
         near = self._settings.shake_below
@@ -89,7 +89,7 @@ class Lamp(Feedback):
         self._send(light, motor)
         return np.array([light, motor])
 
-    def rest(self) -> None:
+    def idle(self) -> None:
         self._send(0.0, 0.0)
 
     def close(self) -> None:

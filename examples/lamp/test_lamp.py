@@ -7,7 +7,7 @@ from device import LampDevice
 from labcrane_lamp import Lamp, LampSettings
 
 from labcrane import DeviceError, Feedback
-from labcrane.testing import TARGETS, FeedbackContract, a_run, a_target, ch8, opened
+from labcrane.testing import TARGETS, FeedbackContract, ch8, make_run, make_target, opened
 
 
 @pytest.fixture
@@ -22,17 +22,17 @@ class TestLamp(FeedbackContract):
 
 
 def test_light_and_motor_follow_the_distance(device: LampDevice) -> None:
-    run = a_run(ch8(), task=TARGETS)
+    run = make_run(ch8(), task=TARGETS)
     lamp = Lamp(LampSettings(port=device.port, far=2.0, shake_below=0.5))
     with opened(lamp, run):
-        frame = a_target(run)
+        frame = make_target(run)
         target = frame.task[run.task.find("target.position")]
         tip = frame.state[run.state.find("tip.position")]
         for distance, expected in ((1.0, [0.5, 0.0]), (0.25, [0.875, 0.5]), (0.0, [1.0, 1.0])):
             tip[:] = target
             tip[2] += distance
             assert lamp.present(frame).tolist() == pytest.approx(expected)
-        assert lamp.facts() == {"device": "lamp 1.2"}
+        assert lamp.metadata() == {"device": "lamp 1.2"}
     deadline = time.monotonic() + 5.0
     while len(device.motor) < 4 and time.monotonic() < deadline:
         time.sleep(0.01)  # another thread reads the line
@@ -44,12 +44,12 @@ def test_something_else_on_the_port_is_refused() -> None:
     modem = LampDevice(name="AT")
     lamp = Lamp(LampSettings(port=modem.port))
     with pytest.raises(DeviceError, match="answered 'AT', and is no lamp; check port:"):
-        lamp.open(a_run(ch8(), task=TARGETS))
+        lamp.open(make_run(ch8(), task=TARGETS))
     lamp.close()
 
 
 def test_no_such_port_is_told() -> None:
     lamp = Lamp(LampSettings(port="/dev/no-such-port"))
     with pytest.raises(DeviceError, match=r"no lamp on /dev/no-such-port: .* check the cable"):
-        lamp.open(a_run(ch8(), task=TARGETS))
+        lamp.open(make_run(ch8(), task=TARGETS))
     lamp.close()

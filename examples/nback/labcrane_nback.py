@@ -14,7 +14,6 @@ import numpy as np
 from pydantic import Field, PositiveFloat
 
 from labcrane import (
-    Ball,
     Cue,
     Feedback,
     FloatArray,
@@ -25,6 +24,7 @@ from labcrane import (
     Settings,
     Shape,
     Signal,
+    Sphere,
     hookimpl,
     offer,
 )
@@ -115,7 +115,7 @@ class NbackBall(Cue):
         ball = self._course.ball(frame)
         if ball is None or not ball[3]:
             return ()
-        return (Ball("nback", PLACES[ball[1]], 0.4, (1.0, 0.9, 0.2, 1.0)),)
+        return (Sphere("nback", PLACES[ball[1]], 0.4, (1.0, 0.9, 0.2, 1.0)),)
 
     def values(self, frame: Frame) -> FloatArray:
         ball = self._course.ball(frame)

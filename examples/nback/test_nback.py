@@ -8,7 +8,15 @@ import pytest
 from labcrane_nback import PLACES, Nback, NbackBall, NbackSettings, order
 
 from labcrane import Cue, Feedback
-from labcrane.testing import TARGETS, CueContract, FeedbackContract, a_run, a_target, ch8, opened
+from labcrane.testing import (
+    TARGETS,
+    CueContract,
+    FeedbackContract,
+    ch8,
+    make_run,
+    make_target,
+    opened,
+)
 
 
 class TestBall(CueContract):
@@ -40,7 +48,7 @@ def test_every_trial_has_an_order_of_its_own_that_comes_back() -> None:
 
 
 def test_markers_of_balls_and_presses_reach_another_program() -> None:
-    run = a_run(ch8(), task=TARGETS)
+    run = make_run(ch8(), task=TARGETS)
     settings = NbackSettings(period_s=0.1)
     nback = Nback(settings)
     with opened(nback, run):
@@ -48,7 +56,7 @@ def test_markers_of_balls_and_presses_reach_another_program() -> None:
         inlet = pylsl.StreamInlet(info)
         inlet.open_stream(timeout=10.0)
         for number in range(48):  # a fifth of a second: two balls
-            frame = a_target(run, number)
+            frame = make_target(run, number)
             frame.axes[run.axes.index("right.trigger")] = 30 <= number < 36
             nback.present(frame)
         heard = [inlet.pull_sample(timeout=5.0) for _ in range(3)]

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from labcrane.analysis.gaze import gaze_units
 from labcrane.analysis.measures import MEASURES
-from labcrane.recording.recording import SessionRecord
+from labcrane.recording.participant_file.reader import SessionRecord
 
 if TYPE_CHECKING:
     import pandas as pd

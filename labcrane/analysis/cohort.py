@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from labcrane.errors import ProtocolError, RecordingError
-from labcrane.recording.parts import participant_path
-from labcrane.recording.recording import Recording, SessionRecord, open_recording
+from labcrane.recording.participant_file.reader import Recording, SessionRecord, open_recording
+from labcrane.recording.paths import participant_path
 
 if TYPE_CHECKING:
     import pandas as pd

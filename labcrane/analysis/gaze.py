@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane.arrays import FloatArray
-from labcrane.recording.recording import SessionRecord
+from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from labcrane.errors import LabcraneError
-from labcrane.evaluation import IndicatorSettings
+from labcrane.protocol.evaluation import IndicatorSettings
 
 FORMULA = "typiak-2024-reconstruction-1"
 """Version of the formula, stored with every result."""

@@ -11,9 +11,9 @@ from labcrane.analysis.gaze import gaze_measures, looks
 from labcrane.analysis.movements import Groups, Movement, cut, groups, machine_of
 from labcrane.analysis.smoothness import ldlj, path_ratio, sparc, sub_movements
 from labcrane.analysis.sticks import coordination, effort, limit_hits, reversals, stick_use
-from labcrane.arrays import FloatArray
-from labcrane.machine import Machine
-from labcrane.recording.recording import SessionRecord
+from labcrane.machines.machine import Machine
+from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd

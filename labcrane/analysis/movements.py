@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from labcrane.arrays import FloatArray
-from labcrane.machine import Machine
-from labcrane.recording.recording import SessionRecord
+from labcrane.machines.machine import Machine
+from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.indicator import Indicator, Performance, indicate
 from labcrane.errors import RecordingError
-from labcrane.evaluation import IndicatorSettings
-from labcrane.recording.recording import Recording, SessionRecord
+from labcrane.protocol.evaluation import IndicatorSettings
+from labcrane.recording.participant_file.reader import Recording, SessionRecord
 
 if TYPE_CHECKING:
     import pandas as pd

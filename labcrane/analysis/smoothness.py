@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labcrane.arrays import FloatArray
+from labcrane.types import FloatArray
 
 
 def sparc(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labcrane.arrays import FloatArray
+from labcrane.types import FloatArray
 
 
 @dataclass(frozen=True, slots=True)

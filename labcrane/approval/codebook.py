@@ -5,14 +5,14 @@ import io
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 
-from labcrane import rig
-from labcrane.attempt import UNITS, trial_units
-from labcrane.frame_log import LOOP
-from labcrane.plan import plan_session
-from labcrane.pseudonyms import pseudonyms
-from labcrane.records import Value
-from labcrane.signals import Layout
-from labcrane.study import Study
+from labcrane.core.records import Value
+from labcrane.core.signals import Layout
+from labcrane.design.plan import plan_session
+from labcrane.design.pseudonyms import pseudonyms
+from labcrane.protocol import rig
+from labcrane.protocol.study import Study
+from labcrane.recording.frame_log import LOOP
+from labcrane.session.trial import UNITS, trial_units
 
 CORE = "labcrane"
 ABOUT = (

@@ -9,10 +9,10 @@ from labcrane.approval import codebook
 from labcrane.approval.difference import differences
 from labcrane.approval.lock import FORMAT, VERSION, Lock, lock_path, read_lock
 from labcrane.approval.materials import materials
-from labcrane.durable_file import SHARED_FILE, copy
 from labcrane.errors import ProtocolError
-from labcrane.registry import Registry
-from labcrane.study import Study
+from labcrane.files.atomic import SHARED_FILE, copy
+from labcrane.protocol.study import Study
+from labcrane.registry.registry import Registry
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,8 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
-from labcrane.durable_file import SHARED_FILE, write_text
 from labcrane.errors import ProtocolError
+from labcrane.files.atomic import SHARED_FILE, write_text
 
 FORMAT = "labcrane lock"
 VERSION = 1

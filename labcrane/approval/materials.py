@@ -12,12 +12,12 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from labcrane.approval.source_tree import hashes
-from labcrane.durable_file import sha256
-from labcrane.entry_points import PROJECT
 from labcrane.errors import ProtocolError
-from labcrane.registry import Registry
-from labcrane.study import Study
-from labcrane.yaml_file import YamlFile
+from labcrane.files.atomic import sha256
+from labcrane.files.yaml import YamlFile
+from labcrane.protocol.study import Study
+from labcrane.registry.entry_points import PROJECT
+from labcrane.registry.registry import Registry
 
 DATA = frozenset({".yaml", ".yml", ".json"})
 OWN = "the study's own"

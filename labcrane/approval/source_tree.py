@@ -4,8 +4,8 @@ from importlib.machinery import ModuleSpec
 from importlib.util import find_spec
 from pathlib import Path
 
-from labcrane.durable_file import sha256
 from labcrane.errors import PluginError
+from labcrane.files.atomic import sha256
 
 CACHES = frozenset({"__pycache__", ".mypy_cache", ".ruff_cache", ".pytest_cache"})
 COMPILED = frozenset({".pyc", ".pyo"})

@@ -12,7 +12,7 @@ from importlib import import_module
 
 import typer
 
-from labcrane.cli import extension
+from labcrane.cli import plugin_groups as extension
 from labcrane.errors import LabcraneError, ProtocolError
 
 MODULES = {

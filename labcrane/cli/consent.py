@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Literal
 
 import typer
 
-from labcrane.cli.approval import today
-from labcrane.console import Command, Order, QueueConsole
-from labcrane.records import Event
+from labcrane.cli.commands.approval import today
+from labcrane.core.records import Event
+from labcrane.session.commands import Command, Order, QueueConsole
 
 if TYPE_CHECKING:
     from labcrane.approval.lock import Lock
-    from labcrane.session import Visit
+    from labcrane.session.session import Visit
 
 LOOK_S = 0.05
 NOBODY = "nobody"
@@ -36,8 +36,8 @@ class Missing:
     def confirm(self, by: str) -> None:
         """Put the consent into the register."""
         from labcrane.participants.enrolment import confirm_consent
-        from labcrane.participants.places import Places
-        from labcrane.supervisor.rights import PARTICIPANT
+        from labcrane.participants.folders import Places
+        from labcrane.web.access import PARTICIPANT
 
         visit = self.visit
         who: Literal["participant", "examiner"] = "participant" if by == PARTICIPANT else "examiner"
@@ -56,9 +56,9 @@ def missing_consent(visit: "Visit") -> Missing | None:
     if visit.pilot or visit.simulated:
         return None
     from labcrane.approval.decision import verify
-    from labcrane.participants.places import Places
+    from labcrane.participants.folders import Places
     from labcrane.participants.register import read
-    from labcrane.registry import discover
+    from labcrane.registry.registry import discover
 
     visit.study.check_participant(visit.participant)
     lock = verify(visit.study, discover(study=visit.study.path), today())

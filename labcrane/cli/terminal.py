@@ -14,11 +14,11 @@ from contextlib import contextmanager, suppress
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from labcrane.cli.sheet import Sheet, Sheets, sheet_line
-from labcrane.console import Command, Order, QueueConsole
-from labcrane.questions import AnswerError
-from labcrane.records import Event
-from labcrane.roles import Questionnaire
+from labcrane.cli.questionnaire import Sheet, Sheets, sheet_line
+from labcrane.core.items import AnswerError
+from labcrane.core.records import Event
+from labcrane.core.roles import Questionnaire
+from labcrane.session.commands import Command, Order, QueueConsole
 
 KEYS: Mapping[str, Order] = {
     " ": Order.START,

@@ -1,4 +1,4 @@
-"""Checks a computer before a study day: clock, scheduling, disk, LSL, and the study's devices.
+"""Checks of a computer before a study day.
 
-Each check says how something is, whether that will do, and what to do about it.
+In comes a protocol, or none; out go findings: what is well, what is not, what to do.
 """

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from labcrane.finding import Finding, Verdict
+from labcrane.core.findings import Finding, Verdict
 
 FINE_S = 1e-6
 """Step of the clock up to which it is fine; a tick at 1 kHz is a thousand of them."""

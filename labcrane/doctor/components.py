@@ -14,10 +14,10 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from labcrane.finding import Finding, Verdict
-from labcrane.offers import Settings
-from labcrane.registry import ROLES, Registry, discover
-from labcrane.study import Study
+from labcrane.core.findings import Finding, Verdict
+from labcrane.protocol.study import Study
+from labcrane.registry.offers import Settings
+from labcrane.registry.registry import ROLES, Registry, discover
 
 WAIT_S = 30.0
 """How long a look may take; with a person who moves things, ten times as long."""

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from labcrane.clock import SystemClock, ticks
+from labcrane.core.clock import SystemClock, ticks
+from labcrane.core.findings import Finding, Verdict
 from labcrane.errors import RecordingError
-from labcrane.finding import Finding, Verdict
-from labcrane.recording.append_file import AppendFile
-from labcrane.streams.verdict import Limit
+from labcrane.files.append import AppendFile
+from labcrane.streams.sync.limits import Limit
 
 NEEDED_BYTES = 1_000_000_000
 """Free space that is asked for where no protocol says how much a session takes."""

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
-from labcrane.finding import Finding, Verdict
+from labcrane.core.findings import Finding, Verdict
 from labcrane.streams.discovery import FoundStream, discover
 from labcrane.streams.network import describe
 from labcrane.streams.request import StreamRequest

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from labcrane.clock import SystemClock, ticks
-from labcrane.finding import Finding, Verdict
-from labcrane.streams.verdict import LATE
+from labcrane.core.clock import SystemClock, ticks
+from labcrane.core.findings import Finding, Verdict
+from labcrane.streams.sync.limits import LATE
 
 SECONDS = 2.0
 CPUS = Path("/sys/devices/system/cpu")

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
 
-from labcrane.durable_file import UNFINISHED, write_text
-from labcrane.participants.places import Places
+from labcrane.files.atomic import UNFINISHED, write_text
+from labcrane.participants.folders import Places
 from labcrane.participants.register import Export, Owed, Register, changed
-from labcrane.recording.relabelling import renaming
+from labcrane.recording.participant_file.relabel import renaming
 
 TABLES = {".csv": ",", ".tsv": "\t"}
 """Exports in which single rows can be taken out, and what separates their cells."""

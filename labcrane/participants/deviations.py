@@ -4,10 +4,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from labcrane.participants.places import Places
+from labcrane.participants.folders import Places
 from labcrane.participants.register import Deviation, Entry, changed, read
 from labcrane.recording.journal_reader import LoggedEvent, read_journal
-from labcrane.recording.parts import journal_path, parts
+from labcrane.recording.paths import journal_path, parts
 
 ORDERS = {
     "order.skip": "skipped",

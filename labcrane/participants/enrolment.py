@@ -6,10 +6,10 @@ from typing import Literal
 from labcrane.design.seeds import derive
 from labcrane.design.slots import group_of, next_slot
 from labcrane.errors import ProtocolError
-from labcrane.participants.places import Places
+from labcrane.participants.folders import Places
+from labcrane.participants.personal_data import personal
 from labcrane.participants.register import Consent, Deviation, Entry, Exclusion, Register, changed
-from labcrane.privacy import personal
-from labcrane.study import Study
+from labcrane.protocol.study import Study
 
 
 def _entry(register: Register, study: Study, participant: str, today: date) -> Entry:

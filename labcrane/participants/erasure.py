@@ -8,7 +8,7 @@ from datetime import date
 from labcrane.errors import ProtocolError
 from labcrane.participants.copies import Reach, edit_exports, forget_export, remove_from_stores
 from labcrane.participants.enrolment import check_words
-from labcrane.participants.places import Places
+from labcrane.participants.folders import Places
 from labcrane.participants.register import Register, Tombstone, Work, begun, changed, read
 
 

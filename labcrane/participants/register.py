@@ -11,10 +11,10 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from labcrane.durable_file import write_text
 from labcrane.errors import ProtocolError, RecordingError
-from labcrane.exclusive import exclusive
-from labcrane.participants.places import Places
+from labcrane.files.atomic import write_text
+from labcrane.files.lock import exclusive
+from labcrane.participants.folders import Places
 
 
 class Record(BaseModel):

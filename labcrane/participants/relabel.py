@@ -5,12 +5,12 @@ import shutil
 from datetime import date
 from pathlib import Path
 
-from labcrane.durable_file import copy, make_folder, replacing, sync_folder
 from labcrane.errors import ProtocolError
+from labcrane.files.atomic import copy, make_folder, replacing, sync_folder
 from labcrane.participants.copies import Reach, edit_exports, forget_export, remove_from_stores
 from labcrane.participants.enrolment import check_words
 from labcrane.participants.erasure import forget_store
-from labcrane.participants.places import Places
+from labcrane.participants.folders import Places
 from labcrane.participants.register import (
     Deviation,
     Entry,
@@ -21,7 +21,7 @@ from labcrane.participants.register import (
     read,
 )
 from labcrane.participants.transfer import transfer
-from labcrane.recording.relabelling import (
+from labcrane.recording.participant_file.relabel import (
     relabel_journal,
     relabel_participant_file,
     renaming,

@@ -4,12 +4,12 @@ import shutil
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from labcrane.durable_file import copy, sha256
 from labcrane.errors import RecordingError
+from labcrane.files.atomic import copy, sha256
 from labcrane.participants.copies import Reach, edit_file, in_store
-from labcrane.participants.places import Places
+from labcrane.participants.folders import Places
 from labcrane.participants.register import Register, changed, read
-from labcrane.recording.recover import is_recovered
+from labcrane.recording.participant_file.recover import is_recovered
 
 
 @dataclass

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from labcrane.arrays import FloatArray
 from labcrane.recording.journal_reader import JournalState, SessionLog, state
-from labcrane.recording.samples import Texts
-from labcrane.recording.stream_header import Channel, StreamHeader
-from labcrane.recording.xdf_reader import XdfFile, XdfStream, read_xdf
+from labcrane.recording.xdf.header import Channel, StreamHeader
+from labcrane.recording.xdf.reader import XdfFile, XdfStream, read_xdf
+from labcrane.recording.xdf.samples import Texts
+from labcrane.types import FloatArray
 
 PROBES = "probes"
 ARRIVALS = "arrivals"

@@ -10,12 +10,12 @@ from typing import Self
 
 import numpy as np
 
-from labcrane.arrays import FloatArray
+from labcrane.core.records import Event
 from labcrane.errors import PluginError, RecordingError
-from labcrane.recording.append_file import SYNC_S
-from labcrane.recording.stream_header import Channel, StreamHeader
-from labcrane.recording.xdf import XdfWriter
-from labcrane.records import Event
+from labcrane.files.append import SYNC_S
+from labcrane.recording.xdf.header import Channel, StreamHeader
+from labcrane.recording.xdf.writer import XdfWriter
+from labcrane.types import FloatArray
 
 FRAMES = "labcrane.frames"
 EVENTS = "labcrane.events"
@@ -51,7 +51,7 @@ class SessionJournal:
     Parameters
     ----------
     path
-        Must not exist; :func:`labcrane.recording.parts.next_part` gives the name.
+        Must not exist; :func:`labcrane.recording.paths.next_part` gives the name.
     columns
         What a frame holds, in order.
     rate_hz
@@ -59,7 +59,7 @@ class SessionJournal:
     sync_s
         Longest time, in seconds, that data wait for the disk.
     now
-        The clock of a simulation; see :class:`~labcrane.recording.xdf.XdfWriter`.
+        The clock of a simulation; see :class:`~labcrane.recording.xdf.writer.XdfWriter`.
     """
 
     def __init__(

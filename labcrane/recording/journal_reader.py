@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from labcrane.arrays import FloatArray
 from labcrane.recording.journal import EVENTS, FRAMES, GROUPS, START, Column
-from labcrane.recording.xdf_reader import XdfFile, XdfStream, read_xdf
+from labcrane.recording.xdf.reader import XdfFile, XdfStream, read_xdf
+from labcrane.types import FloatArray
 
 UNREADABLE = "journal.unreadable"
 """Name of an event whose text is no JSON: damaged in a part of the file that has no checks."""

@@ -1,7 +1,7 @@
 """The session's whole context as a string stream: LSL keeps no history, so it is sent again.
 
 A sample of ``labcrane.context`` is a JSON object of two parts: ``scene``, which never changes
-(:func:`labcrane.run_text.read_run`), and ``situation`` (:class:`labcrane.records.Situation`). It is
+(:func:`labcrane.recording.run_codec.read_run`), and ``situation`` (:class:`labcrane.core.records.SessionState`). It is
 sent at every change and once a second: whoever starts late, or again, draws from one sample alone.
 """
 
@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
-from labcrane.records import Event, Frame, Run, Situation
-from labcrane.run_text import write_run
+from labcrane.core.records import Event, Frame, Run, SessionState
+from labcrane.recording.run_codec import write_run
 from labcrane.streams.outlets import channel, stream_info
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ CONTEXT = "labcrane.context"
 EVERY_S = 1.0
 
 
-def situation_after(situation: Situation, event: Event) -> Situation:
+def situation_after(situation: SessionState, event: Event) -> SessionState:
     """Return what the session is about once ``event`` has happened."""
     data: Mapping[str, Any] = event.data
     counts = {**situation.counts, event.name: situation.counts.get(event.name, 0) + 1}
@@ -51,7 +51,7 @@ def situation_after(situation: Situation, event: Event) -> Situation:
     return _read_after(now, event)
 
 
-def _read_after(now: Situation, event: Event) -> Situation:
+def _read_after(now: SessionState, event: Event) -> SessionState:
     """Return the situation with what the operator is to read once ``event`` has happened."""
     data: Mapping[str, Any] = event.data
     match event.name:
@@ -76,7 +76,7 @@ class ContextOutlet:
         channel(info, label="context", unit="none", type="JSON")
         self._outlet: pylsl.StreamOutlet | None = pylsl.StreamOutlet(info)
         self._scene = write_run(run)
-        self._situation = Situation(trials=trials)
+        self._situation = SessionState(trials=trials)
         self._due = float("-inf")
 
     def push(self, frame: Frame) -> None:
@@ -111,7 +111,7 @@ class ContextInlet:
 
         self._inlet = pylsl.StreamInlet(info, max_buflen=60, recover=True, processing_flags=0)
         self.text = ""
-        self.situation = Situation()
+        self.situation = SessionState()
 
     def changed(self, wait_s: float = 0.0) -> bool:
         """Take what has come; whether the situation is another one now."""
@@ -127,6 +127,6 @@ class ContextInlet:
         return self.situation != before
 
 
-def situation_of(found: Mapping[str, Any]) -> Situation:
+def situation_of(found: Mapping[str, Any]) -> SessionState:
     """Return the situation that JSON holds."""
-    return Situation(**{**found, "active": tuple(found["active"])})
+    return SessionState(**{**found, "active": tuple(found["active"])})

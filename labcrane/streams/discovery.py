@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from labcrane.errors import RecordingError
-from labcrane.recording.stream_header import StreamHeader
+from labcrane.recording.xdf.header import StreamHeader
 from labcrane.streams.probes import ClockProbe, Probe
 from labcrane.streams.request import unstable_id
 

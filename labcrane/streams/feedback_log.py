@@ -12,11 +12,11 @@ from typing import Protocol
 
 import numpy as np
 
-from labcrane.arrays import FloatArray
-from labcrane.records import Frame
-from labcrane.roles import Feedback
-from labcrane.signals import Layout
+from labcrane.core.records import Frame
+from labcrane.core.roles import Feedback
+from labcrane.core.signals import Layout
 from labcrane.streams.outlets import Samples, channel, source_id, stream_info
+from labcrane.types import FloatArray
 
 HEAD = (("frame.tick", "1"), ("frame.due", "s"), ("frame.skipped", "1"))
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane.arrays import FloatArray
-from labcrane.clock import Tick
-from labcrane.records import Frame, Phase, Run
-from labcrane.signals import Layout
+from labcrane.core.clock import Tick
+from labcrane.core.records import Frame, Phase, Run
+from labcrane.core.signals import Layout
 from labcrane.streams.outlets import Samples, channel, stream_info
+from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pylsl

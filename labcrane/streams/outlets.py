@@ -20,12 +20,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from labcrane.arrays import FloatArray
+from labcrane.core.records import Frame, Run
+from labcrane.core.signals import Layout
 from labcrane.errors import StreamError
 from labcrane.recording.journal import event_text
-from labcrane.records import Frame, Run
-from labcrane.signals import Layout
 from labcrane.streams.markers import CODES, OTHER
+from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pylsl

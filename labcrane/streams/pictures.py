@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from labcrane.records import Picture
+from labcrane.core.records import CameraImage
 from labcrane.streams.outlets import channel, source_id, stream_info
 
 if TYPE_CHECKING:
     import pylsl
 
-KIND = "Picture"
+KIND = "CameraImage"
 KEPT_S = 1
 """Of a stream without a rate liblsl keeps a hundred samples for each second: some megabytes."""
 
@@ -47,7 +47,7 @@ class PictureOutlet:
         )
         channel(info, label="picture", unit="none", type="JSON")
         self._outlet: pylsl.StreamOutlet = pylsl.StreamOutlet(info, max_buffered=KEPT_S)
-        self._waiting: queue.SimpleQueue[tuple[Mapping[str, Picture], float] | None]
+        self._waiting: queue.SimpleQueue[tuple[Mapping[str, CameraImage], float] | None]
         self._waiting = queue.SimpleQueue()
         self._free = threading.Event()
         self._free.set()
@@ -59,7 +59,7 @@ class PictureOutlet:
         """Whether somebody watches, and the pictures before are on their way."""
         return self._free.is_set() and bool(self._outlet.have_consumers())
 
-    def push(self, pictures: Mapping[str, Picture], stamp: float) -> None:
+    def push(self, pictures: Mapping[str, CameraImage], stamp: float) -> None:
         """Send pictures of cameras by name; ``stamp`` is when the newest frame was due."""
         if pictures:
             self._free.clear()
@@ -94,7 +94,7 @@ class PictureInlet:
             sample, stamp = self._inlet.pull_sample(timeout=0.0)
 
 
-def _written(camera: str, picture: Picture) -> str:
+def _written(camera: str, picture: CameraImage) -> str:
     coded = base64.b64encode(png(picture.pixels)).decode()
     return json.dumps(
         {"camera": camera, "due": picture.due, "legend": picture.legend, "png": coded}

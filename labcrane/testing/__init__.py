@@ -10,11 +10,11 @@ stand-ins for the other roles, and runs it.
 """
 
 from labcrane.testing.commands import CommandContract
-from labcrane.testing.every_role import PluginContract, check_closes_after_failed_open, check_soon
+from labcrane.testing.components import PluginContract, check_closes_after_failed_open, check_soon
 from labcrane.testing.examinations import ExaminationContract
 from labcrane.testing.exporters import ExporterContract
 from labcrane.testing.monitors import SignalMonitorContract
-from labcrane.testing.presentation import TARGETS, CueContract, FeedbackContract, a_target
+from labcrane.testing.presentation import TARGETS, CueContract, FeedbackContract, make_target
 from labcrane.testing.questionnaires import QuestionnaireContract
 from labcrane.testing.roles import (
     RATE_HZ,
@@ -22,14 +22,14 @@ from labcrane.testing.roles import (
     ControllerContract,
     DynamicsContract,
     InputContract,
-    a_frame,
-    a_run,
-    a_trial,
     ch8,
     check_array,
     check_signals,
     crane_at,
     crane_state,
+    make_frame,
+    make_run,
+    make_trial,
     opened,
 )
 from labcrane.testing.tasks import TaskContract
@@ -50,10 +50,6 @@ __all__ = [
     "QuestionnaireContract",
     "SignalMonitorContract",
     "TaskContract",
-    "a_frame",
-    "a_run",
-    "a_target",
-    "a_trial",
     "ch8",
     "check_array",
     "check_closes_after_failed_open",
@@ -61,5 +57,9 @@ __all__ = [
     "check_soon",
     "crane_at",
     "crane_state",
+    "make_frame",
+    "make_run",
+    "make_target",
+    "make_trial",
     "opened",
 ]

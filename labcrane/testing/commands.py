@@ -5,7 +5,7 @@ import inspect
 import typer
 from typer.testing import CliRunner
 
-from labcrane.offers import CommandOffer
+from labcrane.registry.offers import CommandOffer
 
 
 class CommandContract:

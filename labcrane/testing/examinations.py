@@ -1,8 +1,8 @@
 """The contract of examinations: how a plugin looks at the hardware of its component."""
 
-from labcrane.finding import Finding, Verdict
-from labcrane.offers import Offer, Settings
-from labcrane.roles import Component
+from labcrane.core.findings import Finding, Verdict
+from labcrane.core.roles import Component
+from labcrane.registry.offers import Offer, Settings
 
 
 class ExaminationContract:

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from labcrane.analysis.cohort import Participant, Status
-from labcrane.kinematics import Arm
-from labcrane.machine import Machine
-from labcrane.machine_file import load_machine
+from labcrane.core.records import Event
+from labcrane.core.roles import Exporter
+from labcrane.machines.kinematics import Arm
+from labcrane.machines.library import load_machine
+from labcrane.machines.machine import Machine
 from labcrane.recording.journal import Column, SessionJournal
-from labcrane.recording.participant_file import consolidate
-from labcrane.records import Event
-from labcrane.roles import Exporter
+from labcrane.recording.participant_file.writer import consolidate
 
 RATE_HZ = 100.0
 MOVEMENT_S = 2.0

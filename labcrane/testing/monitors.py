@@ -4,9 +4,9 @@ import time
 
 import numpy as np
 
-from labcrane.arrays import FloatArray
-from labcrane.roles import SignalMonitor
-from labcrane.signals import SignalFault, SignalStream
+from labcrane.core.roles import SignalMonitor
+from labcrane.core.signals import SignalFault, SignalStream
+from labcrane.types import FloatArray
 
 SHARE = 0.1
 """Of the time in which samples come that a monitor may take, at most: others run beside it."""

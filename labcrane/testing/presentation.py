@@ -5,12 +5,20 @@ import copy
 import numpy as np
 from pydantic import BaseModel
 
-from labcrane.records import Frame, Run, Situation
-from labcrane.roles import Cue, Feedback
-from labcrane.shapes import Ball, Shape
-from labcrane.signals import Layout, Signal
-from labcrane.testing.every_role import check_closes_after_failed_open, check_soon
-from labcrane.testing.roles import a_frame, a_run, a_trial, ch8, check_signals, crane_at, opened
+from labcrane.core.primitives import Shape, Sphere
+from labcrane.core.records import Frame, Run, SessionState
+from labcrane.core.roles import Cue, Feedback
+from labcrane.core.signals import Layout, Signal
+from labcrane.testing.components import check_closes_after_failed_open, check_soon
+from labcrane.testing.roles import (
+    ch8,
+    check_signals,
+    crane_at,
+    make_frame,
+    make_run,
+    make_trial,
+    opened,
+)
 
 TARGETS = (
     Signal("target.position", "m", ("x", "y", "z")),
@@ -20,11 +28,11 @@ TARGETS = (
 """What a task of aiming movements shows."""
 
 
-def a_target(run: Run, number: int = 0) -> Frame:
+def make_target(run: Run, number: int = 0) -> Frame:
     """Return a frame with a target in it; each number has another one."""
     machine = run.machine
     turn = 0.02 * number
-    frame = a_frame(run, number, crane_at(machine, [turn, *machine.rest[1:]]))
+    frame = make_frame(run, number, crane_at(machine, [turn, *machine.rest[1:]]))
     frame.task = np.array([5.5, 1.0 - turn, 0.8, 0.25, 4.5, -1.0, 0.8])
     return frame
 
@@ -34,47 +42,47 @@ class CueContract:
 
     def test_cue_draws_the_same_for_the_same_frame(self, cue: Cue) -> None:
         check_signals(cue)
-        run = a_run(ch8(), task=TARGETS)
+        run = make_run(ch8(), task=TARGETS)
         with opened(cue, run):
-            seen = [a_target(run, number) for number in range(5)]
+            seen = [make_target(run, number) for number in range(5)]
             first = [list(cue.draw(frame)) for frame in seen]
             again = [list(cue.draw(copy.deepcopy(frame))) for frame in reversed(seen)]
             assert first == again[::-1], "draw must depend on the frame alone"
 
     def test_cue_draws_shapes_with_names_of_their_own(self, cue: Cue) -> None:
-        run = a_run(ch8(), task=TARGETS)
+        run = make_run(ch8(), task=TARGETS)
         with opened(cue, run):
-            shapes = cue.draw(a_target(run))
+            shapes = cue.draw(make_target(run))
             assert shapes, "with a target there is something to be seen"
             assert len({shape.name for shape in shapes}) == len(shapes)
             for shape in shapes:
                 _check_shape(shape)
 
     def test_cue_has_the_numbers_its_signals_promise(self, cue: Cue) -> None:
-        run = a_run(ch8(), task=TARGETS)
+        run = make_run(ch8(), task=TARGETS)
         with opened(cue, run):
-            values = cue.values(a_target(run))
+            values = cue.values(make_target(run))
             assert values.shape == (Layout("cue", cue.signals).size,)
             assert np.isfinite(values).all()
 
     def test_cue_draws_at_once(self, cue: Cue) -> None:
-        run = a_run(ch8(), task=TARGETS)
-        frame = a_target(run)
+        run = make_run(ch8(), task=TARGETS)
+        frame = make_target(run)
         with opened(cue, run):
-            cue.begin_trial(a_trial())
+            cue.begin_trial(make_trial())
             check_soon(lambda: cue.draw(frame))
 
     def test_cue_closes_after_a_failed_open(self, cue: Cue) -> None:
         check_closes_after_failed_open(cue)
 
     def test_cue_draws_nothing_between_trials(self, cue: Cue) -> None:
-        run = a_run(ch8(), task=TARGETS)
+        run = make_run(ch8(), task=TARGETS)
         with opened(cue, run):
-            assert not cue.draw(a_frame(run))
+            assert not cue.draw(make_frame(run))
 
 
 def _check_shape(shape: Shape) -> None:
-    points = [shape.centre] if isinstance(shape, Ball) else [shape.start, shape.end]
+    points = [shape.centre] if isinstance(shape, Sphere) else [shape.start, shape.end]
     assert np.isfinite(points).all(), shape
     assert shape.radius > 0.0, shape
     assert all(0.0 <= part <= 1.0 for part in shape.colour), shape
@@ -89,12 +97,12 @@ class FeedbackContract:
 
     def test_feedback_returns_what_its_signals_promise(self, feedback: Feedback) -> None:
         check_signals(feedback)
-        run = a_run(ch8(), task=TARGETS)
+        run = make_run(ch8(), task=TARGETS)
         with opened(feedback, run):
             size = Layout("feedback", feedback.signals).size
-            feedback.hear(Situation(trial=1, trials=1))
+            feedback.update(SessionState(trial=1, trials=1))
             for number in range(3):
-                values = feedback.present(a_target(run, number))
+                values = feedback.present(make_target(run, number))
                 assert values.shape == (size,), f"promised ({size},), got {values.shape}"
                 assert values.dtype == np.float64
                 samples = feedback.samples()
@@ -104,9 +112,9 @@ class FeedbackContract:
                     assert rows.shape[1:] == (Layout(name, signals).size,), name
 
     def test_feedback_has_pictures_of_its_cameras_only(self, feedback: Feedback) -> None:
-        run = a_run(ch8(), task=TARGETS)
+        run = make_run(ch8(), task=TARGETS)
         with opened(feedback, run):
-            feedback.present(a_target(run))
+            feedback.present(make_target(run))
             pictures = feedback.pictures()
             assert set(pictures) <= set(feedback.cameras)
             for name, picture in pictures.items():
@@ -115,18 +123,18 @@ class FeedbackContract:
                 assert np.isfinite(picture.due), name
 
     def test_feedback_rests_between_trials(self, feedback: Feedback) -> None:
-        run = a_run(ch8(), task=TARGETS)
+        run = make_run(ch8(), task=TARGETS)
         with opened(feedback, run):
-            feedback.hear(Situation())
-            feedback.present(a_frame(run))  # a frame without a target
-            feedback.rest()
+            feedback.update(SessionState())
+            feedback.present(make_frame(run))  # a frame without a target
+            feedback.idle()
 
     def test_feedback_adjusts_itself_to_no_settings_but_its_own(self, feedback: Feedback) -> None:
-        run = a_run(ch8(), task=TARGETS)
+        run = make_run(ch8(), task=TARGETS)
         with opened(feedback, run):
-            before = feedback.present(a_target(run)).shape
+            before = feedback.present(make_target(run)).shape
             assert feedback.adjust(Foreign()) is False
-            assert feedback.present(a_target(run)).shape == before
+            assert feedback.present(make_target(run)).shape == before
 
     def test_feedback_closes_without_having_been_opened(self, feedback: Feedback) -> None:
         feedback.close()

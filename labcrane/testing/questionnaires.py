@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labcrane.roles import Questionnaire
+from labcrane.core.roles import Questionnaire
 
 
 class QuestionnaireContract:

@@ -5,18 +5,18 @@ from contextlib import closing, contextmanager
 
 import numpy as np
 
-from labcrane.arrays import FloatArray
-from labcrane.clock import Tick
-from labcrane.kinematics import Arm
-from labcrane.machine import Machine
-from labcrane.machine_file import load_machine
-from labcrane.records import Frame, Phase, Planned, Run, Trial
-from labcrane.roles import Component, Controller, Dynamics, InputDevice
-from labcrane.signals import Layout, Signal
-from labcrane.testing.every_role import check_closes_after_failed_open, check_soon
+from labcrane.core.clock import Tick
+from labcrane.core.records import Frame, Phase, PlannedTrial, Run, Trial
+from labcrane.core.roles import Component, Controller, Dynamics, InputDevice
+from labcrane.core.signals import Layout, Signal
+from labcrane.machines.kinematics import Arm
+from labcrane.machines.library import load_machine
+from labcrane.machines.machine import Machine
+from labcrane.testing.components import check_closes_after_failed_open, check_soon
+from labcrane.types import FloatArray
 
 RATE_HZ = 240.0
-"""Ticks a second of a run made by :func:`a_run`."""
+"""Ticks a second of a run made by :func:`make_run`."""
 
 
 def ch8() -> Machine:
@@ -50,14 +50,14 @@ STICKS = (
 """The axes of a dual joystick, as far as tests need them."""
 
 
-def a_run(
+def make_run(
     machine: Machine,
     *,
     axes: Sequence[Signal] = STICKS,
     command: Sequence[Signal] | None = None,
     state: Sequence[Signal] | None = None,
     task: Sequence[Signal] = (),
-    steer: Callable[[FloatArray, FloatArray], FloatArray] | None = None,
+    inverse: Callable[[FloatArray, FloatArray], FloatArray] | None = None,
 ) -> Run:
     """Return a run beside which one component can be opened."""
     drive = (Signal("command", "rad/s", machine.names),)
@@ -70,11 +70,11 @@ def a_run(
         command=Layout("the scheme", tuple(command or drive)),
         state=Layout("the machine", tuple(state)) if state else crane_state(machine),
         task=Layout("the task", tuple(task)),
-        steer=steer or (lambda velocity, state: np.zeros(layout.size)),
+        inverse=inverse or (lambda velocity, state: np.zeros(layout.size)),
     )
 
 
-def a_frame(run: Run, number: int = 0, state: FloatArray | None = None) -> Frame:
+def make_frame(run: Run, number: int = 0, state: FloatArray | None = None) -> Frame:
     """Return a frame in which nothing has happened yet."""
     due = number / run.rate_hz
     return Frame(
@@ -89,9 +89,9 @@ def a_frame(run: Run, number: int = 0, state: FloatArray | None = None) -> Frame
     )
 
 
-def a_trial(planned: Planned | None = None, seed: int = 1) -> Trial:
+def make_trial(planned: PlannedTrial | None = None, seed: int = 1) -> Trial:
     """Return a first attempt."""
-    return Trial(1, 1, seed, planned or Planned({}, expected_s=1.0))
+    return Trial(1, 1, seed, planned or PlannedTrial({}, expected_s=1.0))
 
 
 @contextmanager
@@ -137,31 +137,31 @@ class InputContract:
 
     def test_device_reads_what_its_signals_promise(self, device: InputDevice) -> None:
         check_signals(device)
-        run = a_run(ch8(), axes=device.signals)
+        run = make_run(ch8(), axes=device.signals)
         with opened(device, run):
-            device.begin_trial(a_trial())
+            device.begin_trial(make_trial())
             for number in range(10):
-                frame = a_frame(run, number)
+                frame = make_frame(run, number)
                 axes = device.read(frame.tick, frame)
                 check_array(device, axes)
                 assert np.abs(axes).max(initial=0.0) <= 1.0, f"an axis is outside [-1, 1]: {axes}"
 
     def test_a_trials_seed_decides_all_that_is_random(self, device: InputDevice) -> None:
-        run = a_run(ch8(), axes=device.signals)
+        run = make_run(ch8(), axes=device.signals)
         with opened(device, run):
             read = []
             for _ in range(2):
-                device.begin_trial(a_trial(seed=7))
-                frames = [a_frame(run, number) for number in range(20)]
+                device.begin_trial(make_trial(seed=7))
+                frames = [make_frame(run, number) for number in range(20)]
                 read.append([device.read(frame.tick, frame).copy() for frame in frames])
             if not self.goes_on:
                 np.testing.assert_array_equal(read[0], read[1])
 
     def test_device_reads_at_once(self, device: InputDevice) -> None:
-        run = a_run(ch8(), axes=device.signals)
-        frame = a_frame(run)
+        run = make_run(ch8(), axes=device.signals)
+        frame = make_frame(run)
         with opened(device, run):
-            device.begin_trial(a_trial())
+            device.begin_trial(make_trial())
             check_soon(lambda: device.read(frame.tick, frame))
 
     def test_device_closes_without_having_been_opened(self, device: InputDevice) -> None:
@@ -177,32 +177,32 @@ class ControllerContract:
     def test_controller_commands_what_its_signals_promise(self, controller: Controller) -> None:
         check_signals(controller)
         machine = ch8()
-        run = a_run(machine, command=controller.signals)
+        run = make_run(machine, command=controller.signals)
         with opened(controller, run):
-            controller.begin_trial(a_trial())
+            controller.begin_trial(make_trial())
             state = crane_at(machine, machine.rest)
             for push in (-1.0, 0.0, 0.3, 1.0):
                 command = controller.command(np.full(run.axes.size, push), state)
                 check_array(controller, command)
-            check_array(controller, controller.rest())
+            check_array(controller, controller.idle())
 
     def test_the_same_axes_give_the_same_command_in_every_trial(
         self, controller: Controller
     ) -> None:
         machine = ch8()
-        run = a_run(machine, command=controller.signals)
+        run = make_run(machine, command=controller.signals)
         state = crane_at(machine, machine.rest)
         with opened(controller, run):
             given = []
             for _ in range(2):
-                controller.begin_trial(a_trial(seed=7))
+                controller.begin_trial(make_trial(seed=7))
                 commands = [controller.command(_push(run, x), state) for x in (0.2, -0.7, 1.0)]
                 given.append([command.copy() for command in commands])
             np.testing.assert_array_equal(given[0], given[1])
 
     def test_controller_commands_at_once(self, controller: Controller) -> None:
         machine = ch8()
-        run = a_run(machine, command=controller.signals)
+        run = make_run(machine, command=controller.signals)
         state = crane_at(machine, machine.rest)
         with opened(controller, run):
             check_soon(lambda: controller.command(_push(run, 0.5), state))
@@ -212,17 +212,17 @@ class ControllerContract:
 
     def test_hands_at_rest_ask_for_no_motion(self, controller: Controller) -> None:
         machine = ch8()
-        run = a_run(machine, command=controller.signals)
+        run = make_run(machine, command=controller.signals)
         drive = run.command.find("command")
         with opened(controller, run):
             state = crane_at(machine, machine.rest)
             command = controller.command(np.zeros(run.axes.size), state)
             assert not command[drive].any()
-            assert not controller.rest()[drive].any()
+            assert not controller.idle()[drive].any()
 
     def test_no_command_exceeds_the_joint_speeds(self, controller: Controller) -> None:
         machine = ch8()
-        run = a_run(machine, command=controller.signals)
+        run = make_run(machine, command=controller.signals)
         drive = run.command.find("command")
         random = np.random.default_rng(1)
         lowest, highest = np.array(machine.limits).T
@@ -235,11 +235,11 @@ class ControllerContract:
 
     def test_steering_stays_within_the_axes(self, controller: Controller) -> None:
         machine = ch8()
-        run = a_run(machine, command=controller.signals)
+        run = make_run(machine, command=controller.signals)
         with opened(controller, run):
             state = crane_at(machine, machine.rest)
             for velocity in np.vstack([np.eye(3), -5.0 * np.eye(3)]):
-                axes = controller.steer(velocity, state)
+                axes = controller.inverse(velocity, state)
                 assert axes.shape == (run.axes.size,)
                 assert np.abs(axes).max() <= 1.0
 
@@ -254,7 +254,7 @@ class DynamicsContract:
     def test_dynamics_returns_what_its_signals_promise(self, dynamics: Dynamics) -> None:
         check_signals(dynamics)
         machine = ch8()
-        run = a_run(machine, state=dynamics.signals)
+        run = make_run(machine, state=dynamics.signals)
         with opened(dynamics, run):
             check_array(dynamics, dynamics.state())
             check_array(dynamics, dynamics.step(0.5 * np.array(machine.speeds), 1 / RATE_HZ))
@@ -262,7 +262,7 @@ class DynamicsContract:
 
     def test_reset_forgets_everything(self, dynamics: Dynamics) -> None:
         machine = ch8()
-        run = a_run(machine, state=dynamics.signals)
+        run = make_run(machine, state=dynamics.signals)
         with opened(dynamics, run):
             paths = []
             for _ in range(2):
@@ -273,9 +273,9 @@ class DynamicsContract:
 
     def test_dynamics_steps_at_once(self, dynamics: Dynamics) -> None:
         machine = ch8()
-        run = a_run(machine, state=dynamics.signals)
+        run = make_run(machine, state=dynamics.signals)
         with opened(dynamics, run):
-            dynamics.begin_trial(a_trial())
+            dynamics.begin_trial(make_trial())
             check_soon(lambda: dynamics.step(np.zeros(run.command.size), 1 / RATE_HZ))
 
     def test_dynamics_closes_after_a_failed_open(self, dynamics: Dynamics) -> None:
@@ -283,7 +283,7 @@ class DynamicsContract:
 
     def test_a_machine_at_rest_stays(self, dynamics: Dynamics) -> None:
         machine = ch8()
-        run = a_run(machine, state=dynamics.signals)
+        run = make_run(machine, state=dynamics.signals)
         angle = run.state.find("joint.angle")
         with opened(dynamics, run):
             before = dynamics.state()[angle].copy()

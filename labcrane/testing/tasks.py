@@ -4,20 +4,20 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from labcrane.records import Frame, Phase, Run
-from labcrane.roles import Task
-from labcrane.signals import Signal
-from labcrane.testing.every_role import check_closes_after_failed_open, check_soon
+from labcrane.core.records import Frame, Phase, Run
+from labcrane.core.roles import Task
+from labcrane.core.signals import Signal
+from labcrane.testing.components import check_closes_after_failed_open, check_soon
 from labcrane.testing.roles import (
     RATE_HZ,
-    a_frame,
-    a_run,
-    a_trial,
     ch8,
     check_array,
     check_signals,
     crane_at,
     crane_state,
+    make_frame,
+    make_run,
+    make_trial,
     opened,
 )
 
@@ -33,11 +33,11 @@ class TaskContract:
 
     def _run(self, task: Task) -> Run:
         state = (*crane_state(ch8()).signals, *self.needs)
-        return a_run(ch8(), state=state, task=task.signals)
+        return make_run(ch8(), state=state, task=task.signals)
 
     def _frame(self, run: Run, number: int = 0) -> Frame:
         crane = crane_at(run.machine, run.machine.rest)
-        return a_frame(run, number, np.pad(crane, (0, run.state.size - crane.size)))
+        return make_frame(run, number, np.pad(crane, (0, run.state.size - crane.size)))
 
     def test_a_plan_follows_the_order_of_its_levels(self, task: Task) -> None:
         factors = task.factors()
@@ -53,8 +53,8 @@ class TaskContract:
         run = self._run(task)
         with opened(task, run):
             for planned in task.plan(task.factors())[:3]:
-                task.begin_trial(a_trial(planned))
-                judgement = task.judge(self._frame(run))
+                task.begin_trial(make_trial(planned))
+                judgement = task.evaluate(self._frame(run))
                 check_array(task, judgement.values)
                 assert judgement.phase is not Phase.IDLE
 
@@ -64,8 +64,8 @@ class TaskContract:
             planned = task.plan(task.factors())[0]
             judged = []
             for _ in range(2):
-                task.begin_trial(a_trial(planned, seed=7))
-                seen = [task.judge(self._frame(run, number)) for number in range(20)]
+                task.begin_trial(make_trial(planned, seed=7))
+                seen = [task.evaluate(self._frame(run, number)) for number in range(20)]
                 judged.append([(each.phase, each.values.tolist(), each.events) for each in seen])
             np.testing.assert_equal(judged[0], judged[1])
 
@@ -73,8 +73,8 @@ class TaskContract:
         run = self._run(task)
         frame = self._frame(run)
         with opened(task, run):
-            task.begin_trial(a_trial(task.plan(task.factors())[0]))
-            check_soon(lambda: task.judge(frame))
+            task.begin_trial(make_trial(task.plan(task.factors())[0]))
+            check_soon(lambda: task.evaluate(frame))
 
     def test_task_closes_after_a_failed_open(self, task: Task) -> None:
         check_closes_after_failed_open(task)
@@ -83,20 +83,20 @@ class TaskContract:
         run = self._run(task)
         with opened(task, run):
             for planned in task.plan(task.factors())[:2]:
-                task.begin_trial(a_trial(planned))
-                task.overrule()
+                task.begin_trial(make_trial(planned))
+                task.lift_limits()
                 late = self._frame(run, number=int(3600 * RATE_HZ))
-                assert not task.judge(late).phase.over
+                assert not task.evaluate(late).phase.over
 
     def test_results_are_declared(self, task: Task) -> None:
         run = self._run(task)
         declared = {column for signal in task.results for column in signal.columns}
         with opened(task, run):
             for planned in task.plan(task.factors())[:3]:
-                task.begin_trial(a_trial(planned))
+                task.begin_trial(make_trial(planned))
                 results: Mapping[str, object] = {}
                 for number in range(int(120 * RATE_HZ)):
-                    judgement = task.judge(self._frame(run, number))
+                    judgement = task.evaluate(self._frame(run, number))
                     if judgement.phase.over:
                         results = judgement.results
                         break

@@ -7,15 +7,15 @@ from functools import partial
 from labcrane import (
     Event,
     Frame,
-    Judgement,
     Machine,
     Phase,
-    Planned,
+    PlannedTrial,
     ProtocolError,
     Run,
     Signal,
     Task,
     Trial,
+    TrialStatus,
     reach,
 )
 from labcrane_aiming.pairs import Pair, Point, index_of_difficulty, pairs
@@ -78,14 +78,14 @@ class Aiming(Task):
     def factors(self) -> Mapping[str, Sequence[str]]:
         return {"pairs": tuple(self._pairs)}
 
-    def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[Planned]:
+    def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[PlannedTrial]:
         return [
             self._planned(self._pairs[name], number)
             for name in levels["pairs"]
             for number in range(self._settings.movements + 1)
         ]
 
-    def _planned(self, pair: Pair, number: int) -> Planned:
+    def _planned(self, pair: Pair, number: int) -> PlannedTrial:
         outward = number % 2 == 1  # the approach, number 0, ends at the near circle
         start, target = (pair.near, pair.far) if outward else (pair.far, pair.near)
         difficulty = index_of_difficulty(pair.distance, self._settings.width)
@@ -101,7 +101,7 @@ class Aiming(Task):
             **dict(zip(("target_x", "target_y", "target_z"), target, strict=True)),
         }
         expected = PLAN_INTERCEPT_S + PLAN_SLOPE_S * difficulty
-        return Planned(condition, expected_s=expected, counted=number > 0)
+        return PlannedTrial(condition, expected_s=expected, counted=number > 0)
 
     def open(self, run: Run) -> None:
         # A protocol is checked, and a study planned, without loading numpy.
@@ -120,27 +120,27 @@ class Aiming(Task):
         start, target = _point(condition, "start"), _point(condition, "target")
         self._movement = self._movement_from(start, target)
         self._values = self._movement.shown
-        self._going_on = Judgement(Phase.RUNNING, self._values)  # what most ticks are
+        self._going_on = TrialStatus(Phase.RUNNING, self._values)  # what most ticks are
         self._limit = self._settings.limit_s
         self._pressed = True  # a trigger still held from the last movement ends nothing
 
-    def overrule(self) -> None:
+    def lift_limits(self) -> None:
         self._limit = math.inf
 
-    def judge(self, frame: Frame) -> Judgement:
+    def evaluate(self, frame: Frame) -> TrialStatus:
         movement, state = self._movement, frame.state.tolist()
         movement.see(frame.elapsed, frame.tick.due, state[self._tip], state[self._velocity])
         events = self._moments(frame)
         phase, end = self._phase(frame)
         if not phase.over:
-            return Judgement(phase, self._values, tuple(events)) if events else self._going_on
+            return TrialStatus(phase, self._values, tuple(events)) if events else self._going_on
         onset = movement.onset()
         if onset is not None:
             # Known only now, because it depends on the peak; stamped when it happened.
             events.append(Event("movement.onset", movement.due[onset]))
         if end is not None:
             events.append(Event("movement.offset", movement.due[end]))
-        return Judgement(phase, self._values, tuple(events), movement.measures(end))
+        return TrialStatus(phase, self._values, tuple(events), movement.measures(end))
 
     def _moments(self, frame: Frame) -> list[Event]:
         movement, due = self._movement, frame.tick.due

@@ -61,8 +61,8 @@ class BulletCrane(Crane):
             self._folder.cleanup()
             self._folder = None
 
-    def facts(self) -> Mapping[str, Value]:
-        return {**super().facts(), "engine": f"pybullet {version('pybullet')}"}
+    def metadata(self) -> Mapping[str, Value]:
+        return {**super().metadata(), "engine": f"pybullet {version('pybullet')}"}
 
     def _urdf(self) -> str:
         return urdf(self._machine)

@@ -66,7 +66,7 @@ class Crane(Dynamics):
     def bodies(self) -> Sequence[Body]:
         return link_boxes(self._machine)
 
-    def facts(self) -> Mapping[str, Value]:
+    def metadata(self) -> Mapping[str, Value]:
         actuator = self._settings.actuator.model_dump()
         return {f"actuator.{name}": value for name, value in actuator.items()}
 

@@ -53,8 +53,8 @@ class LoadedCrane(BulletCrane):
             Body("grapple rod", 0, rod, (0.0, 0.0, 0.5 * long), moves="grapple"),
         )
 
-    def facts(self) -> Mapping[str, Value]:
-        return {**super().facts(), "hanging.mass_kg": total_kg(self._loaded)}
+    def metadata(self) -> Mapping[str, Value]:
+        return {**super().metadata(), "hanging.mass_kg": total_kg(self._loaded)}
 
     def _urdf(self) -> str:
         text = super()._urdf()

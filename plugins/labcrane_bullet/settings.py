@@ -2,13 +2,13 @@
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from labcrane import PRESETS, ActuatorSettings, Settings
+from labcrane import ACTUATOR_PRESETS, ActuatorSettings, Settings
 
 
 class CraneSettings(Settings):
     """How the crane follows its commands."""
 
-    actuator: ActuatorSettings = PRESETS["ideal"]
+    actuator: ActuatorSettings = ACTUATOR_PRESETS["ideal"]
     """Delay between command and motion: ideal, electric, hydraulic, sluggish, or written out."""
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from labcrane import Ask, CommandOffer, Finding, InputDevice, Machine, Offer, hookimpl, offer
+from labcrane import CommandOffer, Finding, InputDevice, Machine, Offer, Prompt, hookimpl, offer
 from labcrane_can.settings import CanSettings, ReplaySettings
 
 labcrane_api = 1
@@ -20,7 +20,7 @@ def labcrane_inputs() -> list[Offer[InputDevice]]:
 
         return CanReplay(settings, machine)
 
-    def examine(settings: CanSettings, ask: Ask | None) -> Sequence[Finding]:
+    def examine(settings: CanSettings, ask: Prompt | None) -> Sequence[Finding]:
         from labcrane_can import examination
 
         return examination.examine(settings, ask)

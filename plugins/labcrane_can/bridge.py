@@ -6,8 +6,8 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
-from labcrane_can.asked import PanelCommands
 from labcrane_can.avc import ESTIMATED, encode_flow
+from labcrane_can.command_state import PanelCommands
 from labcrane_can.listener import Listener
 from labcrane_can.settings import CanSettings
 

@@ -3,8 +3,8 @@
 import time
 from collections import Counter
 
-from labcrane import Ask, DeviceError, Finding, ProtocolError, Verdict
-from labcrane_can.asked import PanelCommands
+from labcrane import DeviceError, Finding, Prompt, ProtocolError, Verdict
+from labcrane_can.command_state import PanelCommands
 from labcrane_can.listener import open_bus
 from labcrane_can.settings import CanSettings
 
@@ -12,7 +12,7 @@ LISTEN_S = 1.0
 WAIT_S = 0.05
 
 
-def examine(settings: CanSettings, ask: Ask | None) -> list[Finding]:
+def examine(settings: CanSettings, ask: Prompt | None) -> list[Finding]:
     """Listen to the bus for a second; nothing is sent."""
     del ask  # a panel in order speaks without being touched
     try:

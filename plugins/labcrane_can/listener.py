@@ -8,7 +8,7 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from labcrane import DeviceError
-from labcrane_can.asked import PanelCommands
+from labcrane_can.command_state import PanelCommands
 from labcrane_can.settings import CanSettings
 
 if TYPE_CHECKING:

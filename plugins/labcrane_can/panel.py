@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 
 from labcrane import FloatArray, Frame, InputDevice, Machine, Run, Tick, Value
-from labcrane_can.asked import PanelCommands
 from labcrane_can.avc import ESTIMATED, FULL, MEASURED, encode_flow
 from labcrane_can.axes import PanelAxes
+from labcrane_can.command_state import PanelCommands
 from labcrane_can.listener import Listener
 from labcrane_can.settings import CanSettings
 
@@ -49,7 +49,7 @@ class CanPanel(InputDevice):
             self._listener.close()
             self._listener = None
 
-    def facts(self) -> Mapping[str, Value]:
+    def metadata(self) -> Mapping[str, Value]:
         from importlib.metadata import version  # noqa: PLC0415 - only in a session
 
         return {"bus": self._settings.bus, "python-can": version("python-can")}

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 
 from labcrane import FloatArray, Frame, InputDevice, Machine, ProtocolError, Run, Tick, Value
-from labcrane_can.asked import PanelCommands
 from labcrane_can.axes import PanelAxes
+from labcrane_can.command_state import PanelCommands
 from labcrane_can.settings import ReplaySettings
 
 MICROSECONDS = 6
@@ -63,5 +63,5 @@ class CanReplay(InputDevice):
             return self._axes.lost()
         return self._axes.given(signals, floats)
 
-    def facts(self) -> Mapping[str, Value]:
+    def metadata(self) -> Mapping[str, Value]:
         return {"file": self._settings.file.name, "frames": len(self._frames)}

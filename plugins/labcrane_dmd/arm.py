@@ -8,23 +8,23 @@ from labcrane import (
     Dynamics,
     FloatArray,
     Machine,
-    Placed,
+    PlacedObject,
     PluginError,
     ProtocolError,
     Run,
     Trial,
     Value,
     load_scene,
-    place,
+    place_objects,
 )
 from labcrane_dmd.arm_settings import ArmSettings
 from labcrane_dmd.arm_state import ArmState, arm_signals, scene_parts
 from labcrane_dmd.contacts import Window
 from labcrane_dmd.drive import drives
-from labcrane_dmd.looks import boxes
 from labcrane_dmd.model_file import load
 from labcrane_dmd.overload import overloads
 from labcrane_dmd.recordings import FULL
+from labcrane_dmd.visual import boxes
 from labcrane_dmd.world import World
 
 ROUNDING_S = 1e-9
@@ -141,7 +141,7 @@ class DmdArm(Dynamics):
     def bodies(self) -> Sequence[Body]:
         return boxes(self._machine, self._settings.jaws)
 
-    def facts(self) -> Mapping[str, Value]:
+    def metadata(self) -> Mapping[str, Value]:
         return {
             "engine": f"pybullet {version('pybullet')}",
             "model": self._settings.model.name,
@@ -168,7 +168,7 @@ class DmdArm(Dynamics):
                 speeds[joint] = ((highest if ahead > highest else lowest) - angle) / self._dt
         return found
 
-    def _standing(self) -> tuple[Placed, ...]:
+    def _standing(self) -> tuple[PlacedObject, ...]:
         if self._trial is None or not self._scenes:
             return ()
         name = self._trial.planned.condition.get("scenario")
@@ -177,7 +177,7 @@ class DmdArm(Dynamics):
                 f"the trial is in scene {name!r}; dynamics has {', '.join(self._scenes)}: list the "
                 "same scene files under dynamics and task"
             )
-        return place(self._scenes[str(name)], self._trial.seed)
+        return place_objects(self._scenes[str(name)], self._trial.seed)
 
     def _checked(self, pose: Sequence[float]) -> list[float]:
         angles = [float(angle) for angle in pose]

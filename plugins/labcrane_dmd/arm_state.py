@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane import Arm, FloatArray, Machine, Scene, Signal, place
+from labcrane import Arm, FloatArray, Machine, Scene, Signal, place_objects
 
 if TYPE_CHECKING:
     from labcrane_dmd.world import World
@@ -26,7 +26,7 @@ def scene_parts(scenes: Iterable[Scene]) -> Parts:
     """Return what can move in any of the scenes; a thing of the same name shares its columns."""
     found: dict[str, tuple[str, ...]] = {}
     for scene in scenes:
-        for each in place(scene, 0):
+        for each in place_objects(scene, 0):
             if each.kind != "obstacle":
                 found[each.name] = tuple(dict.fromkeys(part.name for part in each.parts))
     return found

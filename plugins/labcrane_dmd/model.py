@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from labcrane import ProtocolError
-from labcrane_dmd.layer import Layer, is_signal, linear, pchip
+from labcrane_dmd.interpolation import Layer, is_signal, linear, pchip
 from labcrane_dmd.recordings import FULL
 from labcrane_dmd.settings import Between, FitSettings
 

@@ -11,7 +11,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from labcrane import ProtocolError, Settings
-from labcrane_dmd.layer import Layer
+from labcrane_dmd.interpolation import Layer
 from labcrane_dmd.model import Direction, Model, Segment, Source
 from labcrane_dmd.output import written
 from labcrane_dmd.recordings import FULL

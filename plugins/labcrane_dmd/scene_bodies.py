@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from labcrane import Form, Placed, ProtocolError
+from labcrane import PlacedObject, ProtocolError, ShapeKind
 from labcrane_dmd.engine import pybullet
 
 OVERLAP_M = 0.002
@@ -25,7 +25,7 @@ DISTANCE = 8
 class Standing:
     """A thing in the engine: its number there, and the name of the part behind each link."""
 
-    placed: Placed
+    placed: PlacedObject
     body: int
     parts: Mapping[int, str]
 
@@ -38,7 +38,7 @@ def add_ground(client: int) -> int:
     return ground
 
 
-def add(placed: Placed, client: int) -> Standing:
+def add(placed: PlacedObject, client: int) -> Standing:
     """Put a thing into the engine: its first part is the body, the others are fixed to it."""
     shapes = [_shape(part.shape, part.size, client) for part in placed.parts]
     mass = 0.0 if placed.kind == "obstacle" else placed.mass
@@ -97,17 +97,17 @@ def check_apart(standing: list[Standing], arm: int, client: int) -> None:
                 )
 
 
-def _shape(shape: Form, size: tuple[float, float, float], client: int) -> int:
+def _shape(shape: ShapeKind, size: tuple[float, float, float], client: int) -> int:
     x, y, z = size
-    if shape is Form.BOX:
+    if shape is ShapeKind.BOX:
         made = pybullet.createCollisionShape(
             pybullet.GEOM_BOX, halfExtents=[x / 2, y / 2, z / 2], physicsClientId=client
         )
-    elif shape is Form.SPHERE:
+    elif shape is ShapeKind.SPHERE:
         made = pybullet.createCollisionShape(
             pybullet.GEOM_SPHERE, radius=x / 2, physicsClientId=client
         )
-    elif shape is Form.CYLINDER:
+    elif shape is ShapeKind.CYLINDER:
         made = pybullet.createCollisionShape(
             pybullet.GEOM_CYLINDER, radius=x / 2, height=z, physicsClientId=client
         )

@@ -61,7 +61,7 @@ class Valve(Controller):
         self._out[:joints] = self._out[joints:] / FULL * self._speeds
         return self._out
 
-    def steer(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
+    def inverse(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
         angles = state[self._angle].tolist()
         bearing = self._arm.bearing(angles)
         cos, sin = np.cos(bearing), np.sin(bearing)

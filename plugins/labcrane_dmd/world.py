@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from labcrane import Machine, Placed, PluginError
+from labcrane import Machine, PlacedObject, PluginError
 from labcrane_dmd.arm_settings import ArmSettings
 from labcrane_dmd.contacts import Contacts
 from labcrane_dmd.engine import pybullet
@@ -44,7 +44,7 @@ class World:
         machine: Machine,
         dt: float,
         angles: Sequence[float],
-        placed: Sequence[Placed],
+        placed: Sequence[PlacedObject],
     ) -> None:
         client = _engine(dt)
         self._client: int | None = client
@@ -70,7 +70,12 @@ class World:
         self._furnish(settings, placed, client, dt, joints)
 
     def _furnish(
-        self, settings: ArmSettings, placed: Sequence[Placed], client: int, dt: float, joints: int
+        self,
+        settings: ArmSettings,
+        placed: Sequence[PlacedObject],
+        client: int,
+        dt: float,
+        joints: int,
     ) -> None:
         ticks = max(1, round(settings.window_s / dt))
         self.things = [add(each, client) for each in placed]

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from labcrane import Ask, Finding, InputDevice, Machine, Offer, hookimpl, offer
+from labcrane import Finding, InputDevice, Machine, Offer, Prompt, hookimpl, offer
 from labcrane_joystick.settings import JoystickSettings
 
 labcrane_api = 1
@@ -19,7 +19,7 @@ def _dual_joystick(settings: JoystickSettings, machine: Machine) -> InputDevice:
     return DualJoystick(settings)
 
 
-def _examine(settings: JoystickSettings, ask: Ask | None) -> Sequence[Finding]:
+def _examine(settings: JoystickSettings, ask: Prompt | None) -> Sequence[Finding]:
     from labcrane_joystick import examination
 
     return examination.examine(settings, ask)

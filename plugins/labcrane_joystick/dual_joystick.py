@@ -90,7 +90,7 @@ class DualJoystick(InputDevice):
             self._started = False
             sdl.stop()
 
-    def facts(self) -> Mapping[str, Value]:
+    def metadata(self) -> Mapping[str, Value]:
         return self._facts
 
     def _unplugged(self, event: Event) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from statistics import median
 
-from labcrane import Ask, DeviceError, Finding, Verdict
+from labcrane import DeviceError, Finding, Prompt, Verdict
 from labcrane_joystick import sdl
 from labcrane_joystick.calibration import RUN_AGAIN, Calibration, Calibrations, default_path, load
 from labcrane_joystick.dual_joystick import SIDES, tell_apart
@@ -47,7 +47,7 @@ def wait_and_look(seconds: float) -> float:
 
 def examine(
     settings: JoystickSettings,
-    ask: Ask | None,
+    ask: Prompt | None,
     path: Path | None = None,
     look: Look = wait_and_look,
 ) -> list[Finding]:
@@ -66,7 +66,7 @@ def examine(
 
 
 def _examined(
-    sticks: tuple[Stick, Stick], stored: Calibrations | None, ask: Ask | None, look: Look
+    sticks: tuple[Stick, Stick], stored: Calibrations | None, ask: Prompt | None, look: Look
 ) -> Iterator[Finding]:
     both = (stored.left, stored.right) if stored else [Calibration(port=s.port) for s in sticks]
     hands = [Hand(*three) for three in zip(SIDES, sticks, both, strict=True)]
@@ -138,7 +138,7 @@ def _at_rest(hands: Sequence[Hand], look: Look) -> Iterator[Finding]:
                 yield Finding(Verdict.PASS, text)
 
 
-def _pushes(hand: Hand, hands: Sequence[Hand], ask: Ask, look: Look) -> Iterator[Finding]:
+def _pushes(hand: Hand, hands: Sequence[Hand], ask: Prompt, look: Look) -> Iterator[Finding]:
     for where, axis, sign in PUSHES:
         wanted = (hand.side, axis, sign)
         ask(f"push the {hand.side.upper()} stick {where}, and hold it")
@@ -180,7 +180,7 @@ def _released(hands: Sequence[Hand], look: Look) -> None:
         now = look(STEP_S)
 
 
-def _rounds(hand: Hand, ask: Ask, look: Look) -> Iterator[Finding]:
+def _rounds(hand: Hand, ask: Prompt, look: Look) -> Iterator[Finding]:
     ask(f"for {ROUND_S:.0f} s, move the {hand.side.upper()} stick round along its edge")
     lowest, highest = [0.0] * len(HANDS), [0.0] * len(HANDS)
     changes, last = 0, hand.axes()

@@ -77,7 +77,7 @@ class Keyboard(InputDevice):
             self._thread = None
         self._inlet = None
 
-    def facts(self) -> Mapping[str, Value]:
+    def metadata(self) -> Mapping[str, Value]:
         keys = {f"{axis}.keys": " ".join(pair) for axis, pair in self._settings.axes.items()}
         return {"view": self._settings.view, **keys}
 

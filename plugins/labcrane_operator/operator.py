@@ -17,7 +17,7 @@ STICK = ("x", "y", "twist", "slider", "trigger", "connected")
 class SimulatedOperator(InputDevice):
     """Hands on a dual joystick that take the tip to the task's target.
 
-    They see the frame before, like a person, and steer through ``run.steer`` as the scheme needs.
+    They see the frame before, like a person, and steer through ``run.inverse`` as the scheme needs.
     Time is counted in ticks of the trial that were not paused, so a pause only shifts the plan.
     At rest inside the target they press the trigger of the right stick once, for tasks that end
     a movement by it.
@@ -71,13 +71,13 @@ class SimulatedOperator(InputDevice):
         if velocity is not STILL:
             asked = self._asked
             asked[0], asked[1], asked[2] = velocity  # sooner done than by a slice
-            out[:] = self._run.steer(asked, seen.state)
+            out[:] = self._run.inverse(asked, seen.state)
             out[self._left] = out[self._right] = 1.0
         if aimer.pressing:
             out[self._trigger] = 1.0
         return out
 
-    def facts(self) -> Mapping[str, Value]:
+    def metadata(self) -> Mapping[str, Value]:
         return {"simulated": True, "pace": self._pace}
 
     def _sees(self, seen: Frame) -> bool:

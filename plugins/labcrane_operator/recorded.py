@@ -52,5 +52,5 @@ class RecordedInput(InputDevice):
         self.fault = f"the recording {self._settings.file} has ended"
         return self._at_rest
 
-    def facts(self) -> Mapping[str, Value]:
+    def metadata(self) -> Mapping[str, Value]:
         return {"file": str(self._settings.file), "session": self._settings.session}

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from labcrane import Answers, Item, Questionnaire, Score, numbers
+from labcrane import Answers, Item, Questionnaire, Score, numeric_answers
 from labcrane_questionnaires.settings import FreeSettings
 
 
@@ -27,4 +27,4 @@ class Free(Questionnaire):
         return list(self._items.values())
 
     def score(self, answers: Answers) -> Mapping[str, float]:
-        return {score: sum(numbers(answers, names)) for score, names in self._sums.items()}
+        return {score: sum(numeric_answers(answers, names)) for score, names in self._sums.items()}

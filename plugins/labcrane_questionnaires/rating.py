@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from labcrane import Answers, Item, Questionnaire, Score, numbers
+from labcrane import Answers, Item, Questionnaire, Score, numeric_answers
 from labcrane_questionnaires.settings import RatingSettings
 
 HIGHEST = 10.0
@@ -49,4 +49,4 @@ class Rating(Questionnaire):
         return [self._item]
 
     def score(self, answers: Answers) -> Mapping[str, float]:
-        return {"share": numbers(answers, ["rating"])[0] / HIGHEST}
+        return {"share": numeric_answers(answers, ["rating"])[0] / HIGHEST}

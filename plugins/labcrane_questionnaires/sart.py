@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from labcrane import Answers, Score, numbers
+from labcrane import Answers, Score, numeric_answers
 from labcrane_questionnaires.lab_scale import LabScale
 
 DEMAND = ("instability", "complexity", "variability")
@@ -29,7 +29,7 @@ class Sart(LabScale):
 
     def score(self, answers: Answers) -> Mapping[str, float]:
         demand, supply, understanding = (
-            sum(numbers(answers, names)) for names in (DEMAND, SUPPLY, UNDERSTANDING)
+            sum(numeric_answers(answers, names)) for names in (DEMAND, SUPPLY, UNDERSTANDING)
         )
         return {
             "demand": demand,

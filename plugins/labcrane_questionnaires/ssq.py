@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from labcrane import Answers, Score, numbers
+from labcrane import Answers, Score, numeric_answers
 from labcrane_questionnaires.lab_scale import LabScale
 
 # Items by their numbers in the publication. Many copies leave item 8, nausea, out of
@@ -34,7 +34,7 @@ class Ssq(LabScale):
 
     def score(self, answers: Answers) -> Mapping[str, float]:
         sums = {
-            name: sum(numbers(answers, [f"symptom_{item}" for item in items]))
+            name: sum(numeric_answers(answers, [f"symptom_{item}" for item in items]))
             for name, (items, _) in SUBSCALES.items()
         }
         scores = {name: sums[name] * weight for name, (_, weight) in SUBSCALES.items()}

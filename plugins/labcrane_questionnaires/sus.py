@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from labcrane import Answers, Item, Questionnaire, Score, numbers
+from labcrane import Answers, Item, Questionnaire, Score, numeric_answers
 
 STATEMENTS = (
     "I think that I would like to use this system frequently.",
@@ -37,6 +37,6 @@ class Sus(Questionnaire):
         ]
 
     def score(self, answers: Answers) -> Mapping[str, float]:
-        ratings = numbers(answers, NAMES)
+        ratings = numeric_answers(answers, NAMES)
         odd, even = ratings[::2], ratings[1::2]
         return {"total": 2.5 * (sum(r - 1.0 for r in odd) + sum(5.0 - r for r in even))}

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from labcrane import Answers, Item, Questionnaire, Score, numbers
+from labcrane import Answers, Item, Questionnaire, Score, numeric_answers
 from labcrane_questionnaires.settings import TlxSettings
 
 SCALES = {
@@ -87,7 +87,7 @@ class NasaTlx(Questionnaire):
         ]
 
     def score(self, answers: Answers) -> Mapping[str, float]:
-        ratings = np.array(numbers(answers, tuple(SCALES)))
+        ratings = np.array(numeric_answers(answers, tuple(SCALES)))
         scores = {"raw": float(ratings.mean())}
         if self._weighted:
             chosen = [answers.get(f"{one}_or_{other}") for one, other in PAIRS]

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from labcrane import Event, FloatArray, Placed, Run, Value
+from labcrane import Event, FloatArray, PlacedObject, Run, Value
 from labcrane_scenario.mistakes import Episode, Mistakes
 from labcrane_scenario.settings import ScenarioSettings
 
@@ -14,7 +14,7 @@ GRAVITY = 9.81
 class Watched:
     """One limited part of a thing, and where its force sits in the state."""
 
-    thing: Placed
+    thing: PlacedObject
     part: str
     place: int
     support: int | None
@@ -28,7 +28,9 @@ class Observation:
     An object's limit also holds for what it is set down with: its support beyond its own weight.
     """
 
-    def __init__(self, settings: ScenarioSettings, run: Run, placed: tuple[Placed, ...]) -> None:
+    def __init__(
+        self, settings: ScenarioSettings, run: Run, placed: tuple[PlacedObject, ...]
+    ) -> None:
         hold = round(settings.hold_s * run.rate_hz)
         self.mistakes = Mistakes()
         self._watched = []

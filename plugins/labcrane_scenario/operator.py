@@ -28,7 +28,7 @@ CLOSE_RAD = 0.02
 class ScenarioOperator(InputDevice):
     """Hands that take the tip to the task's target, and then open or shut the jaws as it asks.
 
-    They see the frame before, like a person, and know the valves as ``run.steer`` does.
+    They see the frame before, like a person, and know the valves as ``run.inverse`` does.
     """
 
     def __init__(self, settings: OperatorSettings, machine: Machine) -> None:
@@ -74,7 +74,7 @@ class ScenarioOperator(InputDevice):
         if distance > NEAR * seen.task.item(self._radius):
             settings = self._settings
             speed = min(settings.gain_per_s * distance, settings.speed_m_s)
-            out[:] = self._run.steer(away / distance * speed, seen.state)
+            out[:] = self._run.inverse(away / distance * speed, seen.state)
             out[-1] = 1.0
             out[self._joint] = 0.0
         if distance <= seen.task.item(self._radius):

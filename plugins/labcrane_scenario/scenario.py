@@ -11,25 +11,25 @@ from labcrane import (
     Event,
     FloatArray,
     Frame,
-    Judgement,
     Machine,
     Phase,
-    Planned,
+    PlannedTrial,
     ProtocolError,
     Run,
     Scene,
     Signal,
     Task,
     Trial,
+    TrialStatus,
     Value,
     load_scene,
-    place,
+    place_objects,
     write_placed,
 )
+from labcrane_scenario.goals import Way
 from labcrane_scenario.mistakes import KINDS
 from labcrane_scenario.observation import Observation
 from labcrane_scenario.settings import ScenarioSettings
-from labcrane_scenario.way import Way
 
 PRESSED = 0.5  # a button is 0 or 1
 
@@ -78,7 +78,7 @@ class Scenario(Task):
     def factors(self) -> Mapping[str, Sequence[str]]:
         return {"scenes": tuple(self._scenes)}
 
-    def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[Planned]:
+    def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[PlannedTrial]:
         return [self._planned(name, self._scenes[name]) for name in levels["scenes"]]
 
     def open(self, run: Run) -> None:
@@ -90,7 +90,7 @@ class Scenario(Task):
     def begin_trial(self, trial: Trial) -> None:
         name = str(trial.planned.condition["scenario"])
         scene, settings = self._scenes[name], self._settings
-        placed = place(scene, trial.seed)
+        placed = place_objects(scene, trial.seed)
         self._watch = Observation(settings, self._run, placed)
         self._way = Way(scene, placed, self._run)
         self._deformed = next((each for each in placed if each.deformed is not None), None)
@@ -100,10 +100,10 @@ class Scenario(Task):
         self._found = math.nan
         self._placed = write_placed(placed)
 
-    def overrule(self) -> None:
+    def lift_limits(self) -> None:
         self._limit, self._most = math.inf, math.inf
 
-    def judge(self, frame: Frame) -> Judgement:
+    def evaluate(self, frame: Frame) -> TrialStatus:
         due, state = frame.tick.due, frame.state
         events = [*self._watch.see(state, due), *self._findings(frame)]
         if frame.elapsed == 0.0:
@@ -121,14 +121,14 @@ class Scenario(Task):
             phase = Phase.TIMEOUT
         self._values[:] = (*self._way.target(state), *mistakes.counts.values())
         results = self._results(frame, phase) if phase.over else {}
-        return Judgement(phase, self._values, tuple(events), results)
+        return TrialStatus(phase, self._values, tuple(events), results)
 
-    def _planned(self, name: str, scene: Scene) -> Planned:
+    def _planned(self, name: str, scene: Scene) -> PlannedTrial:
         start = None
         if scene.start_deg is not None:
             start = tuple(math.radians(angle) for angle in scene.start_deg)
         limit = self._settings.limit_s or scene.limit_s
-        return Planned({"scenario": name}, expected_s=limit / 2, start_pose=start)
+        return PlannedTrial({"scenario": name}, expected_s=limit / 2, start_pose=start)
 
     def _findings(self, frame: Frame) -> Iterator[Event]:
         if self._deformed is None or not math.isnan(self._found):

@@ -6,10 +6,10 @@ import numpy as np
 
 from labcrane import Arm, Controller, FloatArray, Machine, ProtocolError, Run
 from labcrane_schemes.axis_map import Axis, find_axes
-from labcrane_schemes.log import rest, scheme_signals
 from labcrane_schemes.resolved_rate import ResolvedRate
 from labcrane_schemes.settings import DIRECTIONS, EndEffectorSettings
 from labcrane_schemes.shaping import Shaping
+from labcrane_schemes.signals import rest, scheme_signals
 from labcrane_schemes.soft_stops import soft_stops
 
 FEWEST_TO_HOLD_PITCH = 4
@@ -62,10 +62,10 @@ class EndEffector(Controller):
             out[joints + 1 + joint] = factors[joint]
         return out
 
-    def rest(self) -> FloatArray:
+    def idle(self) -> FloatArray:
         return self._rest.copy()
 
-    def steer(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
+    def inverse(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
         x, y, z = velocity.tolist()
         if not self._base:
             bearing = self._arm.bearing(state[self._angle].tolist())

@@ -7,10 +7,10 @@ import numpy as np
 
 from labcrane import Controller, FloatArray, Machine, Run
 from labcrane_schemes.axis_map import Axis, check_joints, find_axes
-from labcrane_schemes.log import rest, scheme_signals
 from labcrane_schemes.resolved_rate import NOTHING, ResolvedRate
 from labcrane_schemes.settings import JointVelocitySettings
 from labcrane_schemes.shaping import Shaping
+from labcrane_schemes.signals import rest, scheme_signals
 from labcrane_schemes.soft_stops import soft_stops
 
 
@@ -50,10 +50,10 @@ class JointVelocity(Controller):
         self._put(*speeds, 1.0, *limited)
         return self._out
 
-    def rest(self) -> FloatArray:
+    def idle(self) -> FloatArray:
         return self._rest.copy()
 
-    def steer(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
+    def inverse(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
         angles = state[self._angle].tolist()
         speeds, scale, factors = self._rate.solve_base(angles, *velocity.tolist())
         hands, unshape = self._hands, self._shaping.unshape

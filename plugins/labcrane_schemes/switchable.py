@@ -6,8 +6,8 @@ from labcrane import Controller, FloatArray, Machine, Run, Signal, Trial
 from labcrane_schemes.axis_map import find_axis
 from labcrane_schemes.end_effector import EndEffector
 from labcrane_schemes.joint_velocity import JointVelocity
-from labcrane_schemes.log import scheme_signals
 from labcrane_schemes.settings import SwitchableSettings
+from labcrane_schemes.signals import scheme_signals
 
 PRESSED = 0.5
 """Value of a button above which it is down."""
@@ -44,11 +44,11 @@ class Switchable(Controller):
         self._down = down
         return self._with_active(self._schemes[self._active].command(axes, state))
 
-    def rest(self) -> FloatArray:
-        return self._with_active(self._schemes[self._active].rest()).copy()
+    def idle(self) -> FloatArray:
+        return self._with_active(self._schemes[self._active].idle()).copy()
 
-    def steer(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
-        return self._schemes[self._active].steer(velocity, state)
+    def inverse(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
+        return self._schemes[self._active].inverse(velocity, state)
 
     def _with_active(self, command: FloatArray) -> FloatArray:
         self._out[:-1] = command

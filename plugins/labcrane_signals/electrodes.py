@@ -124,7 +124,7 @@ class ElectrodeMonitor(SignalMonitor):
         """Judge one window in microvolts, shape ``(width, n_channels)``."""
         sent = np.isfinite(window).all(axis=0)
         window = window if sent.all() else np.where(sent, window, 0.0)
-        flat, rails = self._rails.judge(window)
+        flat, rails = self._rails.evaluate(window)
         moving = window - window.mean(axis=0)
         power = np.abs(np.fft.rfft(moving * self._taper, axis=0)) ** 2  # µV²/Hz
         rms = np.sqrt(power[self._band].sum(axis=0) * self._step)

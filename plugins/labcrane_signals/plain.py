@@ -69,7 +69,7 @@ class PlainMonitor(SignalMonitor):
     def _judge(self, window: FloatArray) -> list[SignalFault]:
         none: BoolArray = np.asarray(~np.isfinite(window).all(axis=0))
         window = np.where(none, 0.0, window)
-        flat, rails = self._rails.judge(window)
+        flat, rails = self._rails.evaluate(window)
         flat = np.asarray(flat & ~none)
         all_flat = bool(flat.any() and (flat | none).all())
         expected = self._lively >= self.moved

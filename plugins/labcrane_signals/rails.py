@@ -29,7 +29,7 @@ class Rails:
         self._lowest = np.full(channels, np.inf)
         self._highest = np.full(channels, -np.inf)
 
-    def judge(self, window: FloatArray) -> tuple[BoolArray, BoolArray]:
+    def evaluate(self, window: FloatArray) -> tuple[BoolArray, BoolArray]:
         """Return which channels stand still, and which are held at a limit.
 
         Parameters

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from labcrane import Ask, Feedback, Finding, Machine, Offer, hookimpl, offer
+from labcrane import Feedback, Finding, Machine, Offer, Prompt, hookimpl, offer
 from labcrane_sonification.settings import SonificationSettings
 
 labcrane_api = 1
@@ -16,7 +16,7 @@ def labcrane_feedback() -> list[Offer[Feedback]]:
         del machine  # the same for every machine
         return Sonification(settings)
 
-    def examine(settings: SonificationSettings, ask: Ask | None) -> Sequence[Finding]:
+    def examine(settings: SonificationSettings, ask: Prompt | None) -> Sequence[Finding]:
         from labcrane_sonification import examination
 
         return examination.examine(settings, ask)

@@ -2,7 +2,7 @@
 
 import sys
 
-from labcrane import Ask, DeviceError, Finding, Verdict
+from labcrane import DeviceError, Finding, Prompt, Verdict
 from labcrane_sonification import real_time
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sonification.synth import server
@@ -11,7 +11,7 @@ LONG_S = 0.02
 """Length of a block beyond which the delay of a sound is noticed."""
 
 
-def examine(settings: SonificationSettings, ask: Ask | None) -> list[Finding]:
+def examine(settings: SonificationSettings, ask: Prompt | None) -> list[Finding]:
     """Open the sound system as a session would, play nothing, and close it."""
     del ask  # nothing needs to be moved
     try:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel
 
-from labcrane import Feedback, FloatArray, Frame, Run, Signal, Situation, Value
+from labcrane import Feedback, FloatArray, Frame, Run, SessionState, Signal, Value
 from labcrane_sonification import real_time
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sonification.synth import Synth, offline_server, server
@@ -90,14 +90,14 @@ class Sonification(Feedback):
         self._synth.ramp(settings.ramp_s)
         return True
 
-    def hear(self, situation: Situation) -> None:
+    def update(self, situation: SessionState) -> None:
         if situation.trial != self._trial:
             self._trial, self._entered = situation.trial, None
 
     def present(self, frame: Frame) -> FloatArray:
         now = self.tone(frame)
         if now is None:
-            self.rest()
+            self.idle()
             return np.array([math.nan, math.nan, 0.0, math.nan, *self._counts()])
         self.synth.sound(now)
         return np.array([*now.values, *self._counts()])
@@ -144,10 +144,10 @@ class Sonification(Feedback):
             blocks.append(self.synth.block())
         return np.concatenate(blocks)
 
-    def rest(self) -> None:
+    def idle(self) -> None:
         self.synth.silence()
 
-    def facts(self) -> Mapping[str, Value]:
+    def metadata(self) -> Mapping[str, Value]:
         return {
             "driver": self._settings.driver,
             "rate_hz": self._settings.rate_hz,

@@ -9,9 +9,9 @@ labcrane_api = 1
 @hookimpl
 def labcrane_cues() -> list[Offer[Cue]]:
     def build(settings: SphereSettings, machine: Machine) -> Cue:
-        from labcrane_sphere.sphere import Sphere
+        from labcrane_sphere.sphere import SphereCue
 
         del machine  # the same for every machine
-        return Sphere(settings)
+        return SphereCue(settings)
 
     return [offer("sphere", SphereSettings, build)]

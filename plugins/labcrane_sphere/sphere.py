@@ -5,14 +5,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labcrane import Ball, Cue, FloatArray, Frame, Run, Shape, Signal
+from labcrane import Cue, FloatArray, Frame, Run, Shape, Signal, Sphere
 from labcrane_sphere.settings import SphereSettings
 
 STEEPNESS = 9.0
 """Of the logarithmic law: a tenth of the range of distance gives the first 28 % of the change."""
 
 
-class Sphere(Cue):
+class SphereCue(Cue):
     """Radius and brightness are functions of the distance alone."""
 
     signals = (Signal("distance", "m"), Signal("radius", "m"), Signal("brightness", "1"))
@@ -31,7 +31,7 @@ class Sphere(Cue):
         place = frame.task[self._target] if self._settings.at == "target" else None
         x, y, z = (frame.state[self._tip] if place is None else place).tolist()
         red, green, blue = (brightness * part for part in self._settings.colour)
-        return (Ball("sphere", (x, y, z), radius, (red, green, blue, self._settings.opacity)),)
+        return (Sphere("sphere", (x, y, z), radius, (red, green, blue, self._settings.opacity)),)
 
     def values(self, frame: Frame) -> FloatArray:
         distance = float(np.linalg.norm(frame.task[self._target] - frame.state[self._tip]))

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from labcrane import Ask, Feedback, Finding, Machine, Offer, hookimpl, offer
+from labcrane import Feedback, Finding, Machine, Offer, Prompt, hookimpl, offer
 from labcrane_view.settings import ViewSettings
 
 labcrane_api = 1
@@ -15,7 +15,7 @@ def labcrane_feedback() -> list[Offer[Feedback]]:
 
         return View(settings, machine)
 
-    def examine(settings: ViewSettings, ask: Ask | None) -> Sequence[Finding]:
+    def examine(settings: ViewSettings, ask: Prompt | None) -> Sequence[Finding]:
         from labcrane_view import examination
 
         return examination.examine(settings, ask)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labcrane import Ball, FloatArray, Frame, Placed, Run, Shape, read_placed
+from labcrane import FloatArray, Frame, PlacedObject, Run, Shape, Sphere, read_placed
 from labcrane_view.outline import of_body, of_thing
 
 TIP = 0.12
@@ -118,9 +118,9 @@ class Areas:
         self._said = {signal.name for signal in run.state.signals}
         self._bodies = [(body, of_body(body)) for body in run.bodies if body.name in names]
         self._scene = ""
-        self._things: list[tuple[Placed, FloatArray]] = []
+        self._things: list[tuple[PlacedObject, FloatArray]] = []
 
-    def hear(self, scene: str) -> None:
+    def update(self, scene: str) -> None:
         """Take up what stands around, as of :func:`labcrane.read_placed`."""
         if scene != self._scene:
             self._scene = scene
@@ -134,9 +134,9 @@ class Areas:
         self, projection: Projection, frame: Frame, shapes: Sequence[Shape], poses: FloatArray
     ) -> list[float]:
         """Return left, top, right and bottom of every area, one after the other."""
-        balls = {shape.name: shape for shape in shapes if isinstance(shape, Ball)}
+        balls = {shape.name: shape for shape in shapes if isinstance(shape, Sphere)}
         x, y, z = frame.state[self._tip].tolist()
-        balls["tip"] = Ball("tip", (x, y, z), TIP, (0.0, 0.0, 0.0, 0.0))
+        balls["tip"] = Sphere("tip", (x, y, z), TIP, (0.0, 0.0, 0.0, 0.0))
         outlines = self._outlines(frame.state, poses)
         boxes: list[float] = []
         for name in self._names:

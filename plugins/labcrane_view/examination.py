@@ -3,7 +3,7 @@
 import re
 import subprocess
 
-from labcrane import Ask, DeviceError, Finding, Verdict
+from labcrane import DeviceError, Finding, Prompt, Verdict
 from labcrane_view.settings import ViewSettings
 from labcrane_view.window import open_window
 
@@ -11,7 +11,7 @@ CURRENT = re.compile(r"([\d.]+)[ +]*\*")
 SLOW_HZ = 50.0
 
 
-def examine(settings: ViewSettings, ask: Ask | None) -> list[Finding]:
+def examine(settings: ViewSettings, ask: Prompt | None) -> list[Finding]:
     """Open the window for a moment and list the monitors with their refresh rates."""
     del ask  # nothing needs to be moved
     try:

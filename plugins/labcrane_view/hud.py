@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
-from labcrane import Frame, Run, Situation, Targets
+from labcrane import Frame, Run, SessionState, TargetFinder
 
 LOAD = "joint.load"
 ITEM = re.compile(r"([-*+•]|\d+[.)])\s")
@@ -65,9 +65,9 @@ class Hud:
         loads = [signal for signal in run.state.signals if signal.name == LOAD]
         self._joints = loads[0].components if loads else ()
         self._load = run.state.find(LOAD) if loads else slice(0)
-        self._targets = Targets(run.task)
+        self._targets = TargetFinder(run.task)
 
-    def lines(self, frame: Frame, situation: Situation) -> list[str]:
+    def lines(self, frame: Frame, situation: SessionState) -> list[str]:
         """Return the lines to be shown; one that has nothing to say is left out."""
         words = self._words
         of = f" / {situation.trials}" if situation.trials else ""
@@ -92,7 +92,7 @@ class Hud:
         return [*shown, words["paused"]] if frame.paused and self._wanted else shown
 
 
-def notice(frame: Frame, situation: Situation, hint_s: float, language: str) -> list[str]:
+def notice(frame: Frame, situation: SessionState, hint_s: float, language: str) -> list[str]:
     """Return what the operator is to read now: the step's text, and a hint that is still new."""
     fresh = 0.0 <= frame.tick.due - situation.hint_time < hint_s
     asked = situation.questionnaire

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from labcrane import Body, FloatArray, Placed
+from labcrane import Body, FloatArray, PlacedObject
 from labcrane_view.mesh import bevelled_box
 from labcrane_view.mesh_reader import read_mesh
 from labcrane_view.things import pieces
@@ -21,7 +21,7 @@ def of_body(body: Body) -> FloatArray:
     return outermost(bevelled_box(body.size, body.centre).points)
 
 
-def of_thing(thing: Placed) -> FloatArray:
+def of_thing(thing: PlacedObject) -> FloatArray:
     """Return those of what was placed, in the frame in which it moves, shape ``(n, 3)``."""
     return outermost(np.vstack([mesh.points for mesh, _ in pieces(thing)]))
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from labcrane import Picture
+from labcrane import CameraImage
 from labcrane_view.camera import ROUNDING_S, Camera
 from labcrane_view.settings import ViewSettings
 
@@ -37,7 +37,9 @@ class Shots:
         self._due = (math.floor(now * wanted.rate_hz + ROUNDING_S) + 1) / wanted.rate_hz
         return True
 
-    def cut(self, window: npt.NDArray[np.uint8], cameras: Sequence[Camera]) -> dict[str, Picture]:
+    def cut(
+        self, window: npt.NDArray[np.uint8], cameras: Sequence[Camera]
+    ) -> dict[str, CameraImage]:
         """Return each camera's part of the window's picture, shape ``(height, width, 3)``."""
         axis = AXES.get(self._settings.flip)
         upright = window if axis is None else np.flip(window, axis=axis)
@@ -47,7 +49,7 @@ class Shots:
             if camera.settings.name in self.names
         }
 
-    def _of(self, window: npt.NDArray[np.uint8], camera: Camera) -> Picture:
+    def _of(self, window: npt.NDArray[np.uint8], camera: Camera) -> CameraImage:
         wanted, part = self._settings.supervisor, camera.part
         if wanted is None:
             raise AssertionError("pictures are cut where they are wanted")
@@ -55,5 +57,5 @@ class Shots:
         pixels = window[::step, part.left : part.left + part.width : step]
         if camera.settings.shows == "depth":
             near, far = camera.settings.depth_m
-            return Picture(pixels[..., 0], camera.seen, f"white {near:g} m, black {far:g} m")
-        return Picture(pixels, camera.seen)
+            return CameraImage(pixels[..., 0], camera.seen, f"white {near:g} m, black {far:g} m")
+        return CameraImage(pixels, camera.seen)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from panda3d import core
 
-from labcrane import Ball, Body, FloatArray, Run, Shape, read_placed
+from labcrane import Body, FloatArray, Run, Shape, Sphere, read_placed
 from labcrane_view import shader
 from labcrane_view.forest import forest
 from labcrane_view.mesh import Mesh, bevelled_box, cone, sphere
@@ -106,10 +106,10 @@ class Stage:
         for shape in shapes:
             node = self._shown.get(shape.name)
             if node is None:
-                mesh = self._ball if isinstance(shape, Ball) else self._bar
+                mesh = self._ball if isinstance(shape, Sphere) else self._bar
                 node = self._shown[shape.name] = self._add(self.root, shape.name, mesh, STEEL, 0.0)
             self._colour(node, shape.colour)
-            if isinstance(shape, Ball):
+            if isinstance(shape, Sphere):
                 node.set_pos(*shape.centre)
                 node.set_scale(shape.radius)
             else:

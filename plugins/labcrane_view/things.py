@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from labcrane import Form, Part, Placed
+from labcrane import Geom, PlacedObject, ShapeKind
 from labcrane_view.mesh import Mesh, bevelled_box, cone, joined, sphere
 from labcrane_view.mesh_reader import painted, read_mesh
 
@@ -19,7 +19,7 @@ TROUSERS: Colour = (0.20, 0.23, 0.32, 1.0)
 CLOTHES = {"head": SKIN, "torso": JACKET, "pelvis": TROUSERS}
 
 
-def pieces(thing: Placed) -> Iterator[tuple[Mesh, Colour]]:
+def pieces(thing: PlacedObject) -> Iterator[tuple[Mesh, Colour]]:
     """Yield a mesh for every part, in the frame in which the thing moves, with its colour.
 
     That is the frame of the first part: its centre is what ``scene.NAME.position`` says.
@@ -33,7 +33,7 @@ def pieces(thing: Placed) -> Iterator[tuple[Mesh, Colour]]:
         yield _turned(_solid(part), part.yaw).moved((x, y, z)), colour
 
 
-def _colour(thing: Placed, part: Part) -> Colour:
+def _colour(thing: PlacedObject, part: Geom) -> Colour:
     if thing.kind == "obstacle":
         return OBSTACLE
     if thing.kind == "object":
@@ -45,15 +45,15 @@ def _colour(thing: Placed, part: Part) -> Colour:
     return JACKET if part.name.endswith("arm") else TROUSERS
 
 
-def _solid(part: Part) -> Mesh:
+def _solid(part: Geom) -> Mesh:
     if part.mesh is not None:
         return read_mesh(part.mesh)
     x, y, z = part.size
-    if part.shape is Form.BOX:
+    if part.shape is ShapeKind.BOX:
         return bevelled_box(part.size, (0.0, 0.0, 0.0))
-    if part.shape is Form.SPHERE:
+    if part.shape is ShapeKind.SPHERE:
         return _ball(x / 2)
-    if part.shape is Form.CYLINDER:
+    if part.shape is ShapeKind.CYLINDER:
         return cone((0.0, 0.0, -z / 2), (0.0, 0.0, z / 2), (x / 2, x / 2), 24)
     half = max(x - y, 0.01) / 2
     bar = cone((-half, 0.0, 0.0), (half, 0.0, 0.0), (y / 2, y / 2))

@@ -11,21 +11,21 @@ import numpy.typing as npt
 from panda3d import core
 
 from labcrane import (
-    Beam,
+    CameraImage,
+    Cylinder,
     DeviceError,
     Feedback,
     FloatArray,
     Frame,
     Machine,
-    Picture,
     PluginError,
     Run,
+    SessionState,
     Shape,
     Signal,
-    Situation,
-    Targets,
+    TargetFinder,
     Value,
-    frames,
+    link_frames,
 )
 from labcrane_view.areas import Areas
 from labcrane_view.camera import Camera, Delay, Part
@@ -71,7 +71,7 @@ class View(Feedback):
         self._settings = settings
         self._machine = machine
         self._window: Window | None = None
-        self._situation = Situation()
+        self._situation = SessionState()
         self._delay = Delay(settings.delay_s)
         self._due = self._now = 0.0
         self._samples: dict[str, FloatArray] = {}
@@ -81,7 +81,7 @@ class View(Feedback):
     def open(self, run: Run) -> None:
         settings = self._settings
         self._angles = run.state.find("joint.angle")
-        self._targets = Targets(run.task)
+        self._targets = TargetFinder(run.task)
         window = self._window = open_window(settings, "labcrane")
         if not window.shaders:
             self._check_simple()
@@ -130,7 +130,7 @@ class View(Feedback):
             self._window.close()
             self._window = None
 
-    def hear(self, situation: Situation) -> None:
+    def update(self, situation: SessionState) -> None:
         self._situation = situation
 
     def present(self, frame: Frame) -> FloatArray:
@@ -160,11 +160,11 @@ class View(Feedback):
     def samples(self) -> Mapping[str, FloatArray]:
         return self._samples
 
-    def pictures(self) -> Mapping[str, Picture]:
+    def pictures(self) -> Mapping[str, CameraImage]:
         due = self._shots.are_due(self._now)
         return self._shots.cut(self.picture(), self._cameras) if due else {}
 
-    def facts(self) -> Mapping[str, Value]:
+    def metadata(self) -> Mapping[str, Value]:
         window = self._window
         driver = "" if window is None else window.driver
         software = window is not None and window.software
@@ -189,7 +189,7 @@ class View(Feedback):
         files = []
         try:
             view.open(run)
-            view.hear(self._situation)
+            view.update(self._situation)
             view.present(frames[0])
             for number, frame in enumerate(frames[:: round(PREVIEW_S * run.rate_hz)]):
                 view.present(frame)
@@ -225,10 +225,10 @@ class View(Feedback):
 
     def _set(self, frame: Frame) -> tuple[FloatArray, list[Shape]]:
         """Set the stage for a frame; return the machine's frames and the shapes shown."""
-        poses = frames(self._machine, frame.state[self._angles].tolist())
+        poses = link_frames(self._machine, frame.state[self._angles].tolist())
         shapes = [*self._task_shapes(frame), *frame.shapes]
         self.stage.place(poses, self._situation.scene, frame.state)
-        self._areas.hear(self._situation.scene)
+        self._areas.update(self._situation.scene)
         self.stage.show(shapes)
         return poses, shapes
 
@@ -241,7 +241,7 @@ class View(Feedback):
             shapes.append(target)
             if z > target.radius:
                 foot, top = (x, y, 0.0), (x, y, z - target.radius)
-                shapes.append(Beam(f"{target.name} stem", foot, top, 0.03, STEM))
+                shapes.append(Cylinder(f"{target.name} stem", foot, top, 0.03, STEM))
         return shapes
 
     def _write(self, frame: Frame) -> float:

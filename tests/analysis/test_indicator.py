@@ -10,20 +10,20 @@ from pathlib import Path
 
 import pytest
 
+from labcrane.analysis.advice import familiarity, fatigue, suggest
 from labcrane.analysis.cohort import find_cohort
 from labcrane.analysis.indicator import Indicator, Performance, indicate
-from labcrane.analysis.next_practice import familiarity, fatigue, suggest
 from labcrane.analysis.operator_tests import OperatorTest, completion, operator_tests
-from labcrane.analysis.workbook import write_workbook
+from labcrane.analysis.report.workbook import write_workbook
 from labcrane.cli.app import main
+from labcrane.core.records import Event
 from labcrane.errors import LabcraneError, RecordingError
-from labcrane.evaluation import IndicatorSettings, Weights
 from labcrane.participants.enrolment import exclude
-from labcrane.participants.places import Places
+from labcrane.participants.folders import Places
 from labcrane.participants.register import Entry, changed
+from labcrane.protocol.evaluation import IndicatorSettings, Weights
 from labcrane.recording.journal import Column, SessionJournal
-from labcrane.recording.participant_file import consolidate
-from labcrane.records import Event
+from labcrane.recording.participant_file.writer import consolidate
 
 LITERAL = IndicatorSettings()
 UNCAPPED = IndicatorSettings(capped=False)

@@ -7,8 +7,8 @@ import pytest
 from rehearsal import SHORT, Rehearsal, a_study, rehearse
 
 from labcrane.cli.app import main
-from labcrane.console import Command, Order
-from labcrane.study import Study
+from labcrane.protocol.study import Study
+from labcrane.session.commands import Command, Order
 
 HEAD = SHORT.partition("sessions:")[0]
 RATINGS = """\

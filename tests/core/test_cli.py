@@ -87,9 +87,9 @@ def test_plan_lists_every_participants_own_order(capsys: pytest.CaptureFixture[s
 
 
 def test_a_planned_order_is_the_one_that_is_run() -> None:
-    from labcrane.plan import plan_session
-    from labcrane.registry import discover
-    from labcrane.study import load
+    from labcrane.design.plan import plan_session
+    from labcrane.protocol.study import load
+    from labcrane.registry.registry import discover
 
     study = load(AIMING, discover())
     one, again, other = (plan_session(study, name, 1) for name in ("P001", "P001", "P002"))
@@ -157,7 +157,7 @@ def test_groups_of_plugins_have_the_plugins_own_words(
 def test_what_describes_a_group_is_read_without_running_it(
     source: str | None, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from labcrane.cli.extension import description
+    from labcrane.cli.plugin_groups import description
 
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "lamps").mkdir()

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from labcrane.clock import ManualClock, SystemClock, ticks
+from labcrane.core.clock import ManualClock, SystemClock, ticks
 
 
 def test_ticks_are_due_on_a_grid_that_lateness_does_not_move() -> None:

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from rehearsal import SHORT, a_study, rehearse
 
-from labcrane import InputDevice, rig
-from labcrane.console import Command, Order
-from labcrane.records import Phase
-from labcrane.study import Study
+from labcrane import InputDevice
+from labcrane.core.records import Phase
+from labcrane.protocol import rig
+from labcrane.protocol.study import Study
+from labcrane.session.commands import Command, Order
 
 
 @pytest.fixture

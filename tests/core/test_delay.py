@@ -15,12 +15,12 @@ import pytest
 from rehearsal import SHORT, a_study
 
 from labcrane.cli.app import main
-from labcrane.delay_file import delay_in_words, delay_path, read_delays
-from labcrane.delay_measurement import measure
 from labcrane.errors import DeviceError, ProtocolError, StreamError
-from labcrane.feedback_crew import FeedbackCrew
-from labcrane.presentation_delay import Change, delay, onsets, steps
-from labcrane.session import Visit
+from labcrane.feedback.delay_analysis import Change, delay, onsets, steps
+from labcrane.feedback.delays import delay_in_words, delay_path, read_delays
+from labcrane.feedback.measure_delay import measure
+from labcrane.feedback.processes import FeedbackProcesses
+from labcrane.session.session import Visit
 
 STUDY = (
     SHORT
@@ -157,7 +157,7 @@ def test_the_doctor_measures_the_delay_of_a_sensor(
 
 def the_record_says_it(protocol: Path) -> None:
     study = a_study(protocol.parent, STUDY.replace("feedback:\n  tone: {use: click}", ""))
-    crew = FeedbackCrew(Visit(study, "P001", 1, protocol.parent, simulated=True))
+    crew = FeedbackProcesses(Visit(study, "P001", 1, protocol.parent, simulated=True))
     try:
         assert crew.wait(lambda said: None, lambda: False)
         (keeper,) = crew.keepers
@@ -190,7 +190,7 @@ def test_what_cannot_be_measured_is_said(protocol: Path) -> None:
 def test_a_sensor_that_is_not_there_is_said(
     protocol: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("labcrane.delay_measurement.WAIT_S", 0.2)
+    monkeypatch.setattr("labcrane.feedback.measure_delay.WAIT_S", 0.2)
     with pytest.raises(StreamError, match="there is no stream 'diode'; labcrane streams lists"):
         measure(a_study(protocol.parent, STUDY), "window", "diode", 2)
 

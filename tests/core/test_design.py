@@ -5,7 +5,7 @@ from collections import Counter
 
 from labcrane.design.order import RULES, Turn, shuffled
 from labcrane.design.seeds import derive
-from labcrane.design.words import RULES as WORDS
+from labcrane.protocol.design import RULES as WORDS
 
 LEVELS = ("a", "b", "c", "d")
 

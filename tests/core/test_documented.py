@@ -6,10 +6,10 @@ import sys
 import pytest
 from pydantic import Field, ValidationError
 
-from labcrane.documented import Documented, descriptions
+from labcrane.files.model import StrictModel, descriptions
 
 
-class Link(Documented):
+class Link(StrictModel):
     """A link."""
 
     length: float
@@ -63,7 +63,7 @@ def test_descriptions_are_found_by_key_with_those_that_are_inherited() -> None:
 
 def test_a_model_whose_source_is_nowhere_has_a_schema_without_words() -> None:
     program = (
-        "from labcrane.documented import Documented\n"
+        "from labcrane.files.model import StrictModel\n"
         "class Typed(Documented):\n"
         "    length: float\n"
         "    'In metres.'\n"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from labcrane.entry_points import Declared, declared
+from labcrane.registry.entry_points import Declared, declared
 
 GROUPS = ("labcrane", "labcrane.offers", "labcrane.commands")
 

@@ -11,7 +11,7 @@ import pytest
 from fresh_environment import environment_with, run
 
 from labcrane import open_recording
-from labcrane.recording.recording import SessionRecord
+from labcrane.recording.participant_file.reader import SessionRecord
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 NAMES = sorted(path.parent.name for path in EXAMPLES.glob("*/pyproject.toml"))

@@ -14,19 +14,19 @@ from labcrane import (
     Event,
     Layout,
     ProtocolError,
+    SessionState,
     Signal,
-    Situation,
-    Targets,
+    TargetFinder,
 )
-from labcrane.console import Command, Order
-from labcrane.design.fading import faded
-from labcrane.feedback_crew import FeedbackCrew
-from labcrane.plan import plan_session
-from labcrane.run_text import read_run, write_run
-from labcrane.session import Visit, run
+from labcrane.design.order import faded
+from labcrane.design.plan import plan_session
+from labcrane.feedback.processes import FeedbackProcesses
+from labcrane.protocol.study import Study
+from labcrane.recording.run_codec import read_run, write_run
+from labcrane.session.commands import Command, Order
+from labcrane.session.session import Visit, run
 from labcrane.streams.context import situation_after
-from labcrane.study import Study
-from labcrane.testing import TARGETS, a_run, ch8
+from labcrane.testing import TARGETS, ch8, make_run
 
 
 def blocks(*written: str) -> str:
@@ -157,7 +157,7 @@ def test_feedback_that_cannot_start_refuses_the_session_or_is_left_out(
     viewed = SHORT + "views: {window: {use: view}}\n"
     for policy in ("restart", "continue"):
         study = a_study(tmp_path, viewed + f"on_fault: {{feedback_lost: {policy}}}\n")
-        crew = FeedbackCrew(Visit(study, "P001", 1, tmp_path, simulated=True))
+        crew = FeedbackProcesses(Visit(study, "P001", 1, tmp_path, simulated=True))
         said: list[str] = []
         try:
             if policy == "restart":
@@ -175,17 +175,17 @@ def test_feedback_that_cannot_start_refuses_the_session_or_is_left_out(
 
 
 def test_a_scene_comes_through_as_it_was() -> None:
-    a = replace(a_run(ch8(), task=TARGETS), bodies=())
+    a = replace(make_run(ch8(), task=TARGETS), bodies=())
     b = read_run(write_run(a))
     assert (a.machine, a.rate_hz, a.axes, a.command, a.state, a.task, a.bodies) == (
         *(b.machine, b.rate_hz, b.axes, b.command, b.state, b.task, b.bodies),
     )
     with pytest.raises(labcrane.PluginError, match="feedback was asked to steer"):
-        b.steer(np.zeros(3), np.zeros(3))
+        b.inverse(np.zeros(3), np.zeros(3))
 
 
 def test_the_situation_follows_from_events() -> None:
-    now = Situation(trials=2)
+    now = SessionState(trials=2)
     events = [
         Event("step.start", 1.0, {"step": 1, "kind": "block"}),
         Event("block.start", 1.0, {"block": 1, "block_name": "a", "practice": False}),
@@ -201,7 +201,7 @@ def test_the_situation_follows_from_events() -> None:
 
 
 def test_the_situation_says_what_the_operator_is_to_read() -> None:
-    now = Situation()
+    now = SessionState()
     hint = {"text": "slower", "refused": None, "by": "x"}
     for event, text, asked, said in (
         (Event("instructions.shown", 1.0, {"text": "go"}), "go", "", ""),
@@ -218,9 +218,9 @@ def test_the_situation_says_what_the_operator_is_to_read() -> None:
 
 def test_targets_are_found_among_a_tasks_signals() -> None:
     task = Layout("the task", (*TARGETS, Signal("cost", "1")))
-    found = list(Targets(task).find(np.array([1.0, 2.0, 3.0, 0.5, 4.0, 5.0, 6.0, 9.0])))
+    found = list(TargetFinder(task).find(np.array([1.0, 2.0, 3.0, 0.5, 4.0, 5.0, 6.0, 9.0])))
     assert [(ball.name, ball.centre, ball.radius) for ball in found] == [
         ("target", (1.0, 2.0, 3.0), 0.5),
         ("other", (4.0, 5.0, 6.0), 0.5),
     ]
-    assert not list(Targets(task).find(np.full(8, np.nan)))
+    assert not list(TargetFinder(task).find(np.full(8, np.nan)))

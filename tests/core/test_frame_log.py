@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from labcrane import Event, Frame, PluginError, RecordingError, Tick
-from labcrane.frame_log import FrameLog, columns
-from labcrane.oversight import Overrun, Oversight
+from labcrane.recording.frame_log import FrameLog, columns
 from labcrane.recording.journal import SessionJournal
 from labcrane.recording.journal_reader import SessionLog, read_journal
-from labcrane.slowness import FEW, Slowness
-from labcrane.testing import RATE_HZ, a_frame, a_run, ch8
+from labcrane.registry.call_monitor import CallMonitor, Overrun
+from labcrane.session.overruns import FEW, OverrunReporter
+from labcrane.testing import RATE_HZ, ch8, make_frame, make_run
 
-RUN = a_run(ch8())
+RUN = make_run(ch8())
 
 
 class FillingJournal(SessionJournal):
@@ -33,7 +33,7 @@ def journal(tmp_path: Path) -> FillingJournal:
 
 
 def frame_with(*events: Event) -> Frame:
-    frame = a_frame(RUN)
+    frame = make_frame(RUN)
     frame.events = events
     return frame
 
@@ -63,8 +63,8 @@ def test_a_slow_component_is_told_of_when_the_disk_has_room_again(journal: Filli
         def report(self, event: Event) -> None:
             pass
 
-    log, oversight = FrameLog(journal, RUN), Oversight()
-    slowness = Slowness(oversight, RATE_HZ, log, Deaf())
+    log, oversight = FrameLog(journal, RUN), CallMonitor()
+    slowness = OverrunReporter(oversight, RATE_HZ, log, Deaf())
     oversight.overruns["scheme"] = Overrun(calls=FEW + 1, worst_s=0.05)
     journal.full = True
     frame = frame_with()

@@ -12,20 +12,20 @@ import pytest
 from faults.sessions import unique, wait_for
 
 from labcrane import Event, Frame, Tick
-from labcrane.feedback_host import FeedbackProcess
-from labcrane.host_order import HostOrder, Part
+from labcrane.feedback.config import FeedbackConfig, Part
+from labcrane.feedback.process import FeedbackProcess
 from labcrane.streams.context import ContextOutlet
 from labcrane.streams.feedback_log import log_source
 from labcrane.streams.frames import FrameOutlet
-from labcrane.supervisor.pictures import Pictures
-from labcrane.testing import TARGETS, a_run, a_target, ch8
+from labcrane.testing import TARGETS, ch8, make_run, make_target
+from labcrane.web.pictures import Pictures
 
 PLUGIN = """\
 from pathlib import Path
 
 import numpy as np
 
-from labcrane import Feedback, Picture, Settings, hookimpl, offer
+from labcrane import Feedback, CameraImage, Settings, hookimpl, offer
 
 labcrane_api = 1
 
@@ -48,7 +48,7 @@ class Notes(Feedback):
 
     def pictures(self):
         self._file.with_suffix(".pictures").touch()
-        return {"eye": Picture(np.zeros((2, 3), np.uint8), self._due)}
+        return {"eye": CameraImage(np.zeros((2, 3), np.uint8), self._due)}
 
 
 @hookimpl
@@ -61,7 +61,7 @@ class Session:
     """Frames of a trial, as many as are asked for."""
 
     def __init__(self, source: str) -> None:
-        self.run = a_run(ch8(), task=TARGETS)
+        self.run = make_run(ch8(), task=TARGETS)
         self.frames = FrameOutlet(self.run, source)
         self.context = ContextOutlet(self.run, source, trials=1)
         self._number = 0
@@ -70,7 +70,7 @@ class Session:
         self._number += 240  # a second each: the context is due with every one
         due = self._number / 240.0
         return replace(
-            a_target(self.run), tick=Tick(self._number, due, due), trial=1, events=events
+            make_target(self.run), tick=Tick(self._number, due, due), trial=1, events=events
         )
 
     def close(self) -> None:
@@ -86,7 +86,7 @@ class Joined:
         (folder / "plugins" / "notes.py").write_text(PLUGIN)
         self.source, self.notes = unique("joining"), folder / "notes.txt"
         self.session = Session(self.source)
-        order = HostOrder(
+        order = FeedbackConfig(
             "notes",
             Part("notes", {"file": str(self.notes)}),
             self.session.run,

@@ -7,12 +7,13 @@ from pathlib import Path
 import pytest
 from faults.sessions import STUDY, unique, wait_for
 
-from labcrane import launcher as launcher_module
-from labcrane import open_recording, recorder_keeper
-from labcrane.console import Command, Order, QueueConsole
-from labcrane.launcher import Launcher
-from labcrane.recorder_keeper import RecorderKeeper
-from labcrane.session_process import VisitOrder
+from labcrane import open_recording
+from labcrane.launcher import launcher as launcher_module
+from labcrane.launcher.launcher import Launcher
+from labcrane.launcher.session_process import SessionConfig
+from labcrane.session.commands import Command, Order, QueueConsole
+from labcrane.streams.recorder import handle as recorder_keeper
+from labcrane.streams.recorder.handle import RecorderHandle
 
 
 class LateRecorder:
@@ -43,7 +44,7 @@ class LateRecorder:
 def test_a_note_that_is_given_while_streams_are_waited_for_is_in_the_record(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(launcher_module, "RecorderKeeper", LateRecorder)
+    monkeypatch.setattr(launcher_module, "RecorderHandle", LateRecorder)
     protocol = tmp_path / "study.yaml"
     protocol.write_text(STUDY.format(study=unique("early")) + "streams: {eeg: {type: EEG}}\n")
     console, said = QueueConsole(), []
@@ -53,7 +54,7 @@ def test_a_note_that_is_given_while_streams_are_waited_for_is_in_the_record(
         Command(Order.START),
     ):
         console.give(command)
-    order = VisitOrder(protocol, "P001", 1, tmp_path / "data", simulated=True, feedback=False)
+    order = SessionConfig(protocol, "P001", 1, tmp_path / "data", simulated=True, feedback=False)
     assert Launcher(order, console, said.append).run().died is None
     session = open_recording(order.visit().folder.participant_file).session(1)
     events = session.events.set_index("name")["data"]
@@ -86,7 +87,7 @@ def test_a_spare_recorder_that_hangs_keeps_no_recorder_from_closing_its_journal(
             started.append(self)
 
     monkeypatch.setattr(recorder_keeper, "_Recorder", Stubborn)
-    keeper = RecorderKeeper(tmp_path / "ses-01_streams.xdf", [])
+    keeper = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
     wait_for(lambda: keeper.ready, 60.0)
     monkeypatch.setattr(recorder_keeper, "PATIENCE_S", 3.0)
     keeper.stop()
@@ -109,7 +110,7 @@ def test_a_recorder_that_dies_as_it_is_given_its_orders_is_replaced(
             return super().poll() if self.looks > 1 else None  # alive when it is chosen
 
     monkeypatch.setattr(recorder_keeper, "_Recorder", Dying)
-    keeper = RecorderKeeper(tmp_path / "ses-01_streams.xdf", [])
+    keeper = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
     assert keeper.watch()
     assert keeper.restarts == 1
     keeper.stop()

@@ -13,15 +13,15 @@ from rehearsal import SHORT
 from labcrane import Cue, PluginError, ProtocolError, open_recording
 from labcrane.approval.decision import Grant, amend, approve, verify
 from labcrane.cli.app import main
-from labcrane.registry import Registry, discover
-from labcrane.study import Study, load
+from labcrane.protocol.study import Study, load
+from labcrane.registry.registry import Registry, discover
 
 ARROW = """\
 import os
 
 import numpy as np
 
-from labcrane import Ball, Cue, Feedback, Settings, Signal, hookimpl, offer
+from labcrane import Sphere, Cue, Feedback, Settings, Signal, hookimpl, offer
 
 labcrane_api = 1
 
@@ -39,7 +39,7 @@ class Arrow(Cue):
         self._tip = run.state.find("tip.position")
 
     def draw(self, frame):
-        return [Ball("head", tuple(frame.state[self._tip]), self._radius, (1.0, 0.0, 0.0, 1.0))]
+        return [Sphere("head", tuple(frame.state[self._tip]), self._radius, (1.0, 0.0, 0.0, 1.0))]
 
 
 class Counter(Feedback):
@@ -138,7 +138,7 @@ def test_a_changed_file_is_not_what_was_approved(protocol: Path) -> None:
     today = date(2026, 3, 2)
     consent = protocol.parent / "consent.md"
     consent.write_text("I take part.\n")
-    grant = Grant("Board", "2026-1", date(2027, 3, 2), consent)
+    grant = Grant("SessionView", "2026-1", date(2027, 3, 2), consent)
     approve(*loaded(protocol), grant, today)
     verify(*loaded(protocol), today)
 

@@ -8,18 +8,18 @@ import numpy as np
 
 import labcrane
 from labcrane import (
-    Ball,
-    Beam,
+    Cylinder,
     Feedback,
+    SessionState,
     Settings,
     Signal,
-    Situation,
+    Sphere,
     offer,
 )
-from labcrane.host_order import HostOrder, Part
-from labcrane.presenter import Presenter
-from labcrane.registry import discover
-from labcrane.testing import TARGETS, a_run, a_target, ch8
+from labcrane.feedback.config import FeedbackConfig, Part
+from labcrane.feedback.presenter import Presenter
+from labcrane.registry.registry import discover
+from labcrane.testing import TARGETS, ch8, make_run, make_target
 
 
 class Plain(Settings):
@@ -37,13 +37,13 @@ class Notebook(Feedback):
 
     def __init__(self, settings: Plain) -> None:
         self.gain = settings.gain
-        self.shapes: list[Ball | Beam] = []
+        self.shapes: list[Sphere | Cylinder] = []
 
     def present(self, frame: labcrane.Frame) -> labcrane.FloatArray:
         self.shapes = list(frame.shapes)
         return np.array([self.gain])
 
-    def rest(self) -> None:
+    def idle(self) -> None:
         self.rested += 1
 
 
@@ -51,16 +51,16 @@ def presenter(*, always: bool) -> Presenter:
     registry = discover()
     book = offer("notebook", Plain, lambda settings, machine: Notebook(settings))
     registry.offers[Feedback]["notebook"] = book
-    order = HostOrder(
+    order = FeedbackConfig(
         "book",
         Part("notebook", {}),
-        a_run(ch8(), task=TARGETS),
+        make_run(ch8(), task=TARGETS),
         "test",
         Path("study.yaml"),
         always=always,
         cues={"ball": Part("sphere", {"at": "tip"})},
     )
-    again = HostOrder.from_json(order.as_json())
+    again = FeedbackConfig.from_json(order.as_json())
     assert json.loads(again.as_json()) == json.loads(order.as_json())
     made = Presenter(again, registry)
     made.open()
@@ -69,12 +69,12 @@ def presenter(*, always: bool) -> Presenter:
 
 def test_a_cue_is_drawn_only_while_it_is_switched_on() -> None:
     made = presenter(always=True)
-    frame = a_target(a_run(ch8(), task=TARGETS))
+    frame = make_target(make_run(ch8(), task=TARGETS))
     off = made.present(frame)
     assert off is not None
     assert not made.feedback.shapes
     assert np.isnan(off[1:]).all()
-    made.hear(Situation(trial=1, active=("ball",)))
+    made.update(SessionState(trial=1, active=("ball",)))
     on = made.present(frame)
     assert [shape.name for shape in made.feedback.shapes] == ["sphere"]
     assert on is not None
@@ -86,11 +86,11 @@ def test_a_cue_is_drawn_only_while_it_is_switched_on() -> None:
 
 def test_a_sound_rests_once_when_it_is_switched_off() -> None:
     made = presenter(always=False)
-    frame = a_target(a_run(ch8(), task=TARGETS))
+    frame = make_target(make_run(ch8(), task=TARGETS))
     assert made.present(frame) is None
-    made.hear(Situation(trial=1, active=("book",)))
+    made.update(SessionState(trial=1, active=("book",)))
     assert made.present(frame) is not None
-    made.hear(Situation())
+    made.update(SessionState())
     for _ in range(3):
         assert made.present(frame) is None
     assert made.feedback.rested == 1
@@ -98,12 +98,12 @@ def test_a_sound_rests_once_when_it_is_switched_off() -> None:
 
 def test_a_changed_setting_takes_effect() -> None:
     made = presenter(always=True)
-    frame = a_target(a_run(ch8(), task=TARGETS))
-    tip = Situation(trial=1, active=("ball",))
-    made.hear(tip)
+    frame = make_target(make_run(ch8(), task=TARGETS))
+    tip = SessionState(trial=1, active=("ball",))
+    made.update(tip)
     made.present(frame)
     np.testing.assert_array_equal(made.feedback.shapes[0].centre, frame.state[8:11])
-    made.hear(replace(tip, settings={"ball": {"at": "target"}, "book": {"gain": 3.0}}))
+    made.update(replace(tip, settings={"ball": {"at": "target"}, "book": {"gain": 3.0}}))
     values = made.present(frame)
     assert values is not None
     assert values[0] == 3.0

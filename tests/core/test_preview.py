@@ -11,8 +11,8 @@ import labcrane
 from labcrane import (
     ProtocolError,
 )
-from labcrane.feedback_preview import movement, write_preview
-from labcrane.session import Visit, run
+from labcrane.feedback.preview import movement, write_preview
+from labcrane.session.session import Visit, run
 
 PREVIEWED = FED.replace("distances: [2]", "distances: [2], limit_s: 1") + (
     "views: {operator: {use: view, renderer: software, size: [160, 90]}}\n"

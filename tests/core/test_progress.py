@@ -9,10 +9,10 @@ import pytest
 from rehearsal import SHORT, ScriptedConsole, a_study
 
 from labcrane import ProtocolError, open_recording
-from labcrane.console import Command, Order
-from labcrane.plan import plan_session
-from labcrane.progress import progress, remaining
-from labcrane.session import Visit, finish, record, run
+from labcrane.design.plan import plan_session
+from labcrane.session.commands import Command, Order
+from labcrane.session.resume import progress, remaining
+from labcrane.session.session import Visit, finish, record, run
 
 TWO_BLOCKS = SHORT.replace(
     "- block: {task: aiming, pairs: 1}",

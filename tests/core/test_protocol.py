@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from labcrane import ProtocolError
-from labcrane.registry import Registry, discover
-from labcrane.study import load
+from labcrane.protocol.study import load
+from labcrane.registry.registry import Registry, discover
 
 ROOT = Path(__file__).parents[2]
 

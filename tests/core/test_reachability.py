@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from labcrane import Machine, frames, reach
-from labcrane.machine_file import load_machine, machine_names
+from labcrane import Machine, link_frames, reach
+from labcrane.machines.library import load_machine, machine_names
 
 
 @pytest.fixture(params=machine_names())
@@ -19,14 +19,14 @@ def test_wherever_the_joints_can_put_the_tip_is_reached_within_their_limits(
 ) -> None:
     lowest, highest = np.array(machine.limits).T
     for angles in np.random.default_rng(7).uniform(lowest, highest, (40, len(lowest))):
-        point = frames(machine, angles.tolist())[-1, :3, 3]
+        point = link_frames(machine, angles.tolist())[-1, :3, 3]
         radius = math.hypot(point[0] - machine.base_x, point[1])
         bearing = math.atan2(point[1], point[0] - machine.base_x)
         if radius < 1.0 or not lowest[0] <= bearing - machine.joints[0].offset <= highest[0]:
             continue  # bent over backwards
         found = reach(machine, point.tolist())
         assert found is not None, point
-        assert np.linalg.norm(frames(machine, found)[-1, :3, 3] - point) < 1e-3
+        assert np.linalg.norm(link_frames(machine, found)[-1, :3, 3] - point) < 1e-3
         assert (np.array(found) >= lowest).all()
         assert (np.array(found) <= highest).all()
 

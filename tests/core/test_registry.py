@@ -8,8 +8,8 @@ import pytest
 
 import labcrane
 from labcrane import Cue, Dynamics, PluginError, Task
-from labcrane.plugin_commands import plugin_commands
-from labcrane.registry import ROLES, discover
+from labcrane.registry.commands import plugin_commands
+from labcrane.registry.registry import ROLES, discover
 
 ROOT = Path(__file__).parents[2]
 

@@ -9,8 +9,8 @@ from fresh_environment import environment_with, run
 
 from labcrane import open_recording
 from labcrane.cli.app import main
-from labcrane.registry import ROLES
-from labcrane.scaffold import A_ROLE, TEMPLATES
+from labcrane.registry.registry import ROLES
+from labcrane.registry.scaffold import A_ROLE, TEMPLATES
 
 NAMES = {role: "mycounter" if role == "command" else f"my_{role}" for role in A_ROLE}
 

@@ -9,9 +9,9 @@ from jsonschema import Draft202012Validator
 from ruamel.yaml import YAML
 
 from labcrane.cli.app import main
-from labcrane.registry import ROLES, discover
-from labcrane.schema import protocol_schema
-from labcrane.study import load
+from labcrane.protocol.json_schema import protocol_schema
+from labcrane.protocol.study import load
+from labcrane.registry.registry import ROLES, discover
 
 ROOT = Path(__file__).parents[2]
 PROTOCOLS = sorted((ROOT / "protocols").glob("*/protocol.yaml"))

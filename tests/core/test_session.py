@@ -16,8 +16,9 @@ from rehearsal import SHORT, ScriptedConsole, a_study, rehearse
 from virtual_sticks import desk
 
 import labcrane
-from labcrane import DeviceError, Event, PluginError, ProtocolError, RecordingError, rig
-from labcrane.session import Visit, run
+from labcrane import DeviceError, Event, PluginError, ProtocolError, RecordingError
+from labcrane.protocol import rig
+from labcrane.session.session import Visit, run
 
 ROOT = Path(__file__).parents[2]
 BULLET = SHORT.replace("kinematic_crane", "bullet_crane")

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from labcrane import Layout, ProtocolError, Signal, signals_of
-from labcrane.rig import Rig, describe
+from labcrane.protocol.rig import Rig, describe
 
 SIGNALS = (
     Signal("left", "1", ("x", "trigger")),
@@ -40,7 +40,7 @@ def test_what_is_not_there_is_told_with_what_is() -> None:
 
 def test_tasks_that_show_other_signals_are_named_with_what_they_show() -> None:
     device = SimpleNamespace(signals=SIGNALS)
-    tasks = {"aim": SimpleNamespace(signals=SIGNALS[:2]), "rest": SimpleNamespace(signals=())}
+    tasks = {"aim": SimpleNamespace(signals=SIGNALS[:2]), "idle": SimpleNamespace(signals=())}
     study = SimpleNamespace(protocol=SimpleNamespace(rate_hz=240.0), machine=None)
     with pytest.raises(
         ProtocolError, match=r"'aim' shows left, joint.angle; 'rest' shows nothing; put them into"

@@ -7,11 +7,10 @@ from collections import Counter
 import pytest
 
 from labcrane import ProtocolError
-from labcrane.design.balance import carry_over, positions, spread
 from labcrane.design.order import RULES, Turn
 from labcrane.design.sampling import sequence
 from labcrane.design.slots import group_of, next_slot, place_of
-from labcrane.design.squares import latin_square, williams
+from labcrane.design.squares import carry_over, latin_square, positions, spread, williams
 
 # Williams (1949) as crossdes::williams and Bradley (1958) print them, counted from 1.
 KNOWN = {

@@ -15,7 +15,7 @@ from rich.console import Console
 
 from labcrane import Event, open_recording
 from labcrane.cli.terminal import Terminal
-from labcrane.console import QueueConsole
+from labcrane.session.commands import QueueConsole
 
 
 class TerminalUser:

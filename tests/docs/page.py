@@ -40,8 +40,8 @@ from simple_crane import CRANE
 from windows import an_x_server
 
 from labcrane.cli.app import main
-from labcrane.registry import discover
-from labcrane.study import load
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([ROOT / "README.md", ROOT / "plugins" / "README.md", *(ROOT / "docs").glob("*.md")])

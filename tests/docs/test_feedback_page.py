@@ -7,7 +7,7 @@ import pytest
 from docs.page import ROOT, blocks
 
 from labcrane import Cue
-from labcrane.machine_file import load_machine
+from labcrane.machines.library import load_machine
 from labcrane.testing import CueContract
 
 

@@ -11,9 +11,9 @@ import pytest
 from docs.page import ROOT
 
 from labcrane.cli.app import main
-from labcrane.protocol import Protocol
-from labcrane.registry import ROLES, discover
-from labcrane.study import load
+from labcrane.protocol.protocol import Protocol
+from labcrane.protocol.study import load
+from labcrane.registry.registry import ROLES, discover
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,7 @@ from pydantic import BaseModel
 
 import labcrane
 import labcrane.testing
-from labcrane.documented import descriptions
+from labcrane.files.model import descriptions
 
 NOT_ASKED = {
     "ES01": "a summary that says all needs no more",

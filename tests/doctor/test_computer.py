@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from labcrane.core.findings import Finding, Verdict
 from labcrane.doctor import clock, disk, scheduling
 from labcrane.doctor.clock import Reading
-from labcrane.finding import Finding, Verdict
 
 
 def verdicts(found: list[Finding]) -> set[Verdict]:

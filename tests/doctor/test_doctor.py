@@ -10,15 +10,15 @@ from rehearsal import SHORT, ScriptedConsole
 
 import labcrane
 from labcrane.cli.app import main
-from labcrane.console import Command, Order
+from labcrane.core.findings import Finding, Verdict
 from labcrane.doctor import components
 from labcrane.doctor.components import Look, of_everything, of_study
-from labcrane.doctor.diagnosis import Check, diagnosis, keep, latest
+from labcrane.doctor.report import Check, diagnosis, keep, latest
 from labcrane.errors import RecordingError
-from labcrane.finding import Finding, Verdict
-from labcrane.registry import discover
-from labcrane.session import Visit, run
-from labcrane.study import load
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
+from labcrane.session.commands import Command, Order
+from labcrane.session.session import Visit, run
 
 AIMING = Path(__file__).parents[2] / "protocols" / "aiming" / "protocol.yaml"
 

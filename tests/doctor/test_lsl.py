@@ -13,8 +13,8 @@ import pylsl
 import pytest
 from recording.test_full_disk import needs_mounts
 
+from labcrane.core.findings import Finding, Verdict
 from labcrane.doctor import lsl
-from labcrane.finding import Finding, Verdict
 from labcrane.streams.request import StreamRequest
 
 HOST = "127.0.0.1"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from labcrane import Ball, Cue, Feedback, Item, Questionnaire, Settings, Signal, hookimpl, offer
+from labcrane import Cue, Feedback, Item, Questionnaire, Settings, Signal, Sphere, hookimpl, offer
 from labcrane_aiming.aiming import Aiming
 from labcrane_aiming.settings import AimingSettings
 from labcrane_bullet.kinematic_crane import KinematicCrane
@@ -109,7 +109,7 @@ class Dot(Cue):
     signals = (Signal("one", "1"),)
 
     def draw(self, frame):
-        return [Ball("dot", (0.0, 0.0, 0.0), 1.0, (1.0, 1.0, 1.0, 1.0))]
+        return [Sphere("dot", (0.0, 0.0, 0.0), 1.0, (1.0, 1.0, 1.0, 1.0))]
 
     def values(self, frame):
         return np.ones(1)

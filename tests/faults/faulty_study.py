@@ -7,13 +7,13 @@ import numpy as np
 from rehearsal import ScriptedConsole
 
 from labcrane import open_recording
-from labcrane import session as session_module
-from labcrane.console import Command, Order
-from labcrane.frame_log import FrameLog
-from labcrane.recording.recording import SessionRecord
-from labcrane.registry import discover
-from labcrane.session import Visit, run
-from labcrane.study import load
+from labcrane.protocol.study import load
+from labcrane.recording.frame_log import FrameLog
+from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.registry.registry import discover
+from labcrane.session import session as session_module
+from labcrane.session.commands import Command, Order
+from labcrane.session.session import Visit, run
 
 STUDY = """\
 labcrane: 1
@@ -45,7 +45,7 @@ def run_fast(protocol: Path) -> None:
     study = load(protocol, discover(study=protocol))
     visit = Visit(study, "P001", 1, protocol.parent / "data", simulated=True, fast=True)
     wanted = (protocol.parent / "plugins" / "order.txt").read_text().split()[1]
-    override = {20: [Command(Order.OVERRIDE)]} if wanted == "overrule" else {}
+    override = {20: [Command(Order.OVERRIDE)]} if wanted == "lift_limits" else {}
     run(visit, ScriptedConsole(override))
 
 
@@ -70,13 +70,13 @@ def recorded(protocol: Path) -> SessionRecord | None:
 
 
 METHODS = {
-    "input": {"open": 1, "begin_trial": 2, "read": 50, "close": 1, "facts": 1},
-    "scheme": {"open": 1, "begin_trial": 2, "command": 50, "rest": 1, "close": 1, "facts": 1}
-    | {"steer": 20},
+    "input": {"open": 1, "begin_trial": 2, "read": 50, "close": 1, "metadata": 1},
+    "scheme": {"open": 1, "begin_trial": 2, "command": 50, "idle": 1, "close": 1, "metadata": 1}
+    | {"inverse": 20},
     "dynamics": {"open": 1, "begin_trial": 2, "state": 50, "step": 50, "bodies": 1, "close": 1}
-    | {"facts": 1},
-    "task": {"factors": 1, "plan": 1, "open": 1, "begin_trial": 2, "judge": 50, "close": 1}
-    | {"overrule": 1},
+    | {"metadata": 1},
+    "task": {"factors": 1, "plan": 1, "open": 1, "begin_trial": 2, "evaluate": 50, "close": 1}
+    | {"lift_limits": 1},
     "questionnaire": {"items": 1, "score": 1},
 }
 """Every method that a simulated session calls, and at which call it fails."""
@@ -89,11 +89,11 @@ RUNNING = {
     "begin_trial",
     "read",
     "command",
-    "steer",
+    "inverse",
     "state",
     "step",
-    "judge",
-    "overrule",
+    "evaluate",
+    "lift_limits",
     "items",
     "score",
 }

@@ -6,9 +6,9 @@ import pytest
 from jack_server import a_jack_server, underruns
 
 from labcrane import SessionRecord, open_recording
-from labcrane.console import QueueConsole
-from labcrane.launcher import Launcher
-from labcrane.session_process import VisitOrder
+from labcrane.launcher.launcher import Launcher
+from labcrane.launcher.session_process import SessionConfig
+from labcrane.session.commands import QueueConsole
 
 
 class Examiner(QueueConsole):
@@ -23,7 +23,7 @@ def a_jack_session(
     """Run a simulated session; return its record, and what the server complained of."""
     path = folder / "study.yaml"
     path.write_text(protocol)
-    order = VisitOrder(path, "P001", 1, folder / "data", simulated=True)
+    order = SessionConfig(path, "P001", 1, folder / "data", simulated=True)
     said: list[str] = []
     with (
         a_jack_server(folder, real_time=real_time) as (name, log),

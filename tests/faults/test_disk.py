@@ -8,8 +8,8 @@ from recording.test_full_disk import in_namespace, needs_mounts
 from rehearsal import SHORT, a_study
 
 from labcrane import RecordingError
-from labcrane.console import Command, Order
-from labcrane.session import Visit, record
+from labcrane.session.commands import Command, Order
+from labcrane.session.session import Visit, record
 
 SESSION = """
 import sys
@@ -19,9 +19,10 @@ from pathlib import Path
 import numpy as np
 from rehearsal import SHORT, a_study
 
-from labcrane import open_recording, session
-from labcrane.console import Command, Order
-from labcrane.session import Visit, run
+from labcrane import open_recording
+from labcrane.session import session
+from labcrane.session.commands import Command, Order
+from labcrane.session.session import Visit, run
 
 folder = Path(sys.argv[1])
 ballast = folder / "ballast"
@@ -86,7 +87,7 @@ folder = Path(sys.argv[1])
 subprocess.run(["mount", "-o", "remount,ro", str(folder)], check=True)
 from rehearsal import SHORT, ScriptedConsole, a_study
 from labcrane import RecordingError
-from labcrane.session import Visit, run
+from labcrane.session.session import Visit, run
 study = a_study(Path(tempfile.mkdtemp()), SHORT)
 try:
     run(Visit(study, "P001", 1, folder / "data", simulated=True, fast=True), ScriptedConsole())

@@ -11,8 +11,8 @@ from faults.sessions import unique
 from simple_crane import FORM
 
 import labcrane as lab
-from labcrane.console import Command, Order
-from labcrane.records import Event
+from labcrane.core.records import Event
+from labcrane.session.commands import Command, Order
 
 STUDY = (
     """\

@@ -22,10 +22,10 @@ from faults.sessions import (
 )
 
 from labcrane import open_recording
-from labcrane.conclusion import conclude
-from labcrane.progress import progress
-from labcrane.recording.recover import recover
-from labcrane.recording.xdf_reader import read_xdf
+from labcrane.recording.participant_file.recover import recover
+from labcrane.recording.xdf.reader import read_xdf
+from labcrane.session.postprocess import conclude
+from labcrane.session.resume import progress
 
 SIXTY = [pytest.mark.long, pytest.mark.timeout(1500)]
 """The first of these tests waits for all sessions to be killed and recovered."""

@@ -9,8 +9,8 @@ from rehearsal import SHORT, a_study
 from windows import an_x_server
 
 from labcrane.errors import DeviceError
-from labcrane.feedback_crew import FeedbackCrew
-from labcrane.session import Visit
+from labcrane.feedback.processes import FeedbackProcesses
+from labcrane.session.session import Visit
 
 STUDY = """\
 feedback:
@@ -40,9 +40,9 @@ def bare_computer() -> Iterator[None]:
         yield
 
 
-def crew(folder: Path, text: str, policy: str) -> FeedbackCrew:
+def crew(folder: Path, text: str, policy: str) -> FeedbackProcesses:
     study = a_study(folder, SHORT + text + f"on_fault: {{feedback_lost: {policy}}}\n")
-    return FeedbackCrew(Visit(study, "P001", 1, folder, simulated=True))
+    return FeedbackProcesses(Visit(study, "P001", 1, folder, simulated=True))
 
 
 def test_a_session_goes_on_without_what_is_missing_where_the_protocol_says_so(

@@ -15,13 +15,14 @@ from faults.faulty_study import (
     run_through,
 )
 
-from labcrane import LabcraneError, feedback_keeper, open_recording
-from labcrane import stillness as stillness_module
+from labcrane import LabcraneError, open_recording
 from labcrane.cli.app import main
-from labcrane.console import QueueConsole
-from labcrane.launcher import Launcher, Outcome
-from labcrane.recording.recording import SessionRecord
-from labcrane.session_process import VisitOrder
+from labcrane.feedback import handle as feedback_keeper
+from labcrane.launcher import hang_detector as stillness_module
+from labcrane.launcher.launcher import Launcher, Outcome
+from labcrane.launcher.session_process import SessionConfig
+from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.session.commands import QueueConsole
 
 
 @pytest.mark.long
@@ -64,7 +65,7 @@ def recorded_in_parts(protocol: Path) -> SessionRecord:
 
 
 def launch(protocol: Path) -> tuple[Outcome, list[str]]:
-    order = VisitOrder(
+    order = SessionConfig(
         protocol, "P001", 1, protocol.parent / "data", simulated=True, feedback=False
     )
     told: list[str] = []
@@ -123,7 +124,7 @@ def present(protocol: Path, cue: str, views: list[str]) -> tuple[SessionRecord, 
     lines = "\n".join(f"  {view}: {{use: faulty_feedback, how: {view}}}" for view in views)
     study = protocol.read_text().replace("limit_s: 0.5", "limit_s: 3")
     protocol.write_text(study + PRESENTING.format(cue=cue, views=lines))
-    order = VisitOrder(protocol, "P001", 1, protocol.parent / "data", simulated=True)
+    order = SessionConfig(protocol, "P001", 1, protocol.parent / "data", simulated=True)
     assert Launcher(order, QueueConsole(), lambda text: None).run().died is None
     session = recorded(protocol)
     assert session is not None

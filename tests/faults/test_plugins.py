@@ -10,9 +10,9 @@ from rehearsal import ScriptedConsole
 
 from labcrane import PluginError
 from labcrane.cli.app import main
-from labcrane.registry import discover
-from labcrane.session import Visit, run
-from labcrane.study import load
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
+from labcrane.session.session import Visit, run
 
 
 @pytest.mark.parametrize(
@@ -70,8 +70,12 @@ NONSENSE = {
     ("dynamics", "state", "nan"): "returned joint.angle.shoulder nan in tick",
     ("dynamics", "step", "nan"): "returned joint.angle.shoulder nan in tick 49",
     ("dynamics", "step", "short"): "returned shape (13,), and its signals promise (14,) in tick 49",
-    ("task", "judge", "judged_short"): "returned shape (6,), and its signals promise (7,) in tick",
-    ("task", "judge", "nothing"): "returned None in tick",
+    (
+        "task",
+        "evaluate",
+        "judged_short",
+    ): "returned shape (6,), and its signals promise (7,) in tick",
+    ("task", "evaluate", "nothing"): "returned None in tick",
 }
 
 

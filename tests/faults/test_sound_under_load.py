@@ -13,8 +13,8 @@ from faults.sessions import unique
 from jack_server import real_time_is_allowed
 from simple_crane import FORM
 
-from labcrane.console import Command, Order
-from labcrane.records import Event
+from labcrane.core.records import Event
+from labcrane.session.commands import Command, Order
 
 STUDY = (
     """\

@@ -5,7 +5,7 @@ from pathlib import Path
 from governed import Lab
 
 from labcrane import ProtocolError
-from labcrane.admission import gate
+from labcrane.session.eligibility import check_eligibility
 
 MACHINE = (Path(__file__).parents[2] / "labcrane" / "machines" / "ch8.yaml").read_text()
 
@@ -28,7 +28,7 @@ def approved_lab(folder: Path) -> Lab:
 def refusal(lab: Lab) -> list[str]:
     """Return the differences for which P001 is refused; nothing when P001 may be run."""
     try:
-        gate(lab.visit("P001"))
+        check_eligibility(lab.visit("P001"))
     except ProtocolError as error:
         first, *lines, last = str(error).splitlines()
         assert first.endswith("is not the study that was approved under 'KB-12/2026':")

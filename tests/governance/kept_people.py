@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 from governed import TODAY, Lab
 
-from labcrane.participants import unfinished
-from labcrane.participants.places import Places
+from labcrane.participants import recovery as unfinished
+from labcrane.participants.folders import Places
 from labcrane.participants.register import read
 
 REASON = "withdrew consent"

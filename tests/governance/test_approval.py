@@ -9,10 +9,10 @@ from governance.approved_lab import approved_lab, refusal
 from governed import TODAY, Lab, edit
 
 from labcrane import ProtocolError
-from labcrane.admission import gate
 from labcrane.approval.decision import Grant, amend, approve
 from labcrane.approval.lock import lock_path, read_lock
-from labcrane.registry import discover
+from labcrane.registry.registry import discover
+from labcrane.session.eligibility import check_eligibility
 
 
 @pytest.fixture
@@ -22,12 +22,12 @@ def lab(tmp_path: Path) -> Lab:
 
 def test_an_expired_approval_is_refused(lab: Lab) -> None:
     last = date.fromisoformat(read_lock(lab.protocol).approval["valid_until"])
-    gate(lab.visit("P001"), last)
+    check_eligibility(lab.visit("P001"), last)
     with pytest.raises(
         ProtocolError,
         match=rf"the approval 'KB-12/2026' was valid until {last}, today is .*labcrane amend",
     ):
-        gate(lab.visit("P001"), last + timedelta(1))
+        check_eligibility(lab.visit("P001"), last + timedelta(1))
 
 
 def test_a_lock_that_was_edited_by_hand_is_refused(lab: Lab) -> None:
@@ -35,10 +35,10 @@ def test_a_lock_that_was_edited_by_hand_is_refused(lab: Lab) -> None:
     with pytest.raises(
         ProtocolError, match="was edited by hand or is damaged: its content does not match its seal"
     ):
-        gate(lab.visit("P001"))
+        check_eligibility(lab.visit("P001"))
     lock_path(lab.protocol).write_text("{")
     with pytest.raises(ProtocolError, match="was edited by hand or is damaged: it cannot be read"):
-        gate(lab.visit("P001"))
+        check_eligibility(lab.visit("P001"))
 
 
 def test_a_study_that_was_never_approved_is_refused_for_people_only(tmp_path: Path) -> None:
@@ -46,16 +46,16 @@ def test_a_study_that_was_never_approved_is_refused_for_people_only(tmp_path: Pa
     with pytest.raises(
         ProtocolError, match=r"has not been approved: .* labcrane approve, or .* --pilot"
     ):
-        gate(lab.visit("P001"))
-    assert gate(lab.visit("P001", pilot=True)).slot is None
-    assert gate(lab.visit("P001", simulated=True)).slot is None
+        check_eligibility(lab.visit("P001"))
+    assert check_eligibility(lab.visit("P001", pilot=True)).slot is None
+    assert check_eligibility(lab.visit("P001", simulated=True)).slot is None
 
 
 def test_pilots_run_whatever_has_drifted_and_stamp_it(lab: Lab) -> None:
     from rehearsal import ScriptedConsole
 
     import labcrane
-    from labcrane.session import run
+    from labcrane.session.session import run
 
     edit(lab.protocol, "movements: 1", "movements: 2")
     path = run(lab.visit("P001", pilot=True, simulated=True, fast=True), ScriptedConsole())
@@ -118,6 +118,6 @@ def test_an_amended_consent_text_needs_a_new_consent(lab: Lab) -> None:
     grant = Grant("Ethics board", "A1", TODAY + timedelta(99), lock.consent)
     amend(lab.study, discover(), grant, "clearer", TODAY)
     with pytest.raises(ProtocolError, match=r"has not consented to .*, only to version"):
-        gate(lab.visit("P001"))
+        check_eligibility(lab.visit("P001"))
     lab.consent("P001")
-    gate(lab.visit("P001"))
+    check_eligibility(lab.visit("P001"))

@@ -12,15 +12,15 @@ from rehearsal import ScriptedConsole, a_study
 
 import labcrane
 from labcrane import ProtocolError
-from labcrane.allocation import allocate, as_csv, balance
 from labcrane.approval.codebook import codebook
 from labcrane.approval.decision import Grant, amend
 from labcrane.approval.lock import read_lock
 from labcrane.approval.methods import methods
 from labcrane.cli.app import main
-from labcrane.plan import plan_session
-from labcrane.registry import discover
-from labcrane.session import Visit, run
+from labcrane.design.allocation import allocate, as_csv, balance
+from labcrane.design.plan import plan_session
+from labcrane.registry.registry import discover
+from labcrane.session.session import Visit, run
 
 FACTORS = GROUPED.replace("distances: [2]", "distances: [2, 3]").replace(", pairs: 1", "")
 FRAMES = ("loop", "input", "command", "state", "task")
@@ -163,7 +163,7 @@ def test_the_balance_of_36_participants_is_checked_and_exported(
 
 
 def labcrane_study(path: Path):
-    from labcrane.study import load
+    from labcrane.protocol.study import load
 
     return load(path, discover())
 

@@ -15,7 +15,7 @@ from governance.kept_people import (
 from governed import TODAY, Lab
 
 from labcrane import ProtocolError
-from labcrane.participants import unfinished
+from labcrane.participants import recovery as unfinished
 from labcrane.participants.copies import record_export
 from labcrane.participants.register import read
 

@@ -10,9 +10,9 @@ import pytest
 from governed import Lab, edit
 
 from labcrane import ProtocolError
-from labcrane.admission import gate
 from labcrane.approval.lock import lock_path
-from labcrane.participants.places import Places
+from labcrane.participants.folders import Places
+from labcrane.session.eligibility import check_eligibility
 
 RESCUE = Path(__file__).parents[2] / "protocols" / "retrieval"
 ASKED = """
@@ -74,10 +74,10 @@ def test_labcrane_run_refuses_another_number_or_question_in_any_file_and_names_i
 
 def test_each_of_these_files_alone_is_refused(rescue: Lab) -> None:
     for name, (old, new) in DRIFTS.items():
-        gate(rescue.visit("R001"))
+        check_eligibility(rescue.visit("R001"))
         edit(rescue.folder / name, old, new)
         with pytest.raises(ProtocolError, match=f"\n  file {name}: "):
-            gate(rescue.visit("R001"))
+            check_eligibility(rescue.visit("R001"))
         edit(rescue.folder / name, new, old)
 
 
@@ -86,7 +86,7 @@ def test_the_lock_holds_wherever_the_files_are_moved(rescue: Lab) -> None:
     rescue.folder.rename(elsewhere)
     rescue.folder, rescue.protocol = elsewhere, elsewhere / "study.yaml"
     rescue.places = Places(elsewhere / "data")
-    gate(rescue.visit("R001"))
+    check_eligibility(rescue.visit("R001"))
 
 
 def test_a_file_that_would_not_move_with_the_study_is_not_approved(rescue: Lab) -> None:

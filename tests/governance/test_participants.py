@@ -12,12 +12,12 @@ from governed import GOVERNED, GROUPED, TODAY, Lab, Willing
 
 import labcrane
 from labcrane import DeviceError, ProtocolError
-from labcrane.admission import gate
-from labcrane.console import Command, Order
 from labcrane.participants import enrolment
 from labcrane.participants.deviations import all_deviations
+from labcrane.participants.personal_data import personal
 from labcrane.participants.register import changed, read
-from labcrane.privacy import personal
+from labcrane.session.commands import Command, Order
+from labcrane.session.eligibility import check_eligibility
 
 TWO_SESSIONS = GOVERNED + (
     "  - name: retention\n    after_days: [1, 3]\n    steps:\n"
@@ -37,9 +37,9 @@ def test_a_participant_without_consent_is_refused(lab: Lab) -> None:
         ProtocolError,
         match=r"P001 has not consented to consent_v2\.txt \(version [0-9a-f]{12}\); once .* conf",
     ):
-        gate(lab.visit("P001"))
+        check_eligibility(lab.visit("P001"))
     lab.consent("P001")
-    assert gate(lab.visit("P001")).slot == 1
+    assert check_eligibility(lab.visit("P001")).slot == 1
 
 
 def test_a_session_leaves_approval_consent_slot_and_group_in_the_file(tmp_path: Path) -> None:
@@ -85,7 +85,7 @@ def test_the_deviations_of_a_session_that_was_killed_come_from_its_journal(lab: 
     lab.consent("P001")
     child = os.fork()
     if child == 0:
-        from labcrane.session import run
+        from labcrane.session.session import run
 
         class Killer(Willing):
             def commands(self):
@@ -104,7 +104,7 @@ def test_the_deviations_of_a_session_that_was_killed_come_from_its_journal(lab: 
 
 def test_a_session_that_never_was_recorded_was_none(lab: Lab) -> None:
     lab.consent("P001")
-    gate(lab.visit("P001"))
+    check_eligibility(lab.visit("P001"))
     assert len(read(lab.places).participants["P001"].sessions) == 1
     assert all_deviations(lab.places) == []
     lab.run("P001")
@@ -117,7 +117,7 @@ def test_a_session_out_of_its_window_is_refused_and_can_be_waived(tmp_path: Path
     lab.approve()
     lab.consent("P001")
     with pytest.raises(ProtocolError, match="P001 has not run session 1; session 2 comes after it"):
-        gate(lab.visit("P001", 2))
+        check_eligibility(lab.visit("P001", 2))
     lab.run("P001")
     first, last = TODAY + timedelta(1), TODAY + timedelta(3)
     for day in (TODAY, last + timedelta(1)):
@@ -126,11 +126,11 @@ def test_a_session_out_of_its_window_is_refused_and_can_be_waived(tmp_path: Path
             match=f"session 2 of participant P001 is due {first} to {last}, 1 to 3 days after "
             f"session 1; today is {day}; labcrane waive lets it be run, as a deviation",
         ):
-            gate(lab.visit("P001", 2), day)
+            check_eligibility(lab.visit("P001", 2), day)
     for day in (first, last):
-        gate(lab.visit("P001", 2), day)
+        check_eligibility(lab.visit("P001", 2), day)
     enrolment.waive(lab.places, "P001", 2, "was ill", TODAY)
-    gate(lab.visit("P001", 2), last + timedelta(9))
+    check_eligibility(lab.visit("P001", 2), last + timedelta(9))
     assert [(d.what, d.session, d.detail) for _, d in all_deviations(lab.places)] == [
         ("window waived", 2, "was ill")
     ]
@@ -144,7 +144,7 @@ def test_who_is_excluded_leaves_the_slot_to_the_next_and_is_not_run(lab: Lab) ->
     slots = {name: entry.slot for name, entry in read(lab.places).participants.items()}
     assert slots == {"P001": 1, "P002": 2, "P003": 3, "P004": 2}
     with pytest.raises(ProtocolError, match=r"P002 was excluded on .*: moved away"):
-        gate(lab.visit("P002"))
+        check_eligibility(lab.visit("P002"))
 
 
 def test_a_participant_in_two_groups_is_refused(tmp_path: Path) -> None:
@@ -161,7 +161,7 @@ def test_a_participant_in_two_groups_is_refused(tmp_path: Path) -> None:
         match=f"P001 would be in two groups: enrolled in '{written}', but slot 1 of the protocol "
         f"is in '{planned}'",
     ):
-        gate(lab.visit("P001"))
+        check_eligibility(lab.visit("P001"))
 
 
 def test_a_pseudonym_that_does_not_match_is_refused(lab: Lab) -> None:
@@ -224,7 +224,7 @@ def test_people_need_joysticks_and_leave_no_session_when_there_are_none(tmp_path
     lab = Lab(tmp_path, GOVERNED.replace("{use: simulated_operator}", "{use: dual_joystick}"))
     lab.approve()
     lab.consent("P001")
-    from labcrane.session import run
+    from labcrane.session.session import run
 
     with desk(), pytest.raises(DeviceError, match="joystick"):
         run(lab.visit("P001"), Willing())

@@ -11,9 +11,9 @@ import pytest
 from governed import GROUPED, Lab
 
 from labcrane import ProtocolError, RecordingError
-from labcrane.admission import gate
-from labcrane.participants.places import Places
+from labcrane.participants.folders import Places
 from labcrane.participants.register import changed, read
+from labcrane.session.eligibility import check_eligibility
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def test_a_register_edited_into_the_impossible_is_refused(lab: Lab, edit, said: 
         lab.consent(name)
     lab.places.register.write_text(edit(lab.places.register.read_text()))
     with pytest.raises(RecordingError, match=said):
-        gate(lab.visit("P001"))
+        check_eligibility(lab.visit("P001"))
 
 
 def test_another_studys_register_is_refused(lab: Lab) -> None:
@@ -45,7 +45,7 @@ def test_another_studys_register_is_refused(lab: Lab) -> None:
     with changed(lab.places) as register:
         register.study = "welding"
     with pytest.raises(ProtocolError, match="the register is of study 'welding', the protocol of"):
-        gate(lab.visit("P001"))
+        check_eligibility(lab.visit("P001"))
     with pytest.raises(ProtocolError, match="the register is of study 'welding', the protocol of"):
         lab.consent("P002")
 
@@ -80,7 +80,7 @@ def test_processes_that_write_at_once_lose_nothing_and_share_no_slot(tmp_path: P
 WRITER = """
 import sys
 from pathlib import Path
-from labcrane.participants.places import Places
+from labcrane.participants.folders import Places
 from labcrane.participants.register import Entry, changed
 number = 0
 while True:

@@ -10,11 +10,11 @@ from governed import TODAY, Lab
 
 import labcrane
 from labcrane import ProtocolError
-from labcrane.participants import unfinished
+from labcrane.participants import recovery as unfinished
 from labcrane.participants.deviations import all_deviations
 from labcrane.participants.register import read
 from labcrane.recording.journal_reader import read_journal
-from labcrane.recording.xdf_reader import read_xdf
+from labcrane.recording.xdf.reader import read_xdf
 
 
 def check_relabelled(lab: Lab) -> None:
@@ -71,7 +71,7 @@ def test_relabelling_changes_the_number_and_keeps_everything_else(lab: Lab) -> N
 
 
 def test_a_relabelled_file_is_what_recover_would_make_of_its_journals(lab: Lab) -> None:
-    from labcrane.recording.recover import recover
+    from labcrane.recording.participant_file.recover import recover
 
     relabel(lab)
     (found,) = [r for r in recover(lab.places.root) if r.path.name == "P008.h5"]

@@ -7,7 +7,7 @@ from governance.kept_people import KILLS, REASON, check_erased, copied, files, k
 from governed import TODAY, Lab
 
 from labcrane import RecordingError
-from labcrane.participants import unfinished
+from labcrane.participants import recovery as unfinished
 
 
 def test_transfer_copies_proves_and_lists_what_is_only_here(lab: Lab) -> None:

@@ -14,10 +14,11 @@ from faults.sessions import unique, wait_for
 from pages.room import STUDY, Room, a_room, photograph, press, shown, text
 from selenium import webdriver
 
-from labcrane import Frame, Tick, open_recording, rig
-from labcrane.recording.recording import SessionRecord
-from labcrane.registry import discover
-from labcrane.study import load
+from labcrane import Frame, Tick, open_recording
+from labcrane.protocol import rig
+from labcrane.protocol.study import load
+from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.registry.registry import discover
 from labcrane.testing import ch8
 from labcrane_view.settings import ViewSettings
 from labcrane_view.view import View

@@ -16,8 +16,8 @@ from faults.sessions import labcrane, unique, wait_for
 from pages.room import STUDY, Room, a_room
 
 from labcrane import open_recording
-from labcrane.console import FAULTS
-from labcrane.recording.recording import SessionRecord
+from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.session.commands import FAULTS
 
 RATE_HZ = 240
 SPELL_S = 0.7

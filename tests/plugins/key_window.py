@@ -4,23 +4,23 @@ import select
 import sys
 from pathlib import Path
 
-from labcrane.host_order import HostOrder, Part
-from labcrane.presenter import Presenter
-from labcrane.registry import discover
+from labcrane.feedback.config import FeedbackConfig, Part
+from labcrane.feedback.presenter import Presenter
+from labcrane.registry.registry import discover
 from labcrane.streams.feedback_log import FeedbackLog
-from labcrane.testing import TARGETS, a_run, a_target, ch8
+from labcrane.testing import TARGETS, ch8, make_run, make_target
 
 name = sys.argv[1]
-run = a_run(ch8(), task=TARGETS)
+run = make_run(ch8(), task=TARGETS)
 settings = {"size": (400, 300), "keys": ("a", "d", "arrow_up", "arrow_down"), "hud": ()}
-order = HostOrder(name, Part("view", settings), run, "a/test", Path("study.yaml"), always=True)
+order = FeedbackConfig(name, Part("view", settings), run, "a/test", Path("study.yaml"), always=True)
 presenter = Presenter(order, discover())
 presenter.open()
 log = FeedbackLog(name, "a/test", presenter)
 number = 0
 while not select.select([sys.stdin], [], [], 0.01)[0]:
     number += 1
-    frame = a_target(run, number)
+    frame = make_target(run, number)
     log.push(frame, presenter.present(frame), 0, presenter.feedback.samples())
     if number == 3:
         sys.stdout.write("ready\n")

@@ -5,12 +5,12 @@ import sys
 
 import numpy as np
 
-from labcrane import Ball
-from labcrane.testing import TARGETS, a_run, a_target, ch8
+from labcrane import Sphere
+from labcrane.testing import TARGETS, ch8, make_run, make_target
 from labcrane_view.settings import ViewSettings
 from labcrane_view.view import View
 
-run = a_run(ch8(), task=TARGETS)
+run = make_run(ch8(), task=TARGETS)
 camera = {"eye": (0, 0, 0), "look": (5, 0, 0)}
 settings = ViewSettings(
     size=(200, 120), camera=camera, content="feedback", hud=(), targets=False, shadow=0
@@ -40,9 +40,9 @@ def on_screen() -> int:
 
 
 def show(number: int) -> None:
-    frame = a_target(run, number)
+    frame = make_target(run, number)
     colour = (0.0, 0.0, number / 40, 1.0)
-    frame.shapes = (Ball("wall", (5.0, 0.0, 0.0), 3.0, colour),)
+    frame.shapes = (Sphere("wall", (5.0, 0.0, 0.0), 3.0, colour),)
     view.present(frame)
 
 

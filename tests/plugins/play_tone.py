@@ -10,23 +10,23 @@ import os
 import sys
 import time
 
-from labcrane.testing import TARGETS, a_run, a_target, ch8
+from labcrane.testing import TARGETS, ch8, make_run, make_target
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sonification.sonification import Sonification
 
 BLOCK, RATE = 1024, 48000
-run = a_run(ch8(), task=TARGETS)
+run = make_run(ch8(), task=TARGETS)
 seconds, holding = float(sys.argv[1]), sys.argv[2:] == ["holding"]
 with_lock = ctypes.PyDLL(None)
 sonification = Sonification(SonificationSettings(driver="jack", block=BLOCK, rate_hz=RATE))
 sonification.open(run)
-facts, policy = sonification.facts(), os.sched_getscheduler(0)
+facts, policy = sonification.metadata(), os.sched_getscheduler(0)
 began = time.perf_counter()
-first = values = sonification.present(a_target(run))
+first = values = sonification.present(make_target(run))
 changes = holds = 0
 while (passed := time.perf_counter() - began) < seconds:
     changes += 1
-    values = sonification.present(a_target(run, changes % 200))
+    values = sonification.present(make_target(run, changes % 200))
     if holding and passed > 0.5 * (1 + holds):
         with_lock.usleep(round(5.5e6 * BLOCK / RATE))
         holds += 1

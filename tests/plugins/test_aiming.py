@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from labcrane import Phase, ProtocolError, Task, reach
-from labcrane.machine_file import load_machine
-from labcrane.testing import TaskContract, a_frame, a_run, a_trial, ch8, crane_at, opened
+from labcrane.machines.library import load_machine
+from labcrane.testing import TaskContract, ch8, crane_at, make_frame, make_run, make_trial, opened
 from labcrane_aiming import labcrane_tasks
 from labcrane_aiming.aiming import Aiming
 from labcrane_aiming.pairs import index_of_difficulty, pairs
@@ -82,19 +82,19 @@ class Path:
         self.target = np.array([self.planned.condition[f"target_{axis}"] for axis in "xyz"])
 
     def play(self, fractions, *, trigger=(), commands=()):
-        run = a_run(ch8(), task=self.task.signals)
+        run = make_run(ch8(), task=self.task.signals)
         tip, velocity = run.state.find("tip.position"), run.state.find("tip.velocity")
         positions = self.start + np.outer(fractions, self.target - self.start)
         speeds = np.gradient(positions, 1 / RATE_HZ, axis=0)
         judgements = []
         with opened(self.task, run):
-            self.task.begin_trial(a_trial(self.planned))
+            self.task.begin_trial(make_trial(self.planned))
             for number, (position, speed) in enumerate(zip(positions, speeds, strict=True)):
-                frame = a_frame(run, number, crane_at(run.machine, run.machine.rest))
+                frame = make_frame(run, number, crane_at(run.machine, run.machine.rest))
                 frame.state[tip], frame.state[velocity] = position, speed
                 frame.axes[run.axes.index("right.trigger")] = number in trigger
                 frame.command[0] = number in commands
-                judgements.append(self.task.judge(frame))
+                judgements.append(self.task.evaluate(frame))
                 if judgements[-1].phase.over:
                     break
         return judgements

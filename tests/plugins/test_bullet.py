@@ -5,7 +5,7 @@ import pytest
 from cranes import build, cranes, drive, machines, needs_bullet, random_sticks, rates, standing
 
 from labcrane import Arm, Dynamics, jacobian
-from labcrane.machine_file import load_machine
+from labcrane.machines.library import load_machine
 from labcrane.testing import RATE_HZ, DynamicsContract, ch8, crane_state
 
 

@@ -22,8 +22,8 @@ from cranes import (
 )
 from rehearsal import SHORT, a_study, rehearse
 
-from labcrane import PRESETS, Arm, FloatArray, Machine, frames
-from labcrane.machine_file import load_machine
+from labcrane import ACTUATOR_PRESETS, Arm, FloatArray, Machine, link_frames
+from labcrane.machines.library import load_machine
 from labcrane.testing import RATE_HZ, ch8
 
 
@@ -82,7 +82,7 @@ def engine(tmp_path: Path) -> Engine:
 @needs_bullet
 @machines
 @rates
-@pytest.mark.parametrize("actuator", PRESETS)
+@pytest.mark.parametrize("actuator", ACTUATOR_PRESETS)
 def test_the_engine_follows_the_velocity_law(model: str, rate_hz: float, actuator: str) -> None:
     """Tolerance 1e-9: commands that the motors are strong enough for are met exactly."""
     machine = load_machine(model)
@@ -125,7 +125,9 @@ def test_engine_matrices_and_scalars_put_the_tip_in_the_same_place(
     with engine.loaded(machine) as body:
         for pose in random_poses(machine, 1000).tolist():
             tip = body.tip(pose)
-            np.testing.assert_allclose(frames(machine, pose)[-1, :3, 3], tip, rtol=0, atol=1e-6)
+            np.testing.assert_allclose(
+                link_frames(machine, pose)[-1, :3, 3], tip, rtol=0, atol=1e-6
+            )
             np.testing.assert_allclose(arm.tip(pose), tip, rtol=0, atol=1e-6)
 
 
@@ -139,7 +141,7 @@ def test_a_crane_stands_where_it_was_put(name: str, model: str) -> None:
             for state in (crane.state(), crane.step(np.zeros(4), 1 / RATE_HZ)):
                 np.testing.assert_allclose(state[:4], pose, rtol=0, atol=1e-7)
                 np.testing.assert_allclose(
-                    state[8:11], frames(machine, pose)[-1, :3, 3], rtol=0, atol=1e-6
+                    state[8:11], link_frames(machine, pose)[-1, :3, 3], rtol=0, atol=1e-6
                 )
 
 
@@ -151,7 +153,7 @@ def test_boxes_are_drawn_where_the_engine_has_the_masses(model: str, engine: Eng
     assert [box.name for box in boxes] == list(machine.names)
     with engine.loaded(machine) as body:
         for pose in random_poses(machine, 20).tolist():
-            placed = frames(machine, pose)
+            placed = link_frames(machine, pose)
             for box, mass in zip(boxes, body.masses(pose), strict=True):
                 centre = placed[box.frame] @ [*box.centre, 1.0]
                 np.testing.assert_allclose(centre[:3], mass, rtol=0, atol=1e-9)
@@ -160,12 +162,12 @@ def test_boxes_are_drawn_where_the_engine_has_the_masses(model: str, engine: Eng
 PROGRAM = """
 import hashlib, sys
 import numpy as np
-from labcrane.testing import a_run, ch8, RATE_HZ
+from labcrane.testing import make_run, ch8, RATE_HZ
 from labcrane_bullet import labcrane_dynamics
 name, actuator = sys.argv[1:]
 (offer,) = (offer for offer in labcrane_dynamics() if offer.name == name)
 crane = offer.build(offer.settings.model_validate({"actuator": actuator}), ch8())
-crane.open(a_run(ch8()))
+crane.open(make_run(ch8()))
 random, digest = np.random.default_rng(7), hashlib.sha256()
 for command in np.repeat(random.uniform(-1, 1, (40, 4)), 60, axis=0) * ch8().speeds:
     digest.update(crane.step(command, 1 / RATE_HZ).tobytes())

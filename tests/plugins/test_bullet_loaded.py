@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from cranes import build, drive, needs_bullet, random_poses, standing
 
-from labcrane import Arm, Dynamics, FloatArray, ProtocolError, frames
-from labcrane.registry import discover
-from labcrane.study import load
+from labcrane import Arm, Dynamics, FloatArray, ProtocolError, link_frames
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
 from labcrane.testing import RATE_HZ, DynamicsContract, ch8
 
 pytestmark = needs_bullet
@@ -96,9 +96,9 @@ def test_what_hangs_loads_each_joint_by_its_lever(settings: dict[str, object]) -
                 crane.reset(pose)
                 last = drive(crane, np.zeros((20, 4)))[-1]
                 loads.append([found(crane, last, f"joint.load.{name}") for name in MACHINE.names])
-        tip = frames(MACHINE, pose)[-1, :3, 3]
+        tip = link_frames(MACHINE, pose)[-1, :3, 3]
         for joint in (1, 2, 3):
-            axis = frames(MACHINE, pose)[joint, :3, 3]
+            axis = link_frames(MACHINE, pose)[joint, :3, 3]
             lever = (tip - axis)[:2] @ np.array([math.cos(pose[0]), math.sin(pose[0])])
             torque = -150.0 * GRAVITY * lever  # positive pitch is down, so drives pull up
             got = (loads[1][joint] - loads[0][joint]) * MACHINE.joints[joint].effort

@@ -10,7 +10,7 @@ import pytest
 from cranes import build, cranes, needs_bullet, standing
 
 from labcrane import PluginError, ProtocolError, Signal
-from labcrane.testing import RATE_HZ, a_run, ch8
+from labcrane.testing import RATE_HZ, ch8, make_run
 
 
 @cranes
@@ -22,7 +22,7 @@ def test_the_joints_command_is_found_wherever_it_stands(name: str) -> None:
         Signal("scale", "1"),
     )
     crane = build(name, machine)
-    crane.open(a_run(machine, command=command))
+    crane.open(make_run(machine, command=command))
     try:
         wanted = 0.1 * np.array(machine.speeds)
         pushed = np.array([9.0, 9.0, *wanted, 9.0])
@@ -38,7 +38,7 @@ def test_a_scheme_for_another_machine_is_refused(name: str) -> None:
     crane = build(name, ch8())
     two = (Signal("command", "rad/s", ("slew", "boom")),)
     with pytest.raises(ProtocolError, match=r"commands 2 joints; this machine has 4 \(slew,"):
-        crane.open(a_run(ch8(), command=two))
+        crane.open(make_run(ch8(), command=two))
     crane.close()
 
 
@@ -64,7 +64,7 @@ def test_a_tick_of_another_length_is_refused(name: str) -> None:
 def test_a_crane_closes_twice_and_without_having_been_opened(name: str) -> None:
     crane = build(name, ch8())
     crane.close()
-    crane.open(a_run(ch8()))
+    crane.open(make_run(ch8()))
     crane.close()
     crane.close()
 
@@ -79,7 +79,7 @@ def test_the_engine_leaves_no_file_behind(tmp_path: Path, monkeypatch: pytest.Mo
 
 @cranes
 def test_the_record_says_which_delays_were_used(name: str) -> None:
-    facts: Mapping[str, object] = build(name, ch8(), "hydraulic").facts()
+    facts: Mapping[str, object] = build(name, ch8(), "hydraulic").metadata()
     assert facts["actuator.dead_time_s"] == 0.06
     assert facts["actuator.lag_s"] == 0.15
     assert facts["actuator.rate_limit"] == 4.0

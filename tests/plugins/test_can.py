@@ -9,11 +9,11 @@ import pytest
 from slcan_adapter import SlcanAdapter
 
 from labcrane import InputDevice, ProtocolError, Tick
-from labcrane.testing import InputContract, a_frame, a_run, ch8
+from labcrane.testing import InputContract, ch8, make_frame, make_run
 from labcrane.testing.commands import CommandContract
 from labcrane_can import labcrane_commands
-from labcrane_can.asked import PanelCommands
 from labcrane_can.avc import ESTIMATED, FULL, FrameError, State, decode, encode, encode_flow
+from labcrane_can.command_state import PanelCommands
 from labcrane_can.panel import CanPanel
 from labcrane_can.replay import CanReplay
 from labcrane_can.settings import CanSettings, ReplaySettings, ValveMap
@@ -58,9 +58,9 @@ def a_log(path: Path, seed: int = 2) -> Path:
 
 
 def commands_of(device: InputDevice, ticks: int) -> bytes:
-    run = a_run(ch8(), axes=device.signals)
+    run = make_run(ch8(), axes=device.signals)
     device.open(run)
-    frame = a_frame(run)
+    frame = make_frame(run)
     read = [device.read(Tick(number, 0.0, 0.0), frame).tobytes() for number in range(ticks)]
     device.close()
     return b"".join(read)
@@ -112,14 +112,14 @@ def test_malformed_commands_are_refused_and_told_when_the_panel_is_missed(
     with can.Bus(interface="virtual", channel=f"bad-{data.hex()}") as bus:
         settings = CanSettings(bus=f"virtual:bad-{data.hex()}", valves=VALVES)
         device = CanPanel(settings, ch8())
-        run = a_run(ch8(), axes=device.signals)
+        run = make_run(ch8(), axes=device.signals)
         device.open(run)
         try:
             bus.send(message(0x0CFE3125, data))
             bus.send(message(0x18F00425, bytes(8)))
             wait_for(lambda: device._commands.refused and device._commands.foreign)
             now = time.perf_counter()
-            axes = device.read(Tick(1, now, now), a_frame(run))
+            axes = device.read(Tick(1, now, now), make_frame(run))
             assert not axes.any()
             assert device.fault == (
                 f"no valve command for 0.25 s on {settings.bus}; 1 frames were refused, the last "
@@ -143,7 +143,7 @@ def test_a_garbled_line_is_refused_and_the_next_frame_obeyed(garbled: bytes) -> 
     adapter = SlcanAdapter()
     device = CanPanel(CanSettings(bus=f"slcan:{adapter.path}", valves=VALVES), ch8())
     try:
-        device.open(a_run(ch8(), axes=device.signals))
+        device.open(make_run(ch8(), axes=device.signals))
         wait_for(lambda: adapter.opened)
         for _ in range(3):
             adapter.garble(garbled)
@@ -171,7 +171,7 @@ def test_float_block_and_old_commands_ask_for_no_flow() -> None:
 def test_a_single_open_valve_that_falls_silent_holds_the_machine_and_is_named() -> None:
     settings = CanSettings(bus="virtual:silent", valves=VALVES)
     device = CanPanel(settings, ch8())
-    run = a_run(ch8(), axes=device.signals)
+    run = make_run(ch8(), axes=device.signals)
     with can.Bus(interface="virtual", channel="silent") as bus:
         device.open(run)
         try:
@@ -183,7 +183,7 @@ def test_a_single_open_valve_that_falls_silent_holds_the_machine_and_is_named() 
                 asked = device._commands.asked
                 wait_for(lambda: all(asked[joint].time > before[joint] for joint in levels))
                 now = time.perf_counter()
-                return device.read(Tick(1, now, now), a_frame(run))[:4].tolist(), device.fault
+                return device.read(Tick(1, now, now), make_frame(run))[:4].tolist(), device.fault
 
             levels = {"slew": 0, "shoulder": 125, "elbow": -50}
             assert read(levels) == ([0.0, 0.5, -0.2, 0.0], None)
@@ -228,7 +228,7 @@ def test_a_candump_log_of_a_live_bus_replays_what_the_panel_was_heard_to_say(
     live = PanelCommands(ValveMap(valves=VALVES))
     frames = list(can.LogReader(path))
     device = CanReplay(ReplaySettings(file=path, valves=VALVES), ch8())
-    run = a_run(ch8(), axes=device.signals)
+    run = make_run(ch8(), axes=device.signals)
     device.open(run)
     waiting, start = list(frames), frames[0].timestamp
     for number in range(900):
@@ -236,7 +236,7 @@ def test_a_candump_log_of_a_live_bus_replays_what_the_panel_was_heard_to_say(
         while waiting and round(waiting[0].timestamp - start, 6) <= now:
             live.take(waiting[0], round(waiting.pop(0).timestamp - start, 6))
         expected = [signal / FULL for signal in live.signals(now)[0]]
-        assert device.read(Tick(number, 0.0, 0.0), a_frame(run))[:4].tolist() == expected
+        assert device.read(Tick(number, 0.0, 0.0), make_frame(run))[:4].tolist() == expected
 
 
 def test_what_is_no_log_is_refused_in_words(tmp_path: Path) -> None:
@@ -250,7 +250,7 @@ def test_what_is_no_log_is_refused_in_words(tmp_path: Path) -> None:
 def test_a_flooded_bus_holds_the_machine_and_says_so() -> None:
     settings = CanSettings(bus="virtual:flood", valves=VALVES, most_frames_s=300)
     device = CanPanel(settings, ch8())
-    run = a_run(ch8(), axes=device.signals)
+    run = make_run(ch8(), axes=device.signals)
     with can.Bus(interface="virtual", channel="flood") as bus:
         device.open(run)
         try:
@@ -260,7 +260,7 @@ def test_a_flooded_bus_holds_the_machine_and_says_so() -> None:
                     bus.send(message(*encode(1, 100, 0x25)))
                 time.sleep(0.002)
                 now = time.perf_counter()
-                axes = device.read(Tick(1, now, now), a_frame(run))
+                axes = device.read(Tick(1, now, now), make_frame(run))
             assert "virtual:flood is flooded:" in (device.fault or "")
             assert "where 300 are the most" in (device.fault or "")
             assert not axes.any()

@@ -7,7 +7,7 @@ import pytest
 
 from labcrane import ProtocolError
 from labcrane.__main__ import main
-from labcrane_can.asked import PanelCommands
+from labcrane_can.command_state import PanelCommands
 from labcrane_can.settings import ValveMap
 
 LEVERS = (

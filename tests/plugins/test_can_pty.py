@@ -10,13 +10,14 @@ import pytest
 from cranes import needs_bullet
 from rehearsal import NoLog, ScriptedConsole
 
-from labcrane import loop, rig
-from labcrane.clock import SystemClock
-from labcrane.console import Command, Order
-from labcrane.course import Course
-from labcrane.plan import plan_session
-from labcrane.registry import discover
-from labcrane.study import load
+from labcrane.core.clock import SystemClock
+from labcrane.design.plan import plan_session
+from labcrane.protocol import rig
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
+from labcrane.session import loop
+from labcrane.session.commands import Command, Order
+from labcrane.session.sequencer import Sequencer
 
 pytestmark = needs_bullet
 
@@ -76,7 +77,7 @@ def session(folder: Path, controls: str, seconds: int) -> list:
             command = frame.command[signal].copy()
             frames.append((frame.tick.woke, command, frame.paused, frame.events))
 
-        course = Course(study, plan, the_rig, waits=False)
+        course = Sequencer(study, plan, the_rig, waits=False)
         console = ScriptedConsole({240 * seconds: [Command(Order.END)]})
         loop.run(the_rig, run, course, SystemClock(), console, NoLog(), [keep])
     return frames

@@ -10,7 +10,7 @@ from contextlib import suppress
 import pytest
 
 from labcrane import DeviceError, Tick
-from labcrane.testing import a_frame, a_run, ch8
+from labcrane.testing import ch8, make_frame, make_run
 from labcrane_can.avc import encode
 from labcrane_can.panel import CanPanel
 from labcrane_can.settings import CanSettings
@@ -86,14 +86,14 @@ def server() -> Iterator[Server]:
 def test_a_panel_behind_socketcand_is_read_told_lost_and_found_again(server: Server) -> None:
     bus = f"socketcand:can0@127.0.0.1:{server.port}"
     device = CanPanel(CanSettings(bus=bus, valves=VALVES), ch8())
-    run = a_run(ch8(), axes=device.signals)
+    run = make_run(ch8(), axes=device.signals)
     device.open(run)
 
     def read_until(ready: Callable[[list[float]], bool]) -> list[float]:
         end = time.perf_counter() + 5.0
         while time.perf_counter() < end:
             now = time.perf_counter()
-            axes = device.read(Tick(0, now, now), a_frame(run))[:4].tolist()
+            axes = device.read(Tick(0, now, now), make_frame(run))[:4].tolist()
             if ready(axes):
                 return axes
             time.sleep(0.005)
@@ -124,5 +124,5 @@ def test_a_server_that_is_not_there_is_told_at_once() -> None:
     settings = CanSettings(bus=f"socketcand:can0@127.0.0.1:{port}", valves=VALVES)
     began = time.perf_counter()
     with pytest.raises(DeviceError, match=r"cannot be opened: .*refused; plug the adapter in"):
-        CanPanel(settings, ch8()).open(a_run(ch8()))
+        CanPanel(settings, ch8()).open(make_run(ch8()))
     assert time.perf_counter() - began < 5.0  # python-can alone would try for 10 s

@@ -13,7 +13,7 @@ import labcrane_dmd
 from labcrane import ProtocolError, RecordingError
 from labcrane.cli.app import main
 from labcrane_dmd.fitting import fit_model, fit_segment
-from labcrane_dmd.layer import linear, pchip
+from labcrane_dmd.interpolation import linear, pchip
 from labcrane_dmd.model import Model
 from labcrane_dmd.model_file import save
 from labcrane_dmd.recordings import read_recordings

@@ -9,14 +9,14 @@ from dmd_arms import MAP, MODEL, RETRIEVAL, build, standing, step
 
 import labcrane_dmd
 from labcrane import Arm, Controller, Dynamics, ProtocolError, Signal
-from labcrane.machine_file import load_machine
+from labcrane.machines.library import load_machine
 from labcrane.testing import (
     RATE_HZ,
     ControllerContract,
     DynamicsContract,
-    a_run,
     ch8,
     crane_at,
+    make_run,
 )
 from labcrane.testing.commands import CommandContract
 from labcrane_dmd import labcrane_commands
@@ -141,13 +141,13 @@ def test_a_practised_hand_asks_for_the_speed_that_the_model_gives() -> None:
     machine = load_machine("ied_arm.yaml", RETRIEVAL)
     valve = Valve(ValveSettings(model=MODEL), machine)
     axes = (Signal("valve", "1", machine.names),)
-    run = a_run(machine, axes=axes, command=valve.signals)
+    run = make_run(machine, axes=axes, command=valve.signals)
     valve.open(run)
     model = labcrane_dmd.load(MODEL)
     angles = [0.2, 0.3, -0.1, 0.5]
     state = crane_at(machine, angles)
     wanted = np.array([0.03, 0.04, -0.05])
-    signals = 250 * valve.steer(wanted, state)
+    signals = 250 * valve.inverse(wanted, state)
     speeds = [
         signals[0] / 250 * machine.speeds[0],
         model["arm"].speed(signals[1], angles[1]),

@@ -10,11 +10,12 @@ import pytest
 from cranes import needs_bullet
 from rehearsal import Rehearsal, rehearse
 
-from labcrane import FloatArray, Frame, InputDevice, Phase, Run, Signal, Tick, reach, rig
-from labcrane.console import Command, Order
-from labcrane.machine_file import load_machine
-from labcrane.registry import discover
-from labcrane.study import load
+from labcrane import FloatArray, Frame, InputDevice, Phase, Run, Signal, Tick, reach
+from labcrane.machines.library import load_machine
+from labcrane.protocol import rig
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
+from labcrane.session.commands import Command, Order
 
 pytestmark = needs_bullet
 

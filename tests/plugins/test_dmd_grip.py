@@ -9,7 +9,7 @@ from cranes import needs_bullet
 from dmd_arms import RETRIEVAL, standing, step
 
 from labcrane import Dynamics, ProtocolError
-from labcrane.machine_file import load_machine
+from labcrane.machines.library import load_machine
 from labcrane.testing import (
     RATE_HZ,
 )

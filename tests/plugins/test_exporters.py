@@ -3,7 +3,7 @@
 import pytest
 
 from labcrane import Exporter
-from labcrane.registry import discover
+from labcrane.registry.registry import discover
 from labcrane.testing import ExporterContract, ch8
 
 

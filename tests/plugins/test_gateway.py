@@ -13,14 +13,16 @@ from cranes import needs_bullet
 from gone_stream import goes_once
 from rehearsal import NoLog, ScriptedConsole
 
-from labcrane import FloatArray, InputDevice, Run, Tick, loop, rig
-from labcrane.clock import SystemClock
-from labcrane.console import Command, Order
-from labcrane.course import Course
-from labcrane.plan import plan_session
-from labcrane.registry import discover
-from labcrane.study import load
-from labcrane.testing import InputContract, a_frame, a_run, ch8
+from labcrane import FloatArray, InputDevice, Run, Tick
+from labcrane.core.clock import SystemClock
+from labcrane.design.plan import plan_session
+from labcrane.protocol import rig
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
+from labcrane.session import loop
+from labcrane.session.commands import Command, Order
+from labcrane.session.sequencer import Sequencer
+from labcrane.testing import InputContract, ch8, make_frame, make_run
 from labcrane_gateway.settings import GatewaySettings
 from labcrane_gateway.station import Station
 
@@ -66,7 +68,7 @@ def test_a_program_written_from_the_documentation_drives_the_arm(tmp_path: Path)
         with rig.opened(the_rig, study, plan.seed) as run:
             arm = run.state.index("joint.angle.arm")
             signal = run.command.find("valve.signal")
-            course = Course(study, plan, the_rig, waits=False)
+            course = Sequencer(study, plan, the_rig, waits=False)
 
             def keep(frame):
                 moved = frame.state[arm], frame.command[signal].tolist()
@@ -110,7 +112,7 @@ def heard(
         outlet.push_sample(list(sample))
         time.sleep(0.02)
         now = time.perf_counter()
-        axes = device.read(Tick(1, now, now), a_frame(run))
+        axes = device.read(Tick(1, now, now), make_frame(run))
         if enough() or now > end:
             return axes
 
@@ -127,7 +129,7 @@ def test_what_is_wrong_with_a_station_is_told(labels, sample, complaint: str) ->
     name = f"wrong.{len(labels)}.{sample[-3:][0]}"
     outlet = station_outlet(name, labels)
     device = Station(GatewaySettings(stream=name), ch8())
-    run = a_run(ch8(), axes=device.signals)
+    run = make_run(ch8(), axes=device.signals)
     device.open(run)
     try:
         axes = heard(device, run, outlet, sample, lambda: complaint in (device.fault or ""))
@@ -141,7 +143,7 @@ def test_a_station_that_goes_while_it_is_found_is_found_again(monkeypatch) -> No
     goes_once(monkeypatch)
     outlet = station_outlet("gone.once", ch8().names)
     device = Station(GatewaySettings(stream="gone.once"), ch8())
-    run = a_run(ch8(), axes=device.signals)
+    run = make_run(ch8(), axes=device.signals)
     device.open(run)
     try:
         axes = heard(device, run, outlet, [0.0, 125.0, 0.0, 0.0], lambda: device.fault is None)

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 from virtual_sticks import Desk, VirtualStick, desk
 
 from labcrane import DeviceError, InputDevice, Layout
-from labcrane.testing import InputContract, a_frame, a_run, ch8, opened
+from labcrane.testing import InputContract, ch8, make_frame, make_run, opened
 from labcrane_joystick import labcrane_inputs
 from labcrane_joystick.calibration import (
     AxisRange,
@@ -48,7 +48,7 @@ def device(sticks: tuple[VirtualStick, VirtualStick]) -> InputDevice:
 
 @pytest.fixture
 def running(device: DualJoystick) -> Iterator[DualJoystick]:
-    with opened(device, a_run(ch8(), axes=device.signals)):
+    with opened(device, make_run(ch8(), axes=device.signals)):
         yield device
 
 
@@ -62,14 +62,14 @@ class TestDualJoystick(InputContract):
 
 
 def read(device: DualJoystick) -> dict[str, float]:
-    run = a_run(ch8(), axes=device.signals)
-    frame = a_frame(run)
+    run = make_run(ch8(), axes=device.signals)
+    frame = make_frame(run)
     return dict(zip(COLUMNS, device.read(frame.tick, frame).tolist(), strict=True))
 
 
 def open_fails(**settings: str) -> str:
     device = DualJoystick(JoystickSettings(**settings))
-    with pytest.raises(DeviceError) as refused, opened(device, a_run(ch8())):
+    with pytest.raises(DeviceError) as refused, opened(device, make_run(ch8())):
         pass
     return str(refused.value)
 
@@ -122,7 +122,7 @@ def test_an_unplugged_stick_reads_zero_even_where_zero_is_not_its_centre(table, 
     left, right = ports()
     save(config, MODEL, both(Calibration(port=left), Calibration(port=right, x=off)))
     device = DualJoystick(JoystickSettings())
-    with opened(device, a_run(ch8())):
+    with opened(device, make_run(ch8())):
         second.move(0, 2000)
         assert read(device)["right.x"] == 0.0
         second.unplug()
@@ -211,7 +211,7 @@ def test_another_model_can_be_asked_for(table):
     for _ in range(2):
         table.plug(name="Extreme 3D", model=(0x046D, 0xC215))
     device = DualJoystick(JoystickSettings(stick="046d:c215"))
-    with opened(device, a_run(ch8())):
+    with opened(device, make_run(ch8())):
         assert read(device)["right.connected"] == 1.0
 
 
@@ -225,13 +225,13 @@ def test_what_was_identified_decides_which_stick_is_left(table, config):
     one, two = ports()
     save(config, MODEL, both(Calibration(port=two), Calibration(port=one)))
     device = DualJoystick(JoystickSettings())
-    with opened(device, a_run(ch8())):
+    with opened(device, make_run(ch8())):
         first.move(0, 32767)
         second.move(0, -32768)
         axes = read(device)
         assert (axes["left.x"], axes["right.x"]) == (-1.0, 1.0)
-        assert device.facts()["identified"] == "by its trigger, 2025-01-31, joysticks.yaml"
-        assert device.facts()["left.port"] == two
+        assert device.metadata()["identified"] == "by its trigger, 2025-01-31, joysticks.yaml"
+        assert device.metadata()["left.port"] == two
         # Both come back in the order of the first time, so the left is again the second.
         first.unplug()
         second.unplug()
@@ -256,7 +256,7 @@ def test_sticks_in_other_sockets_than_identified_are_refused(table, config):
 
 
 def test_facts_say_what_was_not_done(sticks, running):
-    facts = running.facts()
+    facts = running.metadata()
     assert facts["identified"] == "not identified: the first stick is taken for the left"
     assert facts["calibrated"] == "not calibrated: full range"
     assert facts["right.name"] == "Thrustmaster T.16000M"
@@ -273,13 +273,13 @@ def test_a_calibration_is_applied_to_its_own_stick_and_recorded(table, config):
     y = AxisRange(minimum=-20000, centre=-1000, maximum=25000)
     save(config, MODEL, both(Calibration(port=one), Calibration(port=two, y=y)))
     device = DualJoystick(JoystickSettings())
-    with opened(device, a_run(ch8())):
+    with opened(device, make_run(ch8())):
         first.move(1, 12000)
         second.move(1, 12000)
         axes = read(device)
         assert axes["left.y"] == 12000 / 32767
         assert axes["right.y"] == 13000 / 26000
-        facts = device.facts()
+        facts = device.metadata()
         assert [facts[f"right.y.{key}"] for key in ("minimum", "centre", "maximum")] == [
             -20000,
             -1000,

@@ -9,7 +9,7 @@ import pytest
 from virtual_sticks import Desk, VirtualStick, desk
 
 from labcrane import DeviceError, Layout
-from labcrane.testing import a_frame, a_run, ch8, opened
+from labcrane.testing import ch8, make_frame, make_run, opened
 from labcrane_joystick.__main__ import set_up, wait_and_look
 from labcrane_joystick.calibration import (
     AxisRange,
@@ -45,8 +45,8 @@ def both(left: Calibration, right: Calibration) -> Calibrations:
 
 
 def read(device: DualJoystick) -> dict[str, float]:
-    run = a_run(ch8(), axes=device.signals)
-    frame = a_frame(run)
+    run = make_run(ch8(), axes=device.signals)
+    frame = make_frame(run)
     return dict(zip(COLUMNS, device.read(frame.tick, frame).tolist(), strict=True))
 
 
@@ -185,7 +185,7 @@ def test_what_the_procedure_finds_is_what_the_device_uses(table, config):
     assert "  x: -30000 to 28000, at rest 700" in said
     assert "  slider: -25000 to 31000, at rest 3000" in said
     device = DualJoystick(JoystickSettings())
-    with opened(device, a_run(ch8())):
+    with opened(device, make_run(ch8())):
         axes = read(device)
         assert [axes[f"left.{axis}"] for axis in ("x", "y", "twist", "slider")] == [0, 0, 0, 1]
         first.move(0, -25000)

@@ -11,7 +11,7 @@ import pytest
 from virtual_sticks import Desk, desk
 
 from labcrane import DeviceError
-from labcrane.testing import a_run, ch8, opened
+from labcrane.testing import ch8, make_run, opened
 from labcrane_joystick import sdl
 from labcrane_joystick.dual_joystick import DualJoystick
 from labcrane_joystick.kernel import ABSINFO, axis_codes, fuzz_and_flat, read_request
@@ -32,7 +32,7 @@ def table() -> Iterator[Desk]:
 
 def open_fails(**settings: str) -> str:
     device = DualJoystick(JoystickSettings(**settings))
-    with pytest.raises(DeviceError) as refused, opened(device, a_run(ch8())):
+    with pytest.raises(DeviceError) as refused, opened(device, make_run(ch8())):
         pass
     return str(refused.value)
 
@@ -123,7 +123,7 @@ def test_opening_is_silent_and_leaves_the_environment_as_it_was():
     code = (
         "import os; before = dict(os.environ)\n"
         "from labcrane import DeviceError\n"
-        "from labcrane.testing import a_run, ch8\n"
+        "from labcrane.testing import make_run, ch8\n"
         "from labcrane_joystick.dual_joystick import DualJoystick\n"
         "from labcrane_joystick.settings import JoystickSettings\n"
         "try: DualJoystick(JoystickSettings(stick='ffff:fffe')).open(a_run(ch8()))\n"

@@ -17,8 +17,8 @@ from pydantic import ValidationError
 from windows import an_x_server
 
 from labcrane import InputDevice, ProtocolError
-from labcrane.clock import Tick
-from labcrane.testing import RATE_HZ, InputContract, a_frame, a_run, ch8
+from labcrane.core.clock import Tick
+from labcrane.testing import RATE_HZ, InputContract, ch8, make_frame, make_run
 from labcrane_keyboard.keyboard import Keyboard
 from labcrane_keyboard.settings import KeyboardSettings
 from labcrane_view.settings import ViewSettings
@@ -40,7 +40,7 @@ class Desk:
 
     def __init__(self, view: str, **settings: object) -> None:
         self.keyboard = Keyboard(KeyboardSettings(view=view, axes=AXES, **settings))
-        self._run = a_run(ch8(), axes=self.keyboard.signals)
+        self._run = make_run(ch8(), axes=self.keyboard.signals)
         self._number = 0
         self.keyboard.open(self._run)
 
@@ -50,7 +50,7 @@ class Desk:
         for _ in range(ticks):
             self._number += 1
             now = self._number / RATE_HZ
-            frame = a_frame(self._run, self._number)
+            frame = make_frame(self._run, self._number)
             rows.append(self.keyboard.read(Tick(self._number, now, now), frame).copy())
         return np.array(rows)
 

@@ -8,13 +8,13 @@ from ideal_crane import IdealCrane
 from operator_loop import DISTANCES, RADIUS, SCHEMES, Loop, ends
 
 from labcrane import (
-    PRESETS,
+    ACTUATOR_PRESETS,
     InputDevice,
     Phase,
-    Planned,
+    PlannedTrial,
     Trial,
 )
-from labcrane.machine_file import load_machine
+from labcrane.machines.library import load_machine
 from labcrane.testing import RATE_HZ, InputContract, ch8
 from labcrane_operator import labcrane_inputs
 from labcrane_operator.aimer import Aimer
@@ -117,7 +117,7 @@ def test_a_whole_session_goes_on_from_where_the_machine_stands() -> None:
     assert np.mean(reached) >= 0.95
 
 
-@pytest.mark.parametrize("actuator", PRESETS)
+@pytest.mark.parametrize("actuator", ACTUATOR_PRESETS)
 def test_a_machine_that_follows_late_is_brought_in(actuator: str) -> None:
     reached = []
     for seed in range(3):
@@ -186,9 +186,9 @@ def test_practice_makes_later_trials_faster() -> None:
 
 def test_participants_differ_by_their_seed_and_only_when_asked_to() -> None:
     paces = [Loop(settings={"pace_sd": 0.2}, participant_seed=n) for n in (1, 2, 1)]
-    facts = [loop.operator.facts()["pace"] for loop in paces]
+    facts = [loop.operator.metadata()["pace"] for loop in paces]
     assert facts[0] == facts[2] != facts[1]
-    assert Loop().operator.facts()["pace"] == 1.0
+    assert Loop().operator.metadata()["pace"] == 1.0
 
 
 # --- the same again
@@ -247,7 +247,7 @@ def test_the_trigger_is_pressed_once_at_rest_inside_the_target() -> None:
 
 def test_what_the_last_trial_left_on_view_is_not_aimed_at() -> None:
     loop = Loop(settings={"reaction_s": 0.01, "reaction_sd": 0.0})
-    loop.operator.begin_trial(Trial(2, 1, 1, Planned({}, expected_s=1.0)))
+    loop.operator.begin_trial(Trial(2, 1, 1, PlannedTrial({}, expected_s=1.0)))
     left = (*ends(3.0)[0], RADIUS)
     for number in range(50):
         stale = loop.show(number, left, phase=Phase.SUCCESS, trial=1)

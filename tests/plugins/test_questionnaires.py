@@ -8,11 +8,12 @@ import pytest
 from rehearsal import SHORT, ScriptedConsole, a_study
 
 from labcrane import AnswerError, Item, ProtocolError, Questionnaire
-from labcrane.replay import replay
-from labcrane.session import Visit, run
+from labcrane.replay.replay import replay
+from labcrane.session.session import Visit, run
 from labcrane.testing import QuestionnaireContract
 from labcrane_questionnaires.demographics import Demographics
 from labcrane_questionnaires.free import Free
+from labcrane_questionnaires.licensed_scales import SLOTS
 from labcrane_questionnaires.rating import Rating
 from labcrane_questionnaires.sart import Sart
 from labcrane_questionnaires.settings import (
@@ -21,7 +22,6 @@ from labcrane_questionnaires.settings import (
     RatingSettings,
     TlxSettings,
 )
-from labcrane_questionnaires.slots import SLOTS
 from labcrane_questionnaires.ssq import Ssq
 from labcrane_questionnaires.sus import NAMES, Sus
 from labcrane_questionnaires.tlx import PAIRS, SCALES, NasaTlx

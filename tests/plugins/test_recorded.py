@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from rehearsal import SHORT, ScriptedConsole, a_study, rehearse
 
-from labcrane import InputDevice, ProtocolError, open_recording, rig
-from labcrane.session import Visit, run
+from labcrane import InputDevice, ProtocolError, open_recording
+from labcrane.protocol import rig
+from labcrane.session.session import Visit, run
 from labcrane.testing import InputContract, ch8
 from labcrane_operator import labcrane_inputs
 from labcrane_operator.recorded import RecordedSettings

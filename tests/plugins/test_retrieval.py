@@ -9,8 +9,8 @@ import pytest
 from cranes import needs_bullet
 
 import labcrane
-from labcrane.machine_file import load_machine
-from labcrane.recording.recording import SessionRecord
+from labcrane.machines.library import load_machine
+from labcrane.recording.participant_file.reader import SessionRecord
 
 pytestmark = [needs_bullet, pytest.mark.long]
 

@@ -10,21 +10,21 @@ from labcrane import (
     Event,
     InputDevice,
     Phase,
-    Planned,
+    PlannedTrial,
     ProtocolError,
     Signal,
     Task,
     load_scene,
-    place,
+    place_objects,
 )
 from labcrane.testing import (
     InputContract,
     TaskContract,
-    a_frame,
-    a_run,
-    a_trial,
     ch8,
     crane_state,
+    make_frame,
+    make_run,
+    make_trial,
 )
 from labcrane_scenario.mistakes import Episode
 from labcrane_scenario.operator import ScenarioOperator
@@ -74,7 +74,7 @@ limit_s: 60
 FORCE = "scene.block.force.block"
 
 
-def judged(tmp_path: Path, pushes: list[float], *, overrule: bool = False):
+def judged(tmp_path: Path, pushes: list[float], *, lift_limits: bool = False):
     """Return the task's judgements of a force on the block, tick by tick."""
     (tmp_path / "block.yaml").write_text(BLOCK)
     task = Scenario(ScenarioSettings(scenes=(tmp_path / "block.yaml",), mistakes=4), ch8())
@@ -86,17 +86,17 @@ def judged(tmp_path: Path, pushes: list[float], *, overrule: bool = False):
         Signal("scene.block.support", "N"),
         Signal("grip.drops", "1"),
     )
-    run = a_run(ch8(), state=state, task=task.signals)
+    run = make_run(ch8(), state=state, task=task.signals)
     task.open(run)
-    task.begin_trial(a_trial(Planned({"scenario": "block"}, expected_s=1.0)))
-    if overrule:
-        task.overrule()
+    task.begin_trial(make_trial(PlannedTrial({"scenario": "block"}, expected_s=1.0)))
+    if lift_limits:
+        task.lift_limits()
     seen = []
     for number, force in enumerate(pushes):
         values = np.zeros(run.state.size)
         values[run.state.index(FORCE)] = force
         values[run.state.index("scene.block.support")] = 20 * 9.81
-        seen.append(task.judge(a_frame(run, number, values)))
+        seen.append(task.evaluate(make_frame(run, number, values)))
         if seen[-1].phase.over:
             break
     return seen
@@ -124,17 +124,17 @@ def test_five_mistakes_of_a_kind_end_the_run_and_four_do_not(tmp_path: Path) -> 
 
 
 def test_an_overridden_run_outlasts_its_mistakes(tmp_path: Path) -> None:
-    seen = judged(tmp_path, PUSH * 8, overrule=True)
+    seen = judged(tmp_path, PUSH * 8, lift_limits=True)
     assert not seen[-1].phase.over
     assert seen[-1].values[-5] == 8.0
 
 
 def test_the_same_seed_places_everything_the_same_and_another_one_does_not() -> None:
     scene = load_scene(RETRIEVAL / "scenes" / "casualty.yaml")
-    assert place(scene, 4) == place(scene, 4)
-    found = {place(scene, seed)[0].deformed for seed in range(20)}
+    assert place_objects(scene, 4) == place_objects(scene, 4)
+    found = {place_objects(scene, seed)[0].deformed for seed in range(20)}
     assert found == {"right_forearm", "left_shank", "right_shank"}
-    yaws = [place(scene, seed)[0].yaw for seed in range(50)]
+    yaws = [place_objects(scene, seed)[0].yaw for seed in range(50)]
     assert math.radians(-4) <= min(yaws) < max(yaws) <= math.radians(4)
 
 
@@ -202,9 +202,9 @@ def test_a_deformity_is_found_by_the_operators_button_or_the_supervisors_note(
         Signal("scene.figure.position", "m", ("x", "y", "z")),
         Signal("scene.figure.orientation", "1", ("x", "y", "z", "w")),
     )
-    run = a_run(ch8(), axes=(Signal("button", "1"),), state=state, task=task.signals)
+    run = make_run(ch8(), axes=(Signal("button", "1"),), state=state, task=task.signals)
     task.open(run)
-    task.begin_trial(a_trial(Planned({"scenario": "lying"}, expected_s=1.0)))
+    task.begin_trial(make_trial(PlannedTrial({"scenario": "lying"}, expected_s=1.0)))
     events, results = [], {}
     for number in range(30):
         values = np.zeros(run.state.size)
@@ -217,11 +217,11 @@ def test_a_deformity_is_found_by_the_operators_button_or_the_supervisors_note(
             math.sin(half),
             math.cos(half),
         )
-        frame = a_frame(run, number, values)
+        frame = make_frame(run, number, values)
         frame.axes = np.array([button])
         if number in notes:
             frame.events = (Event("order.note", frame.tick.due, {"text": notes[number]}),)
-        judgement = task.judge(frame)
+        judgement = task.evaluate(frame)
         events += [event for event in judgement.events if event.name == "deformity.found"]
         results = judgement.results or results
     assert [(event.data["by"], event.data["limb"]) for event in events] == (

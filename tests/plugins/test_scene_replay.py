@@ -8,11 +8,11 @@ import pytest
 from cranes import needs_bullet
 
 from labcrane import open_recording
-from labcrane.console import QueueConsole
-from labcrane.registry import discover
-from labcrane.replay import replay
-from labcrane.session import Visit, run
-from labcrane.study import load
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
+from labcrane.replay.replay import replay
+from labcrane.session.commands import QueueConsole
+from labcrane.session.session import Visit, run
 
 pytestmark = needs_bullet
 

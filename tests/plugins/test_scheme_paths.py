@@ -28,7 +28,7 @@ def drive(
     """Steer for a while; return the path of the tip and the joint speeds used."""
     path, commands = [crane.tip.copy()], []
     for _ in range(round(seconds * RATE_HZ)):
-        command = scheme.command(scheme.steer(velocity, crane.state), crane.state)
+        command = scheme.command(scheme.inverse(velocity, crane.state), crane.state)
         commands.append(command.copy())
         path.append(crane.step(command)[8:11].copy())
     return np.array(path), np.array(commands)
@@ -133,7 +133,7 @@ def test_cutting_single_joints_would_have_bent_the_same_path() -> None:
     crane = IdealCrane(machine, LOW["ch8"])
     path = [crane.tip.copy()]
     for _ in range(360):
-        command = scheme.command(scheme.steer(3.0 * direction, crane.state), crane.state)
+        command = scheme.command(scheme.inverse(3.0 * direction, crane.state), crane.state)
         speeds = np.clip(command[:4], -np.array(machine.speeds), machine.speeds)
         path.append(crane.step(speeds)[8:11].copy())
     assert cross_track(np.array(path), direction) > 0.05

@@ -20,10 +20,10 @@ from scheme_setups import (
 from labcrane import Controller, ProtocolError, Settings, jacobian
 from labcrane.testing import (
     ControllerContract,
-    a_run,
-    a_trial,
     ch8,
     crane_at,
+    make_run,
+    make_trial,
     opened,
 )
 from labcrane_schemes import labcrane_controllers
@@ -112,7 +112,7 @@ def test_minimum_norm_is_the_pseudo_inverse_away_from_limits() -> None:
         pose = LOW["ch8"] + random.uniform(-0.2, 0.2, 4)
         velocity = random.uniform(-0.2, 0.2, 3)
         state = crane_at(machine, pose.tolist())
-        command = scheme.command(scheme.steer(velocity, state), state)
+        command = scheme.command(scheme.inverse(velocity, state), state)
         expected = np.linalg.pinv(jacobian(machine, pose.tolist())) @ velocity
         np.testing.assert_allclose(command[:4], expected, atol=1e-12)
 
@@ -136,7 +136,7 @@ def test_steering_inverts_every_scheme(name: str) -> None:
             pose[0] = random.uniform(-2.5, 2.5)
             state = crane_at(machine, pose.tolist())
             velocity = random.uniform(-0.25, 0.25, 3)
-            command = scheme.command(scheme.steer(velocity, state), state)
+            command = scheme.command(scheme.inverse(velocity, state), state)
             got = jacobian(machine, pose.tolist()) @ command[:4]
             np.testing.assert_allclose(got, velocity, atol=1e-9)
 
@@ -148,7 +148,7 @@ def test_a_hand_that_would_need_more_pushes_in_the_same_direction(scheme_class: 
     scheme = ready(scheme_class(settings, machine), machine)
     state = crane_at(machine, LOW["ch8"].tolist())
     velocity = np.array([-20.0, 10.0, 5.0])
-    axes = scheme.steer(velocity, state)
+    axes = scheme.inverse(velocity, state)
     assert np.abs(axes).max() == pytest.approx(1.0)
     got = jacobian(machine, LOW["ch8"].tolist()) @ scheme.command(axes, state)[:4]
     cosine = got @ velocity / np.linalg.norm(got) / np.linalg.norm(velocity)
@@ -195,7 +195,7 @@ def test_the_button_switches_on_its_rising_edge_and_every_tick_says_what_is_acti
         for button in (0, 1, 1, 1, 0, 0, 1, 0, 1, 1)
     ]
     assert active == [0, 1, 1, 1, 1, 1, 0, 0, 1, 1]
-    assert scheme.rest()[-1] == 1
+    assert scheme.idle()[-1] == 1
 
 
 def test_each_scheme_commands_what_it_commands_alone() -> None:
@@ -217,13 +217,13 @@ def test_a_button_held_from_the_last_trial_does_not_switch() -> None:
     state = crane_at(machine, machine.rest)
     scheme.command(push(), state)
     assert scheme.command(push(right_trigger=1), state)[-1] == 1
-    scheme.begin_trial(a_trial())
+    scheme.begin_trial(make_trial())
     assert scheme.command(push(right_trigger=1), state)[-1] == 0
 
 
 def test_at_rest_nothing_is_limited() -> None:
     for scheme in (JointVelocity(joint_velocity(), ch8()), EndEffector(end_effector(), ch8())):
-        np.testing.assert_array_equal(scheme.rest(), [0, 0, 0, 0, 1, 1, 1, 1, 1])
+        np.testing.assert_array_equal(scheme.idle(), [0, 0, 0, 0, 1, 1, 1, 1, 1])
 
 
 # --- what a protocol gets wrong
@@ -244,7 +244,7 @@ def test_an_axis_the_input_lacks_is_refused_with_those_it_has() -> None:
     scheme = JointVelocity(joint_velocity(map=JOINTS | {"wrist": "right.twist"}), ch8())
     with (
         pytest.raises(ProtocolError, match=r"no 'right.twist'; it has left.x, left.y") as caught,
-        opened(scheme, a_run(ch8(), command=scheme.signals)),
+        opened(scheme, make_run(ch8(), command=scheme.signals)),
     ):
         pass
     assert caught.value.__notes__ == ["map asks for it to move 'wrist'"]
@@ -253,7 +253,7 @@ def test_an_axis_the_input_lacks_is_refused_with_those_it_has() -> None:
 def test_an_axis_that_would_move_two_joints_is_refused() -> None:
     scheme = JointVelocity(joint_velocity(map=JOINTS | {"wrist": "-left.x"}), ch8())
     with pytest.raises(ProtocolError, match=r"'left\.x' is mapped to both 'slew' and 'wrist'"):
-        scheme.open(a_run(ch8(), command=scheme.signals))
+        scheme.open(make_run(ch8(), command=scheme.signals))
 
 
 def test_directions_must_fit_the_frame() -> None:

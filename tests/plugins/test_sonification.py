@@ -14,7 +14,7 @@ import pytest
 from pydantic import ValidationError
 
 from labcrane import Feedback, Frame
-from labcrane.testing import TARGETS, FeedbackContract, a_run, a_target, ch8
+from labcrane.testing import TARGETS, FeedbackContract, ch8, make_run, make_target
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sonification.sonification import Sonification
 from labcrane_sonification.synth import Synth, offline_server
@@ -22,7 +22,7 @@ from labcrane_sonification.tone import Tone, gains, tone
 
 RATE = 48000
 BLOCKS = (64, 128, 256, 512, 1024)
-RUN = a_run(ch8(), task=TARGETS)
+RUN = make_run(ch8(), task=TARGETS)
 
 
 class TestSonification(FeedbackContract):
@@ -98,7 +98,7 @@ def test_it_falls_silent_after_a_while_inside_the_target() -> None:
 
 
 def inside(number: int, *, away: float = 0.1) -> Frame:
-    frame = a_target(RUN, number)
+    frame = make_target(RUN, number)
     frame.task[:3] = frame.state[8:11] + np.array((away, 0.0, 0.0))
     return frame
 
@@ -120,7 +120,7 @@ def test_laws_change_while_the_server_runs_and_its_own_settings_do_not() -> None
     assert not sonification.adjust(SonificationSettings(far=2.0))  # it is not open
     sonification.open(RUN)
     try:
-        made, frame = sonification.synth, a_target(RUN)
+        made, frame = sonification.synth, make_target(RUN)
         wide = sonification.present(frame)
         assert sonification.adjust(SonificationSettings(far=9.0, pan="away", ramp_s=0.0))
         assert sonification.synth is made
@@ -139,7 +139,7 @@ def test_a_paused_session_is_silent() -> None:
     sonification = Sonification(SonificationSettings(), offline_server)
     sonification.open(RUN)
     try:
-        frame = a_target(RUN)
+        frame = make_target(RUN)
         assert sonification.present(frame)[2] > 0
         frame.paused = True
         assert sonification.present(frame)[2] == 0

@@ -9,9 +9,9 @@ from hypothesis import strategies as some
 from pydantic import ValidationError
 
 from labcrane import Cue
-from labcrane.testing import TARGETS, CueContract, a_run, a_target, ch8
+from labcrane.testing import TARGETS, CueContract, ch8, make_run, make_target
 from labcrane_sphere.settings import SphereSettings
-from labcrane_sphere.sphere import Sphere
+from labcrane_sphere.sphere import SphereCue
 
 
 class TestSphere(CueContract):
@@ -19,40 +19,40 @@ class TestSphere(CueContract):
 
     @pytest.fixture
     def cue(self) -> Cue:
-        return Sphere(SphereSettings())
+        return SphereCue(SphereSettings())
 
 
 def test_size_and_brightness_change_evenly_with_distance() -> None:
-    sphere = Sphere(SphereSettings(far=4.0, smallest=0.1, largest=0.5, darkest=0.2))
+    sphere = SphereCue(SphereSettings(far=4.0, smallest=0.1, largest=0.5, darkest=0.2))
     looks = [sphere.look(distance) for distance in (0.0, 1.0, 2.0, 4.0)]
     np.testing.assert_allclose(looks, [(0.1, 1.0), (0.2, 0.8), (0.3, 0.6), (0.5, 0.2)])
 
 
 def test_beyond_far_nothing_changes() -> None:
-    sphere = Sphere(SphereSettings(far=4.0))
+    sphere = SphereCue(SphereSettings(far=4.0))
     assert sphere.look(4.0) == sphere.look(40.0)
 
 
 def test_the_logarithmic_law_changes_most_near_the_target() -> None:
-    sphere = Sphere(SphereSettings(far=4.0, law="log", smallest=0.2, largest=1.2))
+    sphere = SphereCue(SphereSettings(far=4.0, law="log", smallest=0.2, largest=1.2))
     radii = [sphere.look(distance)[0] - 0.2 for distance in (0.0, 0.4, 4.0)]
     np.testing.assert_allclose(radii, [0.0, math.log10(1.9), 1.0])
 
 
 @given(some.floats(0.0, 10.0))
 def test_the_other_polarity_is_the_mirror_image(distance: float) -> None:
-    one = Sphere(SphereSettings())
-    other = Sphere(SphereSettings(polarity="grows", brightness="darkens"))
+    one = SphereCue(SphereSettings())
+    other = SphereCue(SphereSettings(polarity="grows", brightness="darkens"))
     sums = np.add(one.look(distance), other.look(distance))
     np.testing.assert_allclose(sums, [0.15 + 0.60, 0.25 + 1.0])
 
 
 @pytest.mark.parametrize("at", ["tip", "target"])
 def test_it_is_drawn_where_it_should_be(at: str) -> None:
-    run = a_run(ch8(), task=TARGETS)
-    sphere = Sphere(SphereSettings(at=at))
+    run = make_run(ch8(), task=TARGETS)
+    sphere = SphereCue(SphereSettings(at=at))
     sphere.open(run)
-    frame = a_target(run)
+    frame = make_target(run)
     place = {"tip": frame.state[run.state.find("tip.position")], "target": frame.task[:3]}[at]
     (ball,) = sphere.draw(frame)
     np.testing.assert_array_equal(ball.centre, place)

@@ -13,17 +13,17 @@ from windows import (
     MACHINE,
     POSE,
     SIZE,
-    a_frame,
     a_view,
     an_x_server,
     centre_of,
     magenta,
+    make_frame,
     projected,
     shown,
 )
 
-from labcrane import Ball, DeviceError, Feedback, ProtocolError, Situation
-from labcrane.kinematics import Arm
+from labcrane import DeviceError, Feedback, ProtocolError, SessionState, Sphere
+from labcrane.machines.kinematics import Arm
 from labcrane.testing import FeedbackContract, crane_at
 from labcrane_view.monitors import parse
 from labcrane_view.settings import CAMERAS, CameraSettings, ViewSettings
@@ -47,14 +47,14 @@ class TestView(FeedbackContract):
 def test_a_thing_is_drawn_where_a_pinhole_camera_sees_it(
     renderer: str, camera: str, thing: str
 ) -> None:
-    frame = a_frame()
+    frame = make_frame()
     places = {
         "tip": Arm(MACHINE).tip(POSE),
         "target": tuple(frame.task[:3]),
         "other": tuple(frame.task[4:7]),
         "sphere": (5.0, 1.0, 1.5),
     }
-    frame.shapes = (Ball("mark", places[thing], 0.12, (1.0, 0.0, 1.0, 1.0)),)
+    frame.shapes = (Sphere("mark", places[thing], 0.12, (1.0, 0.0, 1.0, 1.0)),)
     picture = shown(
         frame, renderer=renderer, camera=camera, targets=False, content="feedback", shadow=0
     )
@@ -64,7 +64,7 @@ def test_a_thing_is_drawn_where_a_pinhole_camera_sees_it(
 
 
 def test_the_end_of_the_machines_last_link_is_at_the_tip() -> None:
-    frame = a_frame()
+    frame = make_frame()
     with a_view(camera="free", areas=("wrist", "tip")) as view:
         view.present(frame)
         view.present(frame)
@@ -85,8 +85,8 @@ def test_the_end_of_the_machines_last_link_is_at_the_tip() -> None:
 
 @pytest.mark.parametrize("camera", ["cab_left", "free", "top"])
 def test_an_area_of_interest_is_the_outline_of_what_is_drawn(camera: str) -> None:
-    frame = a_frame()
-    frame.shapes = (Ball("sphere", (5.0, 1.2, 1.1), 0.6, (1.0, 1.0, 1.0, 1.0)),)
+    frame = make_frame()
+    frame.shapes = (Sphere("sphere", (5.0, 1.2, 1.1), 0.6, (1.0, 1.0, 1.0, 1.0)),)
     with a_view(camera=camera, content="feedback", targets=False, areas=("sphere",)) as view:
         view.present(frame)
         box = view.samples()["areas"]
@@ -96,7 +96,7 @@ def test_an_area_of_interest_is_the_outline_of_what_is_drawn(camera: str) -> Non
 
 
 def test_what_is_behind_the_eye_has_no_area() -> None:
-    frame = a_frame()
+    frame = make_frame()
     frame.task[:3] = (-30.0, 0.0, 1.0)
     with a_view(areas=("target", "nothing")) as view:
         view.present(frame)
@@ -104,7 +104,7 @@ def test_what_is_behind_the_eye_has_no_area() -> None:
 
 
 def test_the_target_is_red_and_the_other_one_is_not() -> None:
-    frame = a_frame()
+    frame = make_frame()
     picture = shown(frame)
     colours = {}
     for name, place in (("target", frame.task[:3]), ("other", frame.task[4:7])):
@@ -116,7 +116,7 @@ def test_the_target_is_red_and_the_other_one_is_not() -> None:
 
 
 def test_the_machine_throws_a_shadow_on_the_ground() -> None:
-    frame = a_frame()
+    frame = make_frame()
     lit, shaded = (shown(frame, shadow=pixels, camera="free") for pixels in (0, 1024))
     x, y, z = Arm(MACHINE).tip(POSE)
     sun = np.array([0.45, -0.38, 0.81])
@@ -131,7 +131,7 @@ def test_the_machine_throws_a_shadow_on_the_ground() -> None:
 
 @pytest.mark.parametrize(("flip", "axis"), [("horizontal", 1), ("vertical", 0)])
 def test_a_mirrored_window_is_the_picture_turned_over(flip: str, axis: int) -> None:
-    frame = a_frame()
+    frame = make_frame()
     plain, mirrored = (
         shown(frame, flip=turn, hud=("distance",), patch={}) for turn in ("none", flip)
     )
@@ -144,19 +144,19 @@ def test_the_areas_of_a_mirrored_window_are_turned_over_too() -> None:
     boxes = []
     for flip in ("none", "horizontal"):
         with a_view(flip=flip, areas=("target",)) as view:
-            view.present(a_frame())
+            view.present(make_frame())
             boxes.append(view.samples()["areas"])
     left, top, right, bottom = boxes[0]
     np.testing.assert_allclose(boxes[1], [SIZE[0] - right, top, SIZE[0] - left, bottom])
 
 
 def test_the_patch_changes_at_chosen_events_only() -> None:
-    frame = a_frame()
+    frame = make_frame()
     whites = []
     with a_view(patch={"on": ["trial.start"], "size": 20}) as view:
         seen: list[Mapping[str, int]] = [{}, {"trial.start": 1}, {"trial.start": 1, "waiting": 1}]
         for counts in [*seen, {"trial.start": 2, "waiting": 1}]:
-            view.hear(Situation(counts=counts))
+            view.update(SessionState(counts=counts))
             logged = view.present(frame)[3]
             corner = view.picture()[-10, 10]
             assert set(corner) == {255 * logged}
@@ -169,7 +169,7 @@ def test_a_camera_rides_on_a_link() -> None:
     with a_view(camera=riding, areas=("tip",)) as view:
         boxes = []
         for angles in (POSE, (-1.0, 0.3, 0.1, 0.2)):
-            frame = a_frame()
+            frame = make_frame()
             frame.state = crane_at(MACHINE, angles)
             view.present(frame)
             boxes.append(view.samples()["areas"])
@@ -178,23 +178,23 @@ def test_a_camera_rides_on_a_link() -> None:
 
 def test_a_delayed_view_shows_the_past() -> None:
     with a_view(renderer="software", delay_s=0.05) as view:
-        ticks = [view.present(a_frame(number))[0] for number in range(0, 48, 2)]
+        ticks = [view.present(make_frame(number))[0] for number in range(0, 48, 2)]
     expected = [max(0, 2 * math.floor((number - 12) / 2)) for number in range(0, 48, 2)]
     assert ticks == expected  # 0.05 s are 12 ticks
 
 
 def test_the_software_renderer_is_named() -> None:
     with a_view(renderer="software") as view:
-        assert "software" in str(view.facts()["renderer"])
-        assert view.facts()["delay"] == "not measured"
+        assert "software" in str(view.metadata()["renderer"])
+        assert view.metadata()["delay"] == "not measured"
 
 
 def test_text_is_written_in_the_operators_language() -> None:
     pictures = []
     for language in ("en", "de", "pl"):
         with a_view(language=language, hud=("distance", "trial"), renderer="software") as view:
-            view.hear(Situation(trials=3))
-            view.present(a_frame())
+            view.update(SessionState(trials=3))
+            view.present(make_frame())
             pictures.append(view.picture()[:60, :250])
     assert len({picture.tobytes() for picture in pictures}) == 3
 
@@ -260,7 +260,7 @@ def test_a_monitor_is_filled_by_number_or_by_name(
 ) -> None:
     monkeypatch.setenv("DISPLAY", x_server)
     with a_view(display="window", screen=screen, renderer="software") as view:
-        view.present(a_frame())
+        view.present(make_frame())
         assert view.picture().shape == (700, 1000, 3)
 
 

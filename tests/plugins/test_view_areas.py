@@ -9,18 +9,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from windows import MACHINE, SIZE, a_frame, a_scene, projected
+from windows import MACHINE, SIZE, a_scene, make_frame, projected
 
 from labcrane import (
     Body,
-    Form,
     Frame,
+    Geom,
     Layout,
     MeshFile,
-    Part,
-    Placed,
+    PlacedObject,
+    SessionState,
+    ShapeKind,
     Signal,
-    Situation,
     write_placed,
 )
 from labcrane_view.outline import outermost
@@ -34,7 +34,7 @@ AWAY = (0.0, 0.0, -50.0)
 
 
 def moving(name: str, where: tuple[float, ...], turn: tuple[float, ...]) -> Frame:
-    frame = a_frame()
+    frame = make_frame()
     quaternion = Rotation.from_euler("xyz", turn).as_quat()
     frame.state = np.concatenate([frame.state, where, quaternion])
     return frame
@@ -107,12 +107,12 @@ def test_the_area_of_a_moving_mesh_is_that_of_its_projected_corners(tmp_path: Pa
 
 def test_the_area_of_a_thing_that_is_moved_is_what_is_drawn_of_it() -> None:
     parts = (
-        Part("head", Form.SPHERE, (0.3, 0.3, 0.3), (0.0, 0.0, 0.0), 0.0),
-        Part("torso", Form.CAPSULE, (0.9, 0.3, 0.3), (0.7, 0.0, 0.0), 0.4),
+        Geom("head", ShapeKind.SPHERE, (0.3, 0.3, 0.3), (0.0, 0.0, 0.0), 0.0),
+        Geom("torso", ShapeKind.CAPSULE, (0.9, 0.3, 0.3), (0.7, 0.0, 0.0), 0.4),
     )
-    person = Placed("person", "body", parts, PLACES[0], 0.0, 70.0, 0.5, 0.0, {})
+    person = PlacedObject("person", "body", parts, PLACES[0], 0.0, 70.0, 0.5, 0.0, {})
     with a_view("scene.person", (), "person") as view:
-        view.hear(Situation(scene=write_placed((person,))))
+        view.update(SessionState(scene=write_placed((person,))))
         for where in PLACES:
             for turn in TURNS:
                 drawn = box_drawn(view, "scene.person", where, turn)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from windows import MACHINE, SIZE, a_frame, a_view, projected, shown
+from windows import MACHINE, SIZE, a_view, make_frame, projected, shown
 
-from labcrane import Ball, DeviceError, Frame, Situation
+from labcrane import DeviceError, Frame, SessionState, Sphere
 from labcrane_view.hud import notice
 from labcrane_view.settings import CAMERAS, CameraSettings
 
@@ -15,8 +15,8 @@ RATE = 240
 
 def coloured(number: int) -> Frame:
     """Return a frame whose number can be seen: a wall of its own blue."""
-    frame = a_frame(number)
-    frame.shapes = (Ball("wall", (5.0, 0.0, 1.0), 3.0, (0.0, 0.0, number / 240, 1.0)),)
+    frame = make_frame(number)
+    frame.shapes = (Sphere("wall", (5.0, 0.0, 1.0), 3.0, (0.0, 0.0, number / 240, 1.0)),)
     return frame
 
 
@@ -58,11 +58,11 @@ def test_cameras_of_one_window_have_rates_and_delays_of_their_own() -> None:
 
 
 def test_a_depth_camera_shows_how_far_away_things_are() -> None:
-    frame = a_frame()
+    frame = make_frame()
     # On the line of sight of the camera, and to its right, each as far along that line.
     balls = {"ahead": (6.0, 0.0, 1.0), "aside": (9.0, -3.0, 2.0)}
     frame.shapes = tuple(
-        Ball(name, place, 0.2, (1.0, 1.0, 1.0, 1.0)) for name, place in balls.items()
+        Sphere(name, place, 0.2, (1.0, 1.0, 1.0, 1.0)) for name, place in balls.items()
     )
     camera = {**STILL, "shows": "depth", "depth_m": (1.0, 11.0)}
     picture = shown(frame, camera=camera, targets=False, content="feedback")
@@ -77,7 +77,7 @@ def test_a_depth_camera_shows_how_far_away_things_are() -> None:
 
 def test_depth_and_colour_stand_side_by_side() -> None:
     depth = {**CAMERAS["free"].model_dump(), "name": "depth", "shows": "depth", "rate_hz": 10.0}
-    picture = shown(a_frame(), camera="free", beside=(depth,))
+    picture = shown(make_frame(), camera="free", beside=(depth,))
     half = SIZE[0] // 2
     assert np.ptp(picture[:, half:], axis=-1).max() == 0
     assert np.ptp(picture[:, :half], axis=-1).max() > 60
@@ -109,11 +109,11 @@ def lower_half(view: object, frame: Frame) -> np.ndarray:
 
 def test_a_hint_is_shown_for_a_while() -> None:
     with a_view(renderer="software", hint_s=1.0) as view:
-        without = lower_half(view, a_frame(240))
-        view.hear(Situation(hint="slower", hint_time=1.0))
-        given = lower_half(view, a_frame(240))
-        still = lower_half(view, a_frame(479))
-        over = lower_half(view, a_frame(480))
+        without = lower_half(view, make_frame(240))
+        view.update(SessionState(hint="slower", hint_time=1.0))
+        given = lower_half(view, make_frame(240))
+        still = lower_half(view, make_frame(479))
+        over = lower_half(view, make_frame(480))
     assert (given != without).any(axis=-1).mean() > 0.005
     np.testing.assert_array_equal(given, still)
     np.testing.assert_array_equal(over, without)
@@ -122,11 +122,11 @@ def test_a_hint_is_shown_for_a_while() -> None:
 def test_instructions_stay_until_they_are_taken_away() -> None:
     text = "Bring the tip to the red ball. " * 6
     with a_view(renderer="software", notices=True) as view:
-        without = lower_half(view, a_frame())
-        view.hear(Situation(text=text))
-        given = lower_half(view, a_frame(24000))
-        view.hear(Situation())
-        after = lower_half(view, a_frame())
+        without = lower_half(view, make_frame())
+        view.update(SessionState(text=text))
+        given = lower_half(view, make_frame(24000))
+        view.update(SessionState())
+        after = lower_half(view, make_frame())
     rows = (given != without).any(axis=(1, 2))
     assert rows.sum() > 3 * 0.05 * SIZE[1]  # several lines
     assert not rows[-5:].any()
@@ -139,10 +139,10 @@ def test_long_instructions_fit_into_the_window(size: tuple[int, int]) -> None:
         ["Bring the tip to the red ball and hold it there until it is grey. " * 4] * 5
     )
     with a_view(renderer="software", size=size) as view:
-        view.present(a_frame())
+        view.present(make_frame())
         without = view.picture().astype(int)
-        view.hear(Situation(text=text))
-        view.present(a_frame())
+        view.update(SessionState(text=text))
+        view.present(make_frame())
         changed = (np.abs(view.picture() - without) > 8).any(axis=-1)
     rows, columns = (np.flatnonzero(changed.any(axis=axis)) for axis in (1, 0))
     assert rows.min() > 0
@@ -154,13 +154,13 @@ def test_long_instructions_fit_into_the_window(size: tuple[int, int]) -> None:
 
 def test_a_paragraph_of_a_text_file_is_broken_where_the_window_ends() -> None:
     text = "You steer a crane\nwith two joysticks.\n\nPlease:\n- go fast,\n  but\n- look.\n"
-    (shown,) = notice(a_frame(), Situation(text=text), 8.0, "en")
+    (shown,) = notice(make_frame(), SessionState(text=text), 8.0, "en")
     assert shown == "You steer a crane with two joysticks.\n\nPlease:\n- go fast, but\n- look."
 
 
 def test_whoever_is_asked_is_told_to_answer() -> None:
-    asked = Situation(questionnaire="NASA-TLX")
-    said = [notice(a_frame(), asked, 8.0, language)[0] for language in ("en", "de", "pl")]
+    asked = SessionState(questionnaire="NASA-TLX")
+    said = [notice(make_frame(), asked, 8.0, language)[0] for language in ("en", "de", "pl")]
     assert said == [
         "Please answer the questions now:\nNASA-TLX",
         "Bitte jetzt die Fragen beantworten:\nNASA-TLX",
@@ -179,8 +179,8 @@ def test_the_joints_load_is_in_the_corner() -> None:
     run = a_scene()
     loads = Signal("joint.load", "1", MACHINE.names)
     loaded = replace(run, state=Layout("the machine", (*run.state.signals, loads)))
-    frame = a_frame()
+    frame = make_frame()
     frame.state = np.append(frame.state, [0.1, -0.5, 0.0, 1.0])
-    (line,) = Hud(("load",), "en", loaded).lines(frame, Situation())
+    (line,) = Hud(("load",), "en", loaded).lines(frame, SessionState())
     assert line == "Load slew 10 %  shoulder -50 %  elbow 0 %  wrist 100 %"
-    assert Hud(("load",), "en", run).lines(a_frame(), Situation()) == []
+    assert Hud(("load",), "en", run).lines(make_frame(), SessionState()) == []

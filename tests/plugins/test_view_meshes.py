@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rehearsal import SHORT, a_study
-from windows import MACHINE, POSE, a_frame, projected
+from windows import MACHINE, POSE, make_frame, projected
 
 from labcrane import (
     DeviceError,
@@ -18,18 +18,18 @@ from labcrane import (
     Machine,
     MeshFile,
     ProtocolError,
+    SessionState,
     Signal,
-    Situation,
-    frames,
     link_boxes,
+    link_frames,
     read_placed,
     urdf,
     write_placed,
 )
 from labcrane.approval.materials import referred
-from labcrane.run_text import read_run, write_run
-from labcrane.scene import load_scene, place
-from labcrane.testing import TARGETS, a_run, crane_state
+from labcrane.machines.scene import load_scene, place_objects
+from labcrane.recording.run_codec import read_run, write_run
+from labcrane.testing import TARGETS, crane_state, make_run
 from labcrane_view.mesh_reader import read_mesh
 from labcrane_view.settings import CameraSettings, ViewSettings
 from labcrane_view.view import View
@@ -191,7 +191,7 @@ def meshed(folder: Path, **settings: object) -> Machine:
 def test_a_mesh_changes_nothing_that_is_touched_and_is_sent_along(tmp_path: Path) -> None:
     machine = meshed(tmp_path)
     assert urdf(machine) == urdf(MACHINE)
-    run = replace(a_run(machine, task=TARGETS), bodies=link_boxes(machine))
+    run = replace(make_run(machine, task=TARGETS), bodies=link_boxes(machine))
     again = read_run(write_run(run))
     assert again.bodies == run.bodies
     assert again.machine == machine
@@ -205,16 +205,16 @@ def spots(picture: np.ndarray) -> np.ndarray:
 
 def test_a_link_is_drawn_as_its_mesh(tmp_path: Path) -> None:
     machine = meshed(tmp_path, scale=0.3, position=(-0.5, 0.0, 0.0))
-    run = replace(a_run(machine, task=TARGETS), bodies=link_boxes(machine))
+    run = replace(make_run(machine, task=TARGETS), bodies=link_boxes(machine))
     view = View(ViewSettings(display="hidden", size=(640, 360), camera="free", hud=()), machine)
     view.open(run)
     try:
-        view.present(a_frame())
-        view.present(a_frame())
+        view.present(make_frame())
+        view.present(make_frame())
         rows, columns = np.nonzero(spots(view.picture()))
     finally:
         view.close()
-    link = frames(machine, POSE)[len(machine.joints)]
+    link = link_frames(machine, POSE)[len(machine.joints)]
     corners = (0.3 * POINTS + [-0.5, 0.0, 0.0]) @ link[:3, :3].T + link[:3, 3]
     camera = ViewSettings(camera="free").camera
     x, y = np.array([projected(tuple(corner), camera) for corner in corners]).T
@@ -244,15 +244,15 @@ def a_scene_file(folder: Path) -> Path:
 
 
 def test_a_scene_is_drawn_where_its_things_stand_and_are_moved(tmp_path: Path) -> None:
-    things = place(load_scene(a_scene_file(tmp_path)), 1)
+    things = place_objects(load_scene(a_scene_file(tmp_path)), 1)
     assert read_placed(write_placed(things)) == things
     crate = Signal("scene.crate.position", "m", ("x", "y", "z"))
     turn = Signal("scene.crate.orientation", "1", ("x", "y", "z", "w"))
     state = (*crane_state(MACHINE).signals, crate, turn)
-    run = replace(a_run(MACHINE, task=TARGETS, state=state), bodies=link_boxes(MACHINE))
+    run = replace(make_run(MACHINE, task=TARGETS, state=state), bodies=link_boxes(MACHINE))
 
     def at(*where: float) -> Frame:
-        frame = a_frame()
+        frame = make_frame()
         quarter = math.sqrt(0.5)  # turned to the left by a quarter
         frame.state = np.array([*frame.state, *where, 0.0, 0.0, quarter, quarter])
         return frame
@@ -264,7 +264,7 @@ def test_a_scene_is_drawn_where_its_things_stand_and_are_moved(tmp_path: Path) -
         view.present(at(5.0, 0.0, 1.0))
         view.present(at(5.0, 0.0, 1.0))  # the first picture is drawn while textures are made
         empty = view.picture()
-        view.hear(Situation(scene=write_placed(things)))
+        view.update(SessionState(scene=write_placed(things)))
         boxes = []
         for where in ((5.0, 0.0, 1.0), (4.6, -0.5, 1.3)):
             view.present(at(*where))
@@ -280,7 +280,7 @@ def test_a_scene_is_drawn_where_its_things_stand_and_are_moved(tmp_path: Path) -
             assert seen[round(row) + 4, round(column) - 1 : round(column) + 3].any()
             assert not seen[round(row) - 3, round(column) - 20 : round(column) + 20].any()
         np.testing.assert_array_equal(boxes[0][1:], boxes[1][1:])  # the wall stands
-        view.hear(Situation())
+        view.update(SessionState())
         view.present(at(5.0, 0.0, 1.0))
         np.testing.assert_array_equal(view.picture(), empty)
     finally:

@@ -13,23 +13,23 @@ from cranes import needs_bullet
 
 from labcrane import (
     FloatArray,
-    Form,
     Frame,
-    Part,
-    Placed,
+    Geom,
+    PlacedObject,
     Run,
-    Situation,
+    SessionState,
+    ShapeKind,
     Tick,
     load_scene,
-    place,
+    place_objects,
     read_placed,
-    rig,
     write_placed,
 )
-from labcrane.registry import discover
+from labcrane.protocol import rig
+from labcrane.protocol.study import Study, load
+from labcrane.registry.registry import discover
 from labcrane.streams.context import situation_after, situation_of
-from labcrane.study import Study, load
-from labcrane.testing import a_trial
+from labcrane.testing import make_trial
 from labcrane_view.areas import Projection
 from labcrane_view.settings import CameraSettings, ViewSettings
 from labcrane_view.view import View
@@ -71,7 +71,7 @@ def view(request, run: Run) -> Iterator[View]:
         made.close()
 
 
-def a_frame(run: Run, things: tuple[Placed, ...]) -> Frame:
+def make_frame(run: Run, things: tuple[PlacedObject, ...]) -> Frame:
     """Return a frame with the arm held up and things where they were placed."""
     state = np.zeros(run.state.size)
     state[run.state.find("joint.angle")] = np.radians([0.0, -20.0, -60.0, 0.0])
@@ -82,7 +82,9 @@ def a_frame(run: Run, things: tuple[Placed, ...]) -> Frame:
     return Frame(Tick(0, 0.0, 0.0), 0.0, nothing, nothing, state, np.full(run.task.size, np.nan))
 
 
-def move(run: Run, state: FloatArray, thing: Placed, to: tuple[float, ...], yaw: float) -> None:
+def move(
+    run: Run, state: FloatArray, thing: PlacedObject, to: tuple[float, ...], yaw: float
+) -> None:
     state[run.state.find(f"scene.{thing.name}.position")] = to
     state[run.state.find(f"scene.{thing.name}.orientation")] = (
         0.0,
@@ -92,8 +94,8 @@ def move(run: Run, state: FloatArray, thing: Placed, to: tuple[float, ...], yaw:
     )
 
 
-def drawn(view: View, frame: Frame, things: tuple[Placed, ...]) -> FloatArray:
-    view.hear(Situation(scene=write_placed(things)))
+def drawn(view: View, frame: Frame, things: tuple[PlacedObject, ...]) -> FloatArray:
+    view.update(SessionState(scene=write_placed(things)))
     view.present(frame)
     view.present(frame)  # the first picture is drawn while textures are made
     return view.picture().astype(int)
@@ -105,18 +107,18 @@ def box_of(mask: np.ndarray) -> tuple[float, float, float, float]:
     return columns.min(), rows.min(), columns.max() + 1, rows.max() + 1
 
 
-def corners(part: Part, to: tuple[float, ...], yaw: float) -> FloatArray:
+def corners(part: Geom, to: tuple[float, ...], yaw: float) -> FloatArray:
     """Return points around a part, in the base frame: its outermost in every direction."""
     x, y, _ = part.size
-    if part.shape is Form.BOX:
+    if part.shape is ShapeKind.BOX:
         cloud = np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * part.size
     else:
         around = np.random.default_rng(1).normal(size=(4000, 3))
         around /= np.linalg.norm(around, axis=1, keepdims=True)
-        if part.shape is Form.SPHERE:
+        if part.shape is ShapeKind.SPHERE:
             cloud = 0.5 * x * around
         else:
-            assert part.shape is Form.CAPSULE
+            assert part.shape is ShapeKind.CAPSULE
             cloud = 0.5 * y * around + 0.5 * (x - y) * np.sign(around[:, :1]) * np.eye(3)[0]
     for turn, at in ((part.yaw, part.centre), (yaw, to)):
         cos, sin = math.cos(turn), math.sin(turn)
@@ -124,7 +126,7 @@ def corners(part: Part, to: tuple[float, ...], yaw: float) -> FloatArray:
     return cloud
 
 
-def expected(thing: Placed, to: tuple[float, ...], yaw: float) -> FloatArray:
+def expected(thing: PlacedObject, to: tuple[float, ...], yaw: float) -> FloatArray:
     eyes = Projection(np.array(CAMERA.eye), np.array(CAMERA.look), CAMERA.fov_deg, 0, *SIZE)
     boxes = np.array([eyes.points(corners(part, to, yaw)) for part in thing.parts])
     return np.hstack([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
@@ -132,8 +134,8 @@ def expected(thing: Placed, to: tuple[float, ...], yaw: float) -> FloatArray:
 
 @pytest.mark.parametrize("name", SCENES)
 def test_everything_in_a_scene_is_drawn_where_it_stands(name: str, view: View, run: Run) -> None:
-    things = place(load_scene(RETRIEVAL / "scenes" / f"{name}.yaml"), 3)
-    frame = a_frame(run, things)
+    things = place_objects(load_scene(RETRIEVAL / "scenes" / f"{name}.yaml"), 3)
+    frame = make_frame(run, things)
     bare = drawn(view, frame, ())
     for thing in things:
         changed = np.abs(drawn(view, frame, (thing,)) - bare).max(axis=-1) > 12
@@ -144,8 +146,8 @@ def test_everything_in_a_scene_is_drawn_where_it_stands(name: str, view: View, r
 
 @pytest.mark.parametrize("name", ["touch", "casualty"])
 def test_what_moves_is_drawn_where_the_state_says(name: str, view: View, run: Run) -> None:
-    *_, thing = place(load_scene(RETRIEVAL / "scenes" / f"{name}.yaml"), 3)
-    frame = a_frame(run, (thing,))
+    *_, thing = place_objects(load_scene(RETRIEVAL / "scenes" / f"{name}.yaml"), 3)
+    frame = make_frame(run, (thing,))
     bare = drawn(view, frame, ())
     to, yaw = (1.5, -0.3, 0.4), 0.7
     move(run, frame.state, thing, to, yaw)
@@ -159,15 +161,15 @@ def test_a_bent_limb_can_be_seen(view: View, run: Run) -> None:
         update={"figure": scene.figure.model_copy(update={"deformity": None})}
     )
     pictures = [
-        drawn(view, a_frame(run, things), things)
-        for things in (place(each, 3) for each in (scene, straight))
+        drawn(view, make_frame(run, things), things)
+        for things in (place_objects(each, 3) for each in (scene, straight))
     ]
     assert (np.abs(pictures[0] - pictures[1]).max(axis=-1) > 30).sum() > 50
 
 
 def test_a_scene_survives_being_sent() -> None:
     for name in SCENES:
-        things = place(load_scene(RETRIEVAL / "scenes" / f"{name}.yaml"), 5)
+        things = place_objects(load_scene(RETRIEVAL / "scenes" / f"{name}.yaml"), 5)
         assert read_placed(write_placed(things)) == things
     assert read_placed("") == ()
 
@@ -176,12 +178,12 @@ def test_the_context_says_what_the_trials_seed_has_placed(study: Study, run: Run
     task = study.tasks["retrieval"]
     planned = next(each for each in task.plan(task.factors()) if "casualty" in str(each.condition))
     task.open(run)
-    task.begin_trial(a_trial(planned, seed=9))
-    things = place(load_scene(RETRIEVAL / "scenes" / "casualty.yaml"), 9)
-    frame = a_frame(run, things)
-    event, *_ = task.judge(frame).events
+    task.begin_trial(make_trial(planned, seed=9))
+    things = place_objects(load_scene(RETRIEVAL / "scenes" / "casualty.yaml"), 9)
+    frame = make_frame(run, things)
+    event, *_ = task.evaluate(frame).events
     frame.elapsed = 0.1
-    assert "scene.placed" not in [event.name for event in task.judge(frame).events]
+    assert "scene.placed" not in [event.name for event in task.evaluate(frame).events]
     assert event.name == "scene.placed"
-    now = situation_after(Situation(), event)
+    now = situation_after(SessionState(), event)
     assert read_placed(situation_of(json.loads(json.dumps(asdict(now)))).scene) == things

@@ -6,7 +6,7 @@ import matplotlib.image
 import numpy as np
 import pytest
 from pydantic import ValidationError
-from windows import SIZE, a_frame, a_view, an_x_server
+from windows import SIZE, a_view, an_x_server, make_frame
 
 from labcrane.streams.pictures import png
 from labcrane_view.settings import ViewSettings
@@ -20,14 +20,14 @@ def test_a_picture_is_the_cameras_part_of_the_window(flip: str) -> None:
     wanted = {"cameras": ["depth"], "width": 160}
     with a_view(camera=STILL, beside=(DEPTH,), flip=flip, supervisor=wanted) as view:
         assert view.cameras == ("depth",)
-        view.present(a_frame(24))
-        view.present(a_frame(48))
+        view.present(make_frame(24))
+        view.present(make_frame(48))
         (name, picture), *others = view.pictures().items()
         window = view.picture()
     axes = {"horizontal": 1, "vertical": 0}
     upright = np.flip(window, axis=axes[flip]) if flip in axes else window
     assert (name, others) == ("depth", [])
-    assert picture.due == a_frame(48).tick.due
+    assert picture.due == make_frame(48).tick.due
     assert picture.legend == "white 1 m, black 11 m"
     half = SIZE[0] // 2
     np.testing.assert_array_equal(picture.pixels, upright[::2, half::2, 0])
@@ -40,7 +40,7 @@ def test_pictures_come_at_their_own_rate_and_say_how_old_they_are() -> None:
     sent = []
     with a_view(**settings) as view:
         for number in range(0, 480, 24):
-            view.present(a_frame(number))
+            view.present(make_frame(number))
             pictures = view.pictures()
             if pictures:
                 assert set(pictures) == {"still", "slow"}
@@ -51,7 +51,7 @@ def test_pictures_come_at_their_own_rate_and_say_how_old_they_are() -> None:
 
 def test_a_view_sends_nothing_unless_it_is_asked_to() -> None:
     with a_view(renderer="software") as view:
-        view.present(a_frame())
+        view.present(make_frame())
         assert view.cameras == ()
         assert view.pictures() == {}
 
@@ -80,7 +80,7 @@ def test_what_is_sent_of_a_window_is_what_is_drawn_in_it(
         for where in ("hidden", "window"):
             with a_view(display=where, **settings) as view:
                 for number in (0, 120):
-                    view.present(a_frame(number))
+                    view.present(make_frame(number))
                 sent.append(view.pictures()["still"].pixels.astype(int))
     assert sent[0].shape == (*SIZE[::-1], 3)
     assert np.ptp(sent[0]) > 100

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from labcrane import RecordingError
-from labcrane.recording.append_file import AppendFile
+from labcrane.files.append import AppendFile
 
 
 @contextmanager

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from recording.journals import COLUMNS, START, frames, stamp, write
 
 from labcrane import RecordingError
-from labcrane.recording import xdf
-from labcrane.recording.stream_header import Channel, StreamHeader
-from labcrane.recording.xdf_chunk import BOUNDARY, MAGIC, Tag, pack, pack_numbers, pack_stream
-from labcrane.recording.xdf_reader import XdfFile, read_xdf
+from labcrane.recording.xdf import writer as xdf
+from labcrane.recording.xdf.chunk import BOUNDARY, MAGIC, Tag, pack, pack_numbers, pack_stream
+from labcrane.recording.xdf.header import Channel, StreamHeader
+from labcrane.recording.xdf.reader import XdfFile, read_xdf
 
 COUNT = 30
 FRAMES = frames(COUNT)

@@ -18,12 +18,12 @@ from labcrane.recording.foreign_streams import (
     RecordedStream,
     companion_headers,
 )
-from labcrane.recording.participant_file import consolidate
-from labcrane.recording.recording import open_recording
-from labcrane.recording.recorrect import recorrect
-from labcrane.recording.recover import recover
-from labcrane.recording.stream_header import Channel, StreamHeader
-from labcrane.recording.xdf import XdfWriter
+from labcrane.recording.participant_file.reader import open_recording
+from labcrane.recording.participant_file.recorrect import recorrect
+from labcrane.recording.participant_file.recover import recover
+from labcrane.recording.participant_file.writer import consolidate
+from labcrane.recording.xdf.header import Channel, StreamHeader
+from labcrane.recording.xdf.writer import XdfWriter
 
 EEG = StreamHeader(
     "EEG / 1",

@@ -27,7 +27,7 @@ FULL_DISK = """
 import sys
 from pathlib import Path
 from labcrane import RecordingError
-from labcrane.recording.xdf_reader import read_xdf
+from labcrane.recording.xdf.reader import read_xdf
 from recording.journals import *
 
 folder = Path(sys.argv[1])
@@ -80,7 +80,7 @@ READ_ONLY = """
 import sys
 from pathlib import Path
 from labcrane import RecordingError
-from labcrane.recording.xdf import XdfWriter
+from labcrane.recording.xdf.writer import XdfWriter
 try:
     XdfWriter(Path(sys.argv[1]) / "ses-01_run.xdf")
 except RecordingError as error:
@@ -100,8 +100,8 @@ import shutil
 import sys
 from pathlib import Path
 from labcrane import RecordingError
-from labcrane.recording.participant_file import consolidate
-from labcrane.recording.recording import open_recording
+from labcrane.recording.participant_file.writer import consolidate
+from labcrane.recording.participant_file.reader import open_recording
 from recording.journals import *
 
 folder = Path(sys.argv[1])

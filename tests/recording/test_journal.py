@@ -10,8 +10,8 @@ import pytest
 from labcrane import Event, PluginError, RecordingError
 from labcrane.recording.journal import Column, SessionJournal, event_text
 from labcrane.recording.journal_reader import UNREADABLE, read_journal
-from labcrane.recording.stream_header import Channel, StreamHeader
-from labcrane.recording.xdf import XdfWriter
+from labcrane.recording.xdf.header import Channel, StreamHeader
+from labcrane.recording.xdf.writer import XdfWriter
 
 
 class Colour(StrEnum):

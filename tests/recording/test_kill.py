@@ -15,11 +15,11 @@ import pyxdf
 from recording import journals
 from recording.journals import frames, stamp, write
 
-from labcrane.recording.participant_file import consolidate
-from labcrane.recording.parts import next_part
-from labcrane.recording.recording import open_recording
-from labcrane.recording.recover import recover
-from labcrane.recording.xdf_reader import read_xdf
+from labcrane.recording.participant_file.reader import open_recording
+from labcrane.recording.participant_file.recover import recover
+from labcrane.recording.participant_file.writer import consolidate
+from labcrane.recording.paths import next_part
+from labcrane.recording.xdf.reader import read_xdf
 
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
 
@@ -77,7 +77,7 @@ RECOVER = """
 import sys
 from pathlib import Path
 import h5py, pandas
-from labcrane.recording.recover import recover
+from labcrane.recording.participant_file.recover import recover
 print("go", flush=True)
 recover(Path(sys.argv[1]))
 print("done", flush=True)

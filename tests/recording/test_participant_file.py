@@ -11,10 +11,10 @@ from recording.journals import COLUMNS, CONTEXT, frames, stamp, write
 
 from labcrane import RecordingError
 from labcrane.recording.journal import Column, SessionJournal
-from labcrane.recording.participant_file import consolidate
-from labcrane.recording.recording import Recording, open_recording
-from labcrane.recording.recover import recover
-from labcrane.recording.xdf_reader import read_xdf
+from labcrane.recording.participant_file.reader import Recording, open_recording
+from labcrane.recording.participant_file.recover import recover
+from labcrane.recording.participant_file.writer import consolidate
+from labcrane.recording.xdf.reader import read_xdf
 
 COUNT = 100
 

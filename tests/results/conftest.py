@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from labcrane.analysis.cohort import Cohort, Status, find_cohort
-from labcrane.console import Command, Order
-from labcrane.participants.places import Places
+from labcrane.participants.folders import Places
 from labcrane.participants.register import Tombstone, changed
+from labcrane.session.commands import Command, Order
 from results.recorded import record, study
 
 

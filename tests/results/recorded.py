@@ -7,22 +7,23 @@ from pathlib import Path
 import numpy as np
 from rehearsal import ScriptedConsole, a_study
 
-from labcrane import loop, rig
-from labcrane.clock import ManualClock
-from labcrane.conclusion import conclude
-from labcrane.console import Command
-from labcrane.context import context
-from labcrane.course import Course
-from labcrane.frame_log import FrameLog, columns
-from labcrane.plan import plan_session
+from labcrane.core.clock import ManualClock
+from labcrane.core.records import Event
+from labcrane.design.plan import plan_session
+from labcrane.protocol import rig
+from labcrane.protocol.study import Study
 from labcrane.recording.foreign_streams import companion_headers
+from labcrane.recording.frame_log import FrameLog, columns
 from labcrane.recording.journal import SessionJournal
-from labcrane.recording.participant_file import consolidate
-from labcrane.recording.stream_header import Channel, StreamHeader
-from labcrane.recording.xdf import XdfWriter
-from labcrane.records import Event
-from labcrane.session import Visit
-from labcrane.study import Study
+from labcrane.recording.participant_file.writer import consolidate
+from labcrane.recording.xdf.header import Channel, StreamHeader
+from labcrane.recording.xdf.writer import XdfWriter
+from labcrane.session import loop
+from labcrane.session.commands import Command
+from labcrane.session.metadata import context
+from labcrane.session.postprocess import conclude
+from labcrane.session.sequencer import Sequencer
+from labcrane.session.session import Visit
 
 STUDY = """\
 labcrane: 1
@@ -70,7 +71,7 @@ def record(
     the_rig = rig.build(the_study, simulated=True)
     clock = ManualClock(start=100.0)
     with rig.opened(the_rig, the_study, plan.seed) as run:
-        course = Course(the_study, plan, the_rig, waits=False)
+        course = Sequencer(the_study, plan, the_rig, waits=False)
         with SessionJournal(visit.journal, columns(run), run.rate_hz) as journal:
             log = FrameLog(journal, run)
             log.note(Event("session.start", clock.now(), context(visit, plan, the_rig, run)))

@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 from labcrane.analysis.cohort import find_cohort
-from labcrane.analysis.fitts import WIDTH_FACTOR, difficulty, regress, throughput
-from labcrane.analysis.learning import CURVES, fit_curve, learning_curves
+from labcrane.analysis.statistics.fitts import WIDTH_FACTOR, difficulty, regress, throughput
+from labcrane.analysis.statistics.learning import CURVES, fit_curve, learning_curves
 from results.recorded import STUDY, record, study
 
 DISTANCES = np.repeat([2.0, 3.0, 4.0, 6.0], 8)

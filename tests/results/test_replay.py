@@ -10,9 +10,9 @@ import labcrane
 from labcrane import Frame, ProtocolError, RecordingError
 from labcrane.analysis.measures import measure_session
 from labcrane.cli.app import main
-from labcrane.console import Command, Order
-from labcrane.recording.recording import open_recording
-from labcrane.replay import replay
+from labcrane.recording.participant_file.reader import open_recording
+from labcrane.replay.replay import replay
+from labcrane.session.commands import Command, Order
 from results.recorded import STUDY, record, study
 
 ROOT = Path(__file__).parents[2]
@@ -73,7 +73,7 @@ def test_a_changed_setting_is_named(path: Path, tmp_path: Path) -> None:
 
 
 def test_another_version_is_named(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from labcrane import replay_parts
+    from labcrane.replay import restore as replay_parts
 
     real = replay_parts.version
     monkeypatch.setattr(

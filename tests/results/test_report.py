@@ -10,7 +10,7 @@ import pytest
 
 from labcrane.analysis.cohort import Cohort, Status, find_cohort
 from labcrane.analysis.quality import exclusions, is_result, loop_quality, sync_quality
-from labcrane.analysis.report import write_report
+from labcrane.analysis.report.report import write_report
 from labcrane.cli.app import main
 from results.consumers import under
 

@@ -7,10 +7,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from labcrane.analysis.anova import greenhouse_geisser, repeated_measures
-from labcrane.analysis.report import anova_table, trend_table
-from labcrane.analysis.reported import Reported, check_reported
-from labcrane.analysis.trends import holm, linear_trend, mixed_model
+from labcrane.analysis.report.report import anova_table, trend_table
+from labcrane.analysis.statistics.anova import greenhouse_geisser, repeated_measures
+from labcrane.analysis.statistics.reported import Reported, check_reported
+from labcrane.analysis.statistics.trends import holm, linear_trend, mixed_model
 from results.consumers import needs_r, r, table
 from results.synthetic import cohort_of_36
 

@@ -10,8 +10,8 @@ from ruamel.yaml import YAML
 
 from labcrane import RecordingError
 from labcrane.cli.app import main
-from labcrane.registry import discover
-from labcrane.study import load
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
 from labcrane_operator.fitting import fit_operator
 from labcrane_operator.strokes import least_jerk_duration, read_strokes
 

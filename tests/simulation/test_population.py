@@ -7,11 +7,11 @@ import pytest
 from simple_crane import CRANE
 
 from labcrane.cli.app import main
+from labcrane.design.plan import plan_session
 from labcrane.errors import ProtocolError
-from labcrane.plan import plan_session
-from labcrane.population import Lognormal, Population, read_population
-from labcrane.registry import discover
-from labcrane.study import Study, load
+from labcrane.protocol.study import Study, load
+from labcrane.registry.registry import discover
+from labcrane.simulation.population import Lognormal, Population, read_population
 
 COUNT = 2000
 STUDY = (

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 from statsmodels.stats.power import TTestIndPower, TTestPower
 
-from labcrane.analysis.power import Effect, make_pool, power, read_effect
 from labcrane.errors import ProtocolError
+from labcrane.simulation.power import Effect, make_pool, power, read_effect
 
 SIZES = (8, 16, 32)
 COHORTS = 2000

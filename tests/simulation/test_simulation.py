@@ -17,8 +17,8 @@ from simple_crane import CRANE
 
 from labcrane.cli.app import main
 from labcrane.errors import LabcraneError, ProtocolError, RecordingError
-from labcrane.recording.recording import open_recording
-from labcrane.simulation import SimulationOrder, simulate, simulate_study
+from labcrane.recording.participant_file.reader import open_recording
+from labcrane.simulation.simulation import SimulationJob, simulate, simulate_study
 
 STUDY = (
     """\
@@ -67,7 +67,7 @@ def cohort(study: Path) -> Path:
 
 
 def orders(study: Path, cohort: Path | None, data: Path, names: tuple[str, ...] = NAMES):
-    return [SimulationOrder(study, cohort, data, name) for name in names]
+    return [SimulationJob(study, cohort, data, name) for name in names]
 
 
 def digests(folder: Path) -> dict[str, str]:
@@ -178,7 +178,7 @@ def test_two_simulations_do_not_share_a_folder(study: Path, tmp_path: Path) -> N
 def test_a_participant_who_leaves_has_no_later_session(study: Path, tmp_path: Path) -> None:
     cohort = study.with_name("leaving.yaml")
     cohort.write_text("labcrane_cohort: 1\ndropout: 1.0\n")
-    folder = simulate(SimulationOrder(study, cohort, tmp_path, "P001"))
+    folder = simulate(SimulationJob(study, cohort, tmp_path, "P001"))
     recording = open_recording(folder.participant_file)
     assert list(recording.sessions) == [1]
     ends = recording.session(1).events.query("name == 'session.end'")
@@ -186,7 +186,7 @@ def test_a_participant_who_leaves_has_no_later_session(study: Path, tmp_path: Pa
 
 
 def test_work_of_a_core_that_was_lost_is_done_again(tmp_path: Path) -> None:
-    from labcrane.workers import work
+    from labcrane.parallel import work
 
     given = [(tmp_path / "mark", number) for number in range(4)]
     assert sorted(work(die_once, given, workers=2)) == [0, 1, 2, 3]
@@ -194,9 +194,9 @@ def test_work_of_a_core_that_was_lost_is_done_again(tmp_path: Path) -> None:
 
 
 def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    from labcrane.workers import work
+    from labcrane.parallel import work
 
-    monkeypatch.setattr("labcrane.workers.CONNECT_S", 1.0)
+    monkeypatch.setattr("labcrane.parallel.CONNECT_S", 1.0)
     with pytest.raises(LabcraneError, match=r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:1'"):
         list(work(die_once, [(Path(), 0)], scheduler="tcp://127.0.0.1:1"))
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labcrane.streams.raw import RawStream
+from labcrane.streams.sync.raw import RawStream
 
 
 @dataclass(frozen=True)

@@ -21,10 +21,10 @@ from streams.emulation import (
     until_ready,
 )
 
-from labcrane.streams.companions import raw_of
-from labcrane.streams.correction import Treatment, correct
-from labcrane.streams.dejitter import Dejitter
-from labcrane.streams.resync import resync
+from labcrane.streams.recorder.companions import raw_of
+from labcrane.streams.sync.correction import Treatment, correct
+from labcrane.streams.sync.dejitter import Dejitter
+from labcrane.streams.sync.resync import resync
 
 EXACT = Treatment(rate_hz=1000.0)
 CHUNKS = Treatment(rate_hz=1000.0, dejitter=Dejitter.ENVELOPE, transport_s=0.008)

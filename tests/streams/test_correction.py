@@ -5,10 +5,10 @@ import pytest
 from streams.synthetic import SourceClock, after_one_another, arrivals, probe, source
 
 from labcrane.errors import RecordingError
-from labcrane.streams.correction import Treatment, correct
-from labcrane.streams.dejitter import Dejitter
-from labcrane.streams.quality import Basis
-from labcrane.streams.raw import RawStream
+from labcrane.streams.sync.correction import Treatment, correct
+from labcrane.streams.sync.dejitter import Dejitter
+from labcrane.streams.sync.quality import Basis
+from labcrane.streams.sync.raw import RawStream
 
 REGULAR = Treatment(rate_hz=500.0, dejitter=Dejitter.NONE)
 MARKERS = Treatment()

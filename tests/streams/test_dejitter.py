@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from streams.synthetic import SourceClock, source
 
-from labcrane.streams.correction import Treatment, correct
-from labcrane.streams.dejitter import Dejitter
-from labcrane.streams.raw import RawStream
+from labcrane.streams.sync.correction import Treatment, correct
+from labcrane.streams.sync.dejitter import Dejitter
+from labcrane.streams.sync.raw import RawStream
 
 
 @pytest.fixture

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labcrane.clock import Tick
+from labcrane.core.clock import Tick
+from labcrane.core.records import Event, Frame
 from labcrane.errors import StreamError
-from labcrane.machine_file import load_machine
+from labcrane.machines.library import load_machine
 from labcrane.recording.journal import event_text
-from labcrane.records import Event, Frame
 from labcrane.streams.markers import CODES, OTHER
 from labcrane.streams.outlets import Outlets, check_clock
-from labcrane.testing import a_frame, a_run
+from labcrane.testing import make_frame, make_run
 
 SOURCE = "study/P001/ses-01"
 STREAMS = ("state", "input", "markers", "codes")
@@ -25,7 +25,7 @@ STREAMS = ("state", "input", "markers", "codes")
 
 @pytest.fixture(scope="module")
 def run():
-    return a_run(load_machine("ch8"))
+    return make_run(load_machine("ch8"))
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def a_few_frames(run, count):
     random = np.random.default_rng(1)
     start = time.perf_counter()
     for number in range(count):
-        frame = a_frame(run, state=random.normal(size=run.state.size))
+        frame = make_frame(run, state=random.normal(size=run.state.size))
         frame.axes = random.uniform(-1, 1, run.axes.size)
         frame.tick = Tick(number, start + number / run.rate_hz, 0.0)
         if number == 50:
@@ -123,7 +123,7 @@ def test_liblsl_runs_on_the_clock_of_the_session():
 
 def test_an_outlet_never_lets_liblsl_choose_the_time(run):
     outlets = Outlets(run, "study/P002/ses-01")
-    frame: Frame = a_frame(run)
+    frame: Frame = make_frame(run)
     assert frame.tick.due == 0.0
     with pytest.raises(StreamError, match="cannot be stamped"):
         outlets.push(frame)

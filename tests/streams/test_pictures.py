@@ -11,9 +11,9 @@ import pylsl
 import pytest
 from faults.sessions import unique, wait_for
 
-from labcrane import Picture
+from labcrane import CameraImage
 from labcrane.streams.pictures import PictureOutlet
-from labcrane.supervisor.pictures import Pictures
+from labcrane.web.pictures import Pictures
 
 GREYS = np.arange(60, dtype=np.uint8).reshape(6, 10)
 
@@ -58,7 +58,7 @@ def test_a_picture_arrives_as_it_was_with_its_age(
     wait_for(lambda: outlet.wanted)
     now = pylsl.local_clock()
     made = now + 60.0  # or it would be out of date on a computer that is held up
-    outlet.push({"depth": Picture(GREYS, now - 100.0, "white 2 m, black 14 m")}, made)
+    outlet.push({"depth": CameraImage(GREYS, now - 100.0, "white 2 m, black 14 m")}, made)
     wait_for(lambda: page.of("watch", "depth")[1] != "no picture yet")
     shot, said = page.of("watch", "depth")
     assert shot is not None
@@ -77,7 +77,7 @@ def test_a_picture_that_is_out_of_date_is_not_shown(
     page = watching(source, ("depth",))
     wait_for(lambda: outlet.wanted)
     made = pylsl.local_clock() - 100.0
-    outlet.push({"depth": Picture(GREYS, made)}, made)
+    outlet.push({"depth": CameraImage(GREYS, made)}, made)
     wait_for(lambda: page.of("watch", "depth")[1] != "no picture yet")
     shot, said = page.of("watch", "depth")
     assert shot is None

@@ -12,8 +12,8 @@ import pyxdf
 from streams.emulation import Lab, stop, until, until_ready
 
 from labcrane.errors import StreamError
-from labcrane.recording.parts import parts
-from labcrane.recording.xdf_reader import read_xdf
+from labcrane.recording.paths import parts
+from labcrane.recording.xdf.reader import read_xdf
 from labcrane.streams.discovery import discover
 from labcrane.streams.request import StreamRequest
 
@@ -162,7 +162,7 @@ def test_discovery_tells_rate_units_and_clock(lab):
 def test_a_recorder_that_is_told_nonsense_says_what_it_understands():
     orders = json.dumps({"journal": "x.xdf", "streams": [], "colour": "red"})
     done = subprocess.run(
-        [sys.executable, "-m", "labcrane.streams.recorder_process", orders],
+        [sys.executable, "-m", "labcrane.streams.recorder.process", orders],
         capture_output=True,
         text=True,
         check=False,

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from streams.synthetic import SourceClock, source
 
+from labcrane.core.findings import Verdict
 from labcrane.errors import RecordingError
-from labcrane.finding import Verdict
 from labcrane.recording.foreign_streams import Note, RecordedStream
-from labcrane.recording.stream_header import Channel, StreamHeader
-from labcrane.streams.quality import Quality
-from labcrane.streams.resync import correction_of, resync, treatment_of
-from labcrane.streams.stream_report import judge_stream
-from labcrane.streams.sync_report import COLUMNS, SyncReport, judge_loop, never_came
-from labcrane.streams.verdict import Limit, Limits
+from labcrane.recording.xdf.header import Channel, StreamHeader
+from labcrane.streams.sync.limits import Limit, Limits
+from labcrane.streams.sync.quality import Quality
+from labcrane.streams.sync.resync import correction_of, resync, treatment_of
+from labcrane.streams.sync.stream_report import judge_stream
+from labcrane.streams.sync.sync_report import COLUMNS, SyncReport, judge_loop, never_came
 
 EEG = StreamHeader("EEG", "EEG", (Channel("Cz", "microvolts"),), rate_hz=500.0, source_id="amp-1")
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labcrane.recording.stream_header import Channel, StreamHeader
-from labcrane.streams.inlet import Flow
-from labcrane.streams.watchdog import Condition, Counter, Health, complaints, condition, rate
+from labcrane.recording.xdf.header import Channel, StreamHeader
+from labcrane.streams.recorder.health import Condition, Counter, Health, complaints, condition, rate
+from labcrane.streams.recorder.inlet import Flow
 
 EEG = StreamHeader("EEG", "EEG", (Channel("Cz"), Channel("Sample Counter")), rate_hz=500.0)
 MARKS = StreamHeader("Marks", "Markers", (Channel("mark"),), "string")

@@ -47,7 +47,7 @@ class MyPart(Controller):
     def command(self, axes: FloatArray, state: FloatArray) -> FloatArray:
         return axes[self._axes] * self._full
 
-    def steer(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
+    def inverse(self, velocity: FloatArray, state: FloatArray) -> FloatArray:
         """Undo command: what a simulated operator does to move the tip at ``velocity``."""
         to_tip = jacobian(self._machine, state[self._angle].tolist())
         share = np.linalg.pinv(to_tip, rcond=0.05) @ velocity / self._full

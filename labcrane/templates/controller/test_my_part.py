@@ -8,7 +8,7 @@ import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane import Controller
-from labcrane.testing import ControllerContract, PluginContract, a_run, ch8, crane_at, opened
+from labcrane.testing import ControllerContract, PluginContract, ch8, crane_at, make_run, opened
 
 
 class TestPlugin(PluginContract):
@@ -26,7 +26,7 @@ class TestMyPart(ControllerContract):
 def test_a_full_push_turns_a_joint_at_its_share_of_speed() -> None:
     machine = ch8()
     controller = MyPart(MyPartSettings(speed=0.25), machine)
-    run = a_run(machine, command=controller.signals)
+    run = make_run(machine, command=controller.signals)
     with opened(controller, run):
         axes = np.zeros(run.axes.size)
         axes[run.axes.index("left.x")] = 1.0

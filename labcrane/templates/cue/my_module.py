@@ -7,8 +7,8 @@ import numpy as np
 from pydantic import PositiveFloat
 
 from labcrane import (
-    Beam,
     Cue,
+    Cylinder,
     FloatArray,
     Frame,
     Machine,
@@ -53,7 +53,9 @@ class MyPart(Cue):
             return ()
         tip_x, tip_y, tip_z = frame.state[self._tip].tolist()
         colour = (*self._settings.colour, 1.0)
-        return (Beam("my_part", (tip_x, tip_y, tip_z), (x, y, z), self._settings.radius, colour),)
+        return (
+            Cylinder("my_part", (tip_x, tip_y, tip_z), (x, y, z), self._settings.radius, colour),
+        )
 
     def values(self, frame: Frame) -> FloatArray:
         return np.array([np.linalg.norm(frame.task[self._target] - frame.state[self._tip])])

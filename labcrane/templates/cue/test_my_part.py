@@ -7,8 +7,16 @@ import my_module
 import pytest
 from my_module import MyPart, MyPartSettings
 
-from labcrane import Beam, Cue
-from labcrane.testing import TARGETS, CueContract, PluginContract, a_run, a_target, ch8, opened
+from labcrane import Cue, Cylinder
+from labcrane.testing import (
+    TARGETS,
+    CueContract,
+    PluginContract,
+    ch8,
+    make_run,
+    make_target,
+    opened,
+)
 
 
 class TestPlugin(PluginContract):
@@ -24,11 +32,11 @@ class TestMyPart(CueContract):
 
 
 def test_the_line_ends_at_tip_and_target() -> None:
-    run = a_run(ch8(), task=TARGETS)
+    run = make_run(ch8(), task=TARGETS)
     cue = MyPart(MyPartSettings())
     with opened(cue, run):
-        frame = a_target(run)
+        frame = make_target(run)
         (line,) = cue.draw(frame)
-        assert isinstance(line, Beam)
+        assert isinstance(line, Cylinder)
         assert line.end == tuple(frame.task[run.task.find("target.position")])
         assert math.dist(line.start, line.end) == pytest.approx(cue.values(frame)[0])

@@ -8,7 +8,7 @@ import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane import Dynamics
-from labcrane.testing import DynamicsContract, PluginContract, a_run, ch8, opened
+from labcrane.testing import DynamicsContract, PluginContract, ch8, make_run, opened
 
 
 class TestPlugin(PluginContract):
@@ -26,7 +26,7 @@ class TestMyPart(DynamicsContract):
 def test_after_one_lag_a_joint_has_63_percent_of_its_speed() -> None:
     machine = ch8()
     dynamics = MyPart(MyPartSettings(lag_s=0.2), machine)
-    run = a_run(machine, state=dynamics.signals)
+    run = make_run(machine, state=dynamics.signals)
     with opened(dynamics, run):
         for _ in range(200):
             state = dynamics.step(np.array([0.1, 0.0, 0.0, 0.0]), 0.001)

@@ -45,13 +45,13 @@ class MyPart(Feedback):
     def present(self, frame: Frame) -> FloatArray:
         distance = float(np.linalg.norm(frame.task[self._target] - frame.state[self._tip]))
         if math.isnan(distance):  # between trials there is no target
-            self.rest()
+            self.idle()
             return np.zeros(1)
         brightness = max(0.0, 1.0 - distance / self._settings.far)
         self._shine(brightness)
         return np.array([brightness])
 
-    def rest(self) -> None:
+    def idle(self) -> None:
         self._shine(0.0)
 
     def _shine(self, brightness: float) -> None:

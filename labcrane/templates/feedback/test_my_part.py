@@ -11,10 +11,10 @@ from labcrane.testing import (
     TARGETS,
     FeedbackContract,
     PluginContract,
-    a_frame,
-    a_run,
-    a_target,
     ch8,
+    make_frame,
+    make_run,
+    make_target,
     opened,
 )
 
@@ -32,10 +32,10 @@ class TestMyPart(FeedbackContract):
 
 
 def test_it_is_dark_without_a_target_and_brightest_at_it() -> None:
-    run = a_run(ch8(), task=TARGETS)
+    run = make_run(ch8(), task=TARGETS)
     lamp = MyPart(MyPartSettings())
     with opened(lamp, run):
-        there = a_target(run)
+        there = make_target(run)
         there.state[run.state.find("tip.position")] = there.task[run.task.find("target.position")]
-        assert lamp.present(a_frame(run)) == [0.0]
+        assert lamp.present(make_frame(run)) == [0.0]
         assert lamp.present(there) == [1.0]

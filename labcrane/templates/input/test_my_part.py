@@ -8,7 +8,7 @@ import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane import InputDevice
-from labcrane.testing import InputContract, PluginContract, a_frame, a_run, ch8, opened
+from labcrane.testing import InputContract, PluginContract, ch8, make_frame, make_run, opened
 
 
 class TestPlugin(PluginContract):
@@ -25,8 +25,8 @@ class TestMyPart(InputContract):
 
 def test_the_wave_comes_back_after_its_period() -> None:
     device = MyPart(MyPartSettings(period_s=2.0))
-    run = a_run(ch8(), axes=device.signals)
+    run = make_run(ch8(), axes=device.signals)
     with opened(device, run):
-        first, later = a_frame(run, 100), a_frame(run, 100 + 480)
+        first, later = make_frame(run, 100), make_frame(run, 100 + 480)
         before = device.read(first.tick, first).copy()
         np.testing.assert_allclose(device.read(later.tick, later), before, atol=1e-12)

@@ -13,7 +13,7 @@ from labcrane import (
     Score,
     Settings,
     hookimpl,
-    numbers,
+    numeric_answers,
     offer,
 )
 
@@ -47,7 +47,7 @@ class MyPart(Questionnaire):
         return Item(name, text, highest=self._highest, left="not at all", right="very")
 
     def score(self, answers: Answers) -> Mapping[str, float]:
-        easy, sure = numbers(answers, ("easy", "sure"))  # NaN where there is no answer
+        easy, sure = numeric_answers(answers, ("easy", "sure"))  # NaN where there is no answer
         return {"ease": (easy + sure) / 2.0 / self._highest}
 
 

@@ -9,16 +9,16 @@ from pydantic import PositiveFloat
 from labcrane import (
     Event,
     Frame,
-    Judgement,
     Machine,
     Offer,
     Phase,
-    Planned,
+    PlannedTrial,
     Run,
     Settings,
     Signal,
     Task,
     Trial,
+    TrialStatus,
     hookimpl,
     offer,
 )
@@ -55,8 +55,10 @@ class MyPart(Task):
         """Return what a protocol may order: design: {order: {heights: shuffled}}."""
         return {"heights": [f"{height:g}" for height in self._settings.heights]}
 
-    def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[Planned]:
-        return [Planned({"height": float(level)}, expected_s=8.0) for level in levels["heights"]]
+    def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[PlannedTrial]:
+        return [
+            PlannedTrial({"height": float(level)}, expected_s=8.0) for level in levels["heights"]
+        ]
 
     def open(self, run: Run) -> None:
         self._tip = run.state.find("tip.position")
@@ -65,18 +67,18 @@ class MyPart(Task):
         self._target = np.array([5.0, 0.0, float(str(trial.planned.condition["height"]))])
         self._limit_s = self._settings.limit_s
 
-    def overrule(self) -> None:
+    def lift_limits(self) -> None:
         self._limit_s = math.inf
 
-    def judge(self, frame: Frame) -> Judgement:
+    def evaluate(self, frame: Frame) -> TrialStatus:
         values = np.array([*self._target, self._settings.radius])
         distance = float(np.linalg.norm(frame.state[self._tip] - self._target))
         if distance <= self._settings.radius:
             touched = Event("target.touched", frame.tick.due, {"distance": distance})
-            return Judgement(Phase.SUCCESS, values, (touched,), {"duration": frame.elapsed})
+            return TrialStatus(Phase.SUCCESS, values, (touched,), {"duration": frame.elapsed})
         if frame.elapsed >= self._limit_s:
-            return Judgement(Phase.TIMEOUT, values, (), {"duration": frame.elapsed})
-        return Judgement(Phase.RUNNING, values)
+            return TrialStatus(Phase.TIMEOUT, values, (), {"duration": frame.elapsed})
+        return TrialStatus(Phase.RUNNING, values)
 
 
 @hookimpl

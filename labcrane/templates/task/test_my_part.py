@@ -7,7 +7,15 @@ import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane import Phase, Task
-from labcrane.testing import PluginContract, TaskContract, a_frame, a_run, a_trial, ch8, opened
+from labcrane.testing import (
+    PluginContract,
+    TaskContract,
+    ch8,
+    make_frame,
+    make_run,
+    make_trial,
+    opened,
+)
 
 
 class TestPlugin(PluginContract):
@@ -24,11 +32,11 @@ class TestMyPart(TaskContract):
 
 def test_a_tip_inside_the_target_ends_the_trial() -> None:
     task = MyPart(MyPartSettings(heights=(1.0,), radius=0.2))
-    run = a_run(ch8(), task=task.signals)
+    run = make_run(ch8(), task=task.signals)
     with opened(task, run):
         (planned,) = task.plan(task.factors())
-        task.begin_trial(a_trial(planned))
-        frame = a_frame(run)
+        task.begin_trial(make_trial(planned))
+        frame = make_frame(run)
         for height, phase in ((1.3, Phase.RUNNING), (1.1, Phase.SUCCESS)):
             frame.state[run.state.find("tip.position")] = (5.0, 0.0, height)
-            assert task.judge(frame).phase is phase
+            assert task.evaluate(frame).phase is phase

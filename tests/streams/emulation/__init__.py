@@ -12,8 +12,8 @@ import numpy as np
 import pyxdf
 
 from labcrane.recording.foreign_streams import RecordedStream, read_streams
-from labcrane.recording.parts import parts
-from labcrane.recording.xdf import XdfWriter
+from labcrane.recording.paths import parts
+from labcrane.recording.xdf.writer import XdfWriter
 
 HERE = Path(__file__).parent
 
@@ -93,7 +93,7 @@ class Lab:
     def recorder(self, *streams: dict[str, object], **orders: object) -> subprocess.Popen[str]:
         told = {"journal": str(self.journal), "streams": list(streams), **orders}
         process = subprocess.Popen(
-            [sys.executable, "-m", "labcrane.streams.recorder_process", json.dumps(told)],
+            [sys.executable, "-m", "labcrane.streams.recorder.process", json.dumps(told)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,

@@ -1,0 +1,205 @@
+"""The report's figures, each with the table it shows."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from labcrane.analysis.statistics.fitts import regress
+from labcrane.analysis.statistics.learning import CURVES
+from labcrane.types import FloatArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WORDS = {
+    "movement_time": "movement time (s)",
+    "absolute_error": "distance from the target's centre (m)",
+    "simultaneous": "time with two or more axes (fraction)",
+    "bimanual": "time with both sticks (fraction)",
+    "reversals": "stick reversals (1/s)",
+    "sparc": "smoothness (SPARC)",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """A figure, its name for files, what it shows, and its table."""
+
+    name: str
+    caption: str
+    figure: "Figure"
+    table: "pd.DataFrame"
+
+
+def new_figure(columns: int = 1) -> "tuple[Figure, list[Axes]]":
+    """Return an empty figure with some axes beside each other; needs no display."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(5.2 * columns, 3.8), layout="constrained")
+    axes = [figure.add_subplot(1, columns, at + 1) for at in range(columns)]
+    for one in axes:
+        one.grid(alpha=0.3)
+        one.spines[["top", "right"]].set_visible(False)
+    return figure, axes
+
+
+def over(movements: "pd.DataFrame", measure: str, by: list[str]) -> "pd.DataFrame":
+    """Return mean, 95 % confidence interval and n over participants' means, for each level."""
+    import pandas as pd
+    from scipy.stats import t
+
+    cells = movements.groupby([*by, "participant"])[measure].mean().dropna()
+    rows = []
+    for level, values in cells.groupby(level=list(range(len(by)))):
+        n, mean = len(values), float(values.mean())
+        spread = float(values.std(ddof=1)) / np.sqrt(n) if n > 1 else np.nan
+        reach = float(t.ppf(0.975, n - 1)) * spread if n > 1 else np.nan
+        rows.append((*cast("tuple[Any, ...]", level), mean, mean - reach, mean + reach, n))
+    columns = [*by, "mean", "ci_low", "ci_high", "participants"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def by_sequence(movements: "pd.DataFrame", measure: str) -> Drawing:
+    """Draw a measure over the sequence: everybody thin, the mean thick."""
+    figure, (axes,) = new_figure()
+    each = movements.groupby(["participant", "sequence"])[measure].mean().unstack(level=0)
+    axes.plot(each.index, each, color="0.75", lw=0.8)
+    table = over(movements, measure, ["sequence"])
+    _with_ci(axes, table["sequence"], table, "C0", "mean")
+    axes.set(xlabel="position in the sequence", ylabel=WORDS.get(measure, measure))
+    caption = (
+        f"{WORDS.get(measure, measure)} over the sequence; mean with 95 % CI, each participant"
+    )
+    return Drawing(f"{measure}_by_sequence", caption, figure, table)
+
+
+def by_distance(movements: "pd.DataFrame") -> Drawing:
+    """Draw movement time and accuracy over the sequence for each distance."""
+    figure, axes = new_figure(2)
+    tables = []
+    for one, measure in zip(axes, ("movement_time", "absolute_error"), strict=True):
+        table = over(movements, measure, ["distance", "sequence"])
+        for number, (distance, part) in enumerate(table.groupby("distance")):
+            _with_ci(one, part["sequence"], part, f"C{number}", f"{distance:g} m")
+        one.set(xlabel="position in the sequence", ylabel=WORDS[measure])
+        tables.append(table.assign(measure=measure))
+    axes[0].legend(title="distance", fontsize="small")
+    import pandas as pd
+
+    caption = "movement time and accuracy over the sequence, per distance; means with 95 % CI"
+    return Drawing("sequence_by_distance", caption, figure, pd.concat(tables))
+
+
+def fitts(movements: "pd.DataFrame") -> Drawing:
+    """Draw movement time over difficulty, with the regression over participants' means."""
+    import pandas as pd
+
+    figure, (axes,) = new_figure()
+    cells = movements.groupby(["participant", "difficulty"])["movement_time"].mean().reset_index()
+    axes.plot(cells["difficulty"], cells["movement_time"], ".", color="0.6", ms=4)
+    rows = []
+    for participant, own in movements.groupby("participant"):
+        rows.append(_line(str(participant), own["difficulty"], own["movement_time"]))
+    whole = regress(_numbers(cells["difficulty"]), _numbers(cells["movement_time"]))
+    rows.append(_line("all (participants' means)", cells["difficulty"], cells["movement_time"]))
+    if whole is not None:
+        x = np.array([cells["difficulty"].min(), cells["difficulty"].max()])
+        axes.plot(x, whole.intercept + whole.slope * x, "C3")
+        axes.set_title(f"{whole.intercept:.2f} s + {whole.slope:.2f} s/bit, R² {whole.r2:.2f}")
+    axes.set(xlabel="index of difficulty (bit)", ylabel=WORDS["movement_time"])
+    return Drawing("fitts", "Fitts' law", figure, pd.DataFrame(rows))
+
+
+def _numbers(column: "pd.Series[Any]") -> FloatArray:
+    return np.asarray(column, np.float64)
+
+
+def _line(who: str, x: "pd.Series[float]", y: "pd.Series[float]") -> dict[str, object]:
+    fit = regress(_numbers(x), _numbers(y))
+    if fit is None:
+        return {"participant": who}
+    return {
+        "participant": who,
+        "intercept_s": fit.intercept,
+        "intercept_low": fit.intercept_ci[0],
+        "intercept_high": fit.intercept_ci[1],
+        "slope_s_bit": fit.slope,
+        "slope_low": fit.slope_ci[0],
+        "slope_high": fit.slope_ci[1],
+        "r2": fit.r2,
+        "n": fit.n,
+    }
+
+
+def learning(movements: "pd.DataFrame", curves: "pd.DataFrame", measure: str) -> Drawing:
+    """Draw participants' means and the better of both learning curves for each."""
+    figure, (axes,) = new_figure()
+    better = curves[(curves["measure"] == measure) & (curves["better"] == "yes")]
+    for number, row in enumerate(better.itertuples(index=False)):
+        own = movements[movements["participant"] == row.participant]
+        means = own.groupby("sequence")[measure].mean()
+        color = f"C{number % 10}"
+        axes.plot(means.index, means, ".", color=color, ms=4)
+        n = np.linspace(1, float(means.index.max()), 100)
+        curve: Callable[..., np.ndarray] = CURVES[str(row.curve)]
+        axes.plot(n, curve(n, row.asymptote, row.gain, row.rate), color=color, lw=0.8)
+    axes.set(xlabel="position in the sequence", ylabel=WORDS.get(measure, measure))
+    return Drawing(f"learning_{measure}", "learning curves, one per participant", figure, curves)
+
+
+def sticks(movements: "pd.DataFrame") -> Drawing:
+    """Draw how the sticks were used over the sequence."""
+    import pandas as pd
+
+    measures = ("simultaneous", "bimanual", "reversals")
+    figure, axes = new_figure(len(measures))
+    tables = []
+    for one, measure in zip(axes, measures, strict=True):
+        table = over(movements, measure, ["sequence"])
+        _with_ci(one, table["sequence"], table, "C2", "mean")
+        one.set(xlabel="position in the sequence", ylabel=WORDS[measure])
+        tables.append(table.assign(measure=measure))
+    caption = "use of the sticks over the sequence; means with 95 % CI"
+    return Drawing("sticks", caption, figure, pd.concat(tables))
+
+
+def throughputs(table: "pd.DataFrame") -> Drawing:
+    """Draw each participant's throughput."""
+    figure, (axes,) = new_figure()
+    axes.bar(table["participant"], table["throughput"], color="C4")
+    axes.tick_params(axis="x", rotation=90, labelsize="x-small")
+    axes.axhline(float(table["throughput"].mean()), color="k", lw=0.8)
+    axes.set(ylabel="throughput (bit/s)")
+    caption = f"throughput, mean of means {table['throughput'].mean():.3f} bit/s"
+    return Drawing("throughput", caption, figure, table)
+
+
+def _with_ci(
+    axes: "Axes", x: "pd.Series[Any]", table: "pd.DataFrame", color: str, label: str
+) -> None:
+    below, above = table["mean"] - table["ci_low"], table["ci_high"] - table["mean"]
+    errors = np.nan_to_num(np.array([below, above], float))
+    axes.errorbar(
+        x.to_numpy(), table["mean"], errors, color=color, marker="o", ms=4, capsize=2, label=label
+    )
+
+
+def power_curve(table: "pd.DataFrame") -> "Figure":
+    """Return the power over the size of the cohort, beside the rate of findings in nothing."""
+    figure, (axes,) = new_figure()
+    for name, words in (("power", "with the effect"), ("null", "labels permuted")):
+        low, high = table[name] - table[f"{name}_low"], table[f"{name}_high"] - table[name]
+        axes.errorbar(
+            table["participants"], table[name], [low, high], marker="o", capsize=3, label=words
+        )
+    axes.axhline(0.8, color="0.6", linestyle="--", linewidth=1)
+    axes.axhline(0.05, color="0.6", linestyle=":", linewidth=1)
+    axes.set(xlabel="participants", ylabel="share of cohorts with p < 0.05", ylim=(-0.03, 1.03))
+    axes.set_title("simulated operators", fontsize="medium")
+    axes.set_xticks(table["participants"])
+    axes.legend(loc="center right")
+    return figure

@@ -1,0 +1,57 @@
+"""A picture of a session's movements: where the tip went, how fast, and what it took."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from labcrane.recording.participant_file.reader import SessionRecord
+
+
+def draw(session: "SessionRecord", path: Path) -> None:
+    """Draw the counted movements of a session into a PNG file."""
+    import matplotlib as mpl  # noqa: PLC0415 - loads for a second
+
+    mpl.use("agg")
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    figure = Figure(figsize=(12, 5.4), layout="constrained")
+    above, speed = figure.subplots(1, 2)
+    stamp = "simulated operator" if session.attrs["simulated"] == "yes" else "recorded operator"
+    figure.suptitle(f"{session.context['title']} — {session.attrs['participant']} ({stamp})")
+    _draw_from_above(session, above)
+    _draw_speed(session, speed)
+    figure.savefig(path, dpi=110)
+
+
+def _draw_from_above(session: "SessionRecord", axes: "Axes") -> None:
+    from matplotlib.patches import Circle  # noqa: PLC0415
+
+    state = session.streams["state"]
+    for _, trial in session.trials.iterrows():
+        moving = (state.time >= trial["started"]) & (state.time <= trial["ended"])
+        x = state.data["tip.position.x"][moving]
+        y = state.data["tip.position.y"][moving]
+        axes.plot(-y, x, lw=1.2, label=f"{trial['trial']:.0f}")
+        axes.add_patch(
+            Circle(
+                (-trial["target_y"], trial["target_x"]), trial["width"] / 2, fill=False, color="0.3"
+            )
+        )
+    axes.plot(0, 0, "ks", ms=8)
+    axes.annotate("crane", (0, 0), textcoords="offset points", xytext=(8, -3))
+    axes.set(xlabel="to the right (m)", ylabel="ahead (m)", title="tip from above", aspect="equal")
+    axes.legend(title="trial", fontsize="small", loc="center left", bbox_to_anchor=(1.02, 0.5))
+    axes.grid(alpha=0.3)
+
+
+def _draw_speed(session: "SessionRecord", axes: "Axes") -> None:
+    state = session.streams["state"]
+    velocity = state.data[["tip.velocity.x", "tip.velocity.y", "tip.velocity.z"]]
+    speed = (velocity**2).sum(axis=1) ** 0.5
+    for _, trial in session.trials.iterrows():
+        moving = (state.time >= trial["started"]) & (state.time <= trial["ended"])
+        axes.plot(state.time[moving] - trial["started"], speed[moving], lw=1)
+    axes.set(xlabel="time in the trial (s)", ylabel="tip speed (m/s)", title="speed of the tip")
+    axes.grid(alpha=0.3)

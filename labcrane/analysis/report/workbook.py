@@ -1,0 +1,191 @@
+"""The evaluation workbook: tests, operators, trend and advice, with totals as live formulas."""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from labcrane.analysis.advice import Advice, familiarity, fatigue, suggest
+from labcrane.analysis.indicator import FORMULA, OBJECTIVE, SUBJECTIVE
+from labcrane.analysis.operator_tests import OperatorTest
+
+if TYPE_CHECKING:
+    from openpyxl import Workbook
+    from openpyxl.worksheet.worksheet import Worksheet
+
+Cell = str | int | float | None
+
+COMPONENTS = (*OBJECTIVE, *SUBJECTIVE)
+FACTS = ("operator", "session", "trial", "scenario", "duration_s", "reference_s")
+COUNTS = ("object", "body", "overload_max", "overload_min", "accuracy", "awareness")
+HEAD = (
+    *FACTS,
+    *(f"n_{name}" if name in OBJECTIVE else f"s_{name}" for name in COUNTS),
+    "k",
+    "k because",
+    *(f"points {name}" for name in COMPONENTS),
+    *(f"weight {name}" for name in COMPONENTS),
+    "objective",
+    "subjective",
+    "raw",
+    "percent",
+)
+WIDTH = 14
+NO_RATING = "no rating"
+
+
+def write_workbook(tests: Sequence[OperatorTest], path: Path) -> None:
+    """Write the workbook of ``tests``, which are in order of operator and time."""
+    from openpyxl import Workbook
+
+    book = Workbook()
+    summary = book.active
+    if summary is None:
+        raise AssertionError("a new workbook has a sheet")
+    summary.title = "Summary"
+    _fill(summary, ("operator", "tests", "raw", "percent", "suggestion"), _operators(tests))
+    _fill(book.create_sheet("Tests"), HEAD, map(_row, tests, range(2, len(tests) + 2)))
+    _trend(book, tests)
+    _fill(
+        book.create_sheet("Advice"),
+        ("operator", "about", "verdict", "evidence"),
+        ((a.operator, a.about, a.verdict, a.evidence) for a in advice(tests)),
+    )
+    _fill(book.create_sheet("Settings"), ("operator", "session", "setting", "value"), _used(tests))
+    book.save(path)
+
+
+def advice(tests: Sequence[OperatorTest]) -> Iterator[Advice]:
+    """Yield what is to be said to each operator."""
+    for _, own in groupby(tests, key=lambda test: test.operator):
+        mine = list(own)
+        yield suggest(mine)
+        for scenario in dict.fromkeys(test.scenario for test in mine):
+            runs = [test for test in mine if test.scenario == scenario]
+            yield familiarity(runs)
+            yield fatigue(runs)
+
+
+def _row(test: OperatorTest, number: int) -> tuple[Cell, ...]:
+    performance, indicator = test.performance, test.indicator
+    points = [_number(indicator.points.get(name)) for name in COMPONENTS]
+    weights = [indicator.largest.get(name) for name in COMPONENTS]
+    at = {name: _letters(HEAD.index(name) + 1) + str(number) for name in HEAD}
+    k, raw = at["k"], at["raw"]
+    objective = f"=SUM({at['points duration']}:{at['points overload_min']})"
+    subjective = f"={at['points accuracy']}+{at['points awareness']}"
+    return (
+        test.operator,
+        test.session,
+        test.trial,
+        test.scenario,
+        performance.duration_s,
+        test.reference_s,
+        *(_number(getattr(performance, name)) for name in COUNTS),
+        int(indicator.completed),
+        test.why,
+        *points,
+        *weights,
+        objective,
+        subjective,
+        f"={k}*({at['objective']}+{at['subjective']})",
+        f"=100*{raw}/SUM({at['weight duration']}:{at['weight awareness']})",
+    )
+
+
+def _operators(tests: Sequence[OperatorTest]) -> Iterator[tuple[Cell, ...]]:
+    names = dict.fromkeys(test.operator for test in tests)
+    for row, operator in enumerate(names, start=2):
+        own = [test for test in tests if test.operator == operator]
+        yield (
+            operator,
+            f"=COUNTIF({_column('operator')},A{row})",
+            f"=AVERAGEIFS({_column('raw')},{_column('operator')},A{row})",
+            f"=AVERAGEIFS({_column('percent')},{_column('operator')},A{row})",
+            suggest(own).verdict,
+        )
+
+
+def _trend(book: "Workbook", tests: Sequence[OperatorTest]) -> None:
+    from openpyxl.chart import LineChart, Reference
+
+    sheet = book.create_sheet("Trend")
+    operators = list(dict.fromkeys(test.operator for test in tests))
+    sessions = sorted({test.session for test in tests})
+    done = {(test.operator, test.session) for test in tests}
+
+    def mean(operator: str, column: int, row: int) -> Cell:
+        if (operator, sessions[row - 2]) not in done:
+            return None
+        name = f"{_letters(column)}$1"
+        by = f"{_column('operator')},{name},{_column('session')},$A{row}"
+        return f"=AVERAGEIFS({_column('percent')},{by})"
+
+    rows = (
+        (session, *(mean(name, at, row) for at, name in enumerate(operators, start=2)))
+        for row, session in enumerate(sessions, start=2)
+    )
+    _fill(sheet, ("session", *operators), rows)
+    chart = LineChart()
+    chart.title, chart.y_axis.title, chart.x_axis.title = "Indicator", "percent", "session"
+    chart.x_axis.delete = chart.y_axis.delete = False
+    last = len(sessions) + 1
+    chart.add_data(
+        Reference(sheet, min_col=2, max_col=len(operators) + 1, min_row=1, max_row=last),
+        titles_from_data=True,
+    )
+    chart.set_categories(Reference(sheet, min_col=1, min_row=2, max_row=last))
+    sheet.add_chart(chart, f"{_letters(len(operators) + 3)}2")
+
+
+def _used(tests: Sequence[OperatorTest]) -> Iterator[tuple[Cell, ...]]:
+    seen = set()
+    for test in tests:
+        if (test.operator, test.session) in seen:
+            continue
+        seen.add((test.operator, test.session))
+        settings = test.settings
+        pairs: list[tuple[str, Cell]] = [
+            ("formula", FORMULA),
+            ("reading", settings.reading),
+            ("mistakes", settings.mistakes),
+            ("capped", "yes" if settings.capped else "no"),
+        ]
+        pairs += [(f"weight {name}", value) for name, value in settings.weights]
+        for name, value in pairs:
+            yield test.operator, test.session, name, value
+
+
+def _fill(sheet: "Worksheet", head: Sequence[str], rows: Iterable[Sequence[Cell]]) -> None:
+    from openpyxl.styles import Font
+
+    sheet.append(list(head))
+    for cell in sheet[1]:
+        cell.font = Font(bold=True)
+    for row in rows:
+        sheet.append([_safe(value) for value in row])
+    sheet.freeze_panes = "A2"
+    for column in range(1, len(head) + 1):
+        sheet.column_dimensions[_letters(column)].width = WIDTH
+
+
+def _safe(value: Cell) -> Cell:
+    """Return a text of others so that no spreadsheet takes it for a formula."""
+    written = isinstance(value, str) and value[:1] in {"+", "-", "@"}
+    return f"'{value}" if written else value
+
+
+def _number(value: float | None) -> Cell:
+    return NO_RATING if value is not None and math.isnan(value) else value
+
+
+def _column(name: str) -> str:
+    letters = _letters(HEAD.index(name) + 1)
+    return f"Tests!${letters}:${letters}"
+
+
+def _letters(column: int) -> str:
+    from openpyxl.utils import get_column_letter
+
+    return str(get_column_letter(column))

@@ -1,0 +1,160 @@
+"""Learning curves, fitted to each participant alone.
+
+Averaged curves look like power functions even when nobody's is one (Heathcote, Brown & Mewhort
+2000, Psychonomic Bulletin & Review 7:185-207), so nothing is averaged before it is fitted.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from labcrane.types import FloatArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PARAMETERS = 3
+RATE_BOUNDS = (1e-3, 10.0)
+"""Beyond these a curve is a straight line, or has ended before its second point."""
+
+
+def exponential(n: FloatArray, asymptote: float, gain: float, rate: float) -> FloatArray:
+    """Return asymptote + gain · exp(-rate · (n - 1)); n counts repetitions from 1."""
+    curve: FloatArray = asymptote + gain * np.exp(-rate * (n - 1.0))
+    return curve
+
+
+def power(n: FloatArray, asymptote: float, gain: float, rate: float) -> FloatArray:
+    """Return asymptote + gain · n ** -rate; n counts repetitions from 1."""
+    curve: FloatArray = asymptote + gain * n ** (-rate)
+    return curve
+
+
+CURVES: dict[str, Callable[[FloatArray, float, float, float], FloatArray]] = {
+    "exponential": exponential,
+    "power": power,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class LearningCurve:
+    """One curve fitted to one participant.
+
+    Attributes
+    ----------
+    curve
+        ``exponential`` or ``power``.
+    asymptote, gain
+        Practised value and what the first repetition has beyond it, in the measure's unit.
+    rate
+        How fast the gain wears off, per repetition (exponential) or as an exponent (power).
+    asymptote_se, gain_se, rate_se
+        Standard errors from the curvature at the solution; infinite where it is flat.
+    aicc
+        Akaike's criterion corrected for few points; the lower one fits better. NaN with fewer
+        than six points, for which the correction does not exist.
+    identified
+        Whether the asymptote can be told from the data: its standard error is less than the
+        spread of the points, and the rate is not at its bounds.
+    n
+        Number of points.
+    """
+
+    curve: str
+    asymptote: float
+    gain: float
+    rate: float
+    asymptote_se: float
+    gain_se: float
+    rate_se: float
+    aicc: float
+    identified: bool
+    n: int
+
+    def at(self, n: FloatArray) -> FloatArray:
+        """Return the curve's values."""
+        return CURVES[self.curve](n, self.asymptote, self.gain, self.rate)
+
+
+def fit_curve(curve: str, n: FloatArray, values: FloatArray) -> LearningCurve | None:
+    """Fit one curve by least squares with bounds; None with fewer points than parameters + 1.
+
+    Gains may be negative: who gets worse is fitted as well. The search starts at several rates.
+    """
+    from scipy.optimize import least_squares
+
+    known = np.isfinite(values)
+    x, y = np.asarray(n, float)[known], np.asarray(values, float)[known]
+    if len(x) <= PARAMETERS:
+        return None
+    model, spread = CURVES[curve], float(np.ptp(y)) or 1.0
+    lower = [float(y.min()) - 2 * spread, -4 * spread, RATE_BOUNDS[0]]
+    upper = [float(y.max()) + 2 * spread, 4 * spread, RATE_BOUNDS[1]]
+    tries = [
+        least_squares(
+            lambda p: model(x, *p) - y,
+            [float(y[-1]), float(y[0] - y[-1]), rate],
+            bounds=(lower, upper),
+            x_scale=[spread, spread, 1.0],
+        )
+        for rate in (0.05, 0.3, 1.0)
+    ]
+    best = min(tries, key=lambda found: float(found.cost))
+    errors = _errors(best.jac, 2.0 * float(best.cost), len(x))
+    asymptote, gain, rate = map(float, best.x)
+    inside = RATE_BOUNDS[0] * 1.01 < rate < RATE_BOUNDS[1] * 0.99
+    return LearningCurve(
+        curve,
+        asymptote,
+        gain,
+        rate,
+        *errors,
+        aicc=_aicc(2.0 * float(best.cost), len(x)),
+        identified=inside and errors[0] < float(y.std(ddof=1)),
+        n=len(x),
+    )
+
+
+def _errors(jacobian: FloatArray, squares: float, n: int) -> tuple[float, float, float]:
+    """Return the standard errors of the three parameters."""
+    information = jacobian.T @ jacobian
+    if np.linalg.cond(information) > 1.0 / np.finfo(float).eps:
+        return math.inf, math.inf, math.inf
+    covariance = np.linalg.inv(information) * squares / (n - PARAMETERS)
+    asymptote, gain, rate = np.sqrt(np.clip(np.diag(covariance), 0.0, None))
+    return float(asymptote), float(gain), float(rate)
+
+
+def _aicc(squares: float, n: int) -> float:
+    k = PARAMETERS + 1  # and the variance
+    if n - k - 1 <= 0:
+        return math.nan
+    likelihood = n * math.log(max(squares, np.finfo(float).tiny) / n)
+    return likelihood + 2 * k + 2 * k * (k + 1) / (n - k - 1)
+
+
+def learning_curves(movements: "pd.DataFrame", measure: str) -> "pd.DataFrame":
+    """Fit both curves to each participant's means of ``measure`` along the sequence.
+
+    Returns one row per participant and curve; ``better`` is yes for the one with the lower AICc.
+    """
+    import pandas as pd
+
+    rows: list[dict[str, object]] = []
+    for participant, own in movements.groupby("participant"):
+        means = own.groupby("sequence")[measure].mean()
+        n = means.index.to_numpy(float)
+        fits = [fit_curve(curve, n, means.to_numpy(float)) for curve in CURVES]
+        found = [fit for fit in fits if fit is not None]
+        lowest = min((fit.aicc for fit in found), default=math.nan)
+        rows += [
+            {"participant": participant, "measure": measure}
+            | {name: getattr(fit, name) for name in LearningCurve.__slots__}
+            | {"better": "yes" if fit.aicc == lowest else "no"}
+            | {"identified": "yes" if fit.identified else "no"}
+            for fit in found
+        ]
+    return pd.DataFrame(rows)

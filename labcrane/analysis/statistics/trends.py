@@ -1,0 +1,204 @@
+"""Whether a measure changes along the session, and what it depends on."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from labcrane.types import FloatArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+LEAST_EIGENVALUE = 1e-4
+"""Of the correlation of random effects; below it one of them follows from the other."""
+
+FIXED = ("sequence", "difficulty", "far_side")
+"""Fixed terms of the mixed model; one that does not vary is left out."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trend:
+    """The test of each participant's slope against zero.
+
+    Attributes
+    ----------
+    measure, along
+        What changes, over what.
+    slope, slope_ci
+        Mean of the participants' least-squares slopes, in the measure's unit per step, with its
+        95 % confidence interval.
+    t, df, p
+        The two-sided t test.
+    dz
+        Effect size: mean slope over the slopes' standard deviation.
+    n
+        Participants.
+    """
+
+    measure: str
+    along: str
+    slope: float
+    slope_ci: tuple[float, float]
+    t: float
+    df: float
+    p: float
+    dz: float
+    n: int
+
+
+def linear_trend(movements: "pd.DataFrame", measure: str) -> Trend | None:
+    """Test for a linear trend over the sequence; None with fewer than three slopes.
+
+    An F test over all positions says that some differ; only this says in which direction.
+    """
+    from scipy.stats import ttest_1samp
+
+    slopes = []
+    for _, own in movements.groupby("participant"):
+        means = own.groupby("sequence")[measure].mean().dropna()
+        if len(means) > 1:
+            slopes.append(float(np.polyfit(means.index.to_numpy(float), means.to_numpy(), 1)[0]))
+    if len(slopes) < 3 or np.ptp(slopes) == 0.0:  # noqa: PLR2004 - no test with fewer
+        return None
+    found = ttest_1samp(slopes, 0.0)
+    low, high = found.confidence_interval(0.95)
+    return Trend(
+        measure,
+        "sequence",
+        slope=float(np.mean(slopes)),
+        slope_ci=(float(low), float(high)),
+        t=float(found.statistic),
+        df=float(found.df),
+        p=float(found.pvalue),
+        dz=float(np.mean(slopes) / np.std(slopes, ddof=1)),
+        n=len(slopes),
+    )
+
+
+def holm(p: Sequence[float]) -> list[float]:
+    """Return p-values corrected after Holm; a NaN is no test and does not count as one."""
+    from statsmodels.stats.multitest import multipletests
+
+    tested = [value for value in p if not math.isnan(value)]
+    if not tested:
+        return list(p)
+    corrected = iter(multipletests(tested, method="holm")[1].tolist())
+    return [value if math.isnan(value) else next(corrected) for value in p]
+
+
+@dataclass(frozen=True, slots=True)
+class MixedModel:
+    """A linear mixed model of the logarithm of a measure.
+
+    ``log measure ~ sequence + difficulty + far_side + (1 + sequence | participant)``, sequence
+    and difficulty centred.
+
+    Attributes
+    ----------
+    measure
+        What was modelled.
+    terms
+        One row per fixed term: term, estimate, standard error, z, p.
+    participant_sd
+        Standard deviation over participants of the intercept, on the log scale.
+    residual_sd
+        That of what is left.
+    slopes
+        Whether each participant has a slope of their own; without, the data could not carry it.
+    converged
+        Whether the fit came to its end; estimates of one that did not mean nothing.
+    n, participants
+        Movements and participants.
+    """
+
+    measure: str
+    terms: "pd.DataFrame"
+    participant_sd: float
+    residual_sd: float
+    slopes: bool
+    converged: bool
+    n: int
+    participants: int
+
+
+def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel | None:
+    """Fit the mixed model by REML; None with fewer than three participants.
+
+    Participants with missing movements stay in. When the model with slopes for each participant
+    does not converge, or has no variance left for them, the one without is fitted, and ``slopes``
+    says so.
+    """
+    import pandas as pd
+
+    data = _modelled(movements, measure)
+    if data["participant"].nunique() < 3:  # noqa: PLR2004
+        return None
+    varied = [name for name in FIXED if data[name].nunique() > 1]
+    formula = "y ~ " + (" + ".join(varied) or "1")
+    for slopes in (True, False):
+        found = _fit(formula, data, "~sequence" if slopes else "1")
+        if found is not None:
+            break
+    else:
+        return None
+    terms = pd.DataFrame(
+        {
+            "term": found.fe_params.index,
+            "estimate": found.fe_params.to_numpy(),
+            "se": found.bse_fe.to_numpy(),
+            "z": found.tvalues[found.fe_params.index].to_numpy(),
+            "p": found.pvalues[found.fe_params.index].to_numpy(),
+        }
+    )
+    return MixedModel(
+        measure,
+        terms,
+        participant_sd=float(np.sqrt(found.cov_re.iloc[0, 0])),
+        residual_sd=float(np.sqrt(found.scale)),
+        slopes=slopes,
+        converged=bool(found.converged),
+        n=len(data),
+        participants=data["participant"].nunique(),
+    )
+
+
+def _modelled(movements: "pd.DataFrame", measure: str) -> "pd.DataFrame":
+    """Return what the model is fitted to: the measure's logarithm, and centred terms."""
+    table = movements[[measure, *FIXED, "participant"]].dropna()
+    table = table[table[measure] > 0.0]
+    data = table[[*FIXED, "participant"]].assign(y=np.log(table[measure]))
+    for name in ("sequence", "difficulty"):
+        data[name] -= data[name].mean()
+    return data
+
+
+def _fit(formula: str, data: "pd.DataFrame", random: str) -> Any:
+    """Return the fitted model; None when it did not converge, or ended at a degenerate one."""
+    import warnings
+
+    from statsmodels.formula.api import mixedlm
+    from statsmodels.tools.sm_exceptions import ConvergenceWarning
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ConvergenceWarning)
+        # statsmodels takes every small variance for a boundary, in whatever unit it is.
+        warnings.filterwarnings("ignore", "The MLE may be on the boundary", ConvergenceWarning)
+        try:
+            found = mixedlm(formula, data, groups="participant", re_formula=random).fit(reml=True)
+        except (ConvergenceWarning, np.linalg.LinAlgError):
+            return None
+    return None if _degenerate(found.cov_re.to_numpy(float)) else found
+
+
+def _degenerate(covariance: FloatArray) -> bool:
+    """Say whether a random effect has no variance of its own."""
+    variances = np.diag(covariance)
+    if variances.min() <= 0.0:
+        return True
+    spread = np.sqrt(variances)
+    correlation = covariance / np.outer(spread, spread)
+    return bool(np.linalg.eigvalsh(correlation).min() < LEAST_EIGENVALUE)

@@ -1,0 +1,96 @@
+"""Commands about approval: approve, amend, methods."""
+
+from datetime import date, datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from labcrane.cli.options import ProtocolPath
+from labcrane.cli.output import out
+from labcrane.errors import ProtocolError
+
+
+def approve(
+    protocol: ProtocolPath,
+    board: Annotated[str, typer.Option(help="who approved it")],
+    reference: Annotated[str, typer.Option(help="the board's number of the approval")],
+    valid_until: Annotated[str, typer.Option(help="last day on which people may take part")],
+    consent: Annotated[Path, typer.Option(help="the consent text, in the protocol's folder")],
+) -> None:
+    """Lock a protocol, with everything it refers to, as approved."""
+    from labcrane.approval import decision
+    from labcrane.protocol.study import load
+    from labcrane.registry.registry import discover
+
+    registry = discover(study=protocol)
+    grant = decision.Grant(board, reference, a_date(valid_until), consent)
+    lock = decision.approve(load(protocol, registry), registry, grant, today())
+    materials = lock.content["materials"]
+    files = ", ".join(materials["files"]) or "no files"
+    out.print(
+        f"{lock.path}: approved until {valid_until}; locked are the protocol, {files}, "
+        f"{lock.approval['consent']} (version {lock.consent_version}), labcrane "
+        f"{materials['labcrane']['version']} and the plugins {', '.join(materials['plugins'])}",
+        markup=False,
+    )
+
+
+def amend(
+    protocol: ProtocolPath,
+    why: Annotated[str, typer.Option(help="why it was changed")],
+    reference: Annotated[str, typer.Option(help="the board's number of the amendment")],
+    board: Annotated[str | None, typer.Option(help="as before by default")] = None,
+    valid_until: Annotated[str | None, typer.Option(help="as before by default")] = None,
+    consent: Annotated[Path | None, typer.Option(help="as before by default")] = None,
+) -> None:
+    """Record what was changed in an approved study, and keep the history."""
+    from labcrane.approval import decision
+    from labcrane.approval.lock import read_lock
+    from labcrane.protocol.study import load
+    from labcrane.registry.registry import discover
+
+    registry, old = discover(study=protocol), read_lock(protocol)
+    grant = decision.Grant(
+        board or old.approval["board"],
+        reference,
+        a_date(valid_until or old.approval["valid_until"]),
+        consent or old.consent,
+    )
+    lock = decision.amend(load(protocol, registry), registry, grant, why, today())
+    entry = lock.amendments[-1]
+    out.print(f"{lock.path}: amendment {entry['number']}:", markup=False)
+    for change in entry["changes"]:
+        out.print(f"  {change}", markup=False)
+
+
+def methods(
+    protocol: ProtocolPath,
+    codebook: Annotated[
+        Path | None, typer.Option(help="where the codebook goes: a CSV file")
+    ] = None,
+) -> None:
+    """Write the Methods paragraph and the codebook of an approved study."""
+    from labcrane.approval.codebook import as_csv
+    from labcrane.approval.lock import read_lock
+    from labcrane.approval.methods import methods as paragraph
+    from labcrane.files.atomic import SHARED_FILE, write_text
+
+    lock = read_lock(protocol)
+    path = codebook or protocol.with_name(f"{protocol.stem}.codebook.csv")
+    out.print(paragraph(lock), markup=False)
+    write_text(path, as_csv(lock.content["codebook"]), SHARED_FILE)
+    out.print(f"codebook: {path}", markup=False)
+
+
+def a_date(text: str) -> date:
+    """Read a date as people type it."""
+    try:
+        return date.fromisoformat(text)
+    except ValueError:
+        raise ProtocolError(f"{text!r} is no date; write it as 2027-12-31") from None
+
+
+def today() -> date:
+    """Return the day it is here."""
+    return datetime.now().astimezone().date()

@@ -1,0 +1,123 @@
+"""Commands that look and run nothing: check and plan."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from labcrane.cli.options import AsJson, ProtocolPath
+from labcrane.cli.output import out
+from labcrane.errors import ProtocolError
+
+if TYPE_CHECKING:
+    from labcrane.design.plan import SessionPlan
+
+
+def check(protocol: ProtocolPath, as_json: AsJson = False) -> None:
+    """Check a protocol and everything it refers to, without running it."""
+    from labcrane.protocol.study import load
+    from labcrane.registry.registry import discover
+
+    try:
+        study = load(protocol, discover(study=protocol))
+    except ProtocolError as error:
+        if as_json:
+            typer.echo(json.dumps({"fine": False, "problems": str(error).splitlines()}))
+        raise
+    if as_json:
+        typer.echo(json.dumps({"fine": True, "problems": [], "study": study.protocol.study}))
+        return
+    sessions = len(study.protocol.sessions)
+    # One plain line, for which rich is not worth loading.
+    typer.echo(
+        f"{protocol}: study {study.protocol.study!r} is fine: {sessions} "
+        f"session{'s' if sessions > 1 else ''} on the {study.machine.title}"
+    )
+
+
+def plan(
+    protocol: ProtocolPath,
+    participants: Annotated[
+        int | None, typer.Option(help="how many to list; as many as are planned by default", min=1)
+    ] = None,
+    participant: Annotated[
+        str | None, typer.Option(help="one participant only, by pseudonym")
+    ] = None,
+    export: Annotated[
+        Path | None, typer.Option(help="write the whole allocation into this CSV file as well")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Show blocks, each participant's order, and how long a session is likely to take."""
+    from labcrane.design.allocation import allocate, as_csv, balance
+    from labcrane.design.plan import plan_session
+    from labcrane.design.pseudonyms import pseudonyms
+    from labcrane.files.atomic import SHARED_FILE, write_text
+    from labcrane.protocol.study import load
+    from labcrane.registry.registry import discover
+
+    study = load(protocol, discover(study=protocol))
+    count = participants or study.protocol.participants.planned
+    names = [participant] if participant else pseudonyms(study.protocol.participants.pattern, count)
+    plans = [
+        [plan_session(study, name, number) for name in names]
+        for number, _ in enumerate(study.protocol.sessions, start=1)
+    ]
+    allotments = allocate(study, dict.fromkeys(names))
+    if export:
+        write_text(export, as_csv(allotments), SHARED_FILE)
+    if as_json:
+        typer.echo(json.dumps([_row(each) for session in plans for each in session], indent=1))
+        return
+    for session in plans:
+        _print(session)
+    if not participant:
+        for line in balance(study, allotments):
+            out.print(line, markup=False)
+    if export:
+        out.print(f"allocation: {export}", markup=False)
+
+
+def _row(session: "SessionPlan") -> dict[str, object]:
+    return {
+        "participant": session.participant,
+        "session": session.number,
+        "name": session.name,
+        "slot": session.slot,
+        "seed": session.seed,
+        "expected_s": session.expected_s,
+        "blocks": [
+            {
+                "number": block.number,
+                "name": block.name,
+                "practice": block.practice,
+                "group": block.group,
+                "trials": sum(trial.planned.counted for trial in block.trials),
+                "levels": {factor: list(levels) for factor, levels in block.levels.items()},
+                "expected_s": block.expected_s,
+            }
+            for block in session.blocks
+        ],
+    }
+
+
+def _print(plans: "Sequence[SessionPlan]") -> None:
+    from textwrap import fill
+
+    whole = plans[0].expected_s / 60
+    out.print(f"session {plans[0].number} {plans[0].name!r}: about {whole:.0f} minutes")
+    for plan in plans:
+        groups = {block.group for block in plan.blocks if block.group}
+        group = f", group {', '.join(sorted(groups))}" if groups else ""
+        out.print(f"{plan.participant}: slot {plan.slot}{group}, seed {plan.seed}", markup=False)
+        for block in plan.blocks:
+            counted = sum(trial.planned.counted for trial in block.trials)
+            practice = " (practice)" if block.practice else ""
+            orders = [f"{factor}: {', '.join(levels)}" for factor, levels in block.levels.items()]
+            about = f"{counted} trials, {block.expected_s / 60:.1f} minutes"
+            line = f"block {block.number} {block.name}{practice}: {'; '.join([about, *orders])}"
+            width = out.console.width
+            whole_line = fill(line, width, initial_indent="  ", subsequent_indent="    ")
+            out.print(whole_line, markup=False)

@@ -1,0 +1,45 @@
+"""Commands for views and sounds."""
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from labcrane.cli.options import ProtocolPath, stay_on_this_computer
+from labcrane.cli.output import out
+
+FILES = Path("preview")
+
+
+def preview(
+    protocol: ProtocolPath,
+    folder: Annotated[
+        Path | None,
+        typer.Option("--to", help="write PNG and WAV files into this folder, and show nothing"),
+    ] = None,
+    recording: Annotated[
+        Path | None,
+        typer.Option(help="participant file with the movement; a simulated one by default"),
+    ] = None,
+    session: Annotated[int, typer.Option(help="session of the recording")] = 1,
+    trial: Annotated[int | None, typer.Option(help="which trial; the first counted one")] = None,
+) -> None:
+    """Play a movement in the study's windows and sounds; as files where there is no display."""
+    stay_on_this_computer()
+    from labcrane.feedback.player import play
+    from labcrane.feedback.preview import chosen, write_preview
+    from labcrane.protocol.study import load
+    from labcrane.registry.registry import discover
+
+    study = load(protocol, discover(study=protocol))
+    shows = sys.platform != "linux" or bool(os.environ.get("DISPLAY"))
+    if folder is None and shows:
+        frames, scene = chosen(study, recording, session, trial)
+        play(study, frames, scene, lambda text: out.print(text, markup=False))
+        return
+    if folder is None:
+        out.print(f"there is no display (DISPLAY is not set); files go to {FILES}/", markup=False)
+    for path in write_preview(study, folder or FILES, recording, session, trial):
+        out.print(str(path), markup=False)

@@ -1,0 +1,118 @@
+"""Commands about participants: the register, consent, deviations."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from labcrane.cli.commands.approval import today
+from labcrane.cli.options import DataBeside, ProtocolPath, data_folder
+from labcrane.cli.output import out, whole_table
+
+Someone = Annotated[str, typer.Argument(metavar="PARTICIPANT", help="pseudonym: P001")]
+Reason = Annotated[str, typer.Option(help="why; no names")]
+Data = Annotated[Path, typer.Option(help="the study's data folder")]
+HERE = Path("data")
+
+
+def participants(data: Data = HERE) -> None:
+    """Show the register: slots, sessions, consent, exclusions."""
+    from labcrane.participants.folders import Places
+    from labcrane.participants.register import read
+
+    register = read(Places(data))
+    table = whole_table("participant", "slot", "group", "seed", "consent", "sessions", "excluded")
+    for name, entry in sorted(register.participants.items()):
+        table.add_row(
+            name,
+            f"{entry.slot}{'' if entry.holds_slot else ' (free)'}",
+            entry.group or "-",
+            str(entry.seed),
+            ", ".join(f"{consent.version} {consent.date}" for consent in entry.consent) or "-",
+            ", ".join(f"{sitting.session} {sitting.date}" for sitting in entry.sessions) or "-",
+            f"{entry.exclusion.date}: {entry.exclusion.reason}" if entry.exclusion else "-",
+        )
+    out.print(table)
+    for name, entry in sorted(register.participants.items()):
+        for text in entry.notes:
+            out.print(f"{name}: {text}", markup=False)
+    for stone in register.tombstones:
+        out.print(f"{stone.participant} erased on {stone.date}: {stone.reason}", markup=False)
+    for export in register.exports:
+        out.print(f"export {export.exporter} of {export.date}: {export.folder}", markup=False)
+
+
+def consent(protocol: ProtocolPath, participant: Someone, data: DataBeside = None) -> None:
+    """Confirm that a participant has consented to the approved text, and enrol the participant."""
+    from labcrane.approval.decision import verify
+    from labcrane.participants.enrolment import confirm_consent
+    from labcrane.participants.folders import Places
+    from labcrane.protocol.study import load
+    from labcrane.registry.registry import discover
+
+    registry = discover(study=protocol)
+    study = load(protocol, registry)
+    lock = verify(study, registry, today())
+    text = (lock.approval["consent"], lock.consent_version)
+    places = Places(data_folder(data, protocol))
+    entry = confirm_consent(places, study, participant, text, today())
+    group = f", group {entry.group}" if entry.group else ""
+    out.print(
+        f"{participant} has consented to {text[0]} (version {text[1]}); slot {entry.slot}{group}, "
+        f"seed {entry.seed}",
+        markup=False,
+    )
+
+
+def exclude(
+    participant: Someone,
+    reason: Reason,
+    keep_slot: Annotated[
+        bool, typer.Option("--keep-slot", help="do not give the slot to another one")
+    ] = False,
+    data: Data = HERE,
+) -> None:
+    """Exclude a participant who dropped out or whose data are not used; the slot gets free."""
+    from labcrane.participants import enrolment
+    from labcrane.participants.folders import Places
+
+    enrolment.exclude(Places(data), participant, reason, today(), keep_slot=keep_slot)
+    out.print(f"{participant} is excluded", markup=False)
+
+
+def note(
+    participant: Someone,
+    text: Annotated[str, typer.Argument(help="what is to be remembered; no names")],
+    data: Data = HERE,
+) -> None:
+    """Keep a note on a participant."""
+    from labcrane.participants import enrolment
+    from labcrane.participants.folders import Places
+
+    enrolment.note(Places(data), participant, text)
+
+
+def waive(
+    participant: Someone,
+    reason: Reason,
+    session: Annotated[int, typer.Option(help="which session", min=2)],
+    data: Data = HERE,
+) -> None:
+    """Let a session be run too early or too late, which is a deviation."""
+    from labcrane.participants import enrolment
+    from labcrane.participants.folders import Places
+
+    enrolment.waive(Places(data), participant, session, reason, today())
+
+
+def deviations(data: Data = HERE) -> None:
+    """List what did not go as the protocol says."""
+    from labcrane.participants.deviations import all_deviations
+    from labcrane.participants.folders import Places
+
+    found = all_deviations(Places(data))
+    table = whole_table("participant", "session", "trial", "what", "detail")
+    for name, deviation in found:
+        where = [str(number) if number else "-" for number in (deviation.session, deviation.trial)]
+        table.add_row(name, *where, deviation.what, deviation.detail)
+    out.print(table if found else "no deviations")

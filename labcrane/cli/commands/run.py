@@ -1,0 +1,183 @@
+"""Commands that run a session: demo, run and resume."""
+
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from labcrane.cli.options import DataBeside, Local, ProtocolPath, data_folder, stay_on_this_computer
+from labcrane.cli.output import out
+from labcrane.errors import LabcraneError, ProtocolError
+
+if TYPE_CHECKING:
+    from labcrane.design.plan import SessionPlan
+    from labcrane.launcher.session_process import SessionConfig
+
+Participant = Annotated[str, typer.Option(help="pseudonym: P001")]
+SessionNumber = Annotated[int, typer.Option(help="which of the protocol's sessions")]
+Simulate = Annotated[
+    bool, typer.Option("--simulate", help="a simulated operator takes the controls")
+]
+Pilot = Annotated[bool, typer.Option("--pilot", help="a trial run: its files are stamped PILOT")]
+Page = Annotated[
+    bool | None,
+    typer.Option("--page/--no-page", help="the pages in the browser; on unless --simulate"),
+]
+WithFeedback = Annotated[
+    bool | None,
+    typer.Option(
+        "--feedback/--no-feedback",
+        help="start views and sounds; by default when a person operates the machine",
+    ),
+]
+
+
+def run(
+    protocol: ProtocolPath,
+    participant: Participant,
+    session: SessionNumber = 1,
+    data: DataBeside = None,
+    simulate: Simulate = False,
+    fast: Annotated[
+        bool, typer.Option("--fast", help="with --simulate: as fast as the machine can, no LSL")
+    ] = False,
+    pilot: Pilot = False,
+    local: Local = False,
+    page: Page = None,
+    feedback: WithFeedback = None,
+) -> None:
+    """Run a session of a study."""
+    if fast and not simulate:
+        raise ProtocolError("--fast needs --simulate: people cannot be hurried")
+    from labcrane.launcher.session_process import SessionConfig
+
+    order = SessionConfig(
+        protocol,
+        participant,
+        session,
+        data_folder(data, protocol),
+        simulate,
+        pilot,
+        feedback=not simulate if feedback is None else feedback,
+    )
+    if local or simulate:
+        stay_on_this_computer()
+    if fast:
+        out.print(f"participant file: {_run_fast(order)}", markup=False)
+    else:
+        _launch(order, page=not simulate if page is None else page)
+
+
+def resume(
+    protocol: ProtocolPath,
+    participant: Participant,
+    session: SessionNumber = 1,
+    data: DataBeside = None,
+    policy: Annotated[
+        Literal["continue", "redo_trial", "redo_block"] | None,
+        typer.Option(help="where to go on; as the protocol says by default"),
+    ] = None,
+    simulate: Simulate = False,
+    pilot: Pilot = False,
+    local: Local = False,
+    page: Page = None,
+    feedback: WithFeedback = None,
+) -> None:
+    """Go on with a session whose process died."""
+    from labcrane.launcher.session_process import SessionConfig
+
+    folder = data_folder(data, protocol)
+    if local or simulate:
+        stay_on_this_computer()
+    shown = not simulate if feedback is None else feedback
+    order = SessionConfig(
+        protocol, participant, session, folder, simulate, pilot, True, policy, shown
+    )
+    _launch(order, page=not simulate if page is None else page)
+
+
+def demo(
+    data: Annotated[Path, typer.Option(help="where the recording goes")] = Path("labcrane-demo"),
+) -> None:
+    """Run a shortened aiming study with a simulated operator."""
+    stay_on_this_computer()
+    from importlib.resources import files
+
+    from labcrane.analysis.report.session_figure import draw
+    from labcrane.launcher.session_process import SessionConfig
+    from labcrane.recording.participant_file.reader import open_recording
+
+    order = SessionConfig(
+        Path(str(files("labcrane") / "demo.yaml")), "P001", 1, data, simulated=True
+    )
+    number = 1
+    while order.visit().folder.path.exists():  # a demo can be run again; nothing is overwritten
+        number += 1
+        order = replace(order, participant=f"P{number:03}")
+    path = _run_fast(order)
+    picture = path.with_suffix(".png")
+    draw(open_recording(path).session(1), picture)
+    out.print(f"participant file: {path}", markup=False)
+    out.print(f"the movements:    {picture}", markup=False)
+
+
+def _run_fast(order: "SessionConfig") -> Path:
+    from labcrane.cli.terminal import Terminal
+    from labcrane.design.plan import plan_session
+    from labcrane.session.commands import QueueConsole
+    from labcrane.session.session import run as run_session
+
+    visit = replace(order.visit(), fast=True)
+    plan = plan_session(visit.study, visit.participant, visit.session)
+    console = QueueConsole()
+    with Terminal(console, out.console, _counted(plan), keys=False):
+        return run_session(visit, console)
+
+
+def _launch(order: "SessionConfig", *, page: bool) -> None:
+    from labcrane.cli.consent import ask_for_consent, await_consent
+    from labcrane.cli.sync import print_report
+    from labcrane.cli.terminal import Terminal
+    from labcrane.design.plan import plan_session
+    from labcrane.launcher.launcher import Launcher
+    from labcrane.launcher.pages import pages
+    from labcrane.session.commands import QueueConsole
+
+    visit = order.visit()
+    ask_for_consent(visit, page=page)
+    plan = plan_session(visit.study, visit.participant, visit.session)
+    console = QueueConsole()
+    keys, asked = not visit.simulated, visit.study.questionnaires
+    shown, count = out.console, _counted(plan)
+    with Terminal(console, shown, count, keys=keys, questionnaires=asked) as terminal:
+        launcher = Launcher(order, console, terminal.say)
+        with (
+            pages(visit, launcher, console, terminal.say, feedback=order.feedback)
+            if page
+            else nullcontext()
+        ):
+            if page:
+                await_consent(visit, console, terminal.say)
+            outcome = launcher.run()
+    if outcome.sync_report is not None:
+        print_report(outcome.sync_report)
+    if visit.folder.participant_file.exists():
+        out.print(f"participant file: {visit.folder.participant_file}", markup=False)
+    if outcome.died is not None:
+        raise LabcraneError(
+            f"the session process died with exit code {outcome.died}"
+            f"{f' in {outcome.where}' if outcome.where else ''}; what it recorded is in the "
+            f"participant file; go on with: labcrane resume {order.protocol} --participant "
+            f"{order.participant} --session {order.session}"
+        )
+
+
+def _counted(plan: "SessionPlan") -> int:
+    return sum(
+        trial.planned.counted
+        for block in plan.blocks
+        if not block.practice
+        for trial in block.trials
+    )

@@ -1,0 +1,56 @@
+"""The command that evaluates operators: score."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from labcrane.cli.commands.results import cohort_of
+from labcrane.cli.output import out
+
+if TYPE_CHECKING:
+    from labcrane.protocol.evaluation import IndicatorSettings
+
+HALF_FINISHED = "half-finished"
+
+
+def score(
+    folder: Annotated[Path, typer.Argument(help="the study's data folder")],
+    into: Annotated[
+        Path | None, typer.Option("--out", help="the workbook; FOLDER/evaluation.xlsx by default")
+    ] = None,
+    settings: Annotated[
+        Path | None,
+        typer.Option(help="YAML with weights, reading, mistakes, capped; as recorded by default"),
+    ] = None,
+    include: Annotated[
+        list[str] | None, typer.Option(help="use also: simulated, pilot; may be repeated")
+    ] = None,
+) -> None:
+    """Write the evaluation workbook: performance indicator, trend, what to practise next."""
+    from rich.table import Table
+
+    from labcrane.analysis.operator_tests import operator_tests
+    from labcrane.analysis.report.workbook import advice, write_workbook
+
+    # Operators are scored while they are still in training.
+    cohort = cohort_of(folder, [HALF_FINISHED, *(include or ())])
+    tests = operator_tests(cohort, _settings(settings) if settings else None)
+    path = into or folder / "evaluation.xlsx"
+    write_workbook(tests, path)
+    table = Table("operator", "session", "trial", "scenario", "raw", "percent")
+    for test in tests:
+        raw, percent = test.indicator.raw, test.indicator.percent
+        where = (test.operator, str(test.session), str(test.trial), test.scenario)
+        table.add_row(*where, f"{raw:.1f}", f"{percent:.1f}")
+    out.print(table)
+    for each in advice(tests):
+        out.print(f"{each.operator}, {each.about}: {each.verdict} ({each.evidence})", markup=False)
+    out.print(f"workbook: {path}", markup=False)
+
+
+def _settings(path: Path) -> "IndicatorSettings":
+    from labcrane.files.yaml import YamlFile
+    from labcrane.protocol.evaluation import IndicatorSettings
+
+    return YamlFile.read(path).checked(IndicatorSettings)

@@ -1,0 +1,193 @@
+"""Commands that rehearse a study without people: simulate and power."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from labcrane.cli.commands.results import Scheduler, Workers, progress_bar
+from labcrane.cli.options import ProtocolPath, stay_on_this_computer
+from labcrane.cli.output import out
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import pandas as pd
+
+    from labcrane.simulation.power import Effect
+
+CohortPath = Annotated[
+    Path | None,
+    typer.Option(help="how operators differ; cohort.yaml beside the protocol if there is one"),
+]
+
+
+def simulate(
+    protocol: ProtocolPath,
+    folder: Annotated[Path, typer.Option("--out", help="the simulated study's data folder")],
+    participants: Annotated[
+        int | None, typer.Option(help="how many; as many as are planned by default", min=1)
+    ] = None,
+    cohort: CohortPath = None,
+    workers: Workers = 1,
+    scheduler: Scheduler = None,
+) -> None:
+    """Run a whole study with simulated operators, as fast as it goes.
+
+    Participants who are in the folder already are kept: what was interrupted goes on.
+    """
+    from labcrane.design.pseudonyms import pseudonyms
+    from labcrane.protocol.study import load
+    from labcrane.registry.registry import discover
+
+    study = load(protocol, discover(study=protocol))
+    count = participants or study.protocol.participants.planned
+    names = pseudonyms(study.protocol.participants.pattern, count)
+    simulate_all(protocol, folder, names, cohort, workers, scheduler)
+    out.print(f"SIMULATED: {count} participants in {folder}", markup=False)
+
+
+def simulate_all(
+    protocol: Path,
+    folder: Path,
+    names: "Sequence[str]",
+    cohort: Path | None,
+    workers: int,
+    scheduler: str | None,
+) -> None:
+    """Simulate whoever is not in ``folder`` yet, and say how far it is."""
+    from labcrane.simulation.population import BESIDE
+    from labcrane.simulation.simulation import SimulationJob, simulate_study
+
+    stay_on_this_computer()
+    beside = protocol.resolve().with_name(BESIDE)
+    cohort = cohort or (beside if beside.exists() else None)
+    out.print(f"operators: {cohort or 'all alike but for their seeds'}", markup=False)
+    # Workers may be in another folder than we are.
+    place = folder.resolve()
+    of = cohort.resolve() if cohort else None
+    orders = [SimulationJob(protocol.resolve(), of, place, name) for name in names]
+    with progress_bar("simulate", len(orders)) as advance:
+        for _ in simulate_study(orders, workers, scheduler):
+            advance()
+
+
+def power(
+    protocol: ProtocolPath,
+    folder: Annotated[Path, typer.Option("--out", help="for the pool, the table and the plot")],
+    participants: Annotated[str, typer.Option(help="sizes of the cohort")] = "12,24,36,48",
+    effect: Annotated[
+        str, typer.Option(help="what is tested: MEASURE~FACTOR; =SIZE puts an effect in")
+    ] = "movement_time~sequence",
+    pool: Annotated[
+        int | None, typer.Option(help="participants to draw cohorts from; twice the largest", min=3)
+    ] = None,
+    cohorts: Annotated[int, typer.Option(help="cohorts drawn for each size", min=20)] = 1000,
+    resimulate: Annotated[
+        int | None, typer.Option(help="simulate so many cohorts afresh and draw none", min=2)
+    ] = None,
+    cohort: CohortPath = None,
+    workers: Workers = 1,
+    scheduler: Scheduler = None,
+) -> None:
+    """Find out how many participants the planned test needs, from simulated ones.
+
+    The test is a t test of the participants' slopes, or differences, against zero; Welch's between
+    groups. With labels permuted it says how often something is found where nothing is.
+    """
+    from labcrane.design.pseudonyms import pseudonyms
+    from labcrane.protocol.study import load
+    from labcrane.registry.registry import discover
+    from labcrane.simulation.power import read_effect
+
+    tested = read_effect(effect)
+    sizes = _sizes(participants)
+    study = load(protocol, discover())
+    count = pool or 2 * max(sizes)
+    if resimulate is not None:
+        count, cohorts = resimulate * max(sizes), resimulate
+    names = pseudonyms(study.protocol.participants.pattern, count)
+    simulate_all(protocol, folder / "pool", names, cohort, workers, scheduler)
+    movements = _movements(folder / "pool", names, workers, scheduler)
+    movements.to_csv(folder / "movements.csv", index=False)
+    _print_power(folder, study.protocol.study, movements, tested, sizes, cohorts, resimulate)
+
+
+def _sizes(text: str) -> list[int]:
+    from labcrane.errors import ProtocolError
+
+    try:
+        sizes = sorted({int(word) for word in text.split(",")})
+    except ValueError:
+        sizes = []
+    if not sizes or sizes[0] < 3:  # noqa: PLR2004 - a t test with fewer says nothing
+        raise ProtocolError(
+            f"--participants {text!r} is no list of sizes of 3 or more; write 12,24,36"
+        )
+    return sizes
+
+
+def _movements(
+    folder: Path, names: "Sequence[str]", workers: int, scheduler: str | None
+) -> "pd.DataFrame":
+    """Return the results of the participants of a pool, who may be more in its folder."""
+    import pandas as pd
+
+    from labcrane.analysis.cohort import find_cohort
+    from labcrane.analysis.measures import measure_participant
+    from labcrane.analysis.quality import is_result
+    from labcrane.parallel import work
+    from labcrane.recording.data_folder import DataFolder
+
+    people = find_cohort(folder.resolve(), ["simulated"]).included
+    wanted = [person for person in people if DataFolder.pseudonym(person.name) in names]
+    with progress_bar("measure", len(wanted)) as advance:
+        tables = []
+        for table in work(measure_participant, wanted, workers, scheduler):
+            tables.append(table)
+            advance()
+    everything = pd.concat(tables, ignore_index=True)
+    everything = everything.sort_values("participant", kind="stable", ignore_index=True)
+    return everything[is_result(everything)]
+
+
+def _print_power(
+    folder: Path,
+    study: str,
+    movements: "pd.DataFrame",
+    tested: "Effect",
+    sizes: "Sequence[int]",
+    cohorts: int,
+    resimulate: int | None,
+) -> None:
+    from dataclasses import asdict
+
+    import pandas as pd
+
+    from labcrane.analysis.report.figures import power_curve
+    from labcrane.cli.output import whole_table
+    from labcrane.design.seeds import derive
+    from labcrane.simulation.power import make_pool
+    from labcrane.simulation.power import power as power_of
+
+    pool = make_pool(movements, tested)
+    if pool.left_out:
+        out.print(f"left out, without a value at some level: {', '.join(pool.left_out)}")
+    table = whole_table("participants", "cohorts", "power", "95 %", "found in nothing", "95 %")
+    found = []
+    seed = derive(study, "power")
+    for one in power_of(pool, tested, sizes, cohorts, seed, fresh=resimulate is not None):
+        found.append(asdict(one))
+        table.add_row(
+            str(one.participants),
+            str(one.cohorts),
+            f"{one.power:.3f}",
+            f"{one.power_low:.3f} to {one.power_high:.3f}",
+            f"{one.null:.3f}",
+            f"{one.null_low:.3f} to {one.null_high:.3f}",
+        )
+    out.print(table)
+    curve = pd.DataFrame(found)
+    curve.to_csv(folder / "power.csv", index=False)
+    power_curve(curve).savefig(folder / "power.png", dpi=150)
+    out.print(f"SIMULATED: {folder / 'power.csv'}, power.png, movements.csv", markup=False)

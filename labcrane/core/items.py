@@ -1,0 +1,123 @@
+"""What a questionnaire asks, and what may be answered."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from labcrane.core.records import Value
+
+Kind = Literal["scale", "number", "choice", "text"]
+
+STEP_TOLERANCE = 1e-9
+
+
+class AnswerError(ValueError):
+    """An answer is not one of those an item takes; the message says which it takes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """One question.
+
+    Attributes
+    ----------
+    name
+        A lower-case word; names the answer in the record.
+    text
+        What is asked, in the language of the questionnaire.
+    kind
+        ``scale``: a number on steps between ``lowest`` and ``highest``; ``number``: any number
+        between them; ``choice``: one of ``choices``; ``text``: words.
+    lowest, highest, step
+        Of a scale or number, in the unit that ``text`` asks for; a step of 0 allows every answer
+        between.
+    left, right
+        Words at the ends of a scale.
+    choices, labels
+        Of a choice: what is recorded, and what is shown for each; the same by default.
+    required
+        Whether the questionnaire cannot be handed in before this is answered, or declined.
+    """
+
+    name: str
+    text: str
+    kind: Kind = "scale"
+    lowest: float = 0.0
+    highest: float = 10.0
+    step: float = 1.0
+    left: str = ""
+    right: str = ""
+    choices: tuple[str, ...] = ()
+    required: bool = True
+    labels: tuple[str, ...] = ()
+
+    @property
+    def takes(self) -> str:
+        """What may be answered, in words."""
+        if self.kind == "choice":
+            return f"one of {', '.join(self.choices)}"
+        if self.kind == "text":
+            return "words"
+        span = f"{self.lowest:g} to {self.highest:g}"
+        return f"{span} in steps of {self.step:g}" if self.step else span
+
+    def check(self, answer: object) -> Value:
+        """Return an answer as it is recorded; None declines the question.
+
+        Raises
+        ------
+        AnswerError
+            The item does not take it.
+        """
+        if answer is None:
+            return None
+        if self.kind in {"choice", "text"}:
+            fits = isinstance(answer, str) and bool(answer.strip())
+            if fits and (self.kind == "text" or answer in self.choices):
+                return str(answer)
+        elif _is_number(answer) and self._on_scale(float(str(answer))):
+            return float(str(answer))
+        raise AnswerError(f"item {self.name!r} takes {self.takes}, not {answer!r}")
+
+    def _on_scale(self, number: float) -> bool:
+        if not self.lowest <= number <= self.highest:  # also refuses NaN
+            return False
+        if not self.step:
+            return True
+        steps = (number - self.lowest) / self.step
+        return math.isclose(steps, round(steps), abs_tol=STEP_TOLERANCE)
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """A number worked out of answers.
+
+    Attributes
+    ----------
+    name
+        A lower-case word; names the score in the record.
+    lowest, highest
+        The range in which the score can be.
+    """
+
+    name: str
+    lowest: float
+    highest: float
+
+
+def _is_number(answer: object) -> bool:
+    return isinstance(answer, int | float) and not isinstance(answer, bool)
+
+
+Answers = Mapping[str, Value]
+"""Answers by the items' names; a declined or unanswered item is None, or missing."""
+
+
+def numeric_answers(answers: Answers, names: Sequence[str]) -> list[float]:
+    """Return the named answers as numbers, NaN for those that are missing.
+
+    Nothing is imputed: a sum with a missing answer is NaN, and says so.
+    """
+    values = (answers.get(name) for name in names)
+    return [float(str(value)) if _is_number(value) else math.nan for value in values]

@@ -1,0 +1,280 @@
+"""What a session of one participant consists of, before anything is opened."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from labcrane.core.records import PlannedTrial, Trial, Value
+from labcrane.design.order import RULES, SQUARES, Turn, faded
+from labcrane.design.seeds import derive
+from labcrane.design.slots import group_of, place_of
+from labcrane.protocol.design import AS_WRITTEN, Criterion
+from labcrane.protocol.steps import Block, Step
+from labcrane.protocol.study import Study
+
+# Seconds an examiner and a participant are likely to spend on a page of text, for plans only.
+READING_S = 120.0
+
+
+@dataclass(frozen=True, slots=True)
+class Owed:
+    """A questionnaire after a trial that a process died before or in the middle of.
+
+    Attributes
+    ----------
+    after
+        The trial that is over.
+    answered
+        What was answered before.
+    """
+
+    after: Trial
+    questionnaire: str
+    answered: Mapping[str, Value]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedBlock:
+    """A run of trials under one condition.
+
+    Attributes
+    ----------
+    name
+        The protocol's name for it.
+    number
+        Counts the session's blocks from 1, practice included.
+    task
+        The protocol's name of the task.
+    practice
+        Whether its trials are practice.
+    levels
+        The levels of each factor, in the order in which they come.
+    trials
+        First attempts, in order.
+    group
+        The participant's between-subject group; "" when the study has none.
+    until, last
+        When practice is enough, and whether no further round of it is planned.
+    reference
+        Whether its trials give the operator's own reference time.
+    ask
+        Questionnaires after each counted trial.
+    feedback
+        What is switched on in each trial, by the trial's number; empty in a study without.
+    owed
+        What a process that died was still to ask after the last trial.
+    """
+
+    name: str
+    number: int
+    task: str
+    practice: bool
+    levels: Mapping[str, tuple[str, ...]]
+    trials: tuple[Trial, ...]
+    group: str = ""
+    until: Criterion | None = None
+    last: bool = True
+    reference: bool = False
+    ask: tuple[str, ...] = ()
+    feedback: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
+    owed: tuple[Owed, ...] = ()
+
+    @property
+    def expected_s(self) -> float:
+        """How long it is likely to take, in seconds."""
+        return sum(trial.planned.expected_s for trial in self.trials)
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedStep:
+    """One step of a session: a text, a break, questionnaires or a block, counted from 1.
+
+    Attributes
+    ----------
+    answered
+        What was answered of its questionnaires before the session's process died.
+    """
+
+    number: int
+    kind: str
+    text: str = ""
+    seconds: float = 0.0
+    block: PlannedBlock | None = None
+    questionnaires: tuple[str, ...] = ()
+    answered: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+
+    @property
+    def expected_s(self) -> float:
+        """How long it is likely to take, in seconds."""
+        if self.block:
+            return self.block.expected_s
+        return self.seconds if self.kind == "break" else READING_S
+
+
+@dataclass(frozen=True, slots=True)
+class SessionPlan:
+    """All steps of one session of one participant, in order.
+
+    Attributes
+    ----------
+    seed
+        The participant's own.
+    slot
+        The participant's place in the design, counted from 1.
+    group
+        Between-subject group; "" when the study has none.
+    """
+
+    participant: str
+    number: int
+    name: str
+    seed: int
+    steps: tuple[PlannedStep, ...]
+    slot: int = 1
+    group: str = ""
+
+    @property
+    def blocks(self) -> tuple[PlannedBlock, ...]:
+        """The blocks among the steps."""
+        return tuple(step.block for step in self.steps if step.block)
+
+    @property
+    def expected_s(self) -> float:
+        """How long the session is likely to take, in seconds."""
+        return sum(step.expected_s for step in self.steps)
+
+
+class Planner:
+    """Plans one session; counts its blocks and trials on the way."""
+
+    def __init__(self, study: Study, participant: str, session: int, slot: int) -> None:
+        self._study = study
+        groups = tuple(study.protocol.design.groups)
+        self.group = group_of(study.protocol.study, groups, slot)
+        self._place = place_of(groups, slot)
+        self._words = (study.protocol.study, participant, session)
+        self._steps = 0
+        self._blocks = 0
+        self._trials = 0
+
+    def steps(self, step: Step) -> Iterator[PlannedStep]:
+        """Yield a step of the protocol, once for each repetition."""
+        if step.block is None:
+            yield self._step(step, None)
+            return
+        rounds = step.block.until.rounds if step.block.until else 1
+        for _ in range(step.block.repeat):
+            for number in range(1, rounds + 1):
+                block = self._block(step.block, step.kind, last=number == rounds)
+                yield self._step(step, block)
+
+    def _step(self, step: Step, block: PlannedBlock | None) -> PlannedStep:
+        self._steps += 1
+        return PlannedStep(
+            self._steps, step.kind, step.text, step.seconds, block, step.questionnaires
+        )
+
+    def _block(self, block: Block, kind: str, *, last: bool) -> PlannedBlock:
+        self._blocks += 1
+        task = self._study.tasks[block.task]
+        levels = {}
+        for factor, written in task.factors().items():
+            order = self._study.protocol.design.order.get(factor, AS_WRITTEN)
+            seed = derive(*self._words, "order", factor, self._blocks)
+            turn = Turn(seed, self._place + self._shift(factor))
+            ordered = RULES[order.rule](written, turn, order.times, order.in_a_row)
+            levels[factor] = ordered[: block.limits.get(factor)]
+        trials = tuple(self._trial(planned) for planned in task.plan(levels))
+        name = block.name or block.task
+        return PlannedBlock(
+            name,
+            self._blocks,
+            block.task,
+            kind == "practice",
+            levels,
+            trials,
+            self.group,
+            until=block.until,
+            last=last,
+            reference=kind == "reference",
+            ask=block.ask,
+            feedback=self._feedback(block, trials),
+        )
+
+    def _shift(self, factor: str) -> int:
+        """Return by how many rows a further square is shifted, so that two squares get crossed.
+
+        Whenever all rows of the first square have been used, the others begin a row later.
+        """
+        orders = self._study.protocol.design.order
+        squares = [name for name, order in orders.items() if order.rule in SQUARES]
+        if factor not in squares[1:]:
+            return 0
+        factors = {
+            name: levels
+            for task in self._study.tasks.values()
+            for name, levels in task.factors().items()
+        }
+        rows = len(SQUARES[orders[squares[0]].rule](len(factors[squares[0]])))
+        return squares.index(factor) * (self._place // rows)
+
+    def _feedback(self, block: Block, trials: Sequence[Trial]) -> dict[int, tuple[str, ...]]:
+        """Return what is on in each trial; an uncounted one is like the counted one after it."""
+        protocol, chosen = self._study.protocol, block.feedback
+        if not protocol.feedback:
+            return {}
+        if chosen == "group":
+            names = protocol.design.groups[self.group]
+        elif chosen == "all":
+            names = tuple(protocol.feedback)
+        else:
+            names = () if chosen == "none" else chosen
+        on = iter(faded(sum(trial.planned.counted for trial in trials), block.fading))
+        shown: dict[int, tuple[str, ...]] = {}
+        waiting: list[int] = []
+        for trial in trials:
+            waiting.append(trial.number)
+            if trial.planned.counted:
+                now = names if next(on) else ()
+                shown.update(dict.fromkeys(waiting, now))
+                waiting.clear()
+        return shown | dict.fromkeys(waiting, names)
+
+    def _trial(self, planned: PlannedTrial) -> Trial:
+        self._trials += 1
+        return Trial(self._trials, 1, derive(*self._words, "trial", self._trials, 1), planned)
+
+
+def slot_by_name(participant: str) -> int:
+    """Return the slot that a pseudonym would have if all came in order: 7 for ``P007``.
+
+    For plans, pilots and simulations, which have no place in the register.
+    """
+    digits = re.search(r"\d+$", participant)
+    return max(1, int(digits[0])) if digits else 1
+
+
+def plan_session(
+    study: Study, participant: str, session: int, slot: int | None = None
+) -> SessionPlan:
+    """Return what happens in ``session`` (from 1) of ``participant``.
+
+    ``slot`` is the participant's in the register; without it, the one of the pseudonym's number.
+    """
+    study.check_participant(participant)
+    study.check_session(session)
+    slot = slot or slot_by_name(participant)
+    written = study.protocol.sessions[session - 1]
+    planner = Planner(study, participant, session, slot)
+    steps = tuple(planned for step in written.steps for planned in planner.steps(step))
+    seed = derive(study.protocol.study, participant)
+    return SessionPlan(participant, session, written.name, seed, steps, slot, planner.group)
+
+
+def next_attempt(
+    study: Study, plan: SessionPlan, trial: Trial, attempt: int | None = None
+) -> Trial:
+    """Return ``trial`` once more, as its next attempt or a given one, with a seed of its own."""
+    attempt = attempt or trial.attempt + 1
+    words = (study.protocol.study, plan.participant, plan.number, "trial", trial.number, attempt)
+    return Trial(trial.number, attempt, derive(*words), trial.planned)

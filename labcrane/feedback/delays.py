@@ -1,0 +1,96 @@
+"""Measured delays of views and sounds, in a file beside the protocol."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from labcrane.errors import ProtocolError
+from labcrane.feedback.delay_analysis import Delay, Kind
+from labcrane.files.atomic import SHARED_FILE, write_text
+
+NOT_MEASURED = "not measured"
+
+Facts = Mapping[str, float | int | str | bool | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A delay, and what it holds for.
+
+    Attributes
+    ----------
+    kind
+        ``display`` or ``audio``.
+    date
+        When it was measured: ``2026-03-01``.
+    sensor
+        Name of the stream that saw it.
+    facts
+        What the component said of itself: renderer, size, driver, block.
+    """
+
+    kind: Kind
+    date: str
+    sensor: str
+    delay: Delay
+    facts: Facts
+
+
+def delay_path(protocol: Path) -> Path:
+    """Return where the delays of a protocol's views and sounds are."""
+    return protocol.with_name(f"{protocol.stem}.delays.json")
+
+
+def read_delays(protocol: Path) -> dict[str, Measured]:
+    """Return what was measured, by the protocol's names for views and sounds.
+
+    Raises
+    ------
+    ProtocolError
+        The file is damaged.
+    """
+    path = delay_path(protocol)
+    if not path.exists():
+        return {}
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        return {name: measured_of(each) for name, each in found.items()}
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        raise ProtocolError(
+            f"{path} is damaged ({error}); remove it and measure again with labcrane doctor"
+        ) from error
+
+
+def measured_of(found: Mapping[str, Any]) -> Measured:
+    """Return the measurement that JSON holds."""
+    return Measured(**{**found, "delay": Delay(**found["delay"])})
+
+
+def store(protocol: Path, name: str, measured: Measured) -> Path:
+    """Put one measurement into the file, instead of an older one; return the file."""
+    path = delay_path(protocol)
+    all_ = {**read_delays(protocol), name: measured}
+    text = json.dumps({key: asdict(each) for key, each in all_.items()}, indent=2)
+    write_text(path, text + "\n", SHARED_FILE)
+    return path
+
+
+def delay_in_words(measured: Measured | None, facts: Facts) -> str:
+    """Return what is known of the delay of a component with these facts."""
+    if measured is None:
+        return NOT_MEASURED
+    now = {name: value for name, value in facts.items() if name != "delay"}
+    other = [
+        f"{name} was {measured.facts.get(name)!r}, is {now.get(name)!r}"
+        for name in {**measured.facts, **now}
+        if measured.facts.get(name) != now.get(name)
+    ]
+    if other:
+        return f"{NOT_MEASURED} as it is now ({'; '.join(other)})"
+    found = measured.delay
+    return (
+        f"{1000 * found.mean_s:.1f} ms (sd {1000 * found.sd_s:.1f} ms, {found.seen} changes, "
+        f"{measured.date})"
+    )

@@ -1,0 +1,235 @@
+"""Measures the delay of a view or a sound with a sensor that is an LSL stream."""
+
+import random
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import date
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from labcrane.core.clock import Tick
+from labcrane.core.records import Frame, Phase, Run, SessionState
+from labcrane.errors import ProtocolError, StreamError
+from labcrane.feedback.config import FeedbackConfig
+from labcrane.feedback.delay_analysis import Change, Kind, delay, onsets, steps
+from labcrane.feedback.delays import Measured
+from labcrane.feedback.presenter import Presenter
+from labcrane.feedback.processes import host_orders
+from labcrane.protocol import rig
+from labcrane.protocol.study import Study
+from labcrane.registry.registry import discover
+
+if TYPE_CHECKING:
+    from labcrane.streams.feedback_log import FeedbackLog
+
+GAP_S = (0.22, 0.41)
+"""Shortest and longest time between two changes: drawn, so that no refresh rate is in step."""
+
+PULL_S = 0.004
+SETTLE_S = 0.3
+LATE_S = 0.5
+"""How long after the last change the sensor is still listened to."""
+
+WAIT_S = 10.0
+"""How long the sensor's stream is looked for."""
+
+SIDE_M = 0.4
+"""How far the tip is from the target for which a sound is made, in metres."""
+
+
+class Sensor:
+    """One channel of a stream: a photodiode or a microphone, on our clock."""
+
+    def __init__(self, name: str, channel: int) -> None:
+        import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
+
+        found = pylsl.resolve_byprop("name", name, timeout=WAIT_S)
+        if not found:
+            raise StreamError(
+                f"there is no stream {name!r}; labcrane streams lists those that there are"
+            )
+        if not 1 <= channel <= found[0].channel_count():
+            raise StreamError(
+                f"stream {name!r} has no channel {channel}; it has {found[0].channel_count()}"
+            )
+        self._channel = channel - 1
+        self._inlet = pylsl.StreamInlet(found[0], max_buflen=60, processing_flags=0)
+        self._offsets = [self._inlet.time_correction(timeout=WAIT_S)]
+        self._inlet.open_stream(timeout=WAIT_S)
+        self._times: list[float] = []
+        self._values: list[float] = []
+
+    @property
+    def sends(self) -> bool:
+        """Whether anything has come."""
+        return bool(self._times)
+
+    def pull(self, wait_s: float) -> None:
+        """Take what has come, waiting for the first of it."""
+        samples, times = self._inlet.pull_chunk(timeout=wait_s, max_samples=4096)
+        self._times += times
+        self._values += [sample[self._channel] for sample in samples]
+
+    def signal(self) -> tuple["np.ndarray", "np.ndarray", float]:
+        """Return times in s on our clock, values, and samples per second."""
+        self._offsets.append(self._inlet.time_correction(timeout=WAIT_S))
+        times = np.array(self._times) + float(np.mean(self._offsets))
+        rate = (len(times) - 1) / (times[-1] - times[0])
+        return times, np.array(self._values), float(rate)
+
+
+class Stage:
+    """Presents one frame over and over, and changes it when it is told to."""
+
+    def __init__(self, order: FeedbackConfig, frame: Frame, kind: Kind, event: str) -> None:
+        self._kind, self._event, self._frame = kind, event, frame
+        self._presenter = Presenter(order, discover(study=order.study))
+        self._name = order.name
+        self._count = self._number = 0
+        self._order = order
+        self.facts = self._presenter.feedback.metadata
+        self._log: FeedbackLog | None = None
+
+    def open(self) -> None:
+        """Open the window or the sound device."""
+        from labcrane.streams.feedback_log import FeedbackLog  # noqa: PLC0415 - liblsl
+
+        self._presenter.open()
+        self._log = FeedbackLog(self._name, self._order.source, self._presenter)
+        columns = self._presenter.layout.columns
+        self._flip = columns.index("flip.time") if "flip.time" in columns else None
+
+    def close(self) -> None:
+        """Close it."""
+        self._presenter.close()
+
+    def change(self) -> None:
+        """Let the patch turn over, or the sound begin or end, with the next frame."""
+        self._count += 1
+        if self._kind == "display":
+            now = SessionState(trial=1, counts={self._event: self._count})
+        else:
+            now = SessionState(trial=1, active=(self._name,) if self._count % 2 else ())
+        self._presenter.update(now)
+
+    def present(self) -> float | None:
+        """Present the frame; return when that was, None for silence."""
+        self._number += 1
+        now = time.perf_counter()
+        frame = replace(self._frame, tick=Tick(self._number, now, now))
+        values = self._presenter.present(frame)
+        if values is None or self._log is None:
+            return None
+        stamp = self._log.push(frame, values, 0, self._presenter.feedback.samples())
+        return stamp if self._flip is None else float(values[self._flip])
+
+
+def measure(
+    study: Study,
+    name: str,
+    stream: str,
+    count: int,
+    channel: int = 1,
+    say: Callable[[str], None] = lambda text: None,
+) -> Measured:
+    """Measure the delay of the view or sound ``name``.
+
+    Parameters
+    ----------
+    stream, channel
+        The sensor, and which of its channels, counted from 1.
+    count
+        How many changes are presented.
+    say
+        Tells people what is going on.
+
+    Raises
+    ------
+    ProtocolError, StreamError, DeviceError
+        It cannot be measured.
+    """
+    kind, event = _kind(study, name)
+    built = rig.build(study, simulated=True)
+    with rig.opened(built, study, 0) as run:
+        (order,) = (each for each in host_orders(study, run, "doctor") if each.name == name)
+        order = replace(order, cues={}, always=kind == "display")
+        frame = _frame(run, built.dynamics.state().copy())
+    sensor = Sensor(stream, channel)
+    stage = Stage(order, frame, kind, event)
+    try:
+        stage.open()
+        say(f"measuring {name!r} with {stream!r}: {count} changes")
+        changes = _changes(stage, sensor, kind, count)
+        facts = {key: value for key, value in stage.facts().items() if key != "delay"}
+    finally:
+        stage.close()
+    times, values, rate = sensor.signal()
+    seen = steps(times, values) if kind == "display" else onsets(times, values)
+    found = delay(changes, seen, rate)
+    return Measured(kind, date.today().isoformat(), stream, found, facts)
+
+
+def _kind(study: Study, name: str) -> tuple[Kind, str]:
+    """Return what kind of thing ``name`` is, and the event at which its patch turns over."""
+    if name in study.sounds:
+        return "audio", ""
+    if name not in study.views:
+        known = ", ".join([*study.views, *study.sounds]) or "none"
+        raise ProtocolError(f"there is no view or sound {name!r}; there is {known}")
+    patch = getattr(study.views[name].settings, "patch", None)
+    if patch is None:
+        raise ProtocolError(
+            f"view {name!r} has no patch for a photodiode; write patch: {{}} under it"
+        )
+    return "display", patch.on[0]
+
+
+def _frame(run: Run, state: "np.ndarray") -> Frame:
+    """Return a frame in which the machine stands still beside a target."""
+    task = np.zeros(run.task.size)
+    columns = run.task.columns
+    if "target.position.x" in columns:
+        tip = state[run.state.find("tip.position")]
+        task[run.task.find("target.position")] = tip + np.array([SIDE_M, 0.0, 0.0])
+    if "target.radius" in columns:
+        task[run.task.index("target.radius")] = SIDE_M / 2.0
+    return Frame(
+        Tick(0, 0.0, 0.0),
+        0.0,
+        np.zeros(run.axes.size),
+        np.zeros(run.command.size),
+        state,
+        task,
+        Phase.RUNNING,
+        trial=1,
+    )
+
+
+def _changes(stage: Stage, sensor: Sensor, kind: Kind, count: int) -> list[Change]:
+    """Make the changes; return those that a sensor should see."""
+    gaps = random.Random(0)  # noqa: S311 - only to be out of step with any refresh rate
+    # The first pictures take long, and so does a sensor's program that has only just been found.
+    started = time.perf_counter()
+    while not sensor.sends or time.perf_counter() < started + SETTLE_S:
+        stage.present()
+        sensor.pull(PULL_S)
+        if time.perf_counter() > started + WAIT_S:
+            raise StreamError(
+                f"the sensor's stream has sent nothing for {WAIT_S:g} s; is its program running?"
+            )
+    changes = []
+    for number in range(1, (1 if kind == "display" else 2) * count + 1):
+        until = time.perf_counter() + gaps.uniform(*GAP_S)
+        while time.perf_counter() < until:
+            stage.present()
+            sensor.pull(PULL_S)
+        stage.change()
+        stamp = stage.present()
+        if stamp is not None:
+            changes.append(Change(stamp, up=kind == "audio" or bool(number % 2)))
+    until = time.perf_counter() + LATE_S
+    while time.perf_counter() < until:
+        sensor.pull(PULL_S)
+    return changes

@@ -1,0 +1,115 @@
+"""Plays a movement to views and sounds as a session does, in real time."""
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+from labcrane.core.clock import Tick
+from labcrane.core.records import Event, Frame, Run, Value
+from labcrane.errors import DeviceError
+from labcrane.feedback.handle import FeedbackHandle
+from labcrane.feedback.processes import host_orders
+from labcrane.machines.scene_codec import SCENE_PLACED
+from labcrane.protocol import rig
+from labcrane.protocol.study import Study
+
+LOOK_S = 0.05
+PATIENCE_S = 10.0
+"""How long to wait until all that are ready have presented the first frame."""
+
+HOLD_S = 1.5
+"""How long the first frame stands, at least."""
+
+END_S = 1.0
+"""How long the last frame stands."""
+
+
+def play(study: Study, frames: Sequence[Frame], scene: str, say: Callable[[str], None]) -> None:
+    """Show and sound consecutive frames with everything switched on.
+
+    Parameters
+    ----------
+    scene
+        What stands around, as of :func:`labcrane.read_placed`.
+    say
+        Tells people what is going on.
+
+    Raises
+    ------
+    DeviceError
+        No view and no sound of the study can be started here.
+    """
+    run = rig.describe(rig.build(study, simulated=True), study, participant_seed=0)
+    source = f"{study.protocol.study}/preview-{os.getpid()}"
+    orders = [replace(order, recorded=False) for order in host_orders(study, run, source)]
+    keepers = [FeedbackHandle(order, "continue") for order in orders]
+    try:
+        _wait(keepers, say)
+        _present(run, source, frames, scene, [*study.cues, *study.sounds], keepers)
+    finally:
+        for keeper in keepers:
+            keeper.stop()
+
+
+def _wait(keepers: Sequence[FeedbackHandle], say: Callable[[str], None]) -> None:
+    """Wait until each is ready or left out."""
+    while not all(keeper.ready or keeper.given_up for keeper in keepers):
+        for keeper in keepers:
+            for news in keeper.watch():
+                say(f"feedback {news.text}")
+        time.sleep(LOOK_S)
+    if all(keeper.given_up for keeper in keepers):
+        raise DeviceError("nothing can be shown or sounded here; --to FOLDER writes files instead")
+
+
+def _present(
+    run: Run,
+    source: str,
+    frames: Sequence[Frame],
+    scene: str,
+    active: Sequence[str],
+    keepers: Sequence[FeedbackHandle],
+) -> None:
+    from labcrane.streams.context import ContextOutlet  # noqa: PLC0415 - loads liblsl
+    from labcrane.streams.frames import FrameOutlet  # noqa: PLC0415
+
+    outlets = (FrameOutlet(run, source), ContextOutlet(run, source, 1))
+    show = partial(_send, [outlet.push for outlet in outlets])
+    try:
+        first, now = frames[0], time.perf_counter()
+        about: dict[str, Value] = {"trial": first.trial, "feedback": "+".join(active) or "none"}
+        placed = Event(SCENE_PLACED, now, {"things": scene})
+        show(first, placed, Event("trial.start", now, about))
+        _hold(lambda: show(first), keepers)
+        began = time.perf_counter()
+        for frame in frames:
+            due = began + frame.tick.due - first.tick.due
+            time.sleep(max(0.0, due - time.perf_counter()))
+            show(frame)
+        time.sleep(END_S)
+    finally:
+        for outlet in outlets:
+            outlet.close()
+
+
+def _send(pushes: Sequence[Callable[[Frame], None]], frame: Frame, *events: Event) -> None:
+    """Send a frame as one of now."""
+    now = time.perf_counter()
+    sent = replace(frame, tick=Tick(frame.tick.number, now, now), events=events)
+    for push in pushes:
+        push(sent)
+
+
+def _hold(show: Callable[[], None], keepers: Sequence[FeedbackHandle]) -> None:
+    """Show the first frame until all present it, and for a while.
+
+    Whoever finds the streams now is told what is switched on within the second.
+    """
+    began = time.perf_counter()
+    while (now := time.perf_counter()) < began + HOLD_S or not (
+        all(keeper.presented or keeper.given_up for keeper in keepers) or now > began + PATIENCE_S
+    ):
+        show()
+        time.sleep(LOOK_S)

@@ -1,0 +1,123 @@
+"""All feedback processes of a run."""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+from labcrane.core.records import Run
+from labcrane.design.seeds import derive
+from labcrane.errors import DeviceError
+from labcrane.feedback.config import FeedbackConfig, Part
+from labcrane.feedback.delays import read_delays
+from labcrane.feedback.handle import FeedbackHandle
+from labcrane.protocol import rig
+from labcrane.protocol.components import ComponentSpec
+from labcrane.protocol.study import Study
+from labcrane.session.commands import Command, Order
+from labcrane.session.session import Visit
+from labcrane.streams.feedback_log import log_source
+from labcrane.streams.request import StreamRequest
+
+LOOK_S = 0.05
+
+
+class FeedbackProcesses:
+    """Starts, watches and stops the views and sounds of a visit."""
+
+    def __init__(self, visit: Visit) -> None:
+        policy = visit.study.protocol.on_fault.feedback_lost
+        self._required = policy != "continue"
+        self.keepers = [FeedbackHandle(order, policy) for order in _orders_of(visit)]
+        self._news: list[Command] = []
+
+    def wait(self, say: Callable[[str], None], ended: Callable[[], bool]) -> bool:
+        """Wait until all are ready or left out; whether the session may start.
+
+        Raises
+        ------
+        DeviceError
+            One cannot be started, and the protocol does not say to go on without it.
+        """
+        while not all(keeper.ready or keeper.given_up for keeper in self.keepers):
+            for keeper in self.keepers:
+                if not (why := keeper.failure):
+                    continue
+                if self._required:
+                    raise DeviceError(
+                        f"feedback {keeper.name!r} cannot be started: {why} (on_fault: "
+                        "{feedback_lost: continue} would go on without it)"
+                    )
+                self._news += (news := keeper.watch())
+                for command in news:
+                    say(f"feedback {command.text}")
+            if ended():
+                return False
+            time.sleep(LOOK_S)
+        return True
+
+    def watch(self, say: Callable[[str], None]) -> list[Command]:
+        """Look after all processes; return what the session is to be told, also of its start."""
+        news = [command for keeper in self.keepers for command in keeper.watch()]
+        for command in news:
+            word = "is ready" if command.order is Order.MENDED else "failed"
+            name, _, text = command.text.partition(": ")
+            say(f"feedback {name} {word}" + (f": {text}" if text else ""))
+        before, self._news = self._news, []
+        return before + news
+
+    def stop(self) -> None:
+        """Stop all processes."""
+        for keeper in self.keepers:
+            keeper.stop()
+
+
+def host_orders(study: Study, run: Run, source: str) -> list[FeedbackConfig]:
+    """Return what the feedback processes of a study are to be told; ``source`` is whose streams."""
+    cues = {name: _part(choice) for name, choice in study.cues.items()}
+    return [
+        *(
+            FeedbackConfig(name, _part(choice), run, source, study.path, always=True, cues=cues)
+            for name, choice in study.views.items()
+        ),
+        *(
+            FeedbackConfig(name, _part(choice), run, source, study.path, always=False)
+            for name, choice in study.sounds.items()
+        ),
+    ]
+
+
+def _orders_of(visit: Visit) -> list[FeedbackConfig]:
+    study = visit.study
+    if not (study.sounds or study.views):
+        return []
+    seed = derive(study.protocol.study, visit.participant)
+    run = rig.describe(rig.build(study, simulated=visit.simulated), study, seed)
+    known = read_delays(study.path)
+    orders = host_orders(study, run, visit.source)
+    return [replace(order, measured=known.get(order.name)) for order in orders]
+
+
+def log_requests(visit: Visit) -> list[StreamRequest]:
+    """Return what the recorder is asked for: the streams in which feedback says what it did."""
+    study = visit.study
+    found = []
+    for name, choice in {**study.views, **study.sounds}.items():
+        feedback = choice.build(study.machine)
+        streams = ("", *getattr(feedback, "streams", {}))
+        for stream in streams:
+            label = f"{name}.{stream}" if stream else name
+            wanted = log_source(visit.source, name, stream)
+            found.append(StreamRequest(label=label, source_id=wanted, required=False))
+    return found
+
+
+def cameras_of(study: Study) -> dict[str, tuple[str, ...]]:
+    """Return the names of the cameras whose pictures the supervisor is sent, by feedback."""
+    chosen = {**study.views, **study.sounds}
+    built = {name: choice.build(study.machine) for name, choice in chosen.items()}
+    named = {name: getattr(feedback, "cameras", ()) for name, feedback in built.items()}
+    return {name: cameras for name, cameras in named.items() if cameras}
+
+
+def _part(choice: ComponentSpec) -> Part:
+    return Part(choice.name, choice.settings.model_dump(mode="json"))

@@ -1,0 +1,221 @@
+"""Starts, watches and restarts the processes of a run.
+
+The session process owns the loop, the recorder process the streams of others. Either may die: the
+recorder is started again at once, and after the session's death everything recorded is put into
+the participant file, to be gone on with by ``labcrane resume``.
+"""
+
+import multiprocessing
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from typing import TYPE_CHECKING, Any
+
+from labcrane.feedback.processes import FeedbackProcesses, log_requests
+from labcrane.launcher.hang_detector import HangDetector
+from labcrane.launcher.session_process import Ended, SessionConfig, serve
+from labcrane.recording.crash_marker import read_whereabouts
+from labcrane.recording.paths import parts
+from labcrane.session.commands import Command, Order, QueueConsole
+from labcrane.session.eligibility import check_eligibility
+from labcrane.session.session import Visit, finish
+from labcrane.streams.recorder.handle import RecorderHandle
+from labcrane.streams.sync.sync_report import SyncReport
+
+if TYPE_CHECKING:
+    from multiprocessing.context import SpawnProcess
+
+LOOK_S = 0.05
+"""How often the launcher looks after its processes: a dead recorder must be back in a second."""
+
+RECORDER = "recorder"
+
+FOR_THE_RECORD = (Order.NOTE, Order.DENIED)
+"""What is kept for the session when it is said while streams and feedback are waited for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a run ended.
+
+    Attributes
+    ----------
+    died
+        Exit code of a session process that died; None when it ended in order.
+    where
+        In which component it was when it died; empty when that is not known.
+    sync_report
+        How right the session's time stamps are; None when nothing was recorded.
+    """
+
+    died: int | None = None
+    where: str = ""
+    sync_report: SyncReport | None = None
+
+
+class Launcher:
+    """Runs one visit.
+
+    Parameters
+    ----------
+    console
+        Takes orders from people, and is told every event.
+    say
+        Tells people what the launcher itself has to say.
+    """
+
+    def __init__(
+        self, order: SessionConfig, console: QueueConsole, say: Callable[[str], None]
+    ) -> None:
+        self._order = order
+        self._visit: Visit = order.visit()
+        self._console = console
+        self._say = say
+        self._recorder: RecorderHandle | None = None
+        self._crew: FeedbackProcesses | None = None
+        self._lost: set[str] = set()
+        self._kept: list[Command] = []
+        self.sync_report: SyncReport | None = None
+
+    def run(self) -> Outcome:
+        """Run the visit to its end and make its participant file.
+
+        Raises
+        ------
+        LabcraneError
+            The session could not be run, in the session process's own words.
+        """
+        visit = self._visit
+        check_eligibility(visit)
+        if not visit.resumed:
+            visit.folder.claim(visit.session)
+        requests = [
+            need.request(label, required=not visit.simulated)
+            for label, need in visit.study.protocol.streams.items()
+        ]
+        if self._order.feedback:
+            requests += log_requests(visit)
+        if requests:
+            self._recorder = RecorderHandle(visit.streams_journal, requests)
+        report = None
+        try:
+            if self._order.feedback:
+                self._crew = FeedbackProcesses(visit)
+            died = self._run() if self._gate() else None
+        finally:
+            if self._crew:
+                self._crew.stop()
+            if self._recorder:
+                self._recorder.stop()
+            if parts(visit.journal):
+                report = self.sync_report = finish(visit)
+        where = read_whereabouts(visit.whereabouts) if died is not None else None
+        return Outcome(died, str(where or ""), report)
+
+    @property
+    def streams_status(self) -> dict[str, Any]:
+        """What the recorder last said of the streams of others; empty without any."""
+        return self._recorder.status if self._recorder else {}
+
+    def _gate(self) -> bool:
+        """Wait until feedback is ready and all required streams flow; whether to start."""
+        if self._crew and not self._crew.wait(self._say, self._told_to_end):
+            return False
+        recorder = self._recorder
+        told: list[str] = []
+        while recorder is not None and not recorder.ready:
+            recorder.watch()
+            if recorder.status and recorder.complaints() != told:
+                told = recorder.complaints()
+                self._say("waiting for streams:\n" + "\n".join(f"  {line}" for line in told))
+            if self._told_to_end():
+                return False
+            time.sleep(LOOK_S)
+        return True
+
+    def _told_to_end(self) -> bool:
+        """Whether the run is to end before it has begun; what is for the record is kept for it."""
+        for command in self._console.commands():
+            if command.order is Order.END:
+                return True
+            if command.order in FOR_THE_RECORD:
+                self._kept.append(command)
+            else:
+                early = "the session has not begun; order it again when it has"
+                self._say(f"{command.order}: {early}")
+        return False
+
+    def _run(self) -> int | None:
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        process = context.Process(target=serve, args=(self._order, theirs), name="session")
+        process.start()
+        theirs.close()
+        try:
+            return self._watch(process, ours)
+        finally:
+            ours.close()
+            process.join()
+
+    def _watch(self, process: "SpawnProcess", pipe: Connection) -> int | None:
+        """Return the exit code of a session that died, None of one that ended in order."""
+        stillness = HangDetector(self._visit.whereabouts, self._say)
+        while True:
+            try:
+                for command in (*self._kept, *self._console.commands()):
+                    self._send(pipe, command)
+                self._kept.clear()
+                ready = wait([pipe, process.sentinel], LOOK_S)
+            except KeyboardInterrupt:
+                self._send(pipe, Command(Order.END))
+                continue
+            # Also when it has died: what it said before is in the pipe.
+            ended = self._pass_events(pipe) if ready else None
+            if ended is not None:
+                if ended.error is not None:
+                    raise ended.error
+                return None
+            if process.sentinel in ready:
+                process.join()
+                return process.exitcode
+            if stillness.hangs():
+                process.kill()  # its journal is whole; the exit code is passed on as any other
+            self._watch_streams(pipe)
+            if self._crew:
+                for news in self._crew.watch(self._say):
+                    self._send(pipe, news)
+
+    def _pass_events(self, pipe: Connection) -> Ended | None:
+        try:
+            while pipe.poll():
+                message = pipe.recv()
+                if isinstance(message, Ended):
+                    return message
+                self._console.report(message)
+        except (EOFError, OSError):
+            pass  # it died in the middle of a message; its exit code says how
+        return None
+
+    def _watch_streams(self, pipe: Connection) -> None:
+        recorder = self._recorder
+        if recorder is None:
+            return
+        if recorder.watch():
+            self._say("the recorder died and was started again")
+        lost = recorder.lost() if recorder.status else {RECORDER}
+        for what in sorted(lost - self._lost):
+            self._send(pipe, Command(Order.LOST, what))
+        for what in sorted(self._lost - lost):
+            self._send(pipe, Command(Order.BACK, what))
+        if lost != self._lost and lost:
+            for line in recorder.complaints():
+                self._say(line)
+        self._lost = lost
+
+    @staticmethod
+    def _send(pipe: Connection, command: Command) -> None:
+        try:
+            pipe.send(command)
+        except OSError:
+            return  # the session has ended this very moment

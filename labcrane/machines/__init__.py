@@ -1,0 +1,5 @@
+"""Machines that are operated, and what stands around them.
+
+In comes a machine or scene file; out go links with their masses and limits, forward and inverse
+kinematics, URDF, meshes and placed objects. Nothing here knows of a session.
+"""

@@ -1,0 +1,42 @@
+"""Read a machine: one that comes with labcrane, or a YAML file of the study."""
+
+from importlib.resources import files
+from pathlib import Path
+
+from labcrane.errors import ProtocolError
+from labcrane.files.yaml import YamlFile
+from labcrane.machines.machine import Machine
+
+
+def machine_names() -> list[str]:
+    """Return the names of the machines that come with labcrane."""
+    folder = files("labcrane") / "machines"
+    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".yaml"))
+
+
+def find_machine(name: str, beside: Path | None = None) -> Path:
+    """Return the file of machine ``name``; ``beside`` is the folder of the study that asks."""
+    if name.endswith((".yaml", ".yml")):
+        path = (beside or Path()) / name
+        if path.is_file():
+            return path
+        raise ProtocolError(
+            f"machine file {str(path)!r} does not exist; a path counts from the protocol's folder"
+        )
+    if name in machine_names():
+        return Path(str(files("labcrane") / "machines" / f"{name}.yaml"))
+    raise ProtocolError(
+        f"no machine is called {name!r}; labcrane has {', '.join(machine_names())}, "
+        "and a file beside the protocol may end in .yaml"
+    )
+
+
+def load_machine(name: str, beside: Path | None = None) -> Machine:
+    """Read machine ``name``.
+
+    Raises
+    ------
+    ProtocolError
+        The machine does not exist, or its file is wrong; the message names file and line.
+    """
+    return YamlFile.read(find_machine(name, beside)).checked(Machine)

@@ -1,0 +1,59 @@
+"""A mesh that something looks like: a file beside the one that names it."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, PositiveFloat, ValidationInfo
+
+from labcrane.files.model import StrictModel
+
+FORMATS = (".stl", ".obj", ".gltf", ".glb")
+
+Triple = tuple[float, float, float]
+
+
+def _beside(path: Path, info: ValidationInfo) -> Path:
+    """Return the path through the folder of the file that names it."""
+    file = info.context["folder"] / path if info.context else path
+    if file.suffix.lower() not in FORMATS:
+        raise ValueError(f"{str(path)!r} is no mesh; {', '.join(FORMATS)} can be shown")
+    if not file.is_file():
+        raise ValueError(f"there is no mesh {str(file)!r}; a path counts from the file naming it")
+    return file
+
+
+class MeshFile(StrictModel):
+    """What something looks like; what it touches is not changed by it."""
+
+    file: Annotated[Path, AfterValidator(_beside)]
+    """STL, OBJ or glTF; its axes are taken as they are in the file."""
+
+    scale: PositiveFloat = 1.0
+    """Metres per unit of the file: 0.001 for millimetres."""
+
+    position: Triple = (0.0, 0.0, 0.0)
+    """Where its origin is, in the frame of the link or thing, in metres."""
+
+    turn_deg: Triple = (0.0, 0.0, 0.0)
+    """Turned about the frame's x, then y, then z axis, in degrees."""
+
+    colour: Triple | None = None
+    """Red, green and blue, each 0 to 1; that of the machine by default."""
+
+
+def _written(value: Any) -> Any:
+    return {"file": value} if isinstance(value, str) else value
+
+
+Looks = Annotated[MeshFile, BeforeValidator(_written)]
+"""A mesh as it is written: a file, or a mapping with the file and where it is."""
+
+
+def write_mesh(mesh: MeshFile | None) -> Any:
+    """Return a mesh ready for JSON."""
+    return None if mesh is None else mesh.model_dump(mode="json")
+
+
+def read_mesh(found: Any) -> MeshFile | None:
+    """Return the mesh that :func:`write_mesh` wrote."""
+    return None if found is None else MeshFile.model_validate(found)

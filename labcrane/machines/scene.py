@@ -1,0 +1,259 @@
+"""What stands around a machine: objects, obstacles and a human figure, from a YAML file.
+
+The machine that touches a scene and the task that judges it read the same file, and place what is
+drawn from a seed in the same way.
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import Field, NonNegativeFloat, PositiveFloat
+
+from labcrane.errors import ProtocolError
+from labcrane.files.model import StrictModel
+from labcrane.files.yaml import YamlFile
+from labcrane.machines.human_figure import Figure, Geom, ShapeKind, figure_parts
+from labcrane.machines.mesh import Looks
+
+Point = tuple[float, float, float]
+Extent = tuple[float, float]
+
+__all__ = [
+    "Geom",
+    "Goal",
+    "PlacedObject",
+    "Scene",
+    "SceneObject",
+    "ShapeKind",
+    "load_scene",
+    "place_objects",
+]
+
+SUNK_M = 0.001
+"""Depth in the ground, in metres, from which on a scene is impossible."""
+
+
+class Scatter(StrictModel):
+    """How far from its place a thing may stand; drawn evenly from the trial's seed."""
+
+    x: Extent = (0.0, 0.0)
+    """Metres ahead."""
+
+    y: Extent = (0.0, 0.0)
+    """Metres to the left."""
+
+    yaw_deg: Extent = (0.0, 0.0)
+    """Degrees, turned to the left."""
+
+
+class SceneObject(StrictModel):
+    """An object, or an obstacle when it is fixed."""
+
+    shape: Literal["box", "cylinder", "sphere"]
+    """A cylinder stands upright."""
+
+    size: Point
+    """Edge lengths in metres; a cylinder's and a sphere's first is the diameter, a cylinder's last
+    the height."""
+
+    position: Point
+    """Where its centre is, in the machine's base frame, in metres."""
+
+    yaw_deg: float = 0.0
+    """Turned to the left, in degrees."""
+
+    fixed: bool = False
+    """Whether it is an obstacle, which nothing moves."""
+
+    mass_kg: PositiveFloat = 1.0
+    """Its mass, in kilograms."""
+
+    friction: NonNegativeFloat = 0.6
+    """Coefficient of friction."""
+
+    limit_n: PositiveFloat | None = None
+    """Contact force, in newtons, beyond which touching it is a mistake; none by default."""
+
+    slip_n: PositiveFloat = 400.0
+    """Force, in newtons, at which it slips out of the jaws."""
+
+    scatter: Scatter = Scatter()
+    """Where it may stand instead."""
+
+    mesh: Looks | None = None
+    """What it looks like instead of its shape, in a frame at its centre; its touch is the same."""
+
+
+class Goal(StrictModel):
+    """A region in which something must come to be, and the way there.
+
+    Each is reached in its turn.
+    """
+
+    position: Point
+    """Centre of the region, in metres."""
+
+    radius: PositiveFloat
+    """In metres."""
+
+    what: str = "tip"
+    """What must come there: ``tip``, or the name of an object or of the figure."""
+
+    jaws: float | None = None
+    """How far the jaws are then to be opened, from 0 to 1; whatever they are by default."""
+
+    beside: str | None = None
+    """Thing with which the region moves: its position counts from where that thing was placed."""
+
+    hold_s: NonNegativeFloat = 0.2
+    """How long it must stay there, in seconds."""
+
+    grip: bool | None = None
+    """Whether something must be in the grip (true), or nothing may be (false), to be there."""
+
+
+class Scene(StrictModel):
+    """Everything around the machine, and what is to be done with it."""
+
+    labcrane_scene: Literal[1]
+    """Version of the format."""
+
+    title: str
+    """What it is, for people."""
+
+    things: dict[str, SceneObject] = Field(default_factory=dict)
+    """Objects and obstacles by name."""
+
+    figure: Figure | None = None
+    """A lying person."""
+
+    goals: tuple[Goal, ...] = Field(min_length=1)
+    """What is to be reached, in order; the last one ends the run."""
+
+    start_deg: tuple[float, ...] | None = None
+    """Joint angles at the start, in degrees; where the machine stands, by default."""
+
+    limit_s: PositiveFloat = 600.0
+    """Time after which the run ends, in seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedObject:
+    """A thing where it stands in one trial.
+
+    Attributes
+    ----------
+    name, kind
+        ``object``, ``obstacle`` or ``body``, which is the figure.
+    parts
+        Its shapes, in its own frame.
+    position, yaw
+        In metres and rad.
+    mass, friction, slip
+        In kg, 1, N.
+    limits
+        Largest force in N by part; a part without one may be pressed as one likes.
+    deformed
+        The part that is deformed, if any.
+    """
+
+    name: str
+    kind: str
+    parts: tuple[Geom, ...]
+    position: Point
+    yaw: float
+    mass: float
+    friction: float
+    slip: float
+    limits: dict[str, float]
+    deformed: str | None = None
+
+
+def load_scene(path: Path) -> Scene:
+    """Read a scene.
+
+    Raises
+    ------
+    ProtocolError
+        With one line for every mistake.
+    """
+    source = YamlFile.read(path)
+    if not isinstance(source.data, dict):
+        raise ProtocolError(
+            f"{path}: a scene is a mapping of keys, beginning with labcrane_scene: 1"
+        )
+    scene = source.checked(Scene)
+    _check_ground(scene, source)
+    _check_goals(scene, source)
+    source.raise_problems()
+    return scene
+
+
+def _check_ground(scene: Scene, source: YamlFile) -> None:
+    """Note things that stand in the ground."""
+    for name, thing in scene.things.items():
+        low = thing.position[2] - _below(thing)
+        if low < -SUNK_M:
+            source.problem(
+                ("things", name, "position"),
+                f"{name!r} is {-low:.3f} m deep in the ground; its centre must be "
+                f"{_below(thing):.3f} m high or more",
+            )
+
+
+def _check_goals(scene: Scene, source: YamlFile) -> None:
+    """Note goals for what is not in the scene."""
+    known = {"tip", *scene.things, *(("figure",) if scene.figure else ())}
+    for number, goal in enumerate(scene.goals):
+        for word in (goal.what, goal.beside or "tip"):
+            if word not in known:
+                there = ", ".join(sorted(known))
+                source.problem(
+                    ("goals", number), f"there is no {word!r} in this scene; there is {there}"
+                )
+
+
+def place_objects(scene: Scene, seed: int) -> tuple[PlacedObject, ...]:
+    """Return where everything stands in a trial with this seed; the same seed, the same places."""
+    random = np.random.default_rng([seed, 0x5CE])
+    placed = [_placed(name, thing, random) for name, thing in scene.things.items()]
+    if scene.figure is not None:
+        parts, deformed, yaw = figure_parts(scene.figure, random)
+        placed.append(
+            PlacedObject(
+                name="figure",
+                kind="body",
+                parts=parts,
+                position=scene.figure.position,
+                yaw=yaw,
+                mass=scene.figure.mass_kg,
+                friction=scene.figure.friction,
+                slip=scene.figure.slip_n,
+                limits=dict(scene.figure.limits_n),
+                deformed=deformed,
+            )
+        )
+    return tuple(placed)
+
+
+def _placed(name: str, thing: SceneObject, random: np.random.Generator) -> PlacedObject:
+    x, y, z = thing.position
+    scatter = thing.scatter
+    return PlacedObject(
+        name=name,
+        kind="obstacle" if thing.fixed else "object",
+        parts=(Geom(name, ShapeKind(thing.shape), thing.size, (0.0, 0.0, 0.0), 0.0, thing.mesh),),
+        position=(x + random.uniform(*scatter.x), y + random.uniform(*scatter.y), z),
+        yaw=math.radians(thing.yaw_deg + random.uniform(*scatter.yaw_deg)),
+        mass=thing.mass_kg,
+        friction=thing.friction,
+        slip=thing.slip_n,
+        limits={} if thing.limit_n is None else {name: thing.limit_n},
+    )
+
+
+def _below(thing: SceneObject) -> float:
+    return thing.size[0] / 2 if thing.shape == "sphere" else thing.size[2] / 2

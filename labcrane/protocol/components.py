@@ -1,0 +1,182 @@
+"""Which components a protocol uses, found among those installed."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, TypeVar
+
+from labcrane.core.roles import Component, Cue, Feedback, Questionnaire, SignalMonitor, Task
+from labcrane.errors import PluginError, ProtocolError
+from labcrane.files.yaml import Place, YamlFile
+from labcrane.machines.library import find_machine, load_machine
+from labcrane.machines.machine import Machine
+from labcrane.protocol.protocol import Protocol, Use
+from labcrane.protocol.referenced_files import plain_settings
+from labcrane.registry.call_monitor import CallMonitor
+from labcrane.registry.offers import Offer, Settings
+from labcrane.registry.proxies import watched
+from labcrane.registry.registry import Registry
+
+RoleT = TypeVar("RoleT", bound=Component)
+
+
+@dataclass(frozen=True, slots=True)
+class ComponentSpec:
+    """A component that a protocol names, and its settings."""
+
+    name: str
+    plugin: str
+    offer: Offer[Component]
+    settings: Settings
+    oversight: CallMonitor = field(default_factory=CallMonitor, compare=False)
+
+    def described(self, folder: Path) -> dict[str, Any]:
+        """Return it ready for JSON, with the study's files named from its ``folder``."""
+        settings = plain_settings(self.settings, folder)
+        return {"use": self.name, "plugin": self.plugin, "settings": settings}
+
+    def build(self, machine: Machine) -> Component:
+        """Build, but do not open, the component, under oversight."""
+        build = self.oversight.place(repr(self.name), self.plugin, "build", self.offer.build)
+        component = self.oversight.call(build, self.offer.build, self.settings, machine)
+        return watched(component, self.name, self.plugin, self.oversight)
+
+
+class ComponentResolver:
+    """Finds what a protocol names, and notes every mistake in its file."""
+
+    def __init__(self, source: YamlFile, registry: Registry) -> None:
+        self._source = source
+        self._registry = registry
+        self.oversight = CallMonitor()
+
+    def choose(
+        self, role: type[RoleT], place: Place, default: Use | None = None
+    ) -> ComponentSpec | None:
+        """Return the component that the protocol uses at ``place``, or note why there is none."""
+        written = self._at(place)
+        if written is None and default is not None:
+            use = default
+        elif isinstance(written, dict) and isinstance(written.get("use"), str):
+            use = Use.model_validate(written)
+        else:
+            return None  # noted by the protocol's own check
+        return self._choice(role, use, place, (*place, "use"))
+
+    def choose_tasks(self) -> dict[str, ComponentSpec]:
+        """Return the tasks that can be chosen, by the protocol's names for them."""
+        written = self._at(("tasks",))
+        names = written if isinstance(written, dict) else {}
+        chosen = {name: self.choose(Task, ("tasks", name)) for name in names}
+        return {name: choice for name, choice in chosen.items() if choice}
+
+    def choose_monitors(self) -> dict[str, ComponentSpec] | None:
+        """Return the monitors of signals by the protocol's names; None where it leaves them out."""
+        written = self._at(("monitors",))
+        if written is None:
+            return None
+        names = written if isinstance(written, dict) else {}
+        chosen = {name: self.choose(SignalMonitor, ("monitors", name)) for name in names}
+        return {name: choice for name, choice in chosen.items() if choice}
+
+    def choose_questionnaires(self, protocol: Protocol) -> dict[str, ComponentSpec]:
+        """Return the questionnaires that the protocol asks, noting those that there are not."""
+        chosen = {
+            name: self.choose(Questionnaire, ("questionnaires", name))
+            for name in protocol.questionnaires
+        }
+        for place, name in self._asked(protocol):
+            if name not in chosen:
+                chosen[name] = self._choice(Questionnaire, Use(use=name), place, place)
+        return {name: choice for name, choice in chosen.items() if choice}
+
+    def _asked(self, protocol: Protocol) -> Iterator[tuple[Place, str]]:
+        for number, session in enumerate(protocol.sessions):
+            for at, step in enumerate(session.steps):
+                place: Place = ("sessions", number, "steps", at)
+                for name in (*step.questionnaires, *(step.block.ask if step.block else ())):
+                    yield place, name
+        for number, rule in enumerate(protocol.stop_rules):
+            yield ("stop_rules", number, "questionnaire"), rule.questionnaire
+
+    def _choice(
+        self, role: type[RoleT], use: Use, place: Place, named: Place
+    ) -> ComponentSpec | None:
+        """Return what is used at ``place``; its name stands at ``named``."""
+        try:
+            offer = self._registry.find(role, use.use)
+        except PluginError as error:
+            self._source.problem(named, str(error))
+            return None
+        settings = self._source.check(offer.settings, place, use.settings)
+        if settings is None:
+            return None
+        plugin = self._registry.plugin(role, use.use)
+        return ComponentSpec(use.use, plugin, offer, settings, self.oversight)
+
+    def choose_feedback(
+        self,
+    ) -> tuple[dict[str, ComponentSpec], dict[str, ComponentSpec], dict[str, ComponentSpec]]:
+        """Return cues, sounds and views by the protocol's names for them."""
+        cues, sounds = {}, {}
+        written = self._at(("feedback",))
+        for name, use in (written if isinstance(written, dict) else {}).items():
+            is_cue = self._is_cue(use.get("use") if isinstance(use, dict) else None)
+            place = ("feedback", name)
+            if is_cue and (choice := self.choose(Cue, place)):
+                cues[name] = choice
+            elif not is_cue and (choice := self.choose(Feedback, place)):
+                sounds[name] = choice
+        written = self._at(("views",))
+        names = written if isinstance(written, dict) else {}
+        views = {name: self.choose(Feedback, ("views", name)) for name in names}
+        for name in set(names) & {*cues, *sounds}:
+            self._source.problem(("views", name), f"{name!r} is the name of a feedback already")
+        return cues, sounds, {name: choice for name, choice in views.items() if choice}
+
+    def _is_cue(self, name: object) -> bool:
+        """Whether what is named under ``feedback`` is a cue, or is one misspelt."""
+        if not isinstance(name, str):
+            return False
+        if (roles := self._registry.roles(name)) & {Cue, Feedback}:
+            return Cue in roles
+        cues, others = self._registry.offers[Cue], self._registry.offers[Feedback]
+        return bool(get_close_matches(name, cues)) and not get_close_matches(name, others)
+
+    def machine(self) -> tuple[Machine, str] | None:
+        """Return the machine and its file's text, or note what is wrong."""
+        name, folder = self._at(("machine",)), self._source.path.parent
+        if not isinstance(name, str):
+            return None
+        try:
+            machine = load_machine(name, folder)
+            return machine, find_machine(name, folder).read_text(encoding="utf-8")
+        except ProtocolError as error:
+            self._source.problem(("machine",), str(error))
+            return None
+
+    def build(
+        self,
+        role: type[RoleT],
+        section: str,
+        choices: Mapping[str, ComponentSpec],
+        machine: Machine,
+    ) -> dict[str, RoleT]:
+        """Return what a section of the protocol names, built, noting what cannot be as written."""
+        built: dict[str, RoleT] = {}
+        for name, choice in choices.items():
+            try:
+                component = choice.build(machine)
+            except ProtocolError as error:
+                self._source.problem((section, name), str(error))
+                continue
+            assert isinstance(component, role)  # noqa: S101 - an offer of this role
+            built[name] = component
+        return built
+
+    def _at(self, place: Place) -> object:
+        node = self._source.data
+        for step in place:
+            node = node.get(step) if isinstance(node, dict) else None
+        return node

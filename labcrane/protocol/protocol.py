@@ -1,0 +1,166 @@
+"""The study protocol: what its YAML may say."""
+
+import re
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import (
+    ConfigDict,
+    Field,
+    PositiveFloat,
+    PositiveInt,
+    field_validator,
+)
+
+from labcrane.files.yaml import YamlFile
+from labcrane.protocol.design import Design
+from labcrane.protocol.evaluation import IndicatorSettings, StopRule
+from labcrane.protocol.pages import PageSettings
+from labcrane.protocol.steps import Section, Session, read_sessions
+from labcrane.protocol.streams import StreamNeed, TimeLimits
+
+
+class Use(Section):
+    """A component to use; the keys beside ``use`` are its settings."""
+
+    model_config = ConfigDict(extra="allow")
+
+    use: str
+    """Name of what a plugin offers; ``labcrane plugins`` lists all."""
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The settings as written, not yet checked against the component."""
+        return dict(self.model_extra or {})
+
+
+DEFAULT_OPERATOR = Use(use="simulated_operator")
+
+
+class Participants(Section):
+    """Who takes part."""
+
+    pattern: str = r"P\d{3,4}"
+    """Regular expression that a participant's pseudonym matches as a whole."""
+
+    planned: PositiveInt = 1
+    """How many participants are planned."""
+
+    @field_validator("pattern")
+    @classmethod
+    def _compiles(cls, pattern: str) -> str:
+        try:
+            re.compile(pattern)
+        except re.error as error:
+            raise ValueError(f"{pattern!r} is no regular expression: {error}") from None
+        return pattern
+
+
+class OnFault(Section):
+    """What happens when something fails during a session."""
+
+    input_lost: Literal["pause", "end"] = "pause"
+    """The operator's controls are unplugged or fall silent: pause until they are back, or end the
+    session. The machine is held at rest either way."""
+
+    stream_lost: Literal["pause", "mark"] = "pause"
+    """A required stream falls silent, or its recorder fails: pause until it is back, or go on and
+    mark it in the record."""
+
+    feedback_lost: Literal["restart", "continue", "pause"] = "restart"
+    """A view or sound fails: start it again, go on without it, or pause until it is back. One that
+    cannot be started in the first place stops the session, unless it is to go on without."""
+
+    session_died: Literal["continue", "redo_trial", "redo_block"] = "redo_trial"
+    """The session's process died: where ``labcrane resume`` goes on."""
+
+
+class Protocol(Section):
+    """One study."""
+
+    labcrane: Literal[1]
+    """Version of the protocol format."""
+
+    study: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
+    """Short name of the study, in lower case; part of every seed."""
+
+    title: str
+    """What the study is called."""
+
+    participants: Participants = Participants()
+    """Who takes part, and how many."""
+
+    rate_hz: PositiveFloat = Field(default=240.0, le=2000.0)
+    """Ticks of the loop per second."""
+
+    machine: str
+    """Name of a machine that comes with labcrane, or of a file beside the protocol."""
+
+    input: Use
+    """What the operator moves."""
+
+    operator: Use = DEFAULT_OPERATOR
+    """Who moves it when the study is simulated."""
+
+    scheme: Use
+    """How the operator's axes become commands."""
+
+    dynamics: Use
+    """What moves."""
+
+    tasks: dict[str, Use] = Field(min_length=1)
+    """What the operator is asked to do, by name."""
+
+    questionnaires: dict[str, Use] = Field(default_factory=dict)
+    """Questionnaires with settings, by the study's names for them. One without settings is asked
+    by its own name and need not be listed."""
+
+    indicator: IndicatorSettings = IndicatorSettings()
+    """How the performance indicator is worked out."""
+
+    stop_rules: tuple[StopRule, ...] = ()
+    """Scores above which the session pauses and the examiner decides."""
+
+    page: PageSettings = PageSettings()
+    """Where the supervisor's and the participant's page are served."""
+
+    feedback: dict[str, Use] = Field(default_factory=dict)
+    """What can be switched on during trials, by name: cues for every view, and sounds."""
+
+    views: dict[str, Use] = Field(default_factory=dict)
+    """Windows and other displays that are always there, by name."""
+
+    streams: dict[str, StreamNeed] = Field(default_factory=dict)
+    """Streams of others to be recorded, by the study's names for them."""
+
+    monitors: dict[str, Use] | None = None
+    """What tells whether the signals of those streams are alive, by name. Without this key all that
+    are installed do, as they are without settings; ``{}`` is none."""
+
+    sync: TimeLimits = TimeLimits()
+    """How right the time stamps must be."""
+
+    design: Design = Design()
+    """What is varied between and within participants, and in which order."""
+
+    sessions: tuple[Session, ...] = Field(min_length=1)
+    """The visits, in order."""
+
+    on_fault: OnFault = OnFault()
+    """What happens when something fails."""
+
+
+def read(path: Path) -> tuple[Protocol | None, YamlFile]:
+    """Read a protocol file; mistakes are noted in the file that is returned.
+
+    Raises
+    ------
+    ProtocolError
+        The file does not exist or is no YAML.
+    """
+    source = YamlFile.read(path)
+    if not isinstance(source.data, dict):
+        source.problem((), "a protocol is a mapping of keys, beginning with 'labcrane: 1'")
+        return None, source
+    plain = {**source.data, "sessions": read_sessions(source)}
+    return source.check(Protocol, value=plain), source

@@ -1,0 +1,70 @@
+"""Files that components' settings name, recorded with what they say: a record needs nothing else.
+
+They are named from the protocol's folder, wherever that was.
+"""
+
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from labcrane.registry.offers import Settings
+
+
+def plain_settings(settings: Settings, folder: Path) -> Any:
+    """Return settings as JSON holds them, with the study's files named from its ``folder``."""
+    names = {str(path): _name(path, folder) for path in _paths(settings.model_dump())}
+    return _renamed(settings.model_dump(mode="json"), names)
+
+
+def named_files(every: Iterable[Settings], folder: Path) -> dict[str, dict[str, str | None]]:
+    """Return what is in every file that settings name, by its name from ``folder``.
+
+    ``text`` is None for what is no text; ``sha256`` there is always.
+    """
+    found: dict[str, dict[str, str | None]] = {}
+    for settings in every:
+        for path in _paths(settings.model_dump()):
+            if path.is_absolute() and path.is_file():
+                raw = path.read_bytes()
+                try:
+                    text = raw.decode("utf-8")
+                except UnicodeDecodeError:
+                    text = None
+                digest = hashlib.sha256(raw).hexdigest()
+                found[_name(path, folder)] = {"sha256": digest, "text": text}
+    return found
+
+
+def write_files(files: Mapping[str, Mapping[str, str | None]], folder: Path) -> None:
+    """Write recorded files into ``folder``; those outside of the study's stay where they are."""
+    for name, file in files.items():
+        path, text = folder / name, file["text"]
+        if text is not None and path.resolve().is_relative_to(folder.resolve()):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+
+
+def _name(path: Path, folder: Path) -> str:
+    inside = folder.resolve()
+    whole = path.resolve() if path.is_absolute() else path
+    return whole.relative_to(inside).as_posix() if whole.is_relative_to(inside) else str(path)
+
+
+def _paths(value: object) -> Iterator[Path]:
+    if isinstance(value, Path):
+        yield value
+    elif isinstance(value, Mapping):
+        for item in value.values():
+            yield from _paths(item)
+    elif isinstance(value, list | tuple):
+        for item in value:
+            yield from _paths(item)
+
+
+def _renamed(value: Any, names: Mapping[str, str]) -> Any:
+    if isinstance(value, str):
+        return names.get(value, value)
+    if isinstance(value, dict):
+        return {key: _renamed(item, names) for key, item in value.items()}
+    return [_renamed(item, names) for item in value] if isinstance(value, list) else value

@@ -1,0 +1,96 @@
+"""Build the components that a study names, and open them together."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+
+from labcrane.core.records import Run, Value
+from labcrane.core.roles import Component, Controller, Dynamics, InputDevice, Task
+from labcrane.core.signals import Layout, Signal
+from labcrane.errors import ProtocolError
+from labcrane.protocol.study import Study
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    """The components of one run.
+
+    Attributes
+    ----------
+    tasks
+        By the protocol's names for them. Only one of them judges at a time.
+    """
+
+    input: InputDevice
+    controller: Controller
+    dynamics: Dynamics
+    tasks: Mapping[str, Task]
+
+    @property
+    def components(self) -> tuple[Component, ...]:
+        """What every trial begins with, the operator's controls last; its task comes after."""
+        return (self.dynamics, self.controller, self.input)
+
+    def metadata(self) -> dict[str, Value]:
+        """Return what the open components want to have recorded, by dotted name."""
+        parts = {"input": self.input, "scheme": self.controller, "dynamics": self.dynamics}
+        return {
+            f"{part}.{name}": value
+            for part, component in parts.items()
+            for name, value in component.metadata().items()
+        }
+
+
+def build(study: Study, *, simulated: bool) -> Rig:
+    """Build, but do not open, what ``study`` names; a simulated operator replaces the input."""
+    machine = study.machine
+    device = (study.operator if simulated else study.input).build(machine)
+    controller = study.scheme.build(machine)
+    dynamics = study.dynamics.build(machine)
+    # The registry filed each offer under its role.
+    assert isinstance(device, InputDevice)  # noqa: S101
+    assert isinstance(controller, Controller)  # noqa: S101
+    assert isinstance(dynamics, Dynamics)  # noqa: S101
+    return Rig(device, controller, dynamics, study.tasks)
+
+
+def describe(rig: Rig, study: Study, participant_seed: int) -> Run:
+    """Return the run of a rig, which need not be open: signals are known before."""
+    return Run(
+        rate_hz=study.protocol.rate_hz,
+        machine=study.machine,
+        participant_seed=participant_seed,
+        axes=Layout("the input", rig.input.signals),
+        command=Layout("the scheme", rig.controller.signals),
+        state=Layout("the machine", rig.dynamics.signals),
+        task=Layout("the tasks", _task_signals(rig.tasks)),
+        inverse=rig.controller.inverse,
+        bodies=tuple(rig.dynamics.bodies()),
+    )
+
+
+@contextmanager
+def opened(rig: Rig, study: Study, participant_seed: int) -> Iterator[Run]:
+    """Open every component, hardware last, and close them all however that ends."""
+    run = describe(rig, study, participant_seed)
+    with ExitStack() as closing:
+        for component in (rig.dynamics, *rig.tasks.values(), rig.controller, rig.input):
+            closing.callback(component.close)
+            component.open(run)
+        yield run
+
+
+def _task_signals(tasks: Mapping[str, Task]) -> tuple[Signal, ...]:
+    """Return the signals of the tasks; tasks of one study show the same ones."""
+    shown = {task.signals: name for name, task in tasks.items()}
+    if len(shown) > 1:
+        differ = "; ".join(
+            f"{name!r} shows {', '.join(signal.name for signal in signals) or 'nothing'}"
+            for signals, name in shown.items()
+        )
+        raise ProtocolError(
+            f"the tasks of one study must show the same signals, and these differ: {differ}; put "
+            "them into studies of their own"
+        )
+    (signals,) = shown
+    return signals

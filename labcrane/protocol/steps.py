@@ -1,0 +1,169 @@
+"""What a session consists of, as a protocol writes it."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveInt,
+    field_validator,
+)
+
+from labcrane.errors import suggestion
+from labcrane.files.yaml import Place, YamlFile
+from labcrane.protocol.design import Criterion
+from labcrane.registry.offers import Settings
+
+
+class Section(Settings):
+    """A part of a protocol."""
+
+
+class Block(Section):
+    """A run of trials of one task.
+
+    Keys beside these limit how many levels of a factor are used: ``pairs: 2``.
+    """
+
+    model_config = ConfigDict(extra="allow")
+
+    task: str
+    """Which of the protocol's tasks."""
+
+    name: str | None = None
+    """Name of the block in the record; the task's by default."""
+
+    ask: tuple[str, ...] = ()
+    """Questionnaires after each counted trial: ``[subjective_accuracy, situational_awareness]``."""
+
+    feedback: Literal["all", "none", "group"] | tuple[str, ...] = "all"
+    """Which feedback is switched on during its trials: ``all``, ``none``, what the participant's
+    ``group`` is given, or a list of names."""
+
+    fading: tuple[Annotated[float, Field(ge=0.0, le=1.0)], ...] = (1.0,)
+    """Share of the trials with feedback, part by part: ``[1, 0.5, 0]`` is all of the first third,
+    every second trial of the second, none of the last."""
+
+    repeat: PositiveInt = 1
+    """How many times the block is run, each time in a new order."""
+
+    until: Criterion | None = None
+    """For practice: it ends as soon as this is met."""
+
+    @property
+    def limits(self) -> dict[str, Any]:
+        """How many levels of which factor, as written."""
+        return dict(self.model_extra or {})
+
+
+class Break(Section):
+    """A pause in which the machine rests."""
+
+    seconds: NonNegativeFloat
+    """How long it lasts, in seconds; the examiner can end it earlier, which is recorded."""
+
+
+class Step(Section):
+    """One step of a session, with what kind it is and what it needs."""
+
+    kind: Literal[
+        "consent", "instructions", "questionnaire", "practice", "reference", "block", "break"
+    ]
+    text: str = ""
+    file: str = ""
+    block: Block | None = None
+    seconds: float = 0.0
+    questionnaires: tuple[str, ...] = ()
+
+
+class Session(Section):
+    """One visit of a participant."""
+
+    name: str
+    """Name of the session in the record."""
+
+    after_days: tuple[NonNegativeInt, NonNegativeInt] | None = None
+    """Earliest and latest day after the session before: ``[1, 3]``."""
+
+    steps: tuple[Step, ...] = Field(min_length=1)
+    """What happens, in order."""
+
+    @field_validator("after_days")
+    @classmethod
+    def _window_is_one(cls, days: tuple[int, int] | None) -> tuple[int, int] | None:
+        if days is not None and days[0] > days[1]:
+            raise ValueError(f"the earliest day, {days[0]}, is after the latest, {days[1]}")
+        return days
+
+
+def read_sessions(source: YamlFile) -> Any:
+    """Return the sessions with every step in its long form, noting steps that make no sense."""
+    sessions = source.data.get("sessions")
+    if not isinstance(sessions, list):
+        return sessions
+    found = []
+    for number, session in enumerate(sessions):
+        place: Place = ("sessions", number)
+        steps = session.get("steps") if isinstance(session, dict) else None
+        if not isinstance(steps, list):
+            found.append(session)
+            continue
+        parsed = [_step(source, (*place, "steps", at), step) for at, step in enumerate(steps)]
+        whole = [step for step in parsed if step is not None]
+        # What is wrong with a step has been noted; the model need not complain about none.
+        stand_in = [] if whole else [{"kind": "break"}]
+        found.append({**session, "steps": whole or stand_in})
+    return found
+
+
+STEPS = ("consent", "instructions", "questionnaire", "practice", "reference", "block", "break")
+
+
+def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
+    if step == "consent":
+        return {"kind": step}
+    if not (isinstance(step, dict) and len(step) == 1):
+        source.problem(place, f"a step is one of {', '.join(STEPS)} with a value, not {step!r}")
+        return None
+    (kind, value), *_ = step.items()
+    if kind not in STEPS:
+        instead = suggestion(str(kind), STEPS, "possible:")
+        source.problem(place, f"{kind!r} is not a step; {instead}")
+        return None
+    if kind == "instructions":
+        return _instructions(source, place, value)
+    if kind == "break":
+        pause = source.check(Break, (*place, kind))
+        return {"kind": kind, "seconds": pause.seconds} if pause else None
+    if kind == "consent":
+        source.problem(place, "consent is a step by itself: '- consent'")
+        return None
+    if kind == "questionnaire":
+        return _questionnaire(source, place, value)
+    block = source.check(Block, (*place, kind))
+    if block and block.until and kind != "practice":
+        source.problem((*place, kind, "until"), "only practice has a criterion; drop until")
+        return None
+    return {"kind": kind, "block": block} if block else None
+
+
+def _questionnaire(source: YamlFile, place: Place, value: Any) -> dict[str, Any] | None:
+    names = [value] if isinstance(value, str) else value
+    if not (isinstance(names, list) and names and all(isinstance(name, str) for name in names)):
+        source.problem(place, f"questionnaire is a name or a list of names, not {value!r}")
+        return None
+    return {"kind": "questionnaire", "questionnaires": tuple(names)}
+
+
+def _instructions(source: YamlFile, place: Place, value: Any) -> dict[str, Any] | None:
+    if not isinstance(value, str):
+        source.problem(place, f"instructions name a text file, not {value!r}")
+        return None
+    path = source.path.parent / value
+    try:
+        return {"kind": "instructions", "file": value, "text": path.read_text(encoding="utf-8")}
+    except OSError:
+        source.problem(place, f"instructions file {str(path)!r} does not exist or cannot be read")
+        return None

@@ -1,0 +1,126 @@
+"""What a protocol says of the streams of others: which, and how right their time must be."""
+
+from typing import TYPE_CHECKING
+
+from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+
+from labcrane.registry.offers import Settings
+from labcrane.streams.sync.limits import Limit, Limits
+
+if TYPE_CHECKING:  # a protocol is checked without loading what corrects clocks
+    from labcrane.recording.xdf.header import StreamHeader
+    from labcrane.streams.request import StreamRequest
+    from labcrane.streams.sync.correction import Treatment
+
+
+class StreamNeed(Settings):
+    """A stream of another program that a study records, by type, name or source id."""
+
+    type: str | None = None
+    """LSL type: ``EEG``, ``Gaze``, ``Markers``."""
+
+    name: str | None = None
+    """LSL name."""
+
+    source_id: str | None = None
+    """LSL source id."""
+
+    required: bool = True
+    """Whether a session starts only when it flows."""
+
+    rate_hz: PositiveFloat | None = None
+    """Nominal rate that is expected, in samples per second."""
+
+    channels: PositiveInt | None = None
+    """Number of channels that is expected."""
+
+    counter: str | None = None
+    """Label of the channel that counts samples; its gaps are lost samples."""
+
+    latency_s: float | None = None
+    """Fixed latency of the device, in seconds, as measured or stated by its maker; subtracted from
+    its times. What the stream's own header states holds by default."""
+
+    min_delay_s: NonNegativeFloat | None = None
+    """For a device whose samples are stamped when they are sent: the shortest time from sampling to
+    stamping, in seconds. It cannot be observed. Without it, stamps are taken to scatter evenly
+    around the truth."""
+
+    @model_validator(mode="after")
+    def _names_a_stream(self) -> "StreamNeed":
+        if self.type is None and self.name is None and self.source_id is None:
+            raise ValueError("a stream needs a type, a name or a source_id to be found by")
+        return self
+
+    def request(self, label: str, *, required: bool) -> "StreamRequest":
+        """Return what the recorder is asked for; ``label`` is the study's name for it."""
+        from labcrane.streams.request import StreamRequest  # noqa: PLC0415
+
+        return StreamRequest(
+            label=label,
+            type=self.type,
+            name=self.name,
+            source_id=self.source_id,
+            required=self.required and required,
+            rate_hz=self.rate_hz,
+            channels=self.channels,
+            counter=self.counter,
+        )
+
+    def is_for(self, header: "StreamHeader") -> bool:
+        """Whether a recorded stream is the one, or one of those, that is needed."""
+        from labcrane.streams.request import same_type  # noqa: PLC0415
+
+        if self.name is not None and self.name != header.name:
+            return False
+        if self.source_id is not None and self.source_id != header.source_id:
+            return False
+        return self.type is None or same_type(self.type, header.type)
+
+    def treatment(self, header: "StreamHeader") -> "Treatment":
+        """Return how the stamps of a recorded stream are to be read."""
+        from labcrane.streams.sync.correction import Treatment  # noqa: PLC0415
+        from labcrane.streams.sync.dejitter import Dejitter  # noqa: PLC0415
+        from labcrane.streams.sync.resync import treatment_of  # noqa: PLC0415
+
+        stated = treatment_of(header)
+        late = self.min_delay_s is not None
+        return Treatment(
+            rate_hz=stated.rate_hz,
+            can_drop_samples=stated.can_drop_samples,
+            dejitter=Dejitter.ENVELOPE if late else stated.dejitter,
+            transport_s=self.min_delay_s or 0.0,
+            latency_s=stated.latency_s if self.latency_s is None else self.latency_s,
+        )
+
+
+class TimeLimits(Settings):
+    """How right time stamps must be: beyond the first number a warning, beyond the second not."""
+
+    rate: Limit = Limits().rate
+    """Relative deviation of a stream's effective rate from its nominal rate."""
+
+    gap_s: Limit = Limits().gap_s
+    """Longest interruption of a regular stream, in seconds."""
+
+    drift_ppm: Limit = Limits().drift_ppm
+    """Rate error of a source's clock, in parts per million."""
+
+    residual_s: Limit = Limits().residual_s
+    """Scatter of clock probes about their curve, in seconds."""
+
+    rtt_s: Limit = Limits().rtt_s
+    """95th percentile of the probes' round trips, in seconds."""
+
+    probe_age_s: Limit = Limits().probe_age_s
+    """Longest time without a trusted probe, in seconds."""
+
+    missing: Limit = Limits().missing
+    """Fraction of samples that a source's own counter says are lost."""
+
+    late: Limit = Limits().late
+    """Fraction of the loop's ticks that woke more than a period after they were due."""
+
+    def limits(self) -> Limits:
+        """Return the limits for the sync report."""
+        return Limits(**dict(self))

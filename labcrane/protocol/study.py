@@ -1,0 +1,235 @@
+"""A study: a protocol that has been checked, with everything it refers to."""
+
+import hashlib
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from labcrane.core.roles import Controller, Dynamics, InputDevice, Questionnaire, Task
+from labcrane.errors import ProtocolError
+from labcrane.files.yaml import Place, YamlFile
+from labcrane.machines.machine import Machine
+from labcrane.protocol.components import ComponentResolver, ComponentSpec
+from labcrane.protocol.protocol import DEFAULT_OPERATOR, Protocol, read
+from labcrane.protocol.steps import Block
+from labcrane.registry.call_monitor import CallMonitor
+from labcrane.registry.registry import Registry
+
+
+@dataclass(frozen=True)
+class Study:
+    """Everything that a run of a protocol needs.
+
+    Attributes
+    ----------
+    path, text, sha256
+        The protocol file, its content, and the content's hash.
+    protocol
+        What it says.
+    machine, machine_text
+        What is operated, and its file's content.
+    input, operator, scheme, dynamics
+        The components chosen; ``operator`` takes the place of ``input`` in a simulation.
+    tasks
+        The tasks by the protocol's names for them, built.
+    questionnaires
+        The questionnaires by the study's names for them, built.
+    cues, sounds, views
+        What presents the session to people, by the protocol's names: cues and sounds are switched
+        on block by block, views are always there.
+    monitors
+        What looks at the signals of streams; None for all that are installed.
+    oversight
+        Watches over all components that are built.
+    """
+
+    path: Path
+    text: str
+    protocol: Protocol
+    machine: Machine
+    machine_text: str
+    input: ComponentSpec
+    operator: ComponentSpec
+    scheme: ComponentSpec
+    dynamics: ComponentSpec
+    tasks: Mapping[str, Task]
+    task_choices: Mapping[str, ComponentSpec]
+    questionnaires: Mapping[str, Questionnaire] = field(default_factory=dict)
+    questionnaire_choices: Mapping[str, ComponentSpec] = field(default_factory=dict)
+    cues: dict[str, ComponentSpec] = field(default_factory=dict)
+    sounds: dict[str, ComponentSpec] = field(default_factory=dict)
+    views: dict[str, ComponentSpec] = field(default_factory=dict)
+    monitors: dict[str, ComponentSpec] | None = None
+    oversight: CallMonitor = field(default_factory=CallMonitor)
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the protocol's text, hexadecimal."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+    @property
+    def choices(self) -> dict[str, ComponentSpec]:
+        """The components for people, by the part they play: ``scheme``, ``tasks.NAME``."""
+        named = {
+            "tasks": self.task_choices,
+            "questionnaires": self.questionnaire_choices,
+            "feedback": self.cues | self.sounds,
+            "views": self.views,
+            "monitors": self.monitors or {},
+        }
+        return {
+            "input": self.input,
+            "scheme": self.scheme,
+            "dynamics": self.dynamics,
+            **{f"{kind}.{name}": choice for kind in named for name, choice in named[kind].items()},
+        }
+
+    def check_participant(self, participant: str) -> None:
+        """Raise :class:`ProtocolError` unless ``participant`` matches the protocol's pattern."""
+        pattern = self.protocol.participants.pattern
+        if not re.fullmatch(pattern, participant):
+            raise ProtocolError(
+                # As it stands in the file, where a backslash is one backslash.
+                f"participant {participant!r} does not match the protocol's pattern '{pattern}'; "
+                "give the pseudonym as it was handed out, or correct participants: pattern:"
+            )
+
+    def check_session(self, number: int) -> None:
+        """Raise :class:`ProtocolError` unless the protocol has session ``number``."""
+        names = [session.name for session in self.protocol.sessions]
+        if not 1 <= number <= len(names):
+            listed = ", ".join(f"{at} {name!r}" for at, name in enumerate(names, start=1))
+            raise ProtocolError(f"there is no session {number}; {self.path} has {listed}")
+
+
+class Checker:
+    """Notes what a protocol asks of its parts and they do not have."""
+
+    def __init__(self, source: YamlFile, protocol: Protocol) -> None:
+        self._source = source
+        self._protocol = protocol
+
+    def check(self, tasks: Mapping[str, Task], asked: Mapping[str, Questionnaire]) -> None:
+        """Note every such mistake, given the tasks and questionnaires that could be built."""
+        self._check_feedback()
+        self._check_blocks(tasks)
+        self._check_stop_rules(asked)
+        if len(tasks) == len(self._protocol.tasks):
+            self._check_order(tasks)
+
+    def _check_blocks(self, tasks: Mapping[str, Task]) -> None:
+        """Note blocks that name no task, or limit what the task does not vary."""
+        for place, block in self._blocks():
+            if block.task not in self._protocol.tasks:
+                known = ", ".join(self._protocol.tasks)
+                message = f"there is no task {block.task!r}; there is {known}"
+                self._source.problem((*place, "task"), message)
+            elif task := tasks.get(block.task):
+                self._limits(place, block.limits, task)
+
+    def _blocks(self) -> Iterator[tuple[Place, Block]]:
+        for number, session in enumerate(self._protocol.sessions):
+            steps = self._source.data["sessions"][number]["steps"]
+            for at, step in enumerate(session.steps):
+                if step.block is not None:
+                    yield ("sessions", number, "steps", at, next(iter(steps[at]))), step.block
+
+    def _limits(self, place: Place, limits: Mapping[str, object], task: Task) -> None:
+        factors = task.factors()
+        for factor, count in limits.items():
+            if factor not in factors:
+                message = f"{factor!r} is nothing the task varies; it varies {', '.join(factors)}"
+            elif not (isinstance(count, int) and 1 <= count <= len(factors[factor])):
+                message = f"{factor} is {count!r}; it must be 1 to {len(factors[factor])}"
+            else:
+                continue
+            self._source.problem((*place, factor), message)
+
+    def _check_order(self, tasks: Mapping[str, Task]) -> None:
+        """Note ordered factors that no task has."""
+        known = {factor for task in tasks.values() for factor in task.factors()}
+        for factor in self._protocol.design.order:
+            if factor not in known:
+                message = f"no task varies {factor!r}; they vary {', '.join(sorted(known))}"
+                self._source.problem(("design", "order", factor), message)
+
+    def _check_stop_rules(self, asked: Mapping[str, Questionnaire]) -> None:
+        """Note stop rules on scores that a questionnaire does not have."""
+        for number, rule in enumerate(self._protocol.stop_rules):
+            questionnaire = asked.get(rule.questionnaire)
+            scores = [score.name for score in questionnaire.scores] if questionnaire else []
+            if questionnaire and rule.score not in scores:
+                self._source.problem(
+                    ("stop_rules", number, "score"),
+                    f"{rule.questionnaire} has no score {rule.score!r}; "
+                    f"it has {', '.join(scores) or 'none'}",
+                )
+
+    def _check_feedback(self) -> None:
+        """Note groups, and blocks, that are given feedback that there is not."""
+        for group, names in self._protocol.design.groups.items():
+            self._feedback_exists(("design", "groups", group), names)
+        for place, block in self._blocks():
+            if block.feedback == "group" and not self._protocol.design.groups:
+                message = "feedback is by group, but design has no groups"
+                self._source.problem((*place, "feedback"), message)
+            elif isinstance(block.feedback, tuple):
+                self._feedback_exists((*place, "feedback"), block.feedback)
+
+    def _feedback_exists(self, place: Place, names: Sequence[str]) -> None:
+        for name in names:
+            if name not in self._protocol.feedback:
+                known = ", ".join(self._protocol.feedback) or "none"
+                self._source.problem(place, f"there is no feedback {name!r}; there is {known}")
+
+
+def load(path: Path, registry: Registry) -> Study:
+    """Read and check a protocol.
+
+    Components are checked even when other parts of the file are wrong, so that one look at the
+    messages is enough.
+
+    Raises
+    ------
+    ProtocolError
+        With one line for every mistake: file, line, what was written, what is possible.
+    """
+    protocol, source = read(path)
+    chooser = ComponentResolver(source, registry)
+    machine = chooser.machine()
+    device = chooser.choose(InputDevice, ("input",))
+    operator = chooser.choose(InputDevice, ("operator",), DEFAULT_OPERATOR)
+    scheme = chooser.choose(Controller, ("scheme",))
+    dynamics = chooser.choose(Dynamics, ("dynamics",))
+    choices = chooser.choose_tasks()
+    tasks = chooser.build(Task, "tasks", choices, machine[0]) if machine else {}
+    asked = chooser.choose_questionnaires(protocol) if protocol else {}
+    built = chooser.build(Questionnaire, "questionnaires", asked, machine[0]) if machine else {}
+    cues, sounds, views = chooser.choose_feedback()
+    monitors = chooser.choose_monitors()
+    if protocol is not None:
+        Checker(source, protocol).check(tasks, built)
+    source.raise_problems()
+    if not (protocol and machine and device and operator and scheme and dynamics):
+        raise AssertionError("a missing part is a problem, and problems were raised")
+    return Study(
+        path=path,
+        text=source.text,
+        protocol=protocol,
+        machine=machine[0],
+        machine_text=machine[1],
+        input=device,
+        operator=operator,
+        scheme=scheme,
+        dynamics=dynamics,
+        tasks=tasks,
+        task_choices=choices,
+        questionnaires=built,
+        questionnaire_choices=asked,
+        cues=cues,
+        sounds=sounds,
+        views=views,
+        monitors=monitors,
+        oversight=chooser.oversight,
+    )

@@ -1,0 +1,109 @@
+"""Where a study's recordings are: one folder per participant."""
+
+import os
+import re
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+from labcrane.errors import ProtocolError, RecordingError
+from labcrane.files.atomic import make_folder
+from labcrane.recording.paths import participant_path
+
+
+def needed_bytes(expected_s: float, bytes_per_s: float, reserve_s: float) -> float:
+    """Return the space for a session of twice the expected length, and its reserve."""
+    return (2.0 * expected_s + reserve_s) * bytes_per_s
+
+
+@dataclass(frozen=True, slots=True)
+class DataFolder:
+    """The recordings of one participant.
+
+    A pilot's or a simulated participant's are kept apart from those of people, under a name that
+    says so: ``P001-PILOT``, ``P001-SIMULATED``.
+
+    Attributes
+    ----------
+    root
+        The study's data folder.
+    participant
+        Pseudonym.
+    pilot, simulated
+        Whether this is a trial run, and whether a program operates the machine.
+    """
+
+    root: Path
+    participant: str
+    pilot: bool
+    simulated: bool
+
+    @property
+    def name(self) -> str:
+        """The participant's name with its stamps."""
+        stamps = ["PILOT"] * self.pilot + ["SIMULATED"] * self.simulated
+        return "-".join([self.participant, *stamps])
+
+    @staticmethod
+    def pseudonym(name: str) -> str:
+        """Return the pseudonym in a ``name`` with stamps."""
+        return name.removesuffix("-SIMULATED").removesuffix("-PILOT")
+
+    @property
+    def path(self) -> Path:
+        """The participant's folder."""
+        return self.root / self.name
+
+    @property
+    def participant_file(self) -> Path:
+        """The HDF5 file with all sessions."""
+        return participant_path(self.path)
+
+    def sessions(self) -> list[int]:
+        """Return the sessions that have been begun: those with a journal of their own."""
+        found = (re.match(r"ses-(\d+)_", entry.name) for entry in self.path.glob("ses-*_run*.xdf"))
+        return sorted({int(match[1]) for match in found if match})
+
+    def claim(self, session: int) -> None:
+        """Make the folder, and make sure that ``session`` can be recorded in it.
+
+        Raises
+        ------
+        ProtocolError
+            The session has been recorded already: nothing is ever overwritten.
+        RecordingError
+            The folder cannot be written.
+        """
+        try:
+            make_folder(self.path)
+        except OSError as error:
+            raise RecordingError(self._cannot_write(error.strerror)) from error
+        if not os.access(self.path, os.W_OK | os.X_OK):
+            raise RecordingError(self._cannot_write("permission denied"))
+        if session in self.sessions():
+            done = ", ".join(map(str, self.sessions()))
+            raise ProtocolError(
+                f"participant {self.name} has already run session {session} (recorded in "
+                f"{self.path}: {done}); check the number, or give the next session"
+            )
+
+    def check_space(self, expected_s: float, bytes_per_s: float, reserve_s: float) -> None:
+        """Make sure that a session of twice the expected length fits, and its reserve.
+
+        Raises
+        ------
+        RecordingError
+            It does not; says how much there is, and how much is needed.
+        """
+        needed = needed_bytes(expected_s, bytes_per_s, reserve_s)
+        free = shutil.disk_usage(self.path).free
+        if free < needed:
+            raise RecordingError(
+                f"the session needs up to {needed / 1e6:.0f} MB (twice its expected "
+                f"{expected_s / 60:.0f} minutes, and {reserve_s:.0f} s in reserve), and only "
+                f"{free / 1e6:.0f} MB are free at {self.path}; free some space, or give another "
+                "folder with --data"
+            )
+
+    def _cannot_write(self, why: str | None) -> str:
+        return f"data folder {self.path} cannot be written: {why}; give another with --data"

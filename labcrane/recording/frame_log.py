@@ -1,0 +1,237 @@
+"""Frames into the journal: one row of numbers a tick, and the events beside it."""
+
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from functools import partial
+
+import numpy as np
+
+from labcrane.core.records import Event, Frame, Phase, Run
+from labcrane.errors import RecordingError
+from labcrane.recording.journal import Column, SessionJournal
+from labcrane.types import FloatArray
+
+PHASES: Mapping[Phase, float] = {phase: float(code) for code, phase in enumerate(Phase)}
+"""The number that stands for a phase in ``loop/phase``."""
+
+LOOP = (
+    ("tick", "1"),
+    ("due", "s"),
+    ("woke", "s"),
+    ("wrote", "s"),  # how long writing the frame before took
+    ("trial", "1"),
+    ("elapsed", "s"),
+    ("phase", "1"),
+    ("paused", "1"),
+)
+
+
+def columns(run: Run) -> tuple[Column, ...]:
+    """Return what a row holds, in order."""
+    layouts = {"input": run.axes, "command": run.command, "state": run.state, "task": run.task}
+    return (
+        *(Column("loop", label, unit) for label, unit in LOOP),
+        *(
+            Column(group, label, unit)
+            for group, layout in layouts.items()
+            for label, unit in zip(layout.columns, layout.units, strict=True)
+        ),
+    )
+
+
+CHUNK_BYTES = 16
+"""What the journal adds to a frame, about."""
+
+
+def frame_bytes(run: Run) -> int:
+    """Return how much a frame adds to the journal, in bytes."""
+    return 8 * len(columns(run)) + CHUNK_BYTES
+
+
+class FrameRow:
+    """Puts frames into rows of numbers, in the order of :func:`columns`."""
+
+    def __init__(self, run: Run) -> None:
+        start = len(LOOP)
+        slices = []
+        for layout in (run.axes, run.command, run.state, run.task):
+            slices.append(slice(start, start + layout.size))
+            start += layout.size
+        self._axes, self._command, self._state, self._task = slices
+
+    def fill(self, row: FloatArray, frame: Frame, wrote: float) -> None:
+        """Fill ``row``; ``wrote`` is how long writing the frame before took, in seconds."""
+        number, due, woke = frame.tick
+        row[: len(LOOP)] = (
+            number,
+            due,
+            woke,
+            wrote,
+            frame.trial,
+            frame.elapsed,
+            PHASES[frame.phase],
+            frame.paused,
+        )
+        row[self._axes] = frame.axes
+        row[self._command] = frame.command
+        row[self._state] = frame.state
+        row[self._task] = frame.task
+
+
+class FrameLog:
+    """Writes frames through to the journal, each before anybody else sees it.
+
+    When the disk refuses, frames wait in memory, in order, and are written as soon as it takes
+    them again: while ``trouble`` is set nobody should produce data that matter.
+
+    Parameters
+    ----------
+    reserve
+        Free bytes below which the disk counts as full: before the first byte is lost.
+
+    Attributes
+    ----------
+    trouble
+        Why the disk cannot be trusted now, in words; None while all is well.
+    """
+
+    def __init__(self, journal: SessionJournal, run: Run, reserve: int = 0) -> None:
+        self.trouble: str | None = None
+        self._journal = journal
+        self._reserve = reserve
+        self._row = np.empty(len(columns(run)))
+        self._fill = FrameRow(run).fill
+        self._wrote = 0.0
+        self._waiting: deque[Callable[[], None]] = deque()
+
+    def write(self, frame: Frame) -> None:
+        """Write one frame and its events; when this returns, the operating system has them."""
+        began = time.perf_counter()
+        row, tick = self._row, frame.tick
+        self._fill(row, frame, self._wrote)
+        if self._waiting or not self._through(frame, row):
+            self._waiting.append(partial(self._journal.write_frame, tick.due, row.copy()))
+            self._write_events(frame)
+        if not self._waiting:
+            free = self._journal.free
+            self.trouble = None if free >= self._reserve else self._nearly_full(free)
+        self._wrote = time.perf_counter() - began
+
+    def note(self, event: Event, tick: int = 0) -> None:
+        """Write an event that is in no frame: before the first, or at the end.
+
+        Raises
+        ------
+        RecordingError
+            The disk refuses it.
+        """
+        self._journal.write_event(event, tick)
+
+    def append(self, event: Event, tick: int) -> None:
+        """Write an event that was found out after ``tick``; it waits as frames do."""
+        self._waiting.append(partial(self._journal.write_event, event, tick))
+        self._catch_up()
+
+    def close(self) -> None:
+        """Write what waits, if the disk takes it now, and close the journal.
+
+        Raises
+        ------
+        RecordingError
+            The disk still refuses; says how much could not be written.
+        """
+        self._catch_up()
+        lost = len(self._waiting)
+        try:
+            self._journal.close()
+        except RecordingError as error:
+            if not lost:
+                raise
+            error.add_note(self._not_written(lost))
+            raise
+        if lost:
+            raise RecordingError(self._not_written(lost))
+
+    def _not_written(self, lost: int) -> str:
+        return (
+            f"{lost} frames and events could not be written: {self.trouble}; what came before is "
+            f"in {self._journal.path}"
+        )
+
+    def _through(self, frame: Frame, row: FloatArray) -> bool:
+        """Write at once; whether the frame went in. Its events wait if they alone did not."""
+        try:
+            self._journal.write_frame(frame.tick.due, row)
+        except RecordingError as error:
+            self.trouble = str(error)
+            return False
+        self._write_events(frame)
+        return True
+
+    def _write_events(self, frame: Frame) -> None:
+        for event in frame.events:
+            self._waiting.append(partial(self._journal.write_event, event, frame.tick.number))
+        self._catch_up()
+
+    def _catch_up(self) -> None:
+        while self._waiting:
+            try:
+                self._waiting[0]()
+            except RecordingError as error:
+                self.trouble = str(error)
+                return
+            except Exception:
+                self._waiting.popleft()  # a plugin's mistake, which no later attempt makes good
+                raise
+            self._waiting.popleft()
+
+    def _nearly_full(self, free: int) -> str:
+        return (
+            f"only {free / 1e6:.0f} MB are free for {self._journal.path}, and "
+            f"{self._reserve / 1e6:.0f} MB are kept in reserve; free some space"
+        )
+
+
+FRAMES = 4096
+"""Frames in one chunk of the journal."""
+
+
+class BatchLog(FrameLog):
+    """Writes what nobody would miss: a simulation that is killed is made again, to the same bits.
+
+    So frames wait in memory for their chunk to be full, and nothing measures how long writing
+    takes. A disk that refuses ends the simulation.
+    """
+
+    def __init__(self, journal: SessionJournal, run: Run) -> None:
+        super().__init__(journal, run)
+        self._stamps = np.empty(FRAMES)
+        self._rows = np.empty((FRAMES, len(columns(run))))
+        self._count = 0
+        self._events: list[tuple[Event, int]] = []
+
+    def write(self, frame: Frame) -> None:
+        """Keep one frame and its events for the next chunk."""
+        count, tick = self._count, frame.tick
+        self._fill(self._rows[count], frame, 0.0)
+        self._stamps[count] = tick.due
+        self._count = count + 1
+        if frame.events:
+            self._events += [(event, tick.number) for event in frame.events]
+        if self._count == FRAMES:
+            self._flush()
+
+    def close(self) -> None:
+        """Write what waits, and close the journal."""
+        try:
+            self._flush()
+        finally:
+            super().close()
+
+    def _flush(self) -> None:
+        self._journal.write_frames(self._stamps[: self._count], self._rows[: self._count])
+        self._count = 0
+        for event, number in self._events:
+            self._journal.write_event(event, number)
+        self._events.clear()

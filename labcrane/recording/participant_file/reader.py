@@ -1,0 +1,245 @@
+"""Opens a participant file for analysis."""
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from labcrane.errors import RecordingError
+from labcrane.recording.journal import GROUPS
+from labcrane.recording.participant_file.columns import holds_texts, text_of, texts_of
+from labcrane.recording.participant_file.writer import SYNC_REPORT, group_name, opened
+from labcrane.types import FloatArray
+
+if TYPE_CHECKING:
+    import h5py
+    import pandas as pd
+
+_SESSION = re.compile(r"ses-([0-9]+)")
+
+
+@dataclass(frozen=True)
+class Stream:
+    """Signals that share one time column; read from the file when first asked for.
+
+    Attributes
+    ----------
+    name
+        ``"state"``, or the name of a stream of others: ``"EEG"``.
+    attrs
+        What the file says of it; for a corrected stream also how right its time is.
+    """
+
+    name: str
+    attrs: Mapping[str, Any]
+    _path: Path
+    _group: str
+    _time: str
+
+    @cached_property
+    def time(self) -> FloatArray:
+        """Seconds on our clock, shape ``(n,)``; the source's own where none was corrected."""
+        return self._column(self._time)
+
+    @cached_property
+    def time_raw(self) -> FloatArray:
+        """Seconds on the clock of the stream's source, shape ``(n,)``."""
+        raw = f"{self._time.rpartition('/')[0]}/time_raw"
+        return self._column(raw) if "rate_hz" in self.attrs else self.time
+
+    @cached_property
+    def data(self) -> "pd.DataFrame":
+        """One column per number, named by its dotted path; one row per time."""
+        import pandas as pd  # noqa: PLC0415 - loads for a second
+
+        with opened(self._path) as file:
+            return pd.DataFrame(
+                {name: _values(dataset) for name, dataset in _columns(file[self._group])}
+            )
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        """The unit of each column."""
+        with opened(self._path) as file:
+            columns = _columns(file[self._group])
+            return {name: str(dataset.attrs.get("unit", "")) for name, dataset in columns}
+
+    def _column(self, path: str) -> FloatArray:
+        with opened(self._path) as file:
+            return np.asarray(file[path][:], np.float64)
+
+
+@dataclass(frozen=True)
+class SessionRecord:
+    """One session of a participant.
+
+    Attributes
+    ----------
+    attrs
+        When, how and with what it was recorded.
+    """
+
+    attrs: Mapping[str, Any]
+    _path: Path
+    _group: str
+
+    @cached_property
+    def streams(self) -> dict[str, Stream]:
+        """Frames as loop, input, command, state and task; streams of others by their names."""
+        with opened(self._path) as file:
+            group = file[self._group]
+            own = {
+                name: Stream(name, {}, self._path, f"{self._group}/{name}", f"{self._group}/time")
+                for name in GROUPS
+                if name in group
+            }
+            others = group.get("streams", {})
+            return own | {name: self._foreign(name, others[name]) for name in others}
+
+    def _foreign(self, name: str, group: "h5py.Group") -> Stream:
+        time = "time" if "time" in group else "time_raw"
+        path = f"{self._group}/streams/{name}"
+        attrs = {**_attributes(group), **_attributes(group[time]), "corrected": time == "time"}
+        return Stream(name, attrs, self._path, f"{path}/data", f"{path}/{time}")
+
+    @cached_property
+    def events(self) -> "pd.DataFrame":
+        """One row per event: time, tick, part, trial, name and data, a dict."""
+        import pandas as pd  # noqa: PLC0415
+
+        with opened(self._path) as file:
+            group = file[f"{self._group}/events"]
+            columns = ("time", "tick", "part", "trial", "name", "data")
+            table = {name: _values(group[name]) for name in columns}
+        table["data"] = [json.loads(text) for text in table["data"]]
+        return pd.DataFrame(table)
+
+    @cached_property
+    def trials(self) -> "pd.DataFrame":
+        """One row per counted trial: its condition and its results."""
+        import pandas as pd  # noqa: PLC0415
+
+        with opened(self._path) as file:
+            columns = _columns(file[f"{self._group}/trials"])
+            return pd.DataFrame({name: _values(dataset) for name, dataset in columns})
+
+    @cached_property
+    def questionnaires(self) -> "pd.DataFrame":
+        """One row per answer and per score: questionnaire, kind, item, text, value, time, ...
+
+        ``kind`` is ``answer`` or ``score``. A declined answer has neither text nor value.
+        """
+        import pandas as pd  # noqa: PLC0415
+
+        with opened(self._path) as file:
+            group = file[self._group]  # sessions of older files have none
+            columns = _columns(group["questionnaires"]) if "questionnaires" in group else []
+            return pd.DataFrame({name: _values(dataset) for name, dataset in columns})
+
+    @cached_property
+    def protocol(self) -> str:
+        """The text of the protocol that was run."""
+        return self._text("protocol")
+
+    @cached_property
+    def context(self) -> dict[str, Any]:
+        """Everything that was known when the session started."""
+        content: dict[str, Any] = json.loads(self._text("context"))
+        return content
+
+    @cached_property
+    def sync_report(self) -> dict[str, Any]:
+        """How right the time stamps are, and what to do where they are not; empty if unknown."""
+        with opened(self._path) as file:
+            if SYNC_REPORT not in file[self._group]:
+                return {}
+        content: dict[str, Any] = json.loads(self._text(SYNC_REPORT))
+        return content
+
+    def _text(self, name: str) -> str:
+        with opened(self._path) as file:
+            return text_of(file[f"{self._group}/{name}"])
+
+
+class Recording:
+    """A participant file; it is open only while something is read from it.
+
+    Attributes
+    ----------
+    path
+        Where it is.
+    participant
+        Pseudonym.
+    attrs
+        What the file says of itself.
+    sessions
+        Numbers of the sessions in it.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        with opened(path) as file:
+            self.attrs: Mapping[str, Any] = _attributes(file)
+            found = (_SESSION.fullmatch(name) for name in file)
+            self.sessions: list[int] = sorted(int(match[1]) for match in found if match)
+        self.participant: str = self.attrs["participant"]
+
+    def session(self, number: int) -> SessionRecord:
+        """Return a session by its number."""
+        if number not in self.sessions:
+            known = ", ".join(map(str, self.sessions)) or "none"
+            raise RecordingError(f"{self.path} has no session {number}; it has {known}")
+        name = group_name(number)
+        with opened(self.path) as file:
+            return SessionRecord(_attributes(file[name]), self.path, name)
+
+    def __iter__(self) -> Iterator[SessionRecord]:
+        return map(self.session, self.sessions)
+
+
+def open_recording(path: Path | str) -> Recording:
+    """Open a participant file.
+
+    Raises
+    ------
+    RecordingError
+        There is none at ``path``, or it cannot be read.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise RecordingError(
+            f"there is no participant file {path}; labcrane recover {path.parent} makes one of the "
+            "journals, if there are any"
+        )
+    return Recording(path)
+
+
+def _attributes(node: "h5py.HLObject") -> dict[str, Any]:
+    """Return attributes as numbers and texts."""
+    return {
+        name: value if isinstance(value, str) else float(value)
+        for name, value in node.attrs.items()
+    }
+
+
+def _columns(group: "h5py.Group") -> list[tuple[str, "h5py.Dataset"]]:
+    """Return a group's columns by their names, in the order in which they were recorded."""
+    import h5py  # noqa: PLC0415
+
+    found: list[h5py.Dataset] = []
+    group.visititems(lambda _, node: found.append(node) if isinstance(node, h5py.Dataset) else None)
+    columns: dict[str, h5py.Dataset] = {}
+    for dataset in sorted(found, key=lambda dataset: dataset.attrs["position"]):
+        path = dataset.name.removeprefix(f"{group.name}/").replace("/", ".")
+        name = str(dataset.attrs.get("name", path))
+        columns[path if name in columns else name] = dataset  # labels of others may not differ
+    return list(columns.items())
+
+
+def _values(dataset: "h5py.Dataset") -> Any:
+    return texts_of(dataset) if holds_texts(dataset) else dataset[:]

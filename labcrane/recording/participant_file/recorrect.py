@@ -1,0 +1,88 @@
+"""Corrects the clocks of a participant file's streams again, from nothing but the file."""
+
+import json
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from labcrane.recording.foreign_streams import Conclude, Note, RecordedStream
+from labcrane.recording.participant_file.columns import text_of, texts_of
+from labcrane.recording.participant_file.reader import open_recording
+from labcrane.recording.participant_file.stream_group import write_time
+from labcrane.recording.participant_file.writer import opened, renewed
+from labcrane.recording.xdf.header import StreamHeader
+
+if TYPE_CHECKING:
+    import h5py
+
+
+def recorrect(path: Path, conclude: Conclude) -> dict[int, list[str]]:
+    """Write corrected times anew for every stream of every session; return which.
+
+    The file is replaced by a new one in one step; raw stamps, probes and samples are copied as
+    they are.
+
+    Raises
+    ------
+    RecordingError
+        The file cannot be read or written; it is as it was.
+    """
+    import h5py  # noqa: PLC0415 - loads for a second
+
+    open_recording(path)  # which says what to do when there is none
+    done: dict[int, list[str]] = {}
+    with (
+        renewed(path, f"labcrane resync {path}") as beside,
+        opened(path) as old,
+        h5py.File(beside, "w") as new,
+    ):
+        for name in old:
+            old.copy(name, new)
+        for name, value in old.attrs.items():
+            new.attrs[name] = value
+        for name in new:
+            if match := re.fullmatch(r"ses-(\d+)", name):
+                done[int(match[1])] = _session(new[name], conclude)
+    return done
+
+
+def _session(group: "h5py.Group", conclude: Conclude) -> list[str]:
+    conclusion = conclude(json.loads(text_of(group["context"])))
+    names = list(group.get("streams", {}))
+    for name in names:
+        stream = group["streams"][name]
+        if "time" in stream:
+            del stream["time"]
+        stream.attrs.pop("uncorrected", None)
+        write_time(stream, read_stream(stream), conclusion.correct)
+    return names
+
+
+def read_stream(group: "h5py.Group") -> RecordedStream:
+    """Return what a participant file holds of a stream, as far as its clock needs it.
+
+    The samples' values are left out: texts are empty, and data have no channels.
+    """
+    count = len(group["time_raw"])
+    probes = [group[f"clock/{name}"][:] for name in ("remote_time", "offset", "rtt", "local")]
+    times, texts = group["notes/time"][:], texts_of(group["notes/data"])
+    offsets = (
+        np.column_stack([group["offsets/time"][:], group["offsets/value"][:]])
+        if "offsets" in group
+        else np.empty((0, 2))
+    )
+    return RecordedStream(
+        header=StreamHeader.from_xml(text_of(group["header"])),
+        time_raw=group["time_raw"][:],
+        data=np.empty((count, 0)),
+        texts=[],
+        probes=np.column_stack(probes),
+        arrivals=np.column_stack([group["arrival/count"][:], group["arrival/time"][:]]),
+        notes=tuple(
+            Note(float(time), json.loads(text)) for time, text in zip(times, texts, strict=True)
+        ),
+        offsets=offsets,
+        starts=tuple(int(start) for start in group["starts"][:]),
+    )

@@ -1,0 +1,111 @@
+"""Writes one session into a participant file."""
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from labcrane.recording.journal_reader import JournalState, LoggedEvent, SessionLog
+from labcrane.recording.participant_file.columns import (
+    node_names,
+    write_attributes,
+    write_numbers,
+    write_text,
+    write_texts,
+    write_values,
+)
+from labcrane.recording.participant_file.questionnaires import write_questionnaires
+
+if TYPE_CHECKING:
+    import h5py
+
+TRIAL_END = "trial.end"
+COUNTED = "counted"
+"""Only trials whose end says so are results, and rows of the trial table."""
+
+
+def write_session(group: "h5py.Group", log: SessionLog, journals: Sequence[JournalState]) -> None:
+    """Write frames, events, trials and the context of a session into its group."""
+    context = log.context
+    write_attributes(group, attributes(context))
+    write_text(group, "protocol", str(context.get("protocol", "")))
+    write_text(group, "context", json.dumps(dict(context), ensure_ascii=False))
+    _write_journals(group.create_group("journals"), journals)
+    _write_frames(group, log)
+    _write_events(group.create_group("events"), log)
+    _write_trials(group.create_group("trials"), log)
+    write_questionnaires(group.create_group("questionnaires"), log)
+
+
+def attributes(context: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what of the context becomes an attribute: everything plain, but the long texts."""
+    return {
+        name: value
+        for name, value in context.items()
+        if not isinstance(value, dict | list) and name != "protocol"
+    }
+
+
+def _write_journals(group: "h5py.Group", journals: Sequence[JournalState]) -> None:
+    """Write what this session was made of, so that nobody has to make it twice."""
+    write_texts(group, "name", [journal.name for journal in journals])
+    for column in ("size", "samples", "torn", "damaged", "unchecked"):
+        values = np.array([getattr(journal, column) for journal in journals], np.float64)
+        write_numbers(group, column, values, "1" if column == "samples" else "byte")
+
+
+def _write_frames(group: "h5py.Group", log: SessionLog) -> None:
+    write_numbers(group, "time", log.time, "s")
+    write_numbers(group, "part", log.part, "1")
+    for number, column in enumerate(log.columns):
+        path = f"{column.group}/{column.label.replace('.', '/')}"
+        write_numbers(group, path, log.rows[:, number], column.unit)
+        write_attributes(group[path], {"position": number})
+
+
+def _write_events(group: "h5py.Group", log: SessionLog) -> None:
+    events = log.events
+    write_numbers(group, "time", np.array([event.time for event in events]), "s")
+    write_numbers(group, "tick", np.array([event.tick for event in events]), "1")
+    write_numbers(group, "part", np.array([float(event.part) for event in events]), "1")
+    write_numbers(group, "trial", np.array(_trials_of(log)), "1")
+    write_texts(group, "name", [event.name for event in events])
+    write_texts(
+        group, "data", [json.dumps(dict(event.data), ensure_ascii=False) for event in events]
+    )
+
+
+def _trials_of(log: SessionLog) -> list[float]:
+    """Return each event's trial: what it says itself, else that of its frame, else NaN."""
+    tick, trial = log.column("loop", "tick"), log.column("loop", "trial")
+    frames: dict[tuple[float, float], float] = {}
+    if tick is not None and trial is not None:
+        wanted = {(float(event.part), event.tick) for event in log.events}
+        ticks = np.isin(tick, [number for _, number in wanted])
+        frames = dict(
+            zip(
+                zip(log.part[ticks].tolist(), tick[ticks].tolist(), strict=True),
+                trial[ticks].tolist(),
+                strict=True,
+            )
+        )
+    return [_own_trial(event, frames.get((event.part, event.tick), np.nan)) for event in log.events]
+
+
+def _own_trial(event: LoggedEvent, otherwise: float) -> float:
+    trial = event.data.get("trial")
+    return float(trial) if isinstance(trial, int | float) else otherwise
+
+
+def _write_trials(group: "h5py.Group", log: SessionLog) -> None:
+    rows = [
+        event.data
+        for event in log.events
+        if event.name == TRIAL_END and event.data.get(COUNTED) is True
+    ]
+    units = log.context.get("trial_units", {})
+    columns = list(dict.fromkeys(name for row in rows for name in row if name != COUNTED))
+    for number, (name, safe) in enumerate(node_names(columns)):
+        write_values(group, safe, [row.get(name) for row in rows], units.get(name))
+        write_attributes(group[safe], {"name": name, "position": number})

@@ -1,0 +1,285 @@
+"""Makes the participant file of journals.
+
+HDF5 is never open for writing while people are recorded. Each session is added to a new file beside
+the old one, which is brought to the disk, read again, and only then takes the old one's name.
+"""
+
+import json
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from labcrane.errors import RecordingError
+from labcrane.files.atomic import replacing
+from labcrane.files.lock import alone_in
+from labcrane.recording.foreign_streams import Conclude, RecordedStream, read_streams
+from labcrane.recording.journal_reader import JournalState, SessionLog, read_journal
+from labcrane.recording.participant_file.columns import node_names, write_attributes, write_text
+from labcrane.recording.participant_file.session_group import write_session
+from labcrane.recording.participant_file.stream_group import write_streams
+from labcrane.recording.paths import parts, session_of
+
+if TYPE_CHECKING:
+    import h5py
+
+FORMAT = "labcrane participant file"
+VERSION = "1"
+SYNC_REPORT = "sync_report"
+
+
+@dataclass(frozen=True, slots=True)
+class Consolidated:
+    """What was put into a participant file.
+
+    Attributes
+    ----------
+    path, session
+        Which file, and which session.
+    frames, events
+        How many.
+    streams
+        Samples per stream of others.
+    notes
+        What was not as it should be in the journals, for people.
+    """
+
+    path: Path
+    session: int
+    frames: int
+    events: int
+    streams: dict[str, int]
+    notes: list[str]
+
+
+@dataclass
+class _Session:
+    """Everything that goes into one session's group."""
+
+    number: int
+    log: SessionLog
+    streams: list[RecordedStream]
+    journals: list[JournalState]
+
+    @property
+    def group(self) -> str:
+        return group_name(self.number)
+
+
+def group_name(session: int) -> str:
+    """Return the name of a session's group."""
+    return f"ses-{session:02d}"
+
+
+def consolidate(
+    path: Path, journals: Sequence[Path], conclude: Conclude | None = None
+) -> Consolidated:
+    """Put one session into a participant file, new or existing.
+
+    May be killed and repeated at any moment: there is always either the file as it was, or the file
+    with the session in it. Journals are only read.
+
+    Parameters
+    ----------
+    path
+        The participant file.
+    journals
+        First parts of the session's journals; further parts beside them are found.
+    conclude
+        Gives what corrects the stamps of other clocks and makes the sync report; without it,
+        streams hold raw stamps only.
+
+    Raises
+    ------
+    RecordingError
+        A file cannot be read or written, or the participant file holds more of the session than
+        its journals do. The participant file is as it was.
+    """
+    session = _read(path, journals)
+    with renewed(path, f"labcrane recover {path.parent}") as beside:
+        _write(beside, path, session, conclude)
+        _verify(beside, path, session)
+    return Consolidated(
+        path,
+        session.number,
+        len(session.log.time),
+        len(session.log.events),
+        {stream.header.name: len(stream.time_raw) for stream in session.streams},
+        [note for journal in session.journals for note in journal.notes],
+    )
+
+
+@contextmanager
+def renewed(path: Path, again: str) -> Iterator[Path]:
+    """Give a file beside a participant file to be written; it takes its place when it is whole.
+
+    Waits for whoever renews one in the same folder. May be killed at any moment.
+
+    Parameters
+    ----------
+    again
+        The command that makes up for it when it cannot be written.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be written; the participant file is as it was.
+    """
+    with alone_in(path.parent), replacing(path) as beside:
+        try:
+            yield beside
+        except (OSError, RuntimeError, ValueError) as error:  # all of them h5py's
+            raise RecordingError(
+                f"cannot write {path}: {_reason(error)}; it is as it was, and so are the journals: "
+                f"remove the cause and run {again}"
+            ) from error
+
+
+def _reason(error: Exception) -> str:
+    """Return why HDF5 failed, in the system's words if there are any in its own."""
+    found = re.search(r"error message = '([^']+)'", str(error))
+    return found[1] if found else str(error)
+
+
+def _read(path: Path, journals: Sequence[Path]) -> _Session:
+    kinds: dict[str, list[Path]] = {"run": [], "streams": []}
+    sessions = set()
+    for journal in journals:
+        named = session_of(journal)
+        found = parts(journal)
+        if named is None or not found:
+            raise RecordingError(
+                f"there is no journal {journal}; journals of {path} are called ses-01_run.xdf "
+                "and ses-01_streams.xdf"
+            )
+        sessions.add(named[0])
+        kinds[named[1]] += found
+    if len(sessions) != 1:
+        raise RecordingError(
+            f"journals of sessions {sorted(sessions)} were given; give those of one session"
+        )
+    log, states = read_journal(kinds["run"])
+    streams, more_states = read_streams(kinds["streams"])
+    return _Session(sessions.pop(), log, streams, states + more_states)
+
+
+def _write(beside: Path, path: Path, session: _Session, conclude: Conclude | None) -> None:
+    import h5py  # noqa: PLC0415 - loads for a second
+
+    context = session.log.context
+    with h5py.File(beside, "w") as new:
+        if path.exists():
+            with opened(path) as old:
+                _refuse_less(path, old, session)
+                for name in old:
+                    if name != session.group:
+                        old.copy(name, new)
+                about = dict(old.attrs)
+        else:
+            about = {
+                "format": FORMAT,
+                "format_version": VERSION,
+                "participant": context.get("participant", path.stem),
+                "study": context.get("study", ""),
+            }
+        write_attributes(new, about)
+        group = new.create_group(session.group)
+        write_attributes(group, {"session": session.number, "participant": path.stem})
+        write_session(group, session.log, session.journals)
+        conclusion = conclude(context) if conclude else None
+        write_streams(group, session.streams, conclusion.correct if conclusion else None)
+        if conclusion and conclusion.report:
+            report = conclusion.report(session.log)
+            write_text(group, SYNC_REPORT, json.dumps(report, ensure_ascii=False, allow_nan=False))
+
+
+@contextmanager
+def opened(path: Path) -> Iterator["h5py.File"]:
+    """Open a participant file for reading.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be read, or is none.
+    """
+    import h5py  # noqa: PLC0415
+
+    try:
+        file = h5py.File(path, "r")
+    except OSError as error:
+        raise RecordingError(f"cannot read {path}: {error}") from error
+    with file:
+        if file.attrs.get("format") != FORMAT:
+            raise RecordingError(
+                f"{path} is an HDF5 file, but not a participant file of labcrane; give the .h5 "
+                "file in a participant's folder"
+            )
+        if file.attrs["format_version"] != VERSION:
+            raise RecordingError(
+                f"{path} has format version {file.attrs['format_version']!r}, this labcrane reads "
+                f"{VERSION!r}; install a newer labcrane"
+            )
+        yield file
+
+
+def _refuse_less(path: Path, old: "h5py.File", session: _Session) -> None:
+    """Refuse to replace a session by one with fewer samples: its journals are no longer whole."""
+    if session.group not in old:
+        return
+    held = float(old[f"{session.group}/journals/samples"][:].sum())
+    given = sum(journal.samples for journal in session.journals)
+    if given < held:
+        raise RecordingError(
+            f"{path} holds {held:.0f} samples of session {session.number}, its journals only "
+            f"{given}; the file is left as it is, look for the missing parts of the journals"
+        )
+
+
+def _verify(beside: Path, path: Path, session: _Session) -> None:
+    """Read the new file again, and compare it with the journals and with the old file."""
+    with opened(beside) as new:
+        group = new[session.group]
+        expected = {"time": session.log.time}
+        expected["events/time"] = np.array([event.time for event in session.log.events])
+        names = node_names([stream.header.name for stream in session.streams])
+        for (_, name), stream in zip(names, session.streams, strict=True):
+            expected[f"streams/{name}/time_raw"] = stream.time_raw
+        for name, values in expected.items():
+            if not np.array_equal(group[name][:], values, equal_nan=True):
+                raise RecordingError(
+                    f"{session.group}/{name} of {beside} is not what the journals hold; "
+                    f"{path} is left as it is: check the disk"
+                )
+        for column in session.log.columns:
+            held = group[f"{column.group}/{column.label.replace('.', '/')}"]
+            if held.shape != session.log.time.shape:
+                raise RecordingError(
+                    f"{held.name} of {beside} has lost samples; {path} is left as it is: check the "
+                    "disk"
+                )
+        if path.exists():
+            _compare(new, path, session.group)
+
+
+def _compare(new: "h5py.File", path: Path, but: str) -> None:
+    """Compare the sessions that were copied with those of the old file."""
+    with opened(path) as old:
+        for name in (name for name in old if name != but):
+            if _inventory(old[name]) != _inventory(new[name]):
+                raise RecordingError(
+                    f"session {name} was not copied whole; {path} is left as it is: check the disk"
+                )
+
+
+def _inventory(group: "h5py.Group") -> list[tuple[str, object, str]]:
+    nodes: list[tuple[str, object, str]] = []
+    group.visititems(
+        lambda name, node: nodes.append(
+            (name, getattr(node, "shape", None), str(getattr(node, "dtype", "")))
+        )
+    )
+    return nodes

@@ -1,0 +1,132 @@
+"""Unpacks the samples of one stream of an XDF file."""
+
+import struct
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from labcrane.recording.xdf.checksums import Span
+from labcrane.recording.xdf.chunk import sample_dtype
+from labcrane.recording.xdf.header import StreamHeader
+from labcrane.recording.xdf.scanner import Chunk, read_length
+from labcrane.types import FloatArray
+
+_ID_BYTES = 4
+_STAMPED = 8
+
+Texts = list[tuple[str, ...]]
+"""One tuple per sample, one text per channel."""
+
+
+class Samples(NamedTuple):
+    """Stamps in seconds, and numbers of shape ``(n_samples, n_channels)`` or texts."""
+
+    stamps: FloatArray
+    data: npt.NDArray[np.generic]
+    texts: Texts
+
+
+def unpack(
+    data: bytes, header: StreamHeader, chunks: Iterable[Chunk], skipped: list[Span]
+) -> Samples:
+    """Unpack the samples of one stream; chunks that do not fit its header are skipped."""
+    stamps: list[FloatArray] = []
+    values: list[npt.NDArray[np.generic]] = []
+    texts: Texts = []
+    last = 0.0
+    for chunk in chunks:
+        try:
+            if header.dtype is None:
+                times, rows = _texts(data, chunk, header, last)
+                texts += rows
+            else:
+                times, numbers = _numbers(data, chunk, header, header.dtype, last)
+                values.append(numbers)
+        except (struct.error, ValueError):
+            skipped.append(Span(chunk.start, chunk.stop))
+            continue
+        if len(times):
+            last = float(times[-1])
+            stamps.append(times)
+    shape = (0, len(header.channels))
+    empty = np.empty(shape, header.dtype if header.dtype is not None else np.float64)
+    return Samples(
+        np.concatenate(stamps) if stamps else np.empty(0),
+        np.concatenate(values) if values else empty,
+        texts,
+    )
+
+
+def _count(data: bytes, chunk: Chunk) -> tuple[int, int]:
+    """Return how many samples a chunk says it holds, and where they start."""
+    found = read_length(data, chunk.body + _ID_BYTES, chunk.stop)
+    if found is None:
+        raise ValueError("no sample count")
+    return found
+
+
+def _numbers(
+    data: bytes, chunk: Chunk, header: StreamHeader, dtype: np.dtype[np.generic], last: float
+) -> tuple[FloatArray, npt.NDArray[np.generic]]:
+    count, start = _count(data, chunk)
+    sample = sample_dtype(dtype, len(header.channels))
+    size = chunk.stop - chunk.start
+    if start + count * sample.itemsize == chunk.stop:
+        samples = np.ndarray(
+            (chunk.count, count), sample, data, start, strides=(size, sample.itemsize)
+        )
+        if (samples["flag"] == _STAMPED).all():
+            shape = (chunk.count * count, len(header.channels))
+            return samples["stamp"].reshape(-1), samples["values"].reshape(shape)
+    step = 1.0 / header.rate_hz if header.rate_hz else 0.0
+    times: list[float] = []
+    rows = []
+    for repeat in range(chunk.count):
+        position = start + repeat * size
+        for _ in range(count):
+            last, position = _stamp(data, position, last + step)
+            rows.append(np.frombuffer(data, dtype, len(header.channels), position))
+            position += dtype.itemsize * len(header.channels)
+            times.append(last)
+        if position != chunk.stop + repeat * size:
+            raise ValueError("samples do not fill the chunk")
+    return np.array(times), np.array(rows)
+
+
+def _stamp(data: bytes, position: int, otherwise: float) -> tuple[float, int]:
+    """Return a sample's time stamp, deduced where it was left out, and where the values start."""
+    flag = data[position] if position < len(data) else -1
+    if flag == _STAMPED:
+        (stamp,) = struct.unpack_from("<d", data, position + 1)
+        return stamp, position + 9
+    if flag != 0:
+        raise ValueError("neither a time stamp nor none")
+    return otherwise, position + 1
+
+
+def _texts(
+    data: bytes, chunk: Chunk, header: StreamHeader, last: float
+) -> tuple[FloatArray, Texts]:
+    count, start = _count(data, chunk)
+    size = chunk.stop - chunk.start
+    times: list[float] = []
+    rows: Texts = []
+    for repeat in range(chunk.count):
+        position, stop = start + repeat * size, chunk.stop + repeat * size
+        for _ in range(count):
+            last, position = _stamp(data, position, last)
+            row = []
+            for _channel in header.channels:
+                found = read_length(data, position, stop)
+                if found is None or found[1] + found[0] > stop:
+                    raise ValueError("a text does not fit the chunk")
+                length, position = found
+                row.append(data[position : position + length].decode(errors="replace"))
+                position += length
+            times.append(last)
+            rows.append(tuple(row))
+        if position != stop:
+            raise ValueError("samples do not fill the chunk")
+    return np.array(times), rows

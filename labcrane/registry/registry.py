@@ -1,0 +1,176 @@
+"""Find installed plugins and look up what they offer."""
+
+from collections.abc import Collection, Iterable, Mapping
+from importlib.metadata import EntryPoint
+from pathlib import Path
+from typing import NamedTuple, TypeVar, cast
+
+import pluggy
+
+from labcrane.core.roles import (
+    Component,
+    Controller,
+    Cue,
+    Dynamics,
+    Exporter,
+    Feedback,
+    InputDevice,
+    Questionnaire,
+    SignalMonitor,
+    Task,
+)
+from labcrane.errors import PluginError, suggestion
+from labcrane.registry.loader import PluginModules, offered
+from labcrane.registry.offers import Offer
+
+RoleT = TypeVar("RoleT", bound=Component)
+
+
+class RoleEntry(NamedTuple):
+    """How a role is found and spoken of.
+
+    Attributes
+    ----------
+    hook
+        The hook that collects its offers.
+    word
+        What a researcher calls it.
+    place
+        Where a protocol uses it; empty for what no protocol names.
+    """
+
+    hook: str
+    word: str
+    place: tuple[str, ...] = ()
+
+
+ROLES: Mapping[type[Component], RoleEntry] = {
+    InputDevice: RoleEntry("labcrane_inputs", "input", ("input",)),
+    Controller: RoleEntry("labcrane_controllers", "scheme", ("scheme",)),
+    Dynamics: RoleEntry("labcrane_dynamics", "dynamics", ("dynamics",)),
+    Task: RoleEntry("labcrane_tasks", "task", ("tasks", "NAME")),
+    Exporter: RoleEntry("labcrane_exporters", "exporter"),
+    Questionnaire: RoleEntry(
+        "labcrane_questionnaires", "questionnaire", ("questionnaires", "NAME")
+    ),
+    SignalMonitor: RoleEntry("labcrane_monitors", "monitor", ("monitors", "NAME")),
+    Cue: RoleEntry("labcrane_cues", "cue", ("feedback", "NAME")),
+    Feedback: RoleEntry("labcrane_feedback", "feedback", ("feedback", "NAME")),
+}
+
+
+class Registry:
+    """What is on offer, and why what should be is not.
+
+    A plugin that says in its entry points what it offers is imported when that is looked for; all
+    are when everything is listed, or when there is not what is looked for.
+
+    Raises
+    ------
+    PluginError
+        Two plugins that were imported offer the same name: nobody could say which is meant.
+    """
+
+    def __init__(self, modules: PluginModules) -> None:
+        self._modules = modules
+        self._offers: dict[type[Component], dict[str, Offer[Component]]]
+        self._offers = {role: {} for role in ROLES}
+        self._plugins: dict[type[Component], dict[str, str]] = {role: {} for role in ROLES}
+        self._import(())  # those that do not say what they offer
+
+    @property
+    def offers(self) -> Mapping[type[Component], Mapping[str, Offer[Component]]]:
+        """All that is installed, by role and name."""
+        self._import()
+        return self._offers
+
+    @property
+    def plugins(self) -> Mapping[type[Component], Mapping[str, str]]:
+        """Which plugin made each offer, by role and name."""
+        self._import()
+        return self._plugins
+
+    @property
+    def broken(self) -> Mapping[str, str]:
+        """What is wrong with a plugin that offers nothing, or not all it should, by plugin."""
+        self._import()
+        return self._modules.broken
+
+    @property
+    def local(self) -> Mapping[str, Path]:
+        """The files of the study's own plugins, by plugin."""
+        return self._modules.local
+
+    def roles(self, name: str) -> frozenset[type[Component]]:
+        """Return the roles that what is called ``name`` can fill."""
+        self._import({name})
+        return frozenset(role for role, offers in self._offers.items() if name in offers)
+
+    def find(self, role: type[RoleT], name: str) -> Offer[RoleT]:
+        """Return the offer called ``name``, or say what there is instead."""
+        self._import({name})
+        offers = self._offers[role] if name in self._offers[role] else self.offers[role]
+        if name in offers:
+            return cast("Offer[RoleT]", offers[name])
+        message = (
+            f"{ROLES[role].word} {name!r} is not installed; {suggestion(name, sorted(offers))} "
+            "(labcrane plugins lists all)"
+        )
+        for plugin, why in self.broken.items():
+            message += f"; plugin {plugin!r} is broken: {why}"
+        raise PluginError(message)
+
+    def plugin(self, role: type[Component], name: str) -> str:
+        """Return which plugin offers ``name``, which must be on offer."""
+        return self._plugins[role][self.find(role, name).name]
+
+    def _import(self, names: Collection[str] | None = None) -> None:
+        if imported := self._modules.load(names):
+            for role in ROLES:
+                self._collect(role, imported)
+            # Whoever else offers the same is seen now, and not when that is looked for.
+            self._import({name for offers in self._offers.values() for name in offers})
+
+    def _collect(self, role: type[Component], imported: Collection[str]) -> None:
+        hook: pluggy.HookCaller = getattr(self._modules.manager.hook, ROLES[role].hook)
+        found, origins = self._offers[role], self._plugins[role]
+        for implementation in hook.get_hookimpls():
+            plugin = implementation.plugin_name
+            if plugin not in imported:
+                continue
+            try:
+                offers = offered(implementation, Offer, "labcrane.offer(...)")
+            except PluginError as error:
+                self._modules.broken[plugin] = str(error)
+                continue
+            for offer in offers:
+                if offer.name in found:
+                    both = (origins[offer.name], plugin)
+                    first, second = sorted(both, key=self._modules.names.index)
+                    raise PluginError(
+                        f"plugins {first!r} and {second!r} both offer the {ROLES[role].word} "
+                        f"{offer.name!r}; uninstall or rename one of them"
+                    )
+                found[offer.name] = offer
+                origins[offer.name] = plugin
+
+
+def discover(plugins: Iterable[EntryPoint] | None = None, *, study: Path | None = None) -> Registry:
+    """Return what the plugins in the ``labcrane`` entry-point group offer.
+
+    A plugin that cannot be imported is noted, not raised: a missing audio library must not
+    stop a study that makes no sound.
+
+    Parameters
+    ----------
+    plugins
+        Instead of those that are installed.
+    study
+        A protocol; the plugins in the folder beside it are collected as well.
+
+    Raises
+    ------
+    PluginError
+        Two plugins offer the same name, so that nobody could say which is meant.
+    """
+    return Registry(PluginModules(plugins, study))

@@ -1,0 +1,101 @@
+"""What entered a recorded session from outside, tick by tick."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from labcrane.core.clock import Tick
+from labcrane.core.records import Event, Frame
+from labcrane.core.roles import InputDevice
+from labcrane.core.signals import Signal, signals_of
+from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.session.commands import Command, Order
+from labcrane.session.questionnaire import SIMULATION
+from labcrane.types import FloatArray
+
+
+class RecordOver(Exception):  # noqa: N818 - ends a loop, and is no error
+    """The last recorded tick has been run."""
+
+
+class RecordedAxes(InputDevice):
+    """Gives each tick what was recorded in it."""
+
+    def __init__(self, signals: tuple[Signal, ...], axes: FloatArray) -> None:
+        self.signals = signals
+        self._axes = axes
+        self.faults: list[tuple[int, str | None]] = []
+
+    def read(self, tick: Tick, seen: Frame) -> FloatArray:
+        if tick.number == len(self._axes):
+            raise RecordOver
+        while self.faults and self.faults[0][0] <= tick.number:
+            self.fault = self.faults.pop(0)[1]
+        row: FloatArray = self._axes[tick.number]
+        return row
+
+
+class Script:
+    """Everything that entered the loop from outside, tick by tick; also the console."""
+
+    def __init__(self, record: SessionRecord) -> None:
+        recorded = record.streams["input"]
+        axes = recorded.data.to_numpy(np.float64)
+        self.input = RecordedAxes(signals_of(list(map(str, recorded.data)), recorded.units), axes)
+        self.ticks = len(axes)
+        self.start = float(record.streams["loop"].data["due"].iloc[0])
+        self.disk_trouble: str | None = None
+        self.awaited: set[str] = set()
+        self._disk: dict[int, str | None] = {}
+        self._orders: dict[int, list[Command]] = {}
+        self._tick = -1
+        events = record.events
+        for tick, name, data in zip(events["tick"], events["name"], events["data"], strict=True):
+            self._take(int(tick), str(name), data)
+
+    def _take(self, tick: int, name: str, data: Mapping[str, Any]) -> None:
+        """Note what an event says came from outside."""
+        part, _, what = name.rpartition(".")
+        if part == "order":
+            self._order(tick, Command(Order(what), data.get("text", ""), data.get("by", "")))
+        elif part == "questionnaire" and data.get("by", SIMULATION) != SIMULATION:
+            self._answer(tick, what, data)
+        elif name == "page.denied":
+            self._order(tick, Command(Order.DENIED, data["why"], data["by"]))
+        elif part == "stream" and what in {"lost", "back"}:
+            self._order(tick, Command(Order(what), data["what"]))
+        elif part == "feedback" and what == "lost":
+            order = Order.LEFT_OUT if data.get("left_out") else Order.FAILED
+            self._order(tick, Command(order, f"{data['what']}: {data['why']}"))
+        elif part == "feedback" and what == "awaited":
+            self.awaited.add(data["what"])
+        elif part == "feedback" and what == "ready":
+            self._order(tick, Command(Order.MENDED, f"{data['what']}: {data['facts']}"))
+        elif part == "input" and what in {"lost", "back"}:
+            self.input.faults.append((tick, data.get("why")))
+        elif part == "disk" and what in {"lost", "back"}:
+            self._disk[tick] = data.get("why")
+
+    def _answer(self, tick: int, what: str, data: Mapping[str, Any]) -> None:
+        """Note what was answered or handed in; a simulated participant answers again by itself."""
+        if what == "answer":
+            given = {name: data[name] for name in ("questionnaire", "item", "value")}
+            self._order(tick, Command(Order.ANSWER, json.dumps(given), data["by"]))
+        elif what == "refused" and data["given"]:
+            self._order(tick, Command(Order.ANSWER, data["given"], data["by"]))
+        elif (what == "refused" and not data["item"]) or (what == "end" and data["handed_in"]):
+            self._order(tick, Command(Order.SUBMIT, "", data["by"]))
+
+    def _order(self, tick: int, command: Command) -> None:
+        self._orders.setdefault(tick, []).append(command)
+
+    def commands(self) -> list[Command]:
+        """Return the orders of this tick."""
+        self._tick += 1
+        self.disk_trouble = self._disk.get(self._tick, self.disk_trouble)
+        return self._orders.get(self._tick, [])
+
+    def report(self, event: Event) -> None:
+        """Nobody is told; the sinks see every event."""

@@ -1,0 +1,64 @@
+"""Settings of cues and sounds, changed while they run."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from labcrane.core.records import Value
+from labcrane.protocol.components import ComponentSpec
+from labcrane.registry.offers import Settings
+
+
+class FeedbackSettings:
+    """What the examiner may change, and what it stands at.
+
+    A change is written as in a protocol: ``tone.far=3``, ``ball.at=tip``.
+    """
+
+    def __init__(self, choices: Mapping[str, ComponentSpec]) -> None:
+        self._now: dict[str, Settings] = {name: each.settings for name, each in choices.items()}
+
+    def refusal(self, text: str) -> str | None:
+        """Return why a change cannot be made, or None when it can."""
+        try:
+            self._changed(text)
+        except ValueError as error:
+            return str(error)
+        return None
+
+    def change(self, text: str) -> dict[str, Value]:
+        """Make a change that is not refused; return it as the data of an event."""
+        name, key, value, settings = self._changed(text)
+        self._now[name] = settings
+        return {"feedback": name, "key": key, "value": value}
+
+    def _changed(self, text: str) -> tuple[str, str, Value, Settings]:
+        place, equals, written = text.partition("=")
+        name, dot, key = place.strip().partition(".")
+        if not (equals and dot):
+            raise ValueError(f"a setting is written name.key=value, not {text!r}")
+        if name not in self._now:
+            known = ", ".join(self._now) or "none"
+            raise ValueError(f"there is no feedback {name!r}; there is {known}")
+        before = self._now[name]
+        fields = type(before).model_fields
+        if key not in fields:
+            raise ValueError(f"{name} has no setting {key!r}; it has {', '.join(fields)}")
+        try:
+            value = YAML(typ="safe", pure=True).load(written)
+        except YAMLError:
+            raise ValueError(
+                f"{written!r} cannot be read as a value; write a number, a word, true or false"
+            ) from None
+        if not isinstance(value, float | int | str | bool | None):
+            message = f"{place.strip()} can be changed to a single value, not {written!r}"
+            raise ValueError(message)  # noqa: TRY004 - what people wrote, like the rest
+        asked: dict[str, Any] = {**before.model_dump(), key: value}
+        try:
+            return name, key, value, type(before).model_validate(asked)
+        except ValidationError as error:
+            what = error.errors()[0]["msg"]
+            raise ValueError(f"{place.strip()} cannot be {value!r}: {what}") from None

@@ -1,0 +1,57 @@
+"""The real-time loop: the whole data flow, in the order it happens."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from labcrane.core.clock import Clock, Tick, ticks
+from labcrane.core.records import Frame, Run
+from labcrane.protocol.rig import Rig
+from labcrane.recording.frame_log import FrameLog
+from labcrane.session.commands import Console
+from labcrane.session.sequencer import Sequencer
+
+
+def run(
+    rig: Rig,
+    run: Run,
+    course: Sequencer,
+    clock: Clock,
+    console: Console,
+    log: FrameLog,
+    sinks: Sequence[Callable[[Frame], None]],
+) -> None:
+    """Tick until the course is over.
+
+    Every frame is written to the journal first, and only then shown to the ``sinks``.
+    """
+    dt = 1.0 / run.rate_hz
+    read, control, rest = rig.input.read, rig.controller.command, rig.controller.idle
+    state, step = rig.dynamics.state, rig.dynamics.step
+    handle, evaluate, write = course.handle, course.evaluate, log.write
+    no_task = np.full(run.task.size, np.nan)
+
+    frame = _before(rig, run)
+    for tick in ticks(clock, run.rate_hz):
+        axes = read(tick, frame)
+        handle(console.commands(), rig.input.fault, log.trouble)
+        command = control(axes, state()) if course.moving else rest()
+        frame = Frame(tick, 0.0, axes, command, step(command, dt), no_task)
+        evaluate(frame)
+        write(frame)
+        for show in sinks:
+            show(frame)
+        if course.over:
+            return
+
+
+def _before(rig: Rig, run: Run) -> Frame:
+    """Return what a person sees before anything has happened."""
+    return Frame(
+        tick=Tick(-1, 0.0, 0.0),
+        elapsed=0.0,
+        axes=np.zeros(run.axes.size),
+        command=rig.controller.idle(),
+        state=rig.dynamics.state(),
+        task=np.full(run.task.size, np.nan),
+    )

@@ -1,0 +1,129 @@
+"""What whoever reads a recording must know, written at its start."""
+
+import hashlib
+import platform
+from datetime import UTC, datetime
+from importlib.metadata import entry_points, version
+from importlib.util import find_spec
+from typing import Any, Protocol
+
+from labcrane.core.records import Run
+from labcrane.design.plan import SessionPlan
+from labcrane.doctor.checks import at_start
+from labcrane.protocol.referenced_files import named_files
+from labcrane.protocol.rig import Rig
+from labcrane.protocol.study import Study
+from labcrane.recording.data_folder import DataFolder
+from labcrane.registry.entry_points import PROJECT
+from labcrane.registry.loader import own_plugins
+from labcrane.session.trial import trial_units
+
+RECORDED_PACKAGES = (
+    "labcrane",
+    "numpy",
+    "panda3d",
+    "pybullet",
+    "pydantic",
+    "pygame",
+    "pylsl",
+    "pyo",
+)
+
+
+class Recorded(Protocol):
+    """A session as far as its context goes."""
+
+    @property
+    def study(self) -> Study: ...
+    @property
+    def session(self) -> int: ...
+    @property
+    def simulated(self) -> bool: ...
+    @property
+    def fast(self) -> bool: ...
+    @property
+    def pilot(self) -> bool: ...
+    @property
+    def resumed(self) -> bool: ...
+    @property
+    def folder(self) -> DataFolder: ...
+
+
+def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> dict[str, Any]:
+    """Return everything that whoever reads the recording must know, ready for JSON."""
+    return {
+        **_of_visit(visit, plan),
+        "rate_hz": this_run.rate_hz,
+        **_of_study(visit.study, simulated=visit.simulated),
+        "facts": the_rig.metadata(),
+        "versions": _versions(),
+        # What a simulation records does not depend on the computer that it is made on.
+        "doctor": None if visit.fast else at_start(visit.folder.root),
+        "plan": [
+            {"block": block.number, "name": block.name, "trials": len(block.trials)}
+            for block in plan.blocks
+        ],
+    }
+
+
+def _of_visit(visit: Recorded, plan: SessionPlan) -> dict[str, Any]:
+    """Return who and when this is, and whether it counts."""
+    return {
+        "study": visit.study.protocol.study,
+        "title": visit.study.protocol.title,
+        "participant": visit.folder.name,
+        "session": visit.session,
+        "session_name": plan.name,
+        "started": _started(visit).isoformat(timespec="milliseconds"),
+        "simulated": visit.simulated,
+        "fast": visit.fast,
+        "pilot": visit.pilot,
+        "resumed": visit.resumed,
+        "clock": "manual" if visit.fast else "lsl",
+        "seed": plan.seed,
+        "slot": plan.slot,
+        "group": plan.group,
+    }
+
+
+def _of_study(study: Study, *, simulated: bool) -> dict[str, Any]:
+    """Return the study as it is run: all that it is made of, and what it says of the data."""
+    folder = study.path.parent
+    choices = study.choices | ({"input": study.operator} if simulated else {})
+    return {
+        "protocol": study.text,
+        "protocol_sha256": study.sha256,
+        "machine": study.machine_text,
+        "machine_sha256": hashlib.sha256(study.machine_text.encode()).hexdigest(),
+        "components": {part: choice.described(folder) for part, choice in choices.items()},
+        "files": named_files((choice.settings for choice in choices.values()), folder),
+        "own_plugins": {
+            name: path.read_text(encoding="utf-8") for name, path in own_plugins(study.path).items()
+        },
+        "streams": {
+            label: need.model_dump(mode="json", exclude_none=True)
+            for label, need in study.protocol.streams.items()
+        },
+        "rights": {name: each.rights for name, each in study.questionnaires.items()},
+        "indicator": study.protocol.indicator.model_dump(mode="json"),
+        "sync": study.protocol.sync.model_dump(mode="json"),
+        "trial_units": {
+            column: unit
+            for task in study.tasks.values()
+            for column, unit in trial_units(task).items()
+        },
+    }
+
+
+def _started(visit: Recorded) -> datetime:
+    """Return when the session begins: with --fast on the simulation's clock, which starts at 0."""
+    return datetime.fromtimestamp(0.0, UTC) if visit.fast else datetime.now(UTC)
+
+
+def _versions() -> dict[str, str]:
+    return {
+        "python": platform.python_version(),
+        "system": platform.platform(),
+        **{name: version(name) for name in RECORDED_PACKAGES if find_spec(name)},
+        **{each.dist.name: each.dist.version for each in entry_points(group=PROJECT) if each.dist},
+    }

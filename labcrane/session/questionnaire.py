@@ -1,0 +1,216 @@
+"""A questionnaire while it is asked: what has been answered, and what comes of it."""
+
+import json
+import math
+import random
+import re
+from collections.abc import Iterator, Mapping
+
+from labcrane.core.items import AnswerError, Item
+from labcrane.core.records import Trial, Value
+from labcrane.core.roles import Questionnaire
+from labcrane.design.plan import SessionPlan
+from labcrane.design.seeds import derive
+from labcrane.participants.personal_data import personal
+from labcrane.protocol.study import Study
+from labcrane.recording.participant_file.questionnaires import ANSWER, END, SCORE
+from labcrane.session.commands import Command, Order, by_whom
+
+Said = tuple[str, dict[str, Value]]
+"""Name and data of an event that follows."""
+
+SIMULATION = "simulation"
+"""Who answers for a simulated participant."""
+
+START, REFUSED = "questionnaire.start", "questionnaire.refused"
+
+
+class QuestionnaireForm:
+    """Takes answers one by one; each becomes an event at once.
+
+    Parameters
+    ----------
+    name
+        The study's name for the questionnaire.
+    about
+        Where in the session it is asked: step, and trial if it follows one.
+    answered
+        What was answered before the session's process died.
+
+    Attributes
+    ----------
+    over
+        Whether it has been handed in.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        questionnaire: Questionnaire,
+        about: Mapping[str, Value],
+        answered: Mapping[str, Value] | None = None,
+    ) -> None:
+        self.over = False
+        self._questionnaire = questionnaire
+        self._items = {item.name: item for item in questionnaire.items()}
+        self._about = {"questionnaire": name, **about}
+        self._answers: dict[str, Value] = dict(answered or {})
+
+    def begin(self) -> Said:
+        """Return the event with which it begins."""
+        kept = json.dumps(self._answers, ensure_ascii=False)
+        return START, {**self._about, "title": self._questionnaire.title, "kept": kept}
+
+    def take(self, text: str, by: str) -> Said:
+        """Take an answer, as JSON of questionnaire, item and value; return what is to be said."""
+        data: dict[str, Value] = {**self._about, "by": by}
+        try:
+            given = json.loads(text)
+            item, value = self._find(given)
+            answer = item.check(value)
+            if isinstance(answer, str) and (found := personal(answer)):
+                # What names a person must not be in the record, not even as a refused answer.
+                why = f"an answer must not hold {found}; write it without"
+                return REFUSED, {**data, "given": "", "item": item.name, "why": why}
+        except (AnswerError, json.JSONDecodeError) as error:
+            return REFUSED, {**data, "given": text, "item": _item_of(text), "why": str(error)}
+        self._answers[item.name] = answer
+        return ANSWER, {**data, "item": item.name, "value": answer}
+
+    def hand_in(self, by: str) -> Said:
+        """Hand it in; refused while a required question is neither answered nor declined."""
+        open_items = [
+            item.name
+            for item in self._items.values()
+            if item.required and item.name not in self._answers
+        ]
+        if open_items:
+            why = f"{', '.join(open_items)} have no answer; answer or decline them"
+            return REFUSED, {**self._about, "by": by, "given": "", "item": "", "why": why}
+        self.over = True
+        return self._end(by, handed_in=True)
+
+    def leave(self) -> Said:
+        """Return the event with which it ends without having been handed in."""
+        self.over = True
+        return self._end("", handed_in=False)
+
+    def scores(self) -> dict[str, float]:
+        """Return every score; NaN where it needs an answer that is missing."""
+        return dict(self._questionnaire.score(self._answers))
+
+    def simulated(self, seed: int) -> Iterator[Said]:
+        """Yield the answers of somebody who answers at random, and hand it in."""
+        dice = random.Random(seed)  # noqa: S311 - nothing secret
+        for item in self._items.values():
+            answer = json.dumps({**self._about, "item": item.name, "value": _any(item, dice)})
+            yield self.take(answer, SIMULATION)
+        yield self.hand_in(SIMULATION)
+
+    def _end(self, by: str, *, handed_in: bool) -> Said:
+        missing = sum(self._answers.get(name) is None for name in self._items)
+        scores: dict[str, Value] = {
+            f"{SCORE}{name}": None if math.isnan(value) else value
+            for name, value in self.scores().items()
+        }
+        return END, {
+            **self._about,
+            "by": by,
+            "handed_in": handed_in,
+            "missing": missing,
+            **scores,
+        }
+
+    def _find(self, given: object) -> tuple[Item, object]:
+        name = self._about["questionnaire"]
+        if (
+            not isinstance(given, dict)
+            or given.get("questionnaire") != name
+            or "value" not in given
+        ):
+            raise AnswerError(
+                f"an answer says questionnaire {name!r}, item and value, not {given!r}"
+            )
+        item = self._items.get(str(given.get("item")))
+        if item is None:
+            known = ", ".join(self._items)
+            raise AnswerError(f"{name} has no item {given.get('item')!r}; it has {known}")
+        return item, given["value"]
+
+
+def _item_of(text: str) -> str:
+    """Return which item an answer that is refused was for; empty when it names none."""
+    found = re.search(r'"item": ?"([a-z][a-z0-9_]*)"', text)
+    return found[1] if found else ""
+
+
+def _any(item: Item, dice: random.Random) -> Value:
+    if item.kind == "choice":
+        return dice.choice(item.choices)
+    if item.kind == "text":
+        return "simulated"
+    step = item.step or (item.highest - item.lowest) / 10.0
+    return item.lowest + step * dice.randint(0, round((item.highest - item.lowest) / step))
+
+
+class QuestionnaireRun:
+    """Asks one questionnaire and looks at the study's stop rules.
+
+    Parameters
+    ----------
+    answered
+        What was answered before the session's process died.
+    after
+        The trial it follows; None when it is a step of its own.
+
+    Attributes
+    ----------
+    alarming
+        Whether a stop rule was met, known when it has ended.
+    """
+
+    def __init__(
+        self,
+        study: Study,
+        plan: SessionPlan,
+        name: str,
+        step: int,
+        answered: Mapping[str, Value],
+        after: Trial | None,
+    ) -> None:
+        about: dict[str, Value] = {"step": step}
+        if after is not None:
+            about["trial"] = after.number
+        self._inquiry = QuestionnaireForm(name, study.questionnaires[name], about, answered)
+        self._name = name
+        self._rules = [rule for rule in study.protocol.stop_rules if rule.questionnaire == name]
+        self._seed = derive("answers", after.seed if after else plan.seed, step, name)
+        self.alarming = False
+
+    @property
+    def over(self) -> bool:
+        """Whether it has been handed in."""
+        return self._inquiry.over
+
+    def begin(self, *, simulated: bool) -> Iterator[Said]:
+        """Yield what is said at its beginning, and a simulated participant's answers."""
+        yield self._inquiry.begin()
+        if simulated:
+            yield from self._inquiry.simulated(self._seed)
+
+    def handle(self, command: Command) -> Said:
+        """Take an answer, or hand the questionnaire in; return what is said of it."""
+        if command.order is Order.SUBMIT:
+            return self._inquiry.hand_in(by_whom(command))
+        return self._inquiry.take(command.text, by_whom(command))
+
+    def end(self) -> Iterator[Said]:
+        """Yield what is said at its end: that it was left, and the stop rules that it meets."""
+        if not self.over:
+            yield self._inquiry.leave()
+        scores = self._inquiry.scores()
+        for rule in self._rules:
+            if scores[rule.score] > rule.above:  # a score that is NaN stops nobody
+                self.alarming = True
+                about: dict[str, Value] = {"questionnaire": self._name, "score": rule.score}
+                yield "stop_rule.met", {**about, "above": rule.above, "value": scores[rule.score]}

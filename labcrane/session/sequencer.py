@@ -1,0 +1,298 @@
+"""The course of a session: which step, which trial, paused or not, tick by tick.
+
+The steps are read like a script: every ``yield`` in a generator below is one tick, and gives back
+the frame that came of it.
+"""
+
+from collections.abc import Generator, Iterable, Mapping, Sequence
+
+from labcrane.core.records import Event, Frame, Phase, Trial, Value
+from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan, next_attempt
+from labcrane.participants.personal_data import personal
+from labcrane.protocol.rig import Rig
+from labcrane.protocol.study import Study
+from labcrane.session.commands import FAULTS, Command, Order, by_whom
+from labcrane.session.live_settings import FeedbackSettings
+from labcrane.session.pause import DISK, EXAMINER, INPUT, STOP, Suspenders
+from labcrane.session.practice import WarmUp
+from labcrane.session.questionnaire import QuestionnaireRun
+from labcrane.session.trial import TrialRun
+
+Ticks = Generator[None, Frame, None]
+
+NOT_ASKED = {
+    Order.ANSWER: "no questionnaire is asked",
+    Order.SUBMIT: "no questionnaire is asked",
+    Order.CONSENT: "consent is given before the session begins",
+}
+
+
+class Sequencer:
+    """Leads a session through its plan.
+
+    The loop calls :meth:`handle` before the machine moves and :meth:`evaluate` after.
+
+    Parameters
+    ----------
+    waits
+        Whether instructions and blocks wait for the order to start. A simulated operator needs
+        no telling.
+    awaits
+        The views and sounds that must present before the first step begins.
+
+    Attributes
+    ----------
+    over
+        Whether the session has ended.
+    """
+
+    def __init__(
+        self,
+        study: Study,
+        plan: SessionPlan,
+        rig: Rig,
+        *,
+        waits: bool,
+        awaits: Iterable[str] = (),
+    ) -> None:
+        self._study = study
+        self._plan = plan
+        self._rig = rig
+        self._waits = waits
+        self._rate_hz = study.protocol.rate_hz
+        self._settings = FeedbackSettings({**study.cues, **study.sounds})
+        self._notes: list[tuple[str, dict[str, Value]]] = []  # stamped with the tick they fall in
+        self._held = Suspenders(
+            study.protocol.on_fault, lambda *note: self._notes.append(note), awaits
+        )
+        self._attempt: TrialRun | None = None
+        self._stage = ""
+        self._step = 0
+        self._asking: QuestionnaireRun | None = None
+        self._wishes: set[Order] = set()  # to start, skip or repeat what runs now
+        self._warm_up = WarmUp()
+        self.over = False
+        self._script = self._session()
+        next(self._script)
+
+    @property
+    def moving(self) -> bool:
+        """Whether the operator's command reaches the machine in this tick."""
+        return self._attempt is not None and not self._held.by
+
+    def handle(
+        self, commands: Sequence[Command], lost_input: str | None, disk_trouble: str | None
+    ) -> None:
+        """Take up orders, and what has become of the operator's controls and of the disk."""
+        for command in commands:
+            if command.order in FAULTS:
+                self._held.report(command)
+            elif command.order is Order.DENIED:
+                self._note("page.denied", why=command.text, by=by_whom(command))
+            elif self._asking is not None and command.order in {Order.ANSWER, Order.SUBMIT}:
+                self._notes.append(self._asking.handle(command))
+            else:
+                self._obey(command)
+        self._held.watch(INPUT, lost_input)
+        self._held.watch(DISK, disk_trouble)
+
+    def evaluate(self, frame: Frame) -> None:
+        """Complete ``frame``: trial, phase, the task's values, and everything that happened."""
+        frame.paused = bool(self._held.by)
+        frame.events = self._stamped(frame)
+        try:
+            self._script.send(frame)
+        except StopIteration:
+            self.over = True
+            frame.events += self._stamped(frame)
+
+    # The script
+
+    def _session(self) -> Ticks:
+        while self._held.awaited and not self._held.ending:
+            yield
+        for step in self._plan.steps:
+            if self._held.ending:
+                break
+            self._step = step.number
+            self._note("step.start", step=step.number, kind=step.kind)
+            yield from self._run(step)
+            self._note("step.end", step=step.number, kind=step.kind)
+        if STOP in self._held:
+            self._note("participant.dropout", why="ended while a stop rule was met")
+        self._note("session.end", reason=", ".join(self._held.ending) or "complete")
+
+    def _run(self, step: PlannedStep) -> Ticks:
+        if step.block and not self._warm_up.begin(step.block):
+            pass  # practice has been enough; the step is done, also for who goes on later
+        elif step.block:
+            yield from self._block(step.block)
+        elif step.kind == "break":
+            yield from self._break(step)
+        elif step.kind == "consent":
+            self._note("consent.asked")  # what was confirmed is in the session's context
+            yield from self._gate("consent")
+        elif step.kind == "questionnaire":
+            for name in step.questionnaires:
+                yield from self._ask(name, step.answered.get(name, {}))
+        else:
+            self._note("instructions.shown", text=step.text)
+            yield from self._gate("instructions")
+
+    def _gate(self, what: str) -> Ticks:
+        if not self._waits:
+            return
+        self._enter("waiting")
+        self._note("waiting", what=what)
+        while Order.START not in self._wishes and not self._held.ending:
+            yield
+        self._enter("")
+
+    def _break(self, step: PlannedStep) -> Ticks:
+        left = round(step.seconds * self._rate_hz)
+        self._enter("break")
+        self._note("break.start", seconds=step.seconds)
+        while left > 0 and Order.SKIP not in self._wishes and not self._held.ending:
+            yield
+            left -= 1
+        self._note("break.end", left=left / self._rate_hz)
+        self._enter("")
+
+    def _block(self, block: PlannedBlock) -> Ticks:
+        yield from self._gate(block.name)
+        if self._held.ending:
+            return
+        about: dict[str, Value] = {"block": block.number, "block_name": block.name}
+        self._note("block.start", **about, task=block.task, practice=block.practice)
+        for owed in block.owed:
+            yield from self._ask(owed.questionnaire, owed.answered, owed.after)
+        for trial in block.trials:
+            yield from self._trial(block, trial)
+            for name in block.ask if trial.planned.counted else ():
+                yield from self._ask(name, {}, trial)
+            if self._held.ending or (block.until and self._warm_up.over):
+                break
+        self._note("block.end", **about)
+        if (verdict := self._warm_up.verdict(block)) is not None:
+            self._note("practice.end", **about, **verdict)
+
+    def _trial(self, block: PlannedBlock, trial: Trial) -> Ticks:
+        task = self._study.tasks[block.task]
+        attempt = TrialRun(task, block, trial, self._rate_hz)
+        for component in (*self._rig.components, task):
+            component.begin_trial(trial)
+        if trial.planned.start_pose is not None:
+            self._rig.dynamics.reset(trial.planned.start_pose)
+        self._note("trial.start", **attempt.about)
+        self._enter("trial", attempt)
+        while not attempt.phase.over:
+            frame = yield
+            attempt.evaluate(frame, self._wished_end())
+        self._enter("")
+        if trial.planned.counted:
+            self._warm_up.count(block, attempt.phase)
+        if attempt.phase is Phase.REPEATED:
+            yield from self._trial(block, next_attempt(self._study, self._plan, trial))
+
+    def _ask(self, name: str, answered: Mapping[str, Value], after: Trial | None = None) -> Ticks:
+        if self._held.ending:
+            return
+        asking = self._asking = QuestionnaireRun(
+            self._study, self._plan, name, self._step, answered, after
+        )
+        self._enter("questionnaire")
+        self._notes.extend(asking.begin(simulated=not self._waits))
+        yield
+        while not (asking.over or Order.SKIP in self._wishes or self._held.ending):
+            yield
+        self._asking = None
+        self._notes.extend(asking.end())
+        self._enter("")
+        if self._waits and asking.alarming:
+            self._held.hold(STOP)
+        while STOP in self._held and not self._held.ending:
+            yield
+
+    def _wished_end(self) -> Phase | None:
+        if self._held.ending:
+            return Phase.ENDED
+        if not self._wishes:
+            return None
+        if Order.SKIP in self._wishes:
+            return Phase.SKIPPED
+        return Phase.REPEATED if Order.REPEAT in self._wishes else None
+
+    def _enter(self, stage: str, attempt: TrialRun | None = None) -> None:
+        self._stage, self._attempt = stage, attempt
+        self._wishes.clear()
+
+    # Orders
+
+    def _obey(self, command: Command) -> None:
+        refused = self._refusal(command)
+        # What names a person must not be in the record, not even as a refused note.
+        text = "" if personal(command.text) else command.text
+        about: dict[str, Value] = {"refused": refused, "by": by_whom(command)}
+        self._note(f"order.{command.order}", text=text, **about)
+        if refused is not None:
+            return
+        match command.order:
+            case Order.PAUSE:
+                self._held.hold(EXAMINER)
+            case Order.START if EXAMINER in self._held or STOP in self._held:
+                self._held.release(EXAMINER)
+                self._held.release(STOP)
+            case Order.START | Order.SKIP | Order.REPEAT:
+                self._wishes.add(command.order)
+            case Order.END:
+                self._held.ending.append("by order")
+            case Order.OVERRIDE:
+                self._running().lift_limits()
+            case Order.COMPLETION:
+                self._running().completion = command.text == "1"
+            case Order.SETTING:
+                self._note("feedback.setting", **self._settings.change(command.text))
+            case Order.NOTE | Order.HINT:
+                pass  # the event is all there is to it
+
+    def _refusal(self, command: Command) -> str | None:
+        """Return why an order makes no sense now, or None when it does."""
+        match command.order:
+            case Order.REPEAT | Order.OVERRIDE | Order.COMPLETION if self._stage != "trial":
+                return "no trial is running"
+            case Order.SKIP if self._stage not in {"trial", "break", "questionnaire"}:
+                return "no trial, break or questionnaire is running"
+            case Order.ANSWER | Order.SUBMIT | Order.CONSENT:
+                return NOT_ASKED[command.order]
+            case Order.START if self._stage != "waiting" and not (
+                EXAMINER in self._held or STOP in self._held
+            ):
+                return "nothing waits to start"
+            case Order.PAUSE if EXAMINER in self._held:
+                return "the session is paused already"
+            case Order.COMPLETION if command.text not in {"0", "1"}:
+                return f"completion is 1 or 0, not {command.text!r}"
+            case Order.NOTE | Order.HINT if not command.text:
+                return f"a {command.order} needs words"
+            case Order.NOTE | Order.HINT if found := personal(command.text):
+                return f"a {command.order} must not hold {found}; write it without"
+            case Order.SETTING:
+                return self._settings.refusal(command.text)
+        return None
+
+    def _running(self) -> TrialRun:
+        if self._attempt is None:
+            raise AssertionError("orders that need a trial are refused without one")
+        return self._attempt
+
+    # What is written down
+
+    def _note(self, name: str, **data: Value) -> None:
+        self._notes.append((name, data))
+
+    def _stamped(self, frame: Frame) -> tuple[Event, ...]:
+        if not self._notes:
+            return ()
+        events = tuple(Event(name, frame.tick.due, data) for name, data in self._notes)
+        self._notes.clear()
+        return events

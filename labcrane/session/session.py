@@ -1,0 +1,258 @@
+"""Run one session: open the rig, lead it through its plan, leave a participant file."""
+
+import gc
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from labcrane.core.clock import Clock, ManualClock, SystemClock
+from labcrane.core.records import Event, Frame, Phase, Run
+from labcrane.design.plan import SessionPlan, plan_session
+from labcrane.errors import DeviceError, PluginError, ProtocolError
+from labcrane.protocol import rig
+from labcrane.protocol.study import Study
+from labcrane.recording.crash_marker import CrashMarker, read_whereabouts, whereabouts_path
+from labcrane.recording.data_folder import DataFolder
+from labcrane.recording.foreign_streams import Conclusion
+from labcrane.recording.frame_log import BatchLog, FrameLog, columns, frame_bytes
+from labcrane.recording.journal import SessionJournal
+from labcrane.recording.participant_file.writer import consolidate
+from labcrane.recording.paths import journal_path, next_part, parts
+from labcrane.registry.proxies import hurried
+from labcrane.session import loop
+from labcrane.session.commands import Console
+from labcrane.session.eligibility import check_eligibility, close_visit
+from labcrane.session.metadata import context
+from labcrane.session.overruns import OverrunReporter
+from labcrane.session.postprocess import SessionConclusion
+from labcrane.session.resume import Policy, Progress, progress, remaining, within_limits
+from labcrane.session.sequencer import Sequencer
+from labcrane.streams.sync.sync_report import SyncReport
+
+RESERVE_S = 60.0
+"""Seconds of recording for which the disk must always have room; below it the session pauses."""
+
+
+@dataclass(frozen=True, slots=True)
+class Visit:
+    """One session to be run.
+
+    Attributes
+    ----------
+    participant, session
+        Who, and which of the protocol's sessions, counted from 1.
+    data
+        The study's data folder.
+    simulated
+        Whether a simulated operator takes the controls.
+    fast
+        Whether to run as fast as the machine can, without LSL; for simulations only.
+    pilot
+        Whether this is a trial run, to be stamped as one.
+    resumed
+        Whether the session goes on after its process died.
+    policy
+        Where it goes on; what the protocol says by default.
+    feedback
+        Whether the launcher starts the views and sounds, so that the session waits for them.
+    """
+
+    study: Study
+    participant: str
+    session: int
+    data: Path
+    simulated: bool = False
+    fast: bool = False
+    pilot: bool = False
+    resumed: bool = False
+    policy: Policy | None = None
+    feedback: bool = False
+
+    @property
+    def folder(self) -> DataFolder:
+        """Where it is recorded."""
+        return DataFolder(self.data, self.participant, self.pilot, self.simulated)
+
+    @property
+    def source(self) -> str:
+        """Which session this is, the same whenever it is resumed; its streams are named by it."""
+        return f"{self.study.protocol.study}/{self.folder.name}/ses-{self.session:02}"
+
+    @property
+    def journal(self) -> Path:
+        """The first part of the session's journal."""
+        return journal_path(self.folder.path, self.session, "run")
+
+    @property
+    def whereabouts(self) -> Path:
+        """The file that says in which component it is, while it runs and after it has died."""
+        return whereabouts_path(self.journal)
+
+    @property
+    def streams_journal(self) -> Path:
+        """The first part of the journal of the streams of others."""
+        return journal_path(self.folder.path, self.session, "streams")
+
+
+def run(visit: Visit, console: Console) -> Path:
+    """Record a session in this process and consolidate it; return the participant file.
+
+    Whatever ends it, what was recorded until then is in the file.
+    """
+    try:
+        record(visit, console)
+    finally:
+        if parts(visit.journal):
+            finish(visit)
+    return visit.folder.participant_file
+
+
+def finish(visit: Visit) -> SyncReport | None:
+    """Put what the journals hold into the participant file, with clocks corrected and judged.
+
+    Returns the session's sync report.
+    """
+    journals = [first for first in (visit.journal, visit.streams_journal) if parts(first)]
+    made: list[SessionConclusion] = []
+
+    def conclude(about: Mapping[str, Any]) -> Conclusion:
+        made.append(SessionConclusion(about))
+        return Conclusion(made[-1].correct, made[-1].report)
+
+    consolidate(visit.folder.participant_file, journals, conclude)
+    close_visit(visit)
+    return made[-1].sync_report
+
+
+def record(visit: Visit, console: Console) -> None:
+    """Run a session to its end and write its journal.
+
+    Raises
+    ------
+    ProtocolError, DeviceError, RecordingError
+        Before anything is recorded: the session cannot be run.
+    """
+    study = visit.study
+    admission = check_eligibility(visit)
+    whole = plan_session(study, visit.participant, visit.session, admission.slot)
+    so_far, plan = _go_on(visit, whole) if visit.resumed else (None, whole)
+    if so_far is None:
+        visit.folder.claim(visit.session)
+    the_rig = rig.build(study, simulated=visit.simulated)
+    clock: Clock = ManualClock() if visit.fast else SystemClock()
+    died = read_whereabouts(visit.whereabouts) if visit.resumed else None
+    with (
+        _watching(visit, the_rig),
+        rig.opened(the_rig, study, plan.seed) as this_run,
+    ):
+        if so_far is not None and so_far.angles:
+            the_rig.dynamics.reset(within_limits(study, so_far.angles))
+        second = frame_bytes(this_run) * this_run.rate_hz
+        visit.folder.check_space(plan.expected_s, second, RESERVE_S)
+        about = context(visit, plan, the_rig, this_run) | admission.context
+        awaits = (*study.views, *study.sounds) if visit.feedback else ()
+        course = Sequencer(study, plan, the_rig, waits=not visit.simulated, awaits=awaits)
+        log = _log(visit, this_run, clock, reserve=round(RESERVE_S * second))
+        try:
+            for event in _opening(about, so_far, died, clock.now()):
+                log.note(event)
+            with _outlets(visit, plan, this_run) as outlets:
+                sinks = [*outlets, _teller(console)]
+                if not visit.fast:
+                    sinks.append(OverrunReporter(study.oversight, this_run.rate_hz, log, console))
+                with _settled():
+                    loop.run(the_rig, this_run, course, clock, console, log, sinks)
+        except (PluginError, DeviceError) as error:
+            log.note(Event("session.failed", clock.now(), {"why": str(error)}))
+            error.add_note(
+                "what was recorded until then is in the participant file; go on with: labcrane "
+                f"resume {study.path} --participant {visit.participant} --session {visit.session}"
+            )
+            raise
+        finally:
+            log.close()
+
+
+def _watching(visit: Visit, the_rig: rig.Rig) -> AbstractContextManager[None]:
+    if visit.fast:
+        visit.whereabouts.unlink(missing_ok=True)  # of a process that died, and was read
+        return hurried((*the_rig.components, *the_rig.tasks.values()))
+    return visit.study.oversight.published(visit.whereabouts)
+
+
+def _log(visit: Visit, this_run: Run, clock: Clock, reserve: int) -> FrameLog:
+    now = clock.now if visit.fast else None
+    path, held = next_part(visit.journal), columns(this_run)
+    journal = SessionJournal(path, held, this_run.rate_hz, now=now)
+    return BatchLog(journal, this_run) if visit.fast else FrameLog(journal, this_run, reserve)
+
+
+def _go_on(visit: Visit, whole: SessionPlan) -> tuple[Progress, SessionPlan]:
+    so_far = progress(visit.journal, visit.study.machine.names)
+    if so_far.complete:
+        raise ProtocolError(
+            f"session {visit.session} of {visit.folder.name} ran to its end, so there is nothing "
+            "to go on with; labcrane recover makes its participant file"
+        )
+    policy = visit.policy or visit.study.protocol.on_fault.session_died
+    return so_far, remaining(visit.study, whole, so_far, policy)
+
+
+def _opening(
+    about: Mapping[str, Any], so_far: Progress | None, died: CrashMarker | None, now: float
+) -> Iterator[Event]:
+    """Yield what is to be known before the first tick."""
+    yield Event("session.start", now, about)
+    if died is not None:
+        yield Event("session.died", now, {"where": str(died), "died_in_tick": died.tick})
+    if so_far is not None and so_far.interrupted is not None:
+        # The dead process could not close its trial; it is a row like any other.
+        lost = {**so_far.interrupted, "outcome": str(Phase.INTERRUPTED)}
+        yield Event("trial.end", now, lost)
+
+
+@contextmanager
+def _settled() -> Iterator[None]:
+    """Leave what is there before the first tick out of every search for garbage.
+
+    It is as much as everything else that a search looks through, and one takes many ticks' time.
+    """
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+
+
+def _teller(console: Console) -> Callable[[Frame], None]:
+    def tell(frame: Frame) -> None:
+        for event in frame.events:
+            console.report(event)
+
+    return tell
+
+
+@contextmanager
+def _outlets(
+    visit: Visit, plan: SessionPlan, this_run: Run
+) -> Iterator[list[Callable[[Frame], None]]]:
+    if visit.fast:  # its stamps are not the computer's time, so nobody could use the streams
+        yield []
+        return
+    from labcrane.streams.context import ContextOutlet  # noqa: PLC0415
+    from labcrane.streams.frames import FrameOutlet  # noqa: PLC0415
+    from labcrane.streams.outlets import Outlets  # noqa: PLC0415 - loads liblsl
+
+    trials = sum(len(block.trials) for block in plan.blocks)
+    outlets = (
+        Outlets(this_run, visit.source),
+        FrameOutlet(this_run, visit.source),
+        ContextOutlet(this_run, visit.source, trials),
+    )
+    try:
+        yield [outlet.push for outlet in outlets]
+    finally:
+        for outlet in outlets:
+            outlet.close()

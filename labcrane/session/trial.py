@@ -1,0 +1,115 @@
+"""One attempt at a trial, from its start to its row in the trial table."""
+
+from labcrane.core.records import Event, Frame, Phase, Trial, TrialStatus, Value
+from labcrane.core.roles import Task
+from labcrane.design.plan import PlannedBlock
+
+
+class TrialRun:
+    """Runs beside the loop while a trial is under way.
+
+    Attributes
+    ----------
+    phase
+        Where the trial stands.
+    about
+        What every event of the trial says of it.
+    """
+
+    def __init__(self, task: Task, block: PlannedBlock, trial: Trial, rate_hz: float) -> None:
+        self.phase = Phase.RUNNING
+        self.about: dict[str, Value] = {
+            "trial": trial.number,
+            "attempt": trial.attempt,
+            "block": block.number,
+            "block_name": block.name,
+            "practice": block.practice,
+            "counted": trial.planned.counted,
+            **({"group": block.group} if block.group else {}),
+            **({"reference": True} if block.reference else {}),
+            **trial.planned.condition,
+        }
+        if block.feedback:
+            self.about["feedback"] = "+".join(block.feedback[trial.number]) or "none"
+        self.completion: bool | None = None
+        self._trial = trial
+        self._task = task
+        self._rate_hz = rate_hz
+        self._period = 1.0 / rate_hz
+        self._ticks = 0
+        self._paused_ticks = 0
+        self._late_ticks = 0
+        self._worst_s = 0.0
+        self._began: float | None = None
+
+    def lift_limits(self) -> None:
+        """Let the trial go on past its automatic ends."""
+        self._task.lift_limits()
+
+    def evaluate(self, frame: Frame, wish: Phase | None) -> None:
+        """Complete ``frame``; ``wish`` ends the trial whatever the task thinks."""
+        if self._began is None:
+            self._began = frame.tick.due
+        lateness = frame.tick.woke - frame.tick.due
+        self._worst_s = max(self._worst_s, lateness)
+        self._late_ticks += lateness > self._period
+        frame.trial = self._trial.number
+        frame.elapsed = self._ticks / self._rate_hz
+        judgement = None
+        if frame.paused:
+            self._paused_ticks += 1
+        else:
+            self._ticks += 1
+            judgement = self._task.evaluate(frame)
+            frame.task = judgement.values
+            if judgement.events:
+                frame.events += tuple(self._of_this_trial(event) for event in judgement.events)
+            self.phase = judgement.phase
+        if wish is not None and not self.phase.over:
+            self.phase = wish
+        frame.phase = self.phase
+        if self.phase.over:
+            frame.events += (Event("trial.end", frame.tick.due, self._row(frame, judgement)),)
+
+    def _of_this_trial(self, event: Event) -> Event:
+        return Event(event.name, event.time, {"trial": self._trial.number, **event.data})
+
+    def _row(self, frame: Frame, judgement: TrialStatus | None) -> dict[str, Value]:
+        results: dict[str, Value] = {
+            column: None for signal in self._task.results for column in signal.columns
+        }
+        if judgement is not None:
+            results.update(judgement.results)
+        return {
+            **self.about,
+            "outcome": str(self.phase),
+            **results,
+            "completion": None if self.completion is None else int(self.completion),
+            "started": self._began,
+            "ended": frame.tick.due,
+            "seed": self._trial.seed,
+            "paused": self._paused_ticks / self._rate_hz,
+            "late_ticks": self._late_ticks,
+            "worst_lateness": self._worst_s,
+        }
+
+
+UNITS = {
+    "started": "s",
+    "ended": "s",
+    "seed": "1",
+    "paused": "s",
+    "late_ticks": "1",
+    "worst_lateness": "s",
+    "trial": "1",
+    "attempt": "1",
+    "block": "1",
+    "completion": "1",
+}
+"""Units of the columns that every trial table has."""
+
+
+def trial_units(task: Task) -> dict[str, str]:
+    """Return the unit of every numeric column that ``task`` and the session put into a row."""
+    results = {column: signal.unit for signal in task.results for column in signal.columns}
+    return {**UNITS, **dict(task.condition_units), **results}

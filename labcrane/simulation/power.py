@@ -1,0 +1,250 @@
+"""How often a planned test finds an effect: cohorts drawn from a pool of simulated participants."""
+
+import re
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from labcrane.errors import ProtocolError
+from labcrane.types import FloatArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+ALPHA = 0.05
+_EFFECT = re.compile(r"(log\()?([a-z0-9_]+)(\))?~([a-z0-9_]+)(?:\[(.+),(.+)\])?(?:=(.+))?")
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """What a planned test is about: ``movement_time~sequence``, ``error~group[none,visual]=0.2``.
+
+    Attributes
+    ----------
+    measure, log
+        A column of the movements, and whether its logarithm is tested.
+    factor
+        The column it depends on. A number is tested for a linear trend over its levels, words for
+        a difference between them; both by participants' means.
+    between
+        The two words that are compared; empty for all there are.
+    size
+        The effect that is put in, in the measure's unit per step of a number or between two words,
+        after the labels were permuted; None takes the data as they were simulated.
+    """
+
+    measure: str
+    log: bool
+    factor: str
+    between: tuple[str, ...]
+    size: float | None
+
+
+def read_effect(text: str) -> Effect:
+    """Read an effect as it is written on the command line."""
+    found = _EFFECT.fullmatch(text.replace(" ", ""))
+    try:
+        size = float(found[7]) if found and found[7] else None
+    except ValueError:
+        found, size = None, None
+    if found is None or bool(found[1]) != bool(found[3]):
+        raise ProtocolError(
+            f"{text!r} is no effect; write MEASURE~FACTOR, log(MEASURE)~FACTOR, "
+            "MEASURE~FACTOR[WORD,WORD] or MEASURE~FACTOR=SIZE, as in movement_time~sequence=-0.1"
+        )
+    between = (found[5], found[6]) if found[5] else ()
+    return Effect(found[2], bool(found[1]), found[4], between, size)
+
+
+@dataclass(frozen=True, slots=True)
+class Pool:
+    """What a test needs of every participant.
+
+    Attributes
+    ----------
+    means
+        Participants' means at each level, shape ``(n_participants, n_levels)``; with groups,
+        shape ``(n_participants, 1)``.
+    weights
+        How a participant's means make the number that is tested, shape ``(n_levels,)``: slope or
+        difference.
+    steps
+        What a unit of the effect adds at each level, shape ``(n_levels,)``.
+    groups
+        Each participant's group as a number from 0, where the factor is between participants.
+    left_out
+        Participants without a value at some level.
+    """
+
+    means: FloatArray
+    weights: FloatArray
+    steps: FloatArray
+    groups: npt.NDArray[np.intp] | None
+    left_out: tuple[str, ...]
+
+
+def make_pool(movements: "pd.DataFrame", effect: Effect) -> Pool:
+    """Return a pool from the movements of all participants.
+
+    Raises
+    ------
+    ProtocolError
+        The movements have no such measure or factor, or it has one level, or more than two words.
+    """
+    import pandas as pd
+
+    for name in (effect.measure, effect.factor):
+        if name not in movements:
+            raise ProtocolError(
+                f"movements have no {name!r}; they have {', '.join(map(str, movements))}"
+            )
+    table = movements[["participant", effect.factor, effect.measure]].dropna()
+    if effect.between:
+        table = table[table[effect.factor].isin(effect.between)]
+    if effect.log:
+        table[effect.measure] = np.log(table[effect.measure])
+    cells = table.groupby(["participant", effect.factor])[effect.measure].mean().unstack()
+    numeric = pd.api.types.is_numeric_dtype(cells.columns)
+    levels = len(cells.columns)
+    if levels < 2 or (levels > 2 and not numeric):  # noqa: PLR2004
+        raise ProtocolError(
+            f"{effect.factor!r} has {levels} levels here ({', '.join(map(str, cells.columns))}); "
+            "the test is for a number with two or more, or for two words, as in "
+            f"{effect.factor}[one,other]"
+        )
+    steps = cells.columns.to_numpy(float) if numeric else np.array([0.0, 1.0])
+    steps = steps - steps.mean()
+    if (cells.notna().sum(axis=1) == 1).all():
+        labels = cells.notna().to_numpy().argmax(axis=1)
+        own = cells.mean(axis=1).to_numpy()[:, None]
+        return Pool(own, np.ones(1), steps, labels, ())
+    whole = cells.dropna()
+    weights = steps / (steps @ steps)
+    left_out = tuple(map(str, cells.index.difference(whole.index)))
+    return Pool(whole.to_numpy(float), weights, steps, None, left_out)
+
+
+@dataclass(frozen=True, slots=True)
+class Power:
+    """How often the test found something in cohorts of one size.
+
+    Attributes
+    ----------
+    participants, cohorts
+        How many in a cohort, and how many cohorts.
+    power, power_low, power_high
+        Share of the cohorts with p below :data:`ALPHA`, and its 95 % Wilson interval.
+    null, null_low, null_high
+        The same with the labels permuted: how often something is found where nothing is.
+    """
+
+    participants: int
+    cohorts: int
+    power: float
+    power_low: float
+    power_high: float
+    null: float
+    null_low: float
+    null_high: float
+
+
+def power(
+    pool: Pool,
+    effect: Effect,
+    sizes: Sequence[int],
+    cohorts: int,
+    seed: int,
+    *,
+    fresh: bool = False,
+) -> Iterator[Power]:
+    """Yield the power of the test for each size of the cohort.
+
+    Parameters
+    ----------
+    cohorts
+        How many are drawn for each size; fresh ones are as many as the pool has at most.
+    fresh
+        Whether cohorts are made of participants of their own, in the pool's order, rather than
+        drawn with replacement.
+
+    Raises
+    ------
+    ProtocolError
+        The pool has too few participants.
+    """
+    for number, size in enumerate(sizes):
+        random = np.random.default_rng([seed, number])
+        drawn = _fresh(pool, size, cohorts) if fresh else _drawn(pool, size, cohorts, random)
+        plain = pool.means[drawn]
+        labels = None if pool.groups is None else pool.groups[drawn]
+        permuted, shuffled = _permuted(plain, labels, random)
+        null = _p(permuted, shuffled, pool) < ALPHA
+        if effect.size is None:
+            found = _p(plain, labels, pool) < ALPHA
+        else:
+            added = pool.steps if shuffled is None else pool.steps[shuffled][..., None]
+            found = _p(permuted + effect.size * added, shuffled, pool) < ALPHA
+        yield Power(size, len(found), *_share(found), *_share(null))
+
+
+def _drawn(
+    pool: Pool, size: int, cohorts: int, random: np.random.Generator
+) -> npt.NDArray[np.intp]:
+    """Draw cohorts with replacement, from each group as many; shape ``(cohorts, size)``."""
+    if pool.groups is None:
+        return random.integers(len(pool.means), size=(cohorts, size))
+    parts = []
+    for group in range(len(pool.steps)):
+        members = np.flatnonzero(pool.groups == group)
+        count = (size + group) // len(pool.steps)
+        parts.append(members[random.integers(len(members), size=(cohorts, count))])
+    return np.concatenate(parts, axis=1)
+
+
+def _fresh(pool: Pool, size: int, cohorts: int) -> npt.NDArray[np.intp]:
+    there = min(cohorts, len(pool.means) // size)  # some participants have left
+    if there < 2:  # noqa: PLR2004
+        raise ProtocolError(
+            f"two cohorts of {size} need {2 * size} participants, and the pool has "
+            f"{len(pool.means)} with a value at every level; simulate more of them"
+        )
+    return np.arange(there * size).reshape(there, size)
+
+
+def _permuted(
+    means: FloatArray, labels: npt.NDArray[np.intp] | None, random: np.random.Generator
+) -> tuple[FloatArray, npt.NDArray[np.intp] | None]:
+    """Permute levels within each participant, or groups over participants."""
+    if labels is None:
+        return random.permuted(means, axis=2), None
+    return means, random.permuted(labels, axis=1)
+
+
+def _p(means: FloatArray, labels: npt.NDArray[np.intp] | None, pool: Pool) -> FloatArray:
+    """Return the p-value of each cohort, shape ``(cohorts,)``."""
+    from scipy.stats import ttest_1samp, ttest_ind_from_stats
+
+    numbers = means @ pool.weights
+    if labels is None:
+        with warnings.catch_warnings():
+            # A small cohort may be the same participant again and again; p is then no number, and
+            # nothing is found.
+            warnings.filterwarnings("ignore", "Precision loss", RuntimeWarning)
+            return np.asarray(ttest_1samp(numbers, 0.0, axis=1).pvalue)
+    known: list[FloatArray] = []
+    for group in (0, 1):
+        own = np.where(labels == group, numbers, np.nan)
+        known += [np.nanmean(own, axis=1), np.nanstd(own, axis=1, ddof=1)]
+        known.append(np.isfinite(own).sum(axis=1).astype(float))
+    return np.asarray(ttest_ind_from_stats(*known, equal_var=False).pvalue)
+
+
+def _share(found: npt.NDArray[np.bool_]) -> tuple[float, float, float]:
+    from statsmodels.stats.proportion import proportion_confint
+
+    low, high = proportion_confint(int(found.sum()), len(found), alpha=0.05, method="wilson")
+    return float(found.mean()), float(low), float(high)

@@ -1,0 +1,180 @@
+"""Records the streams of others: whatever was asked for, late or again after a restart."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from labcrane.errors import RecordingError
+from labcrane.recording.paths import next_part
+from labcrane.recording.xdf.writer import XdfWriter
+from labcrane.streams.recorder.health import Condition, Health, complaints, condition, rate
+from labcrane.streams.recorder.inlet import Inlet
+from labcrane.streams.request import StreamRequest, unstable_id
+
+if TYPE_CHECKING:
+    import pylsl
+
+FORGET_S = 3.0
+"""A stream that has gone is listed for so long; only then is another one of its id a duplicate."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Recorded:
+    request: StreamRequest
+    inlet: Inlet
+    misfits: list[str]
+    warnings: list[str]
+
+
+class Recorder:
+    """Records what is asked for as soon as it is there. Call ``look`` several times a second."""
+
+    def __init__(
+        self,
+        journal: Path,
+        requests: Sequence[StreamRequest],
+        resolver: "pylsl.ContinuousResolver | None" = None,
+    ) -> None:
+        self._requests = tuple(requests)
+        self._writer = XdfWriter(next_part(journal))
+        self._resolver = resolver or a_resolver()
+        self._streams: dict[tuple[str, str, str], _Recorded] = {}
+        self._since: dict[str, float] = {}
+        self._fault: str | None = None
+
+    @property
+    def path(self) -> Path:
+        """The part of the journal that is being written."""
+        return self._writer.path
+
+    def look(self) -> None:
+        """Start to record what has appeared."""
+        found = [info for info in self._resolver.results() if self._wanted(info) is not None]
+        now = time.monotonic()
+        self._since = {info.uid(): self._since.get(info.uid(), now) for info in found}
+        for info in found:
+            key = (info.source_id() or info.uid(), info.name(), info.type())
+            if key not in self._streams:
+                self._start(key, info)
+        self._find_duplicates(found, now)
+
+    def health(self) -> list[Health]:
+        """Return how each stream is now, also those asked for that are not there."""
+        now = time.perf_counter()
+        found = [_health(one, now) for one in self._streams.values()]
+        there = {one.request.label for one in self._streams.values()}
+        return found + [_absent(one) for one in self._requests if one.label not in there]
+
+    def status(self) -> dict[str, Any]:
+        """Return how the recording is, ready for JSON."""
+        streams = self.health()
+        faults = {self._fault, *(one.inlet.flow.fault for one in self._streams.values())} - {None}
+        return {
+            "journal": str(self.path),
+            "bytes": self._writer.size,
+            "free": self._writer.free,
+            "ready": all(one.sane for one in streams if one.required) and not faults,
+            "faults": sorted(str(fault) for fault in faults),
+            "streams": [one.as_json() for one in streams],
+        }
+
+    def close(self) -> bool:
+        """Write down all that has come and close the journal; whether all of it went in."""
+        whole = [one.inlet.close() for one in self._streams.values()]
+        try:
+            self._writer.close()
+        except RecordingError as error:  # the disk is still full: footers are missing, no samples
+            self._fault = str(error)
+        return all(whole) and self._fault is None
+
+    def _wanted(self, info: "pylsl.StreamInfo") -> StreamRequest | None:
+        return next((one for one in self._requests if one.matches(info)), None)
+
+    def _start(self, key: tuple[str, str, str], info: "pylsl.StreamInfo") -> None:
+        request = self._wanted(info)
+        if request is None:
+            return
+        misfits = request.misfits(info.channel_count(), info.nominal_srate())
+        warnings = list(misfits)
+        if (unstable := unstable_id(info.source_id())) is not None:
+            warnings.append(unstable)
+        inlet = Inlet(info, self._writer, request.counter, (*warnings,))
+        self._streams[key] = _Recorded(request, inlet, misfits, warnings)
+
+    def _find_duplicates(self, found: "list[pylsl.StreamInfo]", now: float) -> None:
+        """Warn of two live streams that LSL cannot tell apart: it may reconnect to the other."""
+        for key, recorded in self._streams.items():
+            alike = [
+                info
+                for info in found
+                if (info.source_id(), info.name(), info.type()) == key
+                and now - self._since[info.uid()] > 2 * FORGET_S
+            ]
+            if len(alike) > 1:
+                hosts = " and ".join(sorted(info.hostname() for info in alike))
+                warning = f"has source_id {key[0]!r} in {len(alike)} programs, on {hosts}: stop one"
+                if warning not in recorded.warnings:
+                    recorded.warnings.append(warning)
+                    recorded.inlet.note("warning", text=warning)
+
+
+def a_resolver() -> "pylsl.ContinuousResolver":
+    """Return a resolver that begins to look around at once, and goes on."""
+    import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
+
+    return pylsl.ContinuousResolver(forget_after=FORGET_S)
+
+
+def _health(recorded: _Recorded, now: float) -> Health:
+    inlet, flow, info = recorded.inlet, recorded.inlet.flow, recorded.inlet.info
+    probe = flow.probe
+    # The time of the measurement on our clock, not the time when liblsl told of it.
+    age = None if probe is None else now - (probe.remote_time + probe.offset)
+    health = Health(
+        label=recorded.request.label,
+        name=info.name(),
+        type=info.type(),
+        source_id=info.source_id(),
+        host=info.hostname(),
+        required=recorded.request.required,
+        condition=condition(flow, inlet.header, now),
+        samples=flow.samples,
+        rate_hz=rate(flow, now),
+        nominal_hz=info.nominal_srate(),
+        channels=info.channel_count(),
+        silent_s=now - flow.last if flow.samples else None,
+        offset_s=None if probe is None else probe.offset,
+        offset_age_s=age,
+        rtt_s=None if probe is None else probe.rtt,
+        missing=flow.missing,
+        resets=flow.resets,
+        misfits=recorded.misfits,
+        warnings=list(recorded.warnings),
+    )
+    health.warnings.extend(complaints(health))
+    return health
+
+
+def _absent(request: StreamRequest) -> Health:
+    return Health(
+        label=request.label,
+        name=request.name or "",
+        type=request.type or "",
+        source_id=request.source_id or "",
+        host="",
+        required=request.required,
+        condition=Condition.ABSENT,
+        samples=0,
+        rate_hz=None,
+        nominal_hz=request.rate_hz or 0.0,
+        channels=request.channels or 0,
+        silent_s=None,
+        offset_s=None,
+        offset_age_s=None,
+        rtt_s=None,
+        missing=0,
+        resets=0,
+        warnings=[f"{request} is not on the network: start it, and check that LSL is enabled"],
+    )

@@ -1,0 +1,139 @@
+"""Even time stamps for sources that sample evenly but stamp unevenly.
+
+Only for regular streams whose every sample arrives. Lines are fitted to stretches of two minutes
+that overlap by half and fade into each other: a crystal wanders by a part in a million with the
+room's temperature, which is milliseconds in an hour.
+"""
+
+import itertools
+from collections.abc import Callable
+from enum import StrEnum
+
+import numpy as np
+
+from labcrane.types import FloatArray
+
+STRETCH_S = 120.0
+BLOCK_S = 0.05
+
+Line = Callable[[FloatArray], FloatArray]
+
+
+class Dejitter(StrEnum):
+    """How uneven stamps are made even."""
+
+    NONE = "none"
+    LEAST_SQUARES = "least_squares"  # stamps scatter evenly around the truth
+    ENVELOPE = "envelope"  # stamps are late by a transport delay that has a known minimum
+
+
+def even(times: FloatArray, index: FloatArray, way: Dejitter) -> FloatArray:
+    """Return evened times, shape ``(n,)``.
+
+    Parameters
+    ----------
+    times
+        In seconds, shape ``(n,)``, of one clock.
+    index
+        Which sample each one is, shape ``(n,)``: counts on over samples that are missing.
+    way
+        With ``ENVELOPE``, the line lies below all times: at the truth plus the least delay.
+    """
+    if way is Dejitter.NONE:
+        return times
+    result = times.copy()
+    for start, stop in runs(times, index):
+        if stop - start > 2:  # noqa: PLR2004
+            result[start:stop] = _follow(times[start:stop], index[start:stop], way)
+    return result
+
+
+def runs(times: FloatArray, index: FloatArray) -> list[tuple[int, int]]:
+    """Return the ranges without a gap: nothing is known of how many samples a gap swallowed."""
+    if len(times) < 2:  # noqa: PLR2004
+        return [(0, len(times))] if len(times) else []
+    steps, counts = np.diff(times), np.diff(index)
+    period = float(np.median(steps / np.maximum(counts, 1.0)))
+    odd = np.abs(steps - period * counts)
+    # Eight times what nearly all steps stay below: chunks that travel unevenly are no gaps.
+    limit = min(max(1.5 * period, 8.0 * float(np.quantile(odd, 0.995))), 1.0)
+    cuts = np.flatnonzero((odd > limit) | (counts < 1.0)) + 1
+    bounds = [0, *map(int, cuts), len(times)]
+    return list(itertools.pairwise(bounds))
+
+
+def _follow(times: FloatArray, index: FloatArray, way: Dejitter) -> FloatArray:
+    """Return the times on lines that fade into each other."""
+    fit = _envelope if way is Dejitter.ENVELOPE else _least_squares
+    duration = times[-1] - times[0]
+    if duration < 1.5 * STRETCH_S:
+        return fit(times, index)(index)
+    count = round(duration / (STRETCH_S / 2)) - 1
+    half = (index[-1] - index[0]) / (count + 1)
+    total, result = np.zeros(len(times)), np.zeros(len(times))
+    for k in range(count):
+        centre = index[0] + (k + 1) * half
+        here = slice(*np.searchsorted(index, (centre - half, centre + half)))
+        near = index[here]
+        weight = np.clip(1.0 - np.abs(near - centre) / half, 1e-9, 1.0)
+        if k == 0:
+            weight[near < centre] = 1.0
+        if k == count - 1:
+            weight[near > centre] = 1.0
+            here = slice(here.start, len(times))
+            near = index[here]
+            weight = np.r_[weight, np.ones(len(near) - len(weight))]
+        result[here] += weight * fit(times[here], near)(near)
+        total[here] += weight
+    return result / total
+
+
+def _least_squares(times: FloatArray, index: FloatArray) -> Line:
+    middle, mean = index.mean(), times.mean()
+    away = index - middle
+    slope = float(away @ (times - mean)) / float(away @ away)
+    return lambda at: mean + slope * (at - middle)
+
+
+def _envelope(times: FloatArray, index: FloatArray) -> Line:
+    """Return the highest line below all times: the hull's edge under their middle.
+
+    Moon, Skelly and Towsley 1999, Estimation and removal of clock skew from network delay
+    measurements.
+    """
+    rough = _least_squares(times, index)
+    low_index, low_late = _lowest(index, times - rough(index), times)
+    hull = _lower_hull(low_index, low_late)
+    middle = (index[0] + index[-1]) / 2
+    k = int(np.clip(np.searchsorted(hull[:, 0], middle), 1, len(hull) - 1))
+    (x0, y0), (x1, y1) = hull[k - 1], hull[k]
+    slope = (y1 - y0) / (x1 - x0)
+    return lambda at: rough(at) + y0 + slope * (at - x0)
+
+
+def _lowest(
+    index: FloatArray, late: FloatArray, times: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the earliest sample of each twentieth of a second: only those can be on the hull."""
+    span = float(times[-1] - times[0])
+    size = max(int(len(late) * BLOCK_S / span), 1) if span > 0 else 1
+    whole = len(late) // size * size
+    if whole // size < 3:  # noqa: PLR2004
+        return index, late
+    chosen = np.argmin(late[:whole].reshape(-1, size), axis=1) + np.arange(0, whole, size)
+    chosen = np.r_[chosen, np.arange(whole, len(late))]
+    return index[chosen], late[chosen]
+
+
+def _lower_hull(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Return the lower convex hull (Andrew's monotone chain), shape ``(n, 2)``."""
+    hull: list[tuple[float, float]] = []
+    for point in zip(x.tolist(), y.tolist(), strict=True):
+        while len(hull) > 1 and _turns_right(hull[-2], hull[-1], point):
+            hull.pop()
+        hull.append(point)
+    return np.array(hull)
+
+
+def _turns_right(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) <= 0.0

@@ -1,0 +1,200 @@
+"""Where a source's clock changed: at which probe, and at which sample.
+
+A source that restarts, or a computer that sleeps, goes on with another clock. Its probes say that,
+a second too late; the samples say when.
+"""
+
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from labcrane.streams.sync.raw import RawStream
+from labcrane.types import FloatArray
+
+JUMP_S = 0.002
+"""Offsets that differ by more than this, and more than probes can err, are two clocks."""
+
+FASTEST_DRIFT = 500e-6
+"""No crystal in a computer drifts faster, in seconds per second."""
+
+CERTAIN_S = 0.1
+"""Jumps beyond this show in the times of arrival, whatever the network did."""
+
+REMOTE, OFFSET, RTT, LOCAL = range(4)
+
+
+@dataclass(frozen=True, slots=True)
+class Epoch:
+    """Samples and probes of one and the same clock.
+
+    Attributes
+    ----------
+    start, stop
+        Range of its samples.
+    probes
+        Shape ``(n, 4)``, in the order of :class:`~labcrane.streams.probes.Probe`; may be empty.
+    unsure
+        How many samples at its start may belong to the clock before.
+    """
+
+    start: int
+    stop: int
+    probes: FloatArray
+    unsure: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class _Change:
+    """A change of clock: the first probe, the first sample of the new one."""
+
+    probe: int
+    sample: int
+    unsure: int = 0
+
+
+def epochs(raw: RawStream, *, regular: bool) -> list[Epoch]:
+    """Return the stretches of one clock, in order; they cover every sample.
+
+    ``regular`` says that the source samples at a steady rate, so that a step of its clock shows
+    between two neighbouring stamps.
+    """
+    probes = in_order(raw.probes)
+    jumps = _jumps(probes)
+    probes, jumps = _without_strays(probes, jumps)
+    changes = _changes(raw, probes, jumps, regular=regular)
+    bounds = [_Change(0, 0), *changes, _Change(len(probes), len(raw.stamps))]
+    found = []
+    for this, following in itertools.pairwise(bounds):
+        mine = probes[this.probe : following.probe]
+        if following.sample > this.sample:
+            found.append(Epoch(this.sample, following.sample, mine, this.unsure))
+    return found
+
+
+def in_order(probes: FloatArray) -> FloatArray:
+    """Return the probes as they were told, each once."""
+    if not len(probes):
+        return probes
+    ordered = probes[np.argsort(probes[:, LOCAL], kind="stable")]
+    new = np.r_[True, np.diff(ordered[:, REMOTE]) != 0.0]
+    return np.asarray(ordered[new & np.isfinite(ordered).all(axis=1)])
+
+
+def _jumps(probes: FloatArray) -> list[int]:
+    """Return the probes that cannot be of the clock before.
+
+    The path's asymmetry shifts an offset by up to half the round trip, and no further.
+    """
+    if len(probes) < 2:  # noqa: PLR2004
+        return []
+    measured = probes[:, REMOTE] + probes[:, OFFSET]
+    drift = FASTEST_DRIFT * np.abs(np.diff(measured))
+    doubt = (probes[1:, RTT] + probes[:-1, RTT]) / 2
+    far = np.abs(np.diff(probes[:, OFFSET])) > JUMP_S + drift + doubt
+    return [int(k) + 1 for k in np.flatnonzero(far)]
+
+
+def _without_strays(probes: FloatArray, jumps: list[int]) -> tuple[FloatArray, list[int]]:
+    """Leave out single probes whose neighbours agree with each other."""
+    strays = [
+        k
+        for k, following in itertools.pairwise(jumps)
+        if following == k + 1 and not _jumps(probes[[k - 1, k + 1]])
+    ]
+    if not strays:
+        return probes, jumps
+    kept = np.delete(probes, strays, axis=0)
+    return kept, _jumps(kept)
+
+
+def _changes(
+    raw: RawStream, probes: FloatArray, jumps: list[int], *, regular: bool
+) -> list[_Change]:
+    """Return every change of clock, that liblsl told of or that the probes show."""
+    changes = []
+    left = set(jumps)
+    for told, low, high in raw.resets:
+        # A probe under way at the restart may be told just after it, still of the old clock.
+        near = [k for k in left if probes[k - 1, LOCAL] - 1.0 <= told <= probes[k, LOCAL]]
+        probe = near[0] if near else int(np.searchsorted(probes[:, LOCAL], told))
+        left -= set(near)
+        changes.append(_Change(probe, _within(raw, int(low), int(high))))
+    for k in sorted(left):
+        sample, unsure = _step(raw, probes[k - 1], probes[k], regular=regular)
+        changes.append(_Change(k, sample, unsure))
+    firsts = sorted(change.probe for change in changes)
+    changes.sort(key=lambda change: change.sample)
+    return [replace(change, probe=k) for k, change in zip(firsts, changes, strict=True)]
+
+
+def _within(raw: RawStream, low: int, high: int) -> int:
+    """Return the first sample of a new clock, known to lie in a range."""
+    first, last = max(low, 1), min(high, len(raw.stamps) - 1)
+    if high <= low or last < first:
+        return low
+    steps = np.abs(np.diff(raw.stamps[first - 1 : last + 1]))
+    return first + int(np.argmax(steps))
+
+
+def _step(
+    raw: RawStream, before: FloatArray, after: FloatArray, *, regular: bool
+) -> tuple[int, int]:
+    """Return the first sample after a step between two probes, and how many may be wrong."""
+    low, high = _window(raw, before, after)
+    jump = before[OFFSET] - after[OFFSET]
+    if high <= low:
+        return high, 0
+    if regular:
+        found = _step_between_stamps(raw.stamps, low, high, jump)
+        if found is not None:
+            return found
+    arrival = raw.arrival()
+    if arrival is not None and abs(jump) > CERTAIN_S:
+        return _step_in_arrival(raw, arrival, low, high, (before, after)), 0
+    middle = (before[REMOTE] + before[OFFSET] + after[REMOTE] + after[OFFSET]) / 2
+    old = raw.stamps[low:high] + before[OFFSET] < middle
+    return low + int(np.count_nonzero(old)), high - low
+
+
+def _window(raw: RawStream, before: FloatArray, after: FloatArray) -> tuple[int, int]:
+    """Return the range of samples in which the first one after a step may lie."""
+    arrival = raw.arrival()
+    if arrival is None:
+        ends = [before[REMOTE], after[REMOTE]]
+        inside = (raw.stamps > min(ends) - 3.0) & (raw.stamps < max(ends) + 3.0)
+        where = np.flatnonzero(inside)
+        if not len(where):
+            return len(raw.stamps), len(raw.stamps)
+        return max(int(where[0]), 1), int(where[-1]) + 1
+    start = np.searchsorted(arrival, before[REMOTE] + before[OFFSET] - 0.1)
+    stop = np.searchsorted(arrival, after[LOCAL] + 3.0)
+    return max(int(start), 1), int(stop)
+
+
+def _step_between_stamps(
+    stamps: FloatArray, low: int, high: int, jump: float
+) -> tuple[int, int] | None:
+    """Return where neighbouring stamps of a steady source differ by a step; None if nowhere."""
+    period = float(np.median(np.diff(stamps)))
+    odd = np.abs(np.diff(stamps[low - 1 : high]) - period)
+    if not len(odd) or odd.max() < abs(jump) / 2:
+        return None
+    rivals = np.flatnonzero(odd > abs(jump) / 2)
+    unsure = int(rivals[-1] - rivals[0])
+    return low + int(np.argmax(odd)), unsure
+
+
+def _step_in_arrival(
+    raw: RawStream,
+    arrival: FloatArray,
+    low: int,
+    high: int,
+    probes: tuple[FloatArray, FloatArray],
+) -> int:
+    """Return the step that makes the time from stamp to arrival most even."""
+    lag = arrival[low:high] - raw.stamps[low:high]
+    old, new = (lag - probe[OFFSET] for probe in probes)
+    typical = float(np.median(np.minimum(np.abs(old), np.abs(new))))
+    cost = np.r_[0.0, np.cumsum(np.abs(old - typical) - np.abs(new - typical))]
+    return low + int(np.argmin(cost))

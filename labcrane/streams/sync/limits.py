@@ -1,0 +1,67 @@
+"""What a study demands of its time stamps."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from labcrane.core.findings import Verdict
+
+
+class Limit(NamedTuple):
+    """Beyond ``warn`` a value deserves a look, beyond ``fail`` the data do."""
+
+    warn: float
+    fail: float
+
+    def judge(self, value: float) -> Verdict:
+        """Return the verdict on a value; one that is not known is a failure."""
+        if not value <= self.fail:
+            return Verdict.FAIL
+        return Verdict.WARN if value > self.warn else Verdict.PASS
+
+
+RATE = Limit(0.005, 0.05)
+LAG_S = Limit(0.5, 5.0)
+GAP_S = Limit(0.0, 1.0)
+DRIFT_PPM = Limit(100.0, 500.0)
+RESIDUAL_S = Limit(0.0002, 0.002)
+RTT_S = Limit(0.002, 0.02)
+PROBE_AGE_S = Limit(6.0, 30.0)
+MISSING = Limit(0.0, 0.01)
+LATE = Limit(0.01, 0.05)
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a study demands of its time stamps. Times are seconds.
+
+    Attributes
+    ----------
+    rate
+        Relative deviation of the effective from the nominal rate.
+    lag_s
+        Usual time, either way, from a regular stream's stamps to their arrival.
+    gap_s
+        Longest interruption of a regular stream.
+    drift_ppm
+        Rate error of the source's clock; a crystal in order stays below a hundred.
+    residual_s
+        Scatter of the clock probes about the curve.
+    rtt_s
+        95th percentile of round trips. Half of it bounds what asymmetry of the path can hide.
+    probe_age_s
+        Longest time without a trusted probe.
+    missing
+        Fraction of samples that the source's own counter says are lost.
+    late
+        Fraction of the loop's ticks that woke more than a period after they were due.
+    """
+
+    rate: Limit = RATE
+    lag_s: Limit = LAG_S
+    gap_s: Limit = GAP_S
+    drift_ppm: Limit = DRIFT_PPM
+    residual_s: Limit = RESIDUAL_S
+    rtt_s: Limit = RTT_S
+    probe_age_s: Limit = PROBE_AGE_S
+    missing: Limit = MISSING
+    late: Limit = LATE

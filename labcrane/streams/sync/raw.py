@@ -1,0 +1,71 @@
+"""A stream as it was received, before anything is made of its time stamps."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from labcrane.errors import RecordingError
+from labcrane.types import FloatArray
+
+
+def _nothing(columns: int) -> FloatArray:
+    return np.empty((0, columns))
+
+
+@dataclass(frozen=True, slots=True)
+class RawStream:
+    """What a recorder keeps of a stream's times. Times are seconds; nothing in it is altered.
+
+    Attributes
+    ----------
+    stamps
+        Time stamps on the source's clock, shape ``(n,)``, in the order of arrival.
+    probes
+        Clock probes, shape ``(n_probes, 4)``: the source's time at the probe, what must be added to
+        its clock to have ours, the probe's round trip, and our time when liblsl told of it.
+    arrivals
+        Shape ``(n_chunks, 2)``: samples received so far, our time at that moment.
+    resets
+        Shape ``(n_resets, 3)``: our time when liblsl told that the source is another process, and
+        the range of samples in which the first one of the new process lies, ends included.
+    index
+        The source's own sample counter, unwrapped, shape ``(n,)``; None when it has none.
+    """
+
+    stamps: FloatArray
+    probes: FloatArray
+    arrivals: FloatArray
+    resets: FloatArray
+    index: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        for name, columns in (("probes", 4), ("arrivals", 2), ("resets", 3)):
+            shape = getattr(self, name).shape
+            if len(shape) != 2 or shape[1] != columns:  # noqa: PLR2004
+                raise RecordingError(f"{name} must have the shape (n, {columns}), but have {shape}")
+
+    @classmethod
+    def of(
+        cls,
+        stamps: FloatArray,
+        probes: FloatArray | None = None,
+        arrivals: FloatArray | None = None,
+        resets: FloatArray | None = None,
+        index: FloatArray | None = None,
+    ) -> "RawStream":
+        """Return a stream of which some things may not be known."""
+        return cls(
+            np.asarray(stamps, dtype=np.float64),
+            _nothing(4) if probes is None else probes,
+            _nothing(2) if arrivals is None else arrivals,
+            _nothing(3) if resets is None else resets,
+            index,
+        )
+
+    def arrival(self) -> FloatArray | None:
+        """Return our time when each sample arrived, shape ``(n,)``; None when that is not known."""
+        if not len(self.arrivals):
+            return None
+        counts, times = self.arrivals.T
+        chunk = np.searchsorted(counts, np.arange(len(self.stamps)), side="right")
+        return np.asarray(times[np.minimum(chunk, len(times) - 1)])

@@ -1,0 +1,66 @@
+"""Corrected times of recorded streams, as often as one likes."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+
+from labcrane.errors import RecordingError
+from labcrane.recording.foreign_streams import Correction, RecordedStream
+from labcrane.recording.xdf.header import Description, StreamHeader
+from labcrane.streams.recorder.companions import raw_of
+from labcrane.streams.sync.correction import Corrected, Treatment, correct
+
+
+def treatment_of(header: StreamHeader) -> Treatment:
+    """Return the treatment that a stream's own header asks for.
+
+    ``desc/synchronization`` says whether it may drop samples, and what must be subtracted from its
+    stamps (``offset_mean``, in seconds).
+    """
+    timing = header.desc.get("synchronization", {})
+    return Treatment(
+        rate_hz=header.rate_hz,
+        can_drop_samples=_text(timing, "can_drop_samples").lower() == "true",
+        latency_s=_seconds(header, _text(timing, "offset_mean")),
+    )
+
+
+def resync(recorded: RecordedStream) -> Corrected:
+    """Correct a recorded stream by its header."""
+    return correct(raw_of(recorded), treatment_of(recorded.header))
+
+
+def correction_of(corrected: Corrected, treatment: Treatment) -> Correction:
+    """Return corrected times with everything that the participant file keeps of how they came."""
+    segments = "; ".join(
+        f"{part.start} to {part.stop} by {part.basis}, {part.probes} probes, "
+        f"{part.drift_ppm:+.3f} ppm"
+        for part in corrected.segments
+    )
+    quality: dict[str, float | str] = {
+        name: float(value) for name, value in asdict(corrected.quality).items()
+    }
+    quality |= {
+        "segments": segments,
+        "dejitter": treatment.way.value,
+        "transport_s": treatment.transport_s,
+        "latency_s": treatment.latency_s,
+        "bandwidth_s": treatment.bandwidth_s,
+    }
+    return Correction(corrected.time, quality)
+
+
+def _text(timing: Description, name: str) -> str:
+    if not isinstance(timing, Mapping):
+        return ""
+    value = timing.get(name, "")
+    return value.strip() if isinstance(value, str) else ""
+
+
+def _seconds(header: StreamHeader, text: str) -> float:
+    try:
+        return float(text or 0.0)
+    except ValueError:
+        raise RecordingError(
+            f"stream {header.name!r} states offset_mean {text!r}, which is no number of seconds; "
+            "give its latency in the protocol"
+        ) from None

@@ -1,0 +1,193 @@
+"""The supervisor's page: what happens, and what can be done about it."""
+
+import json
+from collections.abc import Callable, Mapping
+
+from labcrane.core.records import Event
+from labcrane.session.commands import Order
+from labcrane.web.access import SUPERVISOR
+from labcrane.web.form import ConsentCard, Form
+from labcrane.web.page import PRIMARY, PageContext
+from labcrane.web.panels import Cameras, Loads
+from labcrane.web.scene import Scene
+
+BUTTONS: Mapping[str, tuple[Order, str, str]] = {
+    "Start / go on": (Order.START, "", "green-10"),
+    "Pause": (Order.PAUSE, "", "brown-8"),
+    "Repeat trial": (Order.REPEAT, "", "blue-10"),
+    "Skip": (Order.SKIP, "", "blue-10"),
+    "Override end": (Order.OVERRIDE, "", "blue-10"),
+    "Completed": (Order.COMPLETION, "1", "blue-10"),
+    "Not completed": (Order.COMPLETION, "0", "blue-10"),
+}
+LINES = 12
+AXIS = {"axisLine": {"onZero": False}, "axisLabel": {"color": "#333"}}
+RATE_S = 0.25
+
+
+def supervisor_page(desk: PageContext) -> None:
+    """Build the page."""
+    from nicegui import ui  # noqa: PLC0415 - loads for a second
+
+    ui.page_title(f"labcrane: {desk.participant}")
+    ui.colors(primary=PRIMARY)
+    with ui.column().classes("w-full max-w-7xl mx-auto p-3 gap-3"):
+        _status(desk)
+        ConsentCard(desk, SUPERVISOR).build()
+        _orders(desk)
+        with ui.element("div").classes("grid grid-cols-1 lg:grid-cols-2 gap-3 w-full"):
+            with ui.card().classes("w-full"):
+                Scene(desk).build()
+                Loads(desk).build()
+            with ui.card().classes("w-full"):
+                _chart(desk)
+            Cameras(desk).build()
+            with ui.card().classes("w-full"):
+                _log(desk)
+            with ui.card().classes("w-full"):
+                _streams(desk)
+            with ui.card().classes("w-full lg:col-span-2"):
+                Form(desk, SUPERVISOR).build()
+
+
+def _status(desk: PageContext) -> None:
+    from nicegui import ui  # noqa: PLC0415
+
+    title = f"{desk.study.protocol.title}: {desk.participant}, session {desk.plan.number}"
+    ui.label(title).classes("text-xl font-medium").props("role=heading")
+    line = ui.label().classes("text-lg").props('id="stage" role=status')
+    facts = ui.label().props('id="facts"')
+    alarm = ui.label().classes("text-lg font-bold text-red-900").props('id="alarm" role=alert')
+
+    def update() -> None:
+        board = desk.board
+        held = f" · HELD by {', '.join(sorted(board.holds))}" if board.holds else ""
+        line.set_text(board.stage + held)
+        facts.set_text(" · ".join(_facts(desk)))
+        alarm.set_text(board.alarm)
+
+    ui.timer(RATE_S, update)
+
+
+def _facts(desk: PageContext) -> list[str]:
+    board, live = desk.board, desk.live
+    trials = [
+        trial for block in desk.plan.blocks for trial in block.trials if trial.planned.counted
+    ]
+    left = sum(trial.planned.expected_s for trial in trials[board.trials_done :])
+    found = [f"trials {board.trials_done} of {len(trials)}", f"about {left / 60:.0f} min left"]
+    if board.trial:
+        found.append(f"trial {board.trial['trial']}, attempt {board.trial['attempt']}")
+    found += [f"{name} {count}" for name, count in sorted(board.counts.items())]
+    if "worst_lateness" in board.last_trial:
+        worst = float(str(board.last_trial["worst_lateness"]))
+        found.append(f"worst lateness of last trial {1000 * worst:.1f} ms")
+    if live.lateness_s is not None:
+        found.append(f"loop at most {1000 * live.lateness_s:.1f} ms late")
+    if live.age_s is not None:
+        found.append(f"newest frame {1000 * live.age_s:.0f} ms old")
+    return found
+
+
+def _orders(desk: PageContext) -> None:
+    from nicegui import ui  # noqa: PLC0415
+
+    def give(order: Order, text: str = "") -> Callable[[], object]:
+        return lambda: desk.give(SUPERVISOR, order, text)
+
+    with ui.row().classes("gap-2 items-center w-full"):
+        for label, (order, text, colour) in BUTTONS.items():
+            ident = f"{order.value}{text}"
+            ui.button(label, on_click=give(order, text)).props(
+                f'no-caps color={colour} id="order-{ident}"'
+            )
+        with ui.dialog() as sure, ui.card():
+            ui.label("End the session now? What is recorded is kept.")
+            with ui.row():
+                ui.button("End it", on_click=give(Order.END)).on_click(sure.close).props(
+                    'no-caps color=red-10 id="order-end-sure"'
+                )
+                ui.button("Go on", on_click=sure.close).props("no-caps color=blue-10")
+        ui.button("End session", on_click=sure.open).props('no-caps color=red-10 id="order-end"')
+    with ui.row().classes("gap-3 items-center w-full"):
+        for order, label in ((Order.NOTE, "Note"), (Order.HINT, "Hint to the operator")):
+            with ui.row().classes("gap-2 items-center no-wrap"):
+                _words(desk, order, label)
+
+
+def _words(desk: PageContext, order: Order, label: str) -> None:
+    from nicegui import ui  # noqa: PLC0415
+
+    field = ui.input(label).props(f'outlined dense for="{order.value}-field"').classes("w-72")
+
+    def send() -> None:
+        desk.give(SUPERVISOR, order, str(field.value or "").strip())
+        field.set_value("")
+
+    field.on("keydown.enter", send)
+    ui.button("Send", on_click=send).props(f'no-caps color=blue-10 id="order-{order.value}"')
+
+
+def _chart(desk: PageContext) -> None:
+    from nicegui import ui  # noqa: PLC0415
+
+    choice = ui.select([], label="Signal").classes("w-full").props('id="signal"')
+    chart = ui.echart(
+        {
+            "animation": False,
+            "grid": {"left": 50, "right": 15, "top": 15, "bottom": 30},
+            "xAxis": {"type": "value", "min": -20, "max": 0, "name": "s", **AXIS},
+            "yAxis": {"type": "value", "scale": True, **AXIS},
+            "series": [{"type": "line", "showSymbol": False, "data": []}],
+        }
+    ).classes("w-full h-60")
+
+    def update() -> None:
+        signals = sorted(name for name in desk.live.newest if "." in name)  # of machine and task
+        if signals and choice.options != signals:
+            tip = [name for name in signals if name.startswith("state.tip.position")]
+            choice.set_options(signals, value=choice.value or (tip or signals)[0])
+        if choice.value:
+            chart.options["series"][0]["data"] = desk.live.history(choice.value)
+            chart.update()
+
+    ui.timer(RATE_S, update)
+
+
+def _log(desk: PageContext) -> None:
+    from nicegui import ui  # noqa: PLC0415
+
+    ui.label("Events").classes("font-medium")
+    text = ui.label().classes("whitespace-pre-wrap font-mono text-sm break-words w-full")
+    text.props('id="events"')
+    ui.timer(
+        RATE_S,
+        lambda: text.set_text("\n".join(_line(e) for e in [*desk.board.events][: -LINES - 1 : -1])),
+    )
+
+
+def _line(event: Event) -> str:
+    data = {key: value for key, value in event.data.items() if value not in {None, ""}}
+    return f"{event.time:.1f}  {event.name}  {json.dumps(data, ensure_ascii=False)[:160]}"
+
+
+def _streams(desk: PageContext) -> None:
+    from nicegui import ui  # noqa: PLC0415
+
+    ui.label("Streams and clocks").classes("font-medium")
+    text = ui.label().classes("whitespace-pre-wrap font-mono text-sm").props('id="streams"')
+    ui.timer(RATE_S, lambda: text.set_text("\n".join(_health(desk))))
+
+
+def _health(desk: PageContext) -> list[str]:
+    board = desk.board
+    if board.sync_report:
+        return board.sync_report
+    streams = board.streams.get("streams", ())
+    if not streams:
+        return ["the study records no streams of others"]
+    return [
+        f"{stream['label']}: {stream['condition']}"
+        + "".join(f"; {warning}" for warning in stream["warnings"])
+        for stream in streams
+    ]

@@ -1,0 +1,220 @@
+"""A questionnaire on a page: every answer is sent the moment it is given."""
+
+import json
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from labcrane.core.items import Item
+from labcrane.core.records import Value
+from labcrane.session.commands import Order
+from labcrane.web.page import PageContext
+
+if TYPE_CHECKING:
+    from nicegui import ui
+
+from labcrane.web.access import PARTICIPANT
+
+MOST_TICKS = 21
+"""A scale with more steps is a field to write into."""
+
+
+class Form:
+    """Shows the questionnaire that is asked, and what the record has of its answers.
+
+    What is marked is what came back as an event: an answer that is not in the record is not shown
+    as given, also after a reload.
+    """
+
+    def __init__(self, desk: PageContext, page: str) -> None:
+        self._desk = desk
+        self._page = page
+        self._words = desk.words(page)
+        self._refreshers: list[Callable[[], object]] = []
+        self._shown = -1
+
+    def build(self) -> None:
+        """Build it where the page stands, and keep it up to date."""
+        from nicegui import ui  # noqa: PLC0415 - loads for a second
+
+        self._area = ui.column().classes("w-full gap-4")
+        ui.timer(0.1, self.update)
+
+    def update(self) -> None:
+        """Follow the record."""
+        board = self._desk.board
+        if board.form_version != self._shown:
+            self._shown = board.form_version
+            self._area.clear()
+            self._refreshers.clear()
+            with self._area:
+                self._rebuild(board.form)
+        for refresh in self._refreshers:
+            refresh()
+
+    def _rebuild(self, name: str | None) -> None:
+        from nicegui import ui  # noqa: PLC0415
+
+        if name is None:
+            wait = ui.label().classes("text-lg").props('id="wait"')
+            board = self._desk.board
+            self._refreshers.append(
+                lambda: wait.set_text("" if board.consent else self._words.wait)
+            )
+            return
+        questionnaire = self._desk.study.questionnaires[name]
+        ui.label(questionnaire.title).classes("text-2xl font-medium").props("role=heading")
+        for item in questionnaire.items():
+            self._item(name, item)
+        refusal = ui.label().classes("text-red-900 text-lg").props('role=alert id="refusal"')
+        self._refreshers.append(lambda: refusal.set_text(self._refusal()))
+        ui.button(
+            self._words.hand_in, on_click=lambda: self._desk.give(self._page, Order.SUBMIT)
+        ).props('size=lg no-caps color=blue-10 id="submit"')
+
+    def _item(self, name: str, item: Item) -> None:
+        from nicegui import ui  # noqa: PLC0415
+
+        with ui.card().classes("w-full").props(f'role=group id="item-{item.name}"'):
+            ui.label(item.text).classes("text-lg")
+            if item.kind == "choice":
+                self._choices(
+                    name, item, dict(zip(item.choices, item.labels or item.choices, strict=True))
+                )
+            elif item.kind == "scale" and item.step and _ticks(item) <= MOST_TICKS:
+                values = [item.lowest + item.step * tick for tick in range(_ticks(item))]
+                self._choices(name, item, {value: f"{value:g}" for value in values})
+            else:
+                self._field(name, item)
+            with ui.row().classes("items-center gap-4"):
+                ui.button(
+                    self._words.no_answer, on_click=lambda: self._answer(name, item, None)
+                ).props(f'flat dense no-caps color=grey-9 id="decline-{item.name}"')
+                status = ui.label().classes("text-green-900").props(f'id="status-{item.name}"')
+            self._refreshers.append(lambda: status.set_text(self._status(item)))
+
+    def _choices(
+        self, name: str, item: Item, values: "Mapping[float, str] | Mapping[str, str]"
+    ) -> None:
+        from nicegui import ui  # noqa: PLC0415
+
+        with ui.row().classes("w-full items-center gap-1"):
+            if item.left:
+                ui.label(item.left).classes("font-medium mr-2")
+            for value, label in values.items():
+                button = ui.button(
+                    label, on_click=lambda value=value: self._answer(name, item, value)
+                )
+                button.props('outline dense no-caps padding="6px 7px" color=blue-10')
+                ident = value if isinstance(value, str) else label
+                button.props(f'id="{item.name}-{ident}"').classes("min-w-8")
+                self._refreshers.append(self._marking(button, item, value))
+            if item.right:
+                ui.label(item.right).classes("font-medium ml-2")
+
+    def _marking(self, button: "ui.button", item: Item, value: Value) -> Callable[[], None]:
+        marked = [False]
+
+        def refresh() -> None:
+            given = self._desk.board.answers.get(item.name) == value
+            if given != marked[0]:
+                marked[0] = given
+                button.props("unelevated aria-pressed=true", remove="outline") if given else (
+                    button.props("outline aria-pressed=false", remove="unelevated")
+                )
+
+        return refresh
+
+    def _field(self, name: str, item: Item) -> None:
+        from nicegui import ui  # noqa: PLC0415
+
+        held = self._desk.board.answers.get(item.name)
+        hint = "" if item.kind == "text" else self._words.takes(item)
+        shown = "" if held is None else f"{held:g}" if isinstance(held, float) else str(held)
+        field = ui.input(hint, value=shown).classes("w-full")
+        field.props(f'outlined for="{item.name}-field"')
+
+        def save() -> None:
+            text = str(field.value or "").strip()
+            if text:
+                self._answer(name, item, text if item.kind == "text" else _number(text))
+
+        field.on("blur", save)
+        field.on("keydown.enter", save)
+
+    def _answer(self, name: str, item: Item, value: object) -> None:
+        given = {"questionnaire": name, "item": item.name, "value": value}
+        self._desk.give(self._page, Order.ANSWER, json.dumps(given, ensure_ascii=False))
+
+    def _status(self, item: Item) -> str:
+        board, words = self._desk.board, self._words
+        if board.refusal and board.refused_item == item.name:
+            return f"{words.not_taken}: {words.refused(board.refusal, item)}"
+        if item.name not in board.answers:
+            return ""
+        return words.declined if board.answers[item.name] is None else words.saved
+
+    def _refusal(self) -> str:
+        """Return why the last answer, or what was handed in, was not taken."""
+        board = self._desk.board
+        if not (board.refusal and board.form):
+            return ""
+        items = {item.name: item for item in self._desk.study.questionnaires[board.form].items()}
+        return self._words.refused(board.refusal, items.get(board.refused_item))
+
+
+def _ticks(item: Item) -> int:
+    return round((item.highest - item.lowest) / item.step) + 1
+
+
+def _number(text: str) -> float | str:
+    """Return the number that was written, or what was written, for the item to refuse."""
+    try:
+        return float(text.replace(",", "."))
+    except ValueError:
+        return text
+
+
+SIGNED = "The participant has signed this text"
+"""What the supervisor confirms."""
+
+
+class ConsentCard:
+    """Shows the approved text and its version for as long as a consent to it is missing."""
+
+    def __init__(self, desk: PageContext, page: str) -> None:
+        self._desk = desk
+        self._page = page
+        self._shown = ""
+
+    def build(self) -> None:
+        """Build it where the page stands, and keep it up to date."""
+        from nicegui import ui  # noqa: PLC0415 - loads for a second
+
+        self._area = ui.column().classes("w-full")
+        ui.timer(0.1, self._update)
+
+    def _update(self) -> None:
+        version = str(self._desk.board.consent.get("version", ""))
+        if version != self._shown:
+            self._shown = version
+            self._area.clear()
+            if version:
+                with self._area:
+                    self._rebuild(version)
+
+    def _rebuild(self, version: str) -> None:
+        from nicegui import ui  # noqa: PLC0415
+
+        asked, words = self._desk.board.consent, self._desk.words(self._page)
+        with ui.card().classes("w-full").props('id="consent"'):
+            ui.label(words.consent).classes("text-2xl font-medium").props("role=heading")
+            ui.label(f"{asked['file']}, {words.version} {version}").props('id="consent-version"')
+            if asked["text"]:
+                ui.label(str(asked["text"])).classes("whitespace-pre-wrap text-lg")
+            ui.link(f"{words.open_file} {asked['file']}", "/consent", new_tab=True).classes(
+                "text-blue-10"
+            )
+            ui.button(
+                words.take_part if self._page == PARTICIPANT else SIGNED,
+                on_click=lambda: self._desk.give(self._page, Order.CONSENT, version),
+            ).props('no-caps size=lg color=blue-10 id="order-consent"')

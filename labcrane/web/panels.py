@@ -1,0 +1,90 @@
+"""How hard the joints work: torques, as the machine reports them."""
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING
+
+from labcrane.machines.machine import Joint
+from labcrane.web.page import PageContext
+
+if TYPE_CHECKING:
+    from nicegui import ui
+
+RATE_S = 0.25
+LOAD = "state.joint.load"
+SHARE = "1"
+"""The unit of loads that are shares of the joints' efforts, with the sign of the torque."""
+
+
+class Loads:
+    """A line for each joint, as long as the machine's state has loads; nothing otherwise."""
+
+    def __init__(self, desk: PageContext) -> None:
+        self._desk = desk
+
+    def build(self) -> None:
+        """Build it where the page stands, and keep it up to date."""
+        from nicegui import ui  # noqa: PLC0415 - loads for a second
+
+        joints = self._desk.study.machine.joints
+        with ui.element("div").classes("w-full") as self._all:
+            ui.label("Torques").classes("font-medium")
+            with ui.element("div").classes("grid grid-cols-[auto_1fr] gap-x-4 font-mono text-sm"):
+                self._values = {}
+                for joint in joints:
+                    ui.label(joint.name)
+                    self._values[joint.name] = ui.label().props(f'id="load-{joint.name}"')
+        self._update()
+        ui.timer(RATE_S, self._update)
+
+    def _update(self) -> None:
+        live = self._desk.live
+        self._all.set_visibility(any(column.startswith(LOAD) for column in live.newest))
+        for joint in self._desk.study.machine.joints:
+            column = f"{LOAD}.{joint.name}"
+            load, unit = live.newest.get(column, math.nan), live.units.get(column, SHARE)
+            self._values[joint.name].set_text(said(load, unit, joint))
+
+
+def said(load: float, unit: str, joint: Joint) -> str:
+    """Return a load in words, with its torque where it is a share of the joint's effort."""
+    if not math.isfinite(load):
+        return "not known"
+    if unit != SHARE:
+        return f"{load:.1f} {unit}"
+    return f"{load * joint.effort:.1f} N m, {100.0 * load:.1f} % of {joint.effort:g} N m"
+
+
+RATE_S = 0.1
+
+
+class Cameras:
+    """A picture for each camera that a view sends, with its age; none that is out of date."""
+
+    def __init__(self, desk: PageContext) -> None:
+        self._pictures = desk.pictures
+
+    def build(self) -> None:
+        """Build it where the page stands, and keep it up to date."""
+        from nicegui import ui  # noqa: PLC0415 - loads for a second
+
+        for view, cameras in self._pictures.cameras.items():
+            for camera in cameras:
+                ident = f"camera-{view}-{camera}".replace(" ", "-")
+                with ui.card().classes("w-full"):
+                    ui.label(f"{view}: {camera}").classes("font-medium")
+                    image = ui.element("img").classes("w-full")
+                    image.props["id"], image.props["alt"] = ident, f"what camera {camera} shows"
+                    line = ui.label().classes("font-mono text-sm")
+                    line.props["id"] = f"{ident}-age"
+                update = partial(self._update, view, camera, image, line)
+                update()
+                ui.timer(RATE_S, update)
+
+    def _update(self, view: str, camera: str, image: "ui.element", line: "ui.label") -> None:
+        shot, said = self._pictures.of(view, camera)
+        line.set_text(said)
+        image.set_visibility(shot is not None)
+        if shot is not None and image.props.get("src") != shot.source:
+            image.props["src"] = shot.source
+            image.update()

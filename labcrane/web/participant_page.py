@@ -1,0 +1,16 @@
+"""The participant's page: consent, the questionnaire that is asked, and nothing else."""
+
+from labcrane.web.access import PARTICIPANT
+from labcrane.web.form import ConsentCard, Form
+from labcrane.web.page import PRIMARY, PageContext
+
+
+def participant_page(desk: PageContext) -> None:
+    """Build the page."""
+    from nicegui import ui  # noqa: PLC0415 - loads for a second
+
+    ui.page_title("labcrane")
+    ui.colors(primary=PRIMARY)
+    with ui.column().classes("w-full max-w-4xl mx-auto p-4"):
+        ConsentCard(desk, PARTICIPANT).build()
+        Form(desk, PARTICIPANT).build()

@@ -1,0 +1,92 @@
+"""What stands around the machine in a scenario: things and the human figure, where they are now."""
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from labcrane.machines.human_figure import Geom, ShapeKind
+from labcrane.machines.scene import PlacedObject
+from labcrane.machines.scene_codec import read_placed
+from labcrane.web.page import PageContext
+
+if TYPE_CHECKING:
+    from nicegui import ui
+    from nicegui.elements.scene.objects import Group
+    from nicegui.elements.scene.scene_object3d import Object3D
+
+Rows = list[list[float]]
+
+PAINT = {"object": "#92400e", "obstacle": "#6b7280", "body": "#be185d"}
+UPRIGHT: Rows = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
+"""Turns a cylinder, which three.js lays along y, along z."""
+LYING: Rows = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+"""Turns it along x."""
+
+
+class Surroundings:
+    """Draws what the running trial's task has placed; nothing between trials.
+
+    What it is made of is in the event ``scene.placed``; where it is now, in the state's signals
+    ``scene.NAME.position`` and ``.orientation``. What has none stays where it was placed.
+    """
+
+    def __init__(self, desk: PageContext, canvas: "ui.scene") -> None:
+        self._desk = desk
+        self._canvas = canvas
+        self._drawn = ""
+        self._groups: dict[str, Group] = {}
+
+    def update(self) -> None:
+        """Follow the session."""
+        things = self._desk.board.things
+        if things != self._drawn:
+            self._drawn = things
+            for group in self._groups.values():
+                group.delete()
+            self._groups = {placed.name: self._draw(placed) for placed in read_placed(things)}
+        newest = self._desk.live.newest
+        for name, group in self._groups.items():
+            where = [newest.get(f"state.scene.{name}.position.{axis}", math.nan) for axis in "xyz"]
+            turn = [newest.get(f"state.scene.{name}.orientation.{q}", math.nan) for q in "xyzw"]
+            if all(map(math.isfinite, (*where, *turn))):
+                group.move(*where)
+                group.rotate_R(_rotation(turn))
+
+    def _draw(self, placed: PlacedObject) -> "Group":
+        with self._canvas, self._canvas.group() as group:
+            for part in placed.parts:
+                self._part(part, PAINT[placed.kind])
+        group.with_name(placed.name).move(*placed.position)
+        group.rotate_R(_about_z(placed.yaw))
+        return group
+
+    def _part(self, part: Geom, colour: str) -> None:
+        canvas, (x, y, z) = self._canvas, part.size
+        turn = np.array(_about_z(part.yaw))
+        match part.shape:
+            case ShapeKind.BOX:
+                shape: Object3D = canvas.box(x, y, z)
+            case ShapeKind.SPHERE:
+                shape = canvas.sphere(x / 2)
+            case ShapeKind.CYLINDER:
+                shape, turn = canvas.cylinder(x / 2, x / 2, z, 24), turn @ UPRIGHT
+            case _:
+                shape, turn = canvas.cylinder(y / 2, y / 2, x, 16), turn @ LYING
+        shape.material(colour).move(*part.centre).rotate_R(turn.tolist())
+
+
+def _about_z(yaw: float) -> Rows:
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return [[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]
+
+
+def _rotation(turn: Sequence[float]) -> Rows:
+    """Return the rotation of a unit quaternion x, y, z, w."""
+    x, y, z, w = turn
+    return [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]

@@ -1,0 +1,119 @@
+"""The goals of one run, in their order."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from labcrane import Event, FloatArray, Layout, PlacedObject, Run, Scene
+
+Point = tuple[float, float, float]
+ANY = -1.0
+"""Opening of the jaws that does not matter."""
+
+OPEN_WITHIN = 0.1
+"""How near the jaws' opening must come to what a goal asks, as a share of their range."""
+
+
+class Way:
+    """Follows which goal is next."""
+
+    def __init__(self, scene: Scene, placed: tuple[PlacedObject, ...], run: Run) -> None:
+        self._goals = scene.goals
+        self._placed = {each.name: each for each in placed}
+        self._positions = _of_things(run.state, "position")
+        self._turns = _of_things(run.state, "orientation")
+        self._tip = run.state.find("tip.position")
+        self._jaws = run.state.find("joint.angle").stop - 1
+        self._opening = run.machine.limits[-1]
+        columns = run.state.columns
+        self._grip = columns.index("grip.thing") if "grip.thing" in columns else None
+        self._hold_rate = run.rate_hz
+        self._held = 0
+        self.reached = 0
+
+    @property
+    def done(self) -> bool:
+        """Whether all goals were reached."""
+        return self.reached == len(self._goals)
+
+    def position(self, state: FloatArray, what: str) -> Point:
+        """Return where the tip or a thing is, in m."""
+        if what != "tip" and what not in self._positions:
+            return self._placed[what].position  # an obstacle does not move
+        x, y, z = state[self._tip if what == "tip" else self._positions[what]].tolist()
+        return x, y, z
+
+    def nearest(self, state: FloatArray, what: str, part: str) -> float:
+        """Return how far the tip is from the middle of a thing's part, in m."""
+        thing = self._placed[what]
+        if what in self._turns:
+            x, y, z, w = state[self._turns[what]].tolist()
+        else:
+            x, y, z, w = 0.0, 0.0, math.sin(thing.yaw / 2.0), math.cos(thing.yaw / 2.0)
+        axis, at = np.array([x, y, z]), np.array(self.position(state, what))
+        tip = np.array(self.position(state, "tip"))
+        found = []
+        for each in thing.parts:  # a thing moves with the centre of its first part
+            if each.name == part:
+                away = np.subtract(each.centre, thing.parts[0].centre)
+                turned = away + 2.0 * np.cross(axis, np.cross(axis, away) + w * away)
+                found.append(float(np.linalg.norm(tip - at - turned)))
+        return min(found)
+
+    def see(self, state: FloatArray, due: float) -> Iterator[Event]:
+        """Take a tick; yield the goal that was reached in it, if one was."""
+        if self.done:
+            return
+        goal = self._goals[self.reached]
+        self._held = self._held + 1 if self._there(state) else 0
+        if self._held > goal.hold_s * self._hold_rate:
+            self.reached, self._held = self.reached + 1, 0
+            yield Event("goal.reached", due, {"goal": self.reached, "what": goal.what})
+
+    def target(self, state: FloatArray) -> tuple[float, float, float, float, float, float]:
+        """Return where the tip should go, the region's radius, the jaws, and the goals reached.
+
+        For a goal that something else must come to, the tip should go there by as much as is
+        still missing.
+        """
+        goal = self._goals[min(self.reached, len(self._goals) - 1)]
+        x, y, z = self._place()
+        if goal.what != "tip":
+            at, tip = self.position(state, goal.what), self.position(state, "tip")
+            x, y, z = x + tip[0] - at[0], y + tip[1] - at[1], z + tip[2] - at[2]
+        jaws = ANY if goal.jaws is None else goal.jaws
+        return x, y, z, goal.radius, jaws, float(self.reached)
+
+    def _there(self, state: FloatArray) -> bool:
+        goal = self._goals[self.reached]
+        if math.dist(self.position(state, goal.what), self._place()) > goal.radius:
+            return False
+        if goal.grip is not None and (self._grip is None or goal.grip != bool(state[self._grip])):
+            return False
+        if goal.jaws is None or goal.grip is True:
+            return True
+        lowest, highest = self._opening
+        share = (state.item(self._jaws) - lowest) / (highest - lowest)
+        return abs(share - goal.jaws) <= OPEN_WITHIN
+
+    def _place(self) -> Point:
+        goal = self._goals[min(self.reached, len(self._goals) - 1)]
+        x, y, z = goal.position
+        if goal.beside is None:
+            return x, y, z
+        # The thing as it was placed: turned with it, and not moving with it afterwards.
+        thing = self._placed[goal.beside]
+        cos, sin = math.cos(thing.yaw), math.sin(thing.yaw)
+        ahead, left, up = thing.position
+        return ahead + cos * x - sin * y, left + sin * x + cos * y, up + z
+
+
+def _of_things(state: Layout, quantity: str) -> dict[str, slice]:
+    """Return where the state has a quantity of each thing that moves, by the thing's name."""
+    names = (signal.name.split(".") for signal in state.signals)
+    return {
+        words[1]: state.find(".".join(words))
+        for words in names
+        if len(words) == 3 and words[0] == "scene" and words[2] == quantity  # noqa: PLR2004
+    }
