@@ -1,1 +1,1 @@
-"""What labcrane costs, each time beside a bare reference in the same run."""
+"""Benchmarks of labcrane, each time beside a bare reference in the same run."""

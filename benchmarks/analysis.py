@@ -1,4 +1,4 @@
-"""How long export and report take per participant, and how that grows.
+"""Analysis: how long export and report take per participant, and how that grows.
 
     python -m benchmarks.analysis [--participants 36] [--movements 4]
 

@@ -1,4 +1,4 @@
-"""What a simulated study costs beside bare PyBullet ticks, on one core, on two, and in memory.
+"""Cohort of a simulated study beside bare PyBullet ticks: one core, two, and memory.
 
     python -m benchmarks.cohort [--participants 36]
 

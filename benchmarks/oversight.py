@@ -1,4 +1,4 @@
-"""What it costs to watch a component, as a share of a tick.
+"""Monitoring of a component, as a share of a tick.
 
     python -m benchmarks.oversight
 

@@ -1,4 +1,4 @@
-"""What recording costs, against the least it could cost: ``python -m benchmarks.recording``.
+"""Recording, against the least it could cost: ``python -m benchmarks.recording``.
 
 Everything that is compared runs in the same process, in turns, on the same disk. Times on a shared
 computer are noise; the ratios are what counts.

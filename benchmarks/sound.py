@@ -1,4 +1,4 @@
-"""How fast the tone is made offline, and how many blocks a change takes to be heard.
+"""Sound: how fast the tone is made offline, and how many blocks until a change is heard.
 
 python -m benchmarks.sound
 """

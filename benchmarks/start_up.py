@@ -1,4 +1,4 @@
-"""How long the command line takes to answer, beside the two libraries that it is made of.
+"""Start-up of the command line, beside the two libraries that it is made of.
 
     python -m benchmarks.start_up
 

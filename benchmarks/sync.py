@@ -1,4 +1,4 @@
-"""How far markers fall from the right samples, with real processes and wrong clocks.
+"""Synchronisation: how far markers fall from the right samples, with wrong clocks.
 
     python -m benchmarks.sync [--seconds 240] [--restarts 8]
 
@@ -130,9 +130,9 @@ def judge(case: Case, streams: dict, folder: Path) -> bool:
     """Print a line of the table; whether the case is within its limit."""
     from streams.emulation import alignment, as_labrecorder, truth  # noqa: PLC0415
 
-    from labcrane.streams.recorder.companions import raw_of  # noqa: PLC0415
     from labcrane.streams.sync.correction import Treatment, correct  # noqa: PLC0415
     from labcrane.streams.sync.dejitter import Dejitter  # noqa: PLC0415
+    from labcrane.streams.sync.raw import raw_of  # noqa: PLC0415
     from labcrane.streams.sync.resync import resync  # noqa: PLC0415
 
     device, markers = streams[case.name], streams["Moments"]

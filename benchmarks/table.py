@@ -1,4 +1,4 @@
-"""What every benchmark gives: figures, each beside a bare reference in the same run."""
+"""Table of figures, each beside a bare reference in the same run."""
 
 from dataclasses import dataclass
 

@@ -1,6 +1,9 @@
 """The public names, and the modules from which they are imported."""
 
+from .analysis.codebook import codebook_of
 from .analysis.cohort import Participant
+from .analysis.exporter import Exporter
+from .analysis.measures import measures_of
 from .analysis.movements import Movement, movements
 from .core.clock import Tick
 from .core.findings import Finding, Verdict
@@ -22,13 +25,13 @@ from .core.roles import (
     Controller,
     Cue,
     Dynamics,
-    Exporter,
     Feedback,
     InputDevice,
     Questionnaire,
     SignalMonitor,
     Task,
 )
+from .core.settings import Settings, StudyPath
 from .core.signals import (
     Layout,
     Signal,
@@ -57,7 +60,7 @@ from .recording.participant_file.reader import SessionRecord, Stream, open_recor
 from .recording.xdf.header import Channel, StreamHeader
 from .recording.xdf.writer import XdfWriter
 from .registry.hookspecs import hookimpl
-from .registry.offers import CommandOffer, Offer, Prompt, Settings, StudyPath, offer
+from .registry.offers import CommandOffer, Offer, Prompt, offer
 from .registry.quiet_import import quietly_imported
 from .types import FloatArray
 
@@ -130,11 +133,13 @@ __all__ = [
     "Value",
     "Verdict",
     "XdfWriter",
+    "codebook_of",
     "hookimpl",
     "jacobian",
     "link_boxes",
     "link_frames",
     "load_scene",
+    "measures_of",
     "movements",
     "numeric_answers",
     "offer",

@@ -1,4 +1,4 @@
-"""What an operator should practise next, and whether a scenario has been learned or worn out.
+"""Advice on what to practise next, and whether a scenario has been learned or worn out.
 
 Rules of thumb with their evidence, not tests of significance; docs/indicator.md states them.
 """

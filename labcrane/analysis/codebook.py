@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING
 
+from labcrane.analysis.cohort import Participant
 from labcrane.analysis.gaze import gaze_units
 from labcrane.analysis.measures import MEASURES
 from labcrane.recording.participant_file.reader import SessionRecord
@@ -16,6 +17,15 @@ IDENTITY = {
     "session_name": "the protocol's name of the session",
 }
 MEASURED, WRITTEN = "computed from the frames by labcrane", "recorded by the session"
+
+
+def codebook_of(participant: Participant, measures: "pd.DataFrame") -> "pd.DataFrame":
+    """Return unit, meaning and source of every column of ``measures`` and of all streams."""
+    import pandas as pd
+
+    sessions = [session for _, session in participant.sessions()]
+    tables = [trial_codebook(measures, sessions[0]), *map(stream_codebook, sessions)]
+    return pd.concat(tables).drop_duplicates(["table", "column"], ignore_index=True)
 
 
 def trial_codebook(measures: "pd.DataFrame", session: SessionRecord) -> "pd.DataFrame":

@@ -1,4 +1,4 @@
-"""Who is in a data folder, and who counts."""
+"""Cohort of a data folder: who is in it, and who counts."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -71,39 +71,6 @@ class Participant:
         recording = self.recording
         for number in recording.sessions:
             yield number, recording.session(number)
-
-    def codebook(self, measures: "pd.DataFrame") -> "pd.DataFrame":
-        """Return unit, meaning and source of every column of ``measures`` and of all streams."""
-        import pandas as pd
-
-        from labcrane.analysis.codebook import stream_codebook, trial_codebook
-
-        sessions = [session for _, session in self.sessions()]
-        tables = [trial_codebook(measures, sessions[0]), *map(stream_codebook, sessions)]
-        return pd.concat(tables).drop_duplicates(["table", "column"], ignore_index=True)
-
-    def measures(self) -> "pd.DataFrame":
-        """Return one row per counted movement of all sessions: condition, results, measures."""
-        from labcrane.analysis.measures import measure_participant
-
-        return measure_participant(self)
-
-
-@dataclass(frozen=True)
-class Measured(Participant):
-    """A participant whose measures have been worked out before.
-
-    Attributes
-    ----------
-    table
-        What :meth:`measures` returns.
-    """
-
-    table: "pd.DataFrame"
-
-    def measures(self) -> "pd.DataFrame":
-        """Return one row per counted movement of all sessions: condition, results, measures."""
-        return self.table
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Where the operator looked, from a stream of others that says it.
+"""Gaze measures, from a stream of others that says where the operator looked.
 
 A gaze stream is a stream of LSL type ``Gaze`` with a channel labelled ``aoi``: for each sample the
 name of the area of interest that is looked at, or its number from 1; an empty text or 0 for none,

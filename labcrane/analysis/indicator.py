@@ -10,8 +10,8 @@ not in the text that is left of it and was reconstructed (docs/indicator.md)::
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from labcrane.analysis.indicator_settings import IndicatorSettings
 from labcrane.errors import LabcraneError
-from labcrane.protocol.evaluation import IndicatorSettings
 
 FORMULA = "typiak-2024-reconstruction-1"
 """Version of the formula, stored with every result."""

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from labcrane.analysis.cohort import Measured, Participant
+from labcrane.analysis.cohort import Participant
 from labcrane.analysis.gaze import gaze_measures, looks
 from labcrane.analysis.movements import Groups, Movement, cut, groups, machine_of
 from labcrane.analysis.smoothness import ldlj, path_ratio, sparc, sub_movements
@@ -81,11 +81,25 @@ MEASURES: Mapping[str, tuple[str, str]] = {
 """Unit and meaning of what is measured here; the trial table's own columns stand beside it."""
 
 
-def measure_participant(
-    participant: Participant, settings: MeasureSettings = DEFAULTS
-) -> "pd.DataFrame":
-    """Return one row per counted movement of all sessions of a participant."""
+@dataclass(frozen=True)
+class Measured(Participant):
+    """A participant whose measures have been worked out before.
+
+    Attributes
+    ----------
+    table
+        What :func:`measures_of` returns.
+    """
+
+    table: "pd.DataFrame"
+
+
+def measures_of(participant: Participant, settings: MeasureSettings = DEFAULTS) -> "pd.DataFrame":
+    """Return one row per counted movement of all sessions: condition, results, measures."""
     import pandas as pd
+
+    if isinstance(participant, Measured):
+        return participant.table
 
     tables = []
     for number, session in participant.sessions():
@@ -100,7 +114,7 @@ def measure_participant(
 
 def measure_ahead(participant: Participant) -> Measured:
     """Return a participant with the measures worked out; a worker's function."""
-    table = measure_participant(participant)
+    table = measures_of(participant)
     return Measured(participant.name, participant.path, participant.status, participant.why, table)
 
 

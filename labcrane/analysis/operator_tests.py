@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.indicator import Indicator, Performance, indicate
+from labcrane.analysis.indicator_settings import IndicatorSettings
 from labcrane.errors import RecordingError
-from labcrane.protocol.evaluation import IndicatorSettings
 from labcrane.recording.participant_file.reader import Recording, SessionRecord
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""How well the loop ran and the clocks agreed, one row per session and per stream."""
+"""Quality of loop and clocks, one row per session and per stream."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -1,4 +1,4 @@
-"""How smooth a movement is."""
+"""Smoothness of a movement."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""How the operator used the sticks."""
+"""Stick measures: how the operator used the sticks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

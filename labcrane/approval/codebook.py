@@ -12,7 +12,7 @@ from labcrane.design.pseudonyms import pseudonyms
 from labcrane.protocol import rig
 from labcrane.protocol.study import Study
 from labcrane.recording.frame_log import LOOP
-from labcrane.session.trial import UNITS, trial_units
+from labcrane.recording.trial_columns import UNITS, trial_units
 
 CORE = "labcrane"
 ABOUT = (

@@ -1,4 +1,4 @@
-"""What differs between two versions of a study, in words."""
+"""Differences between two versions of a study, in words."""
 
 from collections.abc import Iterator, Mapping
 from difflib import SequenceMatcher

@@ -16,17 +16,17 @@ from labcrane.cli import plugin_groups as extension
 from labcrane.errors import LabcraneError, ProtocolError
 
 MODULES = {
-    "running": ("demo", "run", "resume"),
-    "inspect": ("check", "plan"),
+    "run": ("demo", "run", "resume"),
+    "check": ("check", "plan"),
     "doctor": ("doctor",),
     "plugins": ("schema", "new_plugin"),
-    "recording": ("streams", "record", "recover", "resync"),
-    "scoring": ("score",),
+    "record": ("streams", "record", "recover", "resync"),
+    "score": ("score",),
     "results": ("export", "report", "replay"),
-    "simulating": ("simulate", "power"),
+    "simulate": ("simulate", "power"),
     "approval": ("approve", "amend", "methods"),
-    "people": ("participants", "consent", "exclude", "note", "waive", "deviations"),
-    "upkeep": ("erase", "relabel", "transfer"),
+    "participants": ("participants", "consent", "exclude", "note", "waive", "deviations"),
+    "data": ("erase", "relabel", "transfer"),
 }
 """Where commands are: a module, and its functions."""
 
@@ -82,7 +82,7 @@ def commands(words: Sequence[str]) -> typer.Typer:
         about = extension.first_line(run)
         app.command(name, short_help=about)(run if everything else _stub(run))
     if first == PLUGINS or everything:
-        app.add_typer(import_module(f"labcrane.cli.{PLUGINS}").app, name=PLUGINS)
+        app.add_typer(import_module(f"labcrane.cli.commands.{PLUGINS}").app, name=PLUGINS)
     else:
         extension.add(app, PLUGINS, "What installed plugins offer.")
     extension.add(app, FEEDBACK, "Views and sounds.")
@@ -93,7 +93,7 @@ def commands(words: Sequence[str]) -> typer.Typer:
 
 
 def _function(module: str, name: str) -> Callable[..., None]:
-    there = import_module(f"labcrane.cli.{module}")
+    there = import_module(f"labcrane.cli.commands.{module}")
     found: Callable[..., None] = getattr(there, name.replace("-", "_"))
     return found
 

@@ -1,4 +1,4 @@
-"""Where commands print; rich is loaded when the first of them does."""
+"""Output of commands; rich is loaded when the first of them prints."""
 
 from functools import cached_property
 from typing import TYPE_CHECKING

@@ -1,5 +1,5 @@
 """The contract of a run: the records that flow through it, and the roles that a plugin fills.
 
-In and out go plain data: ticks, frames, events, signals, shapes, questionnaire items. Whatever a
-plugin fills is an abstract class in ``roles``.
+In comes what a plugin makes of a role, an abstract class in ``roles``; out go plain records that
+all other packages speak: ticks, frames, events, signals, primitives, questionnaire items.
 """

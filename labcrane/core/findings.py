@@ -1,4 +1,4 @@
-"""What was found when something was checked: the time stamps of a session, or a machine."""
+"""Findings of a check: of a session's time stamps, or of a machine."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a questionnaire asks, and what may be answered."""
+"""Items of a questionnaire, and what may be answered."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What a cue draws: plain shapes in the machine's base frame, the same for every view."""
+"""Primitives that a cue draws, in the machine's base frame, the same for every view."""
 
 from __future__ import annotations
 

@@ -7,21 +7,20 @@ Each role has exactly one method that runs every tick. The loop calls it directl
 pluggy, so it must return soon and must not block. ``labcrane.testing`` has a contract test for
 every role; a plugin's tests subclass it.
 
-An Exporter works on what was recorded, long after: it is built, but never opened.
+:class:`~labcrane.analysis.exporter.Exporter` works on what was recorded, long after.
 A SignalMonitor looks at the streams of other programs, in a process beside the recorder.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pydantic import BaseModel
 
 if TYPE_CHECKING:  # a protocol is checked without loading what it does not need
-    from labcrane.analysis.cohort import Participant
     from labcrane.core.clock import Tick
     from labcrane.core.items import Answers, Item, Score
     from labcrane.core.primitives import Shape
@@ -147,23 +146,6 @@ class Task(Component):
         """Let the running trial go on past its automatic ends: a time-out, too many mistakes.
 
         The supervisor's decision. It holds for this trial only.
-        """
-
-
-class Exporter(Component):
-    """What turns recordings into files for other programs.
-
-    Built with the machine that was operated; ``open``, ``begin_trial`` and ``close`` are never
-    called.
-    """
-
-    @abstractmethod
-    def export(self, participants: Iterable[Participant], folder: Path) -> None:
-        """Write the data of ``participants`` into ``folder``, which exists and is empty.
-
-        Go through the participants once and keep nothing of one while the next is read: there may
-        be hundreds. Every table says the status of each participant; the caller writes down who
-        was left out.
         """
 
 

@@ -1,4 +1,4 @@
-"""What a session of one participant consists of, before anything is opened."""
+"""Plan of one participant's session, before anything is opened."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Whether the clock can be trusted: how fine it is, what drives it, and whether NTP bends it.
+"""Clock examination: how fine it is, what drives it, and whether NTP bends it.
 
 Time stamps are on the monotonic clock. A step of the wall clock does not touch it, but while NTP
 slews, it runs fast or slow by up to 500 ppm, and other computers see that as drift.

@@ -15,8 +15,8 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from labcrane.core.findings import Finding, Verdict
+from labcrane.core.settings import Settings
 from labcrane.protocol.study import Study
-from labcrane.registry.offers import Settings
 from labcrane.registry.registry import ROLES, Registry, discover
 
 WAIT_S = 30.0

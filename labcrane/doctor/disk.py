@@ -1,4 +1,4 @@
-"""Whether the disk takes what a session writes, in time, and keeps it."""
+"""Disk examination: whether it takes what a session writes, in time, and keeps it."""
 
 import os
 import shutil

@@ -1,4 +1,4 @@
-"""Whether LSL gets through: a stream that is missing is told apart from one that is blocked.
+"""LSL examination: a stream that is missing is told apart from one that is blocked.
 
 A stream is announced over UDP, described and sent over TCP, and its clock is asked over UDP
 again; a firewall can stop each alone. The first look is at a stream of our own.

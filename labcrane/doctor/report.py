@@ -1,4 +1,4 @@
-"""What the doctor found, and the file that keeps it for the sessions that follow."""
+"""Report of the doctor, and the file that keeps it for the sessions that follow."""
 
 import json
 import platform

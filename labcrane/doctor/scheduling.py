@@ -1,4 +1,4 @@
-"""Whether the operating system lets a loop tick in time."""
+"""Scheduling examination: whether the operating system lets a loop tick in time."""
 
 import itertools
 import os

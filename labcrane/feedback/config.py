@@ -1,4 +1,4 @@
-"""What a feedback process is told, as a line of text."""
+"""Configuration of a feedback process, as a line of text."""
 
 import json
 from collections.abc import Mapping

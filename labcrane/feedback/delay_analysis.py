@@ -1,4 +1,4 @@
-"""How long it takes from a recorded change to light and air, from a sensor's samples.
+"""Delay from a recorded change to light and air, from a sensor's samples.
 
 A photodiode on the view's patch sees steps up and down; a microphone hears sounds begin. Both are
 found at half of the way, between two samples, so that a slow sensor adds no delay of its own.

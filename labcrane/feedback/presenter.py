@@ -7,11 +7,12 @@ import numpy as np
 
 from labcrane.core.records import Frame, SessionState, Value
 from labcrane.core.roles import Component, Cue, Feedback
+from labcrane.core.settings import Settings
 from labcrane.core.signals import Layout
 from labcrane.feedback.config import FeedbackConfig, Part
 from labcrane.feedback.delays import delay_in_words
 from labcrane.registry.call_monitor import promised
-from labcrane.registry.offers import Offer, Settings
+from labcrane.registry.offers import Offer
 from labcrane.registry.registry import Registry
 from labcrane.types import FloatArray
 

@@ -1,4 +1,4 @@
-"""What a movement looks and sounds like, as files: without session, display or device."""
+"""Preview of a movement as pictures and sound files, without session, display or device."""
 
 import tempfile
 from dataclasses import replace

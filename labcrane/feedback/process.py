@@ -1,9 +1,9 @@
 """A feedback process: one view or sound, fed with the newest frame.
 
-``python -m labcrane.feedback.process`` reads its order, one line of JSON, from the standard input and
-ends when that is closed or says ``stop``. It reports on its standard output, a line of JSON each
-time: ``ready`` with the component's facts, ``presents`` from the first frame on, ``beat`` while it
-lives, ``failed`` with the reason.
+``python -m labcrane.feedback.process`` reads its order, one line of JSON, from the standard input
+and ends when that is closed or says ``stop``. It reports on its standard output, a line of JSON
+each time: ``ready`` with the component's metadata, ``presents`` from the first frame on, ``beat``
+while it lives, ``failed`` with the reason.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""What is written in YAML: strict models, whose schema says what the docstring under a key says."""
+"""Models of YAML: strict, with a schema that says what the docstring under a key says."""
 
 import ast
 import inspect

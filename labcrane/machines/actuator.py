@@ -1,4 +1,4 @@
-"""What lies between a commanded speed and the joint: dead time, lag and a rate limit."""
+"""Actuator model between commanded and joint speed: dead time, lag and a rate limit."""
 
 import math
 from collections import deque
@@ -19,7 +19,7 @@ from labcrane.files.model import StrictModel
 
 
 class ActuatorSettings(StrictModel):
-    """How a drive follows its command: written out, or the name of one of :data:`ACTUATOR_PRESETS`."""
+    """How a drive follows its command: written out, or a name in :data:`ACTUATOR_PRESETS`."""
 
     dead_time_s: NonNegativeFloat = 0.0
     """Time before a command has any effect, in seconds; rounded to whole ticks."""
@@ -49,8 +49,8 @@ class ActuatorSettings(StrictModel):
             message = f"no actuator is called {value!r}; {suggestion(value, ACTUATOR_PRESETS)}"
             raise ValueError(message)  # noqa: TRY004 - pydantic reports no TypeError
         raise ValueError(
-            f"{value!r} is no actuator; write a name ({', '.join(ACTUATOR_PRESETS)}) or a mapping of "
-            f"{', '.join(cls.model_fields)}"
+            f"{value!r} is no actuator; write a name ({', '.join(ACTUATOR_PRESETS)}) or a mapping "
+            f"of {', '.join(cls.model_fields)}"
         )
 
 

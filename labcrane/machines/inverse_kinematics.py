@@ -1,4 +1,4 @@
-"""Whether a point can be reached, and with which joint angles."""
+"""Inverse kinematics: whether a point can be reached, and with which joint angles."""
 
 import math
 import random

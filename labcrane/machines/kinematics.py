@@ -1,4 +1,4 @@
-"""Where the tip is, and how the joints must move to move it.
+"""Kinematics: where the tip is, and how the joints must move to move it.
 
 ``dh_matrix`` and ``frames`` are the reference: the product of standard Denavit-Hartenberg
 matrices (facts of the crane study; the printed matrix has two misprints, see

@@ -10,7 +10,7 @@ from labcrane.machines.machine import Machine
 
 def machine_names() -> list[str]:
     """Return the names of the machines that come with labcrane."""
-    folder = files("labcrane") / "machines"
+    folder = files("labcrane") / "machines" / "data"
     return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".yaml"))
 
 
@@ -24,7 +24,7 @@ def find_machine(name: str, beside: Path | None = None) -> Path:
             f"machine file {str(path)!r} does not exist; a path counts from the protocol's folder"
         )
     if name in machine_names():
-        return Path(str(files("labcrane") / "machines" / f"{name}.yaml"))
+        return Path(str(files("labcrane") / "machines" / "data" / f"{name}.yaml"))
     raise ProtocolError(
         f"no machine is called {name!r}; labcrane has {', '.join(machine_names())}, "
         "and a file beside the protocol may end in .yaml"

@@ -1,4 +1,4 @@
-"""What a machine without meshes looks like: a box for its foot and one along every link."""
+"""Links drawn without meshes: a box for the machine's foot and one along every link."""
 
 from labcrane.machines.machine import Body, Machine
 

@@ -1,4 +1,4 @@
-"""What is operated: joints, link lengths, limits and speeds.
+"""Machine that is operated: joints, link lengths, limits and speeds.
 
 A machine is a slewing base that carries a chain of pitch joints, written as a standard
 Denavit-Hartenberg table. Angles are degrees in YAML, and radians everywhere else.

@@ -1,4 +1,4 @@
-"""What stands around a machine: objects, obstacles and a human figure, from a YAML file.
+"""Scenes: objects, obstacles and a human figure around a machine, from a YAML file.
 
 The machine that touches a scene and the task that judges it read the same file, and place what is
 drawn from a seed in the same way.

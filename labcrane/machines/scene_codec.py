@@ -1,4 +1,4 @@
-"""What stands around the machine in a trial, in a form that can be recorded and sent."""
+"""Codec of placed objects: a scene in a form that can be recorded and sent."""
 
 import json
 from collections.abc import Iterable, Mapping

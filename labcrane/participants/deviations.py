@@ -1,4 +1,4 @@
-"""What did not go as the protocol says, from the events of a session."""
+"""Deviations from the protocol, from the events of a session."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path

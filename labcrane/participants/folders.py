@@ -1,4 +1,4 @@
-"""Where personal data, raw data and exports lie in a study's data folder.
+"""Folders for personal data, raw data and exports in a study's data folder.
 
 ::
 

@@ -1,4 +1,4 @@
-"""When a participant may be run, and what the register keeps of it."""
+"""Session windows: when a participant may be run, and what the register keeps of it."""
 
 from datetime import date, timedelta
 

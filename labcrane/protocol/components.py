@@ -1,4 +1,4 @@
-"""Which components a protocol uses, found among those installed."""
+"""Components that a protocol uses, found among those installed."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from labcrane.core.roles import Component, Cue, Feedback, Questionnaire, SignalMonitor, Task
+from labcrane.core.settings import Settings
 from labcrane.errors import PluginError, ProtocolError
 from labcrane.files.yaml import Place, YamlFile
 from labcrane.machines.library import find_machine, load_machine
@@ -14,7 +15,7 @@ from labcrane.machines.machine import Machine
 from labcrane.protocol.protocol import Protocol, Use
 from labcrane.protocol.referenced_files import plain_settings
 from labcrane.registry.call_monitor import CallMonitor
-from labcrane.registry.offers import Offer, Settings
+from labcrane.registry.offers import Offer
 from labcrane.registry.proxies import watched
 from labcrane.registry.registry import Registry
 

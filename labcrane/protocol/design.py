@@ -1,10 +1,10 @@
-"""What a protocol may say about its design."""
+"""Design section of a protocol."""
 
 from typing import Annotated, Any
 
 from pydantic import Field, PositiveInt, field_validator
 
-from labcrane.registry.offers import Settings
+from labcrane.core.settings import Settings
 
 RULES = ("as_written", "blocked", "latin_square", "shuffled", "williams")
 """What a protocol may say under ``design: order:``; :mod:`labcrane.design.order` follows it."""

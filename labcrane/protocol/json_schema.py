@@ -17,9 +17,10 @@ from labcrane.core.roles import (
     SignalMonitor,
     Task,
 )
+from labcrane.core.settings import Settings
 from labcrane.protocol.protocol import Protocol
 from labcrane.protocol.steps import Block, Break, Session
-from labcrane.registry.offers import Offer, Settings
+from labcrane.registry.offers import Offer
 from labcrane.registry.registry import Registry
 
 Schema = dict[str, Any]

@@ -1,10 +1,10 @@
-"""Where pages are served."""
+"""Settings of the pages: where they are served."""
 
 from typing import Literal
 
 from pydantic import Field
 
-from labcrane.registry.offers import Settings
+from labcrane.core.settings import Settings
 
 Language = Literal["en", "de"]
 

@@ -12,9 +12,10 @@ from pydantic import (
     field_validator,
 )
 
+from labcrane.analysis.indicator_settings import IndicatorSettings
 from labcrane.files.yaml import YamlFile
 from labcrane.protocol.design import Design
-from labcrane.protocol.evaluation import IndicatorSettings, StopRule
+from labcrane.protocol.evaluation import StopRule
 from labcrane.protocol.pages import PageSettings
 from labcrane.protocol.steps import Section, Session, read_sessions
 from labcrane.protocol.streams import StreamNeed, TimeLimits

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from labcrane.registry.offers import Settings
+from labcrane.core.settings import Settings
 
 
 def plain_settings(settings: Settings, folder: Path) -> Any:

@@ -1,4 +1,4 @@
-"""What a session consists of, as a protocol writes it."""
+"""Steps of a session, as a protocol writes them."""
 
 from typing import Annotated, Any, Literal
 
@@ -11,10 +11,10 @@ from pydantic import (
     field_validator,
 )
 
+from labcrane.core.settings import Settings
 from labcrane.errors import suggestion
 from labcrane.files.yaml import Place, YamlFile
 from labcrane.protocol.design import Criterion
-from labcrane.registry.offers import Settings
 
 
 class Section(Settings):

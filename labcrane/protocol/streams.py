@@ -1,10 +1,10 @@
-"""What a protocol says of the streams of others: which, and how right their time must be."""
+"""Streams of others that a protocol asks for, and how right their time must be."""
 
 from typing import TYPE_CHECKING
 
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
-from labcrane.registry.offers import Settings
+from labcrane.core.settings import Settings
 from labcrane.streams.sync.limits import Limit, Limits
 
 if TYPE_CHECKING:  # a protocol is checked without loading what corrects clocks

@@ -1,4 +1,4 @@
-"""Which component a session is in, in a small file that outlives its process.
+"""Crash marker: which component a session is in, in a small file that outlives it.
 
 A process that exits or hangs in a plugin cannot say so any more. The session therefore stores one
 number before it enters a component and one after: a store into memory that the operating system

@@ -1,4 +1,4 @@
-"""Where a study's recordings are: one folder per participant."""
+"""Data folder of a study: one folder per participant."""
 
 import os
 import re

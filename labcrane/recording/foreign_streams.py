@@ -23,6 +23,15 @@ from labcrane.types import FloatArray
 PROBES = "probes"
 ARRIVALS = "arrivals"
 NOTES = "notes"
+
+OPENED = "opened"
+"""The first note of every part: counts of samples start anew with it."""
+
+RESET = "reset"
+"""A note of a source that was replaced."""
+
+COUNTER_GAP = "counter gap"
+"""A note of samples that the source's own counter left out; ``missing`` says how many."""
 PROBE_CHANNELS = tuple(Channel(label, "s") for label in ("remote_time", "offset", "rtt", "local"))
 ARRIVAL_CHANNELS = (Channel("count", "1"), Channel("time", "s"))
 

@@ -1,4 +1,4 @@
-"""What there is to know of an offer before it is used: settings, signals, an example."""
+"""Description of an offer before it is used: settings, signals, an example."""
 
 import json
 from collections.abc import Mapping
@@ -8,7 +8,8 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from labcrane.core.roles import Component, Cue, Exporter, Feedback, Questionnaire, Task
+from labcrane.analysis.exporter import Exporter
+from labcrane.core.roles import Component, Cue, Feedback, Questionnaire, Task
 from labcrane.errors import LabcraneError
 from labcrane.machines.machine import Machine
 from labcrane.registry.offers import Offer

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 
 import pluggy
 
+from labcrane.analysis.exporter import Exporter
 from labcrane.core.roles import (
     Controller,
     Cue,
     Dynamics,
-    Exporter,
     Feedback,
     InputDevice,
     Questionnaire,

@@ -1,16 +1,13 @@
-"""How a plugin says what it has: a name, its settings, and how to build it."""
+"""Offers of plugins: a name, its settings, and how to build it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeVar
-
-from pydantic import AfterValidator, ValidationInfo
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from labcrane.core.roles import Component
-from labcrane.files.model import StrictModel
+from labcrane.core.settings import Settings
 
 if TYPE_CHECKING:
     from labcrane.core.findings import Finding
@@ -18,25 +15,12 @@ if TYPE_CHECKING:
 
 RoleT = TypeVar("RoleT", bound=Component)
 RoleT_co = TypeVar("RoleT_co", bound=Component, covariant=True)
-SettingsT = TypeVar("SettingsT", bound="Settings")
+SettingsT = TypeVar("SettingsT", bound=Settings)
 
 
 API = 1
 """Version of the interface that plugins are written against: hooks, roles and public names. A
 plugin says ``labcrane_api = 1`` in its module; ``docs/compatibility.md`` says when it rises."""
-
-
-class Settings(StrictModel):
-    """Base of every plugin's settings: unknown keys are errors, values never change."""
-
-
-def _beside(path: Path, info: ValidationInfo) -> Path:
-    return info.context["folder"] / path if info.context else path
-
-
-StudyPath = Annotated[Path, AfterValidator(_beside)]
-"""A file of the study in a component's settings: a relative path counts from the folder of the
-protocol that names it."""
 
 
 Prompt = Callable[[str], None]

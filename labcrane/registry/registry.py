@@ -7,12 +7,12 @@ from typing import NamedTuple, TypeVar, cast
 
 import pluggy
 
+from labcrane.analysis.exporter import Exporter
 from labcrane.core.roles import (
     Component,
     Controller,
     Cue,
     Dynamics,
-    Exporter,
     Feedback,
     InputDevice,
     Questionnaire,

@@ -1,4 +1,4 @@
-"""Where in a plugin's source an error arose."""
+"""Traceback of a plugin: where in its source an error arose."""
 
 from collections.abc import Iterator
 from pathlib import Path

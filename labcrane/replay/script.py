@@ -1,4 +1,4 @@
-"""What entered a recorded session from outside, tick by tick."""
+"""Script of a recorded session: what entered it from outside, tick by tick."""
 
 import json
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""What the people in the room say to a session, and what it tells them."""
+"""Commands of the people in the room, and what the session tells them."""
 
 import queue
 from collections.abc import Callable

@@ -1,7 +1,7 @@
-"""Whether a session may be run, and what the register keeps of it.
+"""Eligibility of a session, and what the register keeps of it.
 
-Two calls where a session is run: :func:`check_eligibility` before anything opens, which may be repeated, and
-:func:`close_visit` when its participant file is written.
+Two calls where a session is run: :func:`check_eligibility` before anything opens, which may be
+repeated, and :func:`close_visit` when its participant file is written.
 """
 
 from dataclasses import dataclass

@@ -8,8 +8,8 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from labcrane.core.records import Value
+from labcrane.core.settings import Settings
 from labcrane.protocol.components import ComponentSpec
-from labcrane.registry.offers import Settings
 
 
 class FeedbackSettings:

@@ -1,4 +1,4 @@
-"""What whoever reads a recording must know, written at its start."""
+"""Metadata written at the start of a recording for whoever reads it."""
 
 import hashlib
 import platform
@@ -14,9 +14,9 @@ from labcrane.protocol.referenced_files import named_files
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.recording.data_folder import DataFolder
+from labcrane.recording.trial_columns import trial_units
 from labcrane.registry.entry_points import PROJECT
 from labcrane.registry.loader import own_plugins
-from labcrane.session.trial import trial_units
 
 RECORDED_PACKAGES = (
     "labcrane",

@@ -1,4 +1,4 @@
-"""What holds a session: the examiner, a part in trouble, a stop rule."""
+"""Pause of a session: held by the examiner, a part in trouble, or a stop rule."""
 
 from collections.abc import Callable, Iterable
 

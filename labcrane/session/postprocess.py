@@ -1,4 +1,4 @@
-"""What is worked out of a session when it has ended: corrected clocks, and the sync report."""
+"""Postprocessing of a session that has ended: corrected clocks, and the sync report."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -8,8 +8,8 @@ import numpy as np
 from labcrane.protocol.streams import StreamNeed, TimeLimits
 from labcrane.recording.foreign_streams import Conclusion, Correction, RecordedStream
 from labcrane.recording.journal_reader import SessionLog
-from labcrane.streams.recorder.companions import raw_of
 from labcrane.streams.sync.correction import Treatment, correct
+from labcrane.streams.sync.raw import raw_of
 from labcrane.streams.sync.resync import correction_of, treatment_of
 from labcrane.streams.sync.stream_report import StreamReport, judge_stream
 from labcrane.streams.sync.sync_report import LoopReport, SyncReport, judge_loop, never_came

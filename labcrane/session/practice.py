@@ -1,4 +1,4 @@
-"""Whether practice has been enough."""
+"""Practice: whether it has been enough."""
 
 from labcrane.core.records import Phase, Value
 from labcrane.design.plan import PlannedBlock

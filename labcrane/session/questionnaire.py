@@ -1,4 +1,4 @@
-"""A questionnaire while it is asked: what has been answered, and what comes of it."""
+"""Questionnaires asked in a session: answers as they come, and stop rules after them."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""How far a session has come, and what is left of it: for going on after a crash."""
+"""Resume point: how far a session has come, and what is left of it."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

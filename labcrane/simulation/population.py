@@ -1,4 +1,4 @@
-"""Whom a simulated study has for participants: how its operators differ, and how many leave."""
+"""Population of simulated participants: how its operators differ, and how many leave."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""How often a planned test finds an effect: cohorts drawn from a pool of simulated participants."""
+"""Power of a planned test: cohorts drawn from a pool of simulated participants."""
 
 import re
 import warnings

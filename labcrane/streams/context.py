@@ -1,8 +1,9 @@
 """The session's whole context as a string stream: LSL keeps no history, so it is sent again.
 
 A sample of ``labcrane.context`` is a JSON object of two parts: ``scene``, which never changes
-(:func:`labcrane.recording.run_codec.read_run`), and ``situation`` (:class:`labcrane.core.records.SessionState`). It is
-sent at every change and once a second: whoever starts late, or again, draws from one sample alone.
+(:func:`labcrane.recording.run_codec.read_run`), and ``situation``
+(:class:`labcrane.core.records.SessionState`). It is sent at every change and once a second: whoever
+starts late, or again, draws from one sample alone.
 """
 
 import json

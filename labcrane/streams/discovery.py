@@ -1,4 +1,4 @@
-"""What streams there are on the network."""
+"""Discovery of the streams on the network."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace

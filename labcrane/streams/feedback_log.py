@@ -1,4 +1,4 @@
-"""What a feedback process presented, and when, as streams that the recorder takes.
+"""Feedback log: what was presented, and when, as streams that the recorder takes.
 
 ``labcrane.feedback.<name>`` has a sample for every frame presented: the tick of that frame and when
 it was due, how many newer ones replaced others unseen so far, and the component's signals. Its

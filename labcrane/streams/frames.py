@@ -1,4 +1,4 @@
-"""Whole frames as one LSL stream, for whoever presents them.
+"""Frames as one LSL stream, for whoever presents them.
 
 A sample of ``labcrane.frame`` is everything a frame holds but its events, in float64: the columns
 of :func:`frame_columns`, in order. Its time is the time the tick was due.

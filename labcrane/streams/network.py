@@ -1,4 +1,4 @@
-"""Where LSL streams travel: this computer only, or the lab's network.
+"""Network on which LSL streams travel: this computer only, or the lab's.
 
 liblsl reads the file named by ``LSLAPICFG`` once, when it is loaded. So the choice is made before
 anything imports pylsl, and child processes inherit it with the environment.

@@ -1,4 +1,4 @@
-"""What cameras show, as a stream of strings for whoever watches; the recorder does not take it.
+"""Pictures of cameras as a stream of strings for whoever watches; the recorder leaves it.
 
 A sample of ``labcrane.pictures.<name>`` is a JSON object: ``camera``, its name; ``due``, when what
 it shows happened; ``legend``, what its greys mean; ``png``, the picture in base 64. Its time is

@@ -1,4 +1,4 @@
-"""What liblsl knows of another clock, with the time and the round trip of its own measurement.
+"""Clock probes of liblsl, with the time and the round trip of its own measurement.
 
 pylsl's ``time_correction`` tells the offset alone, so that it can only be paired with the time it
 is polled, up to two seconds late. liblsl's ``lsl_time_correction_ex`` tells the rest.

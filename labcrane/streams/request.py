@@ -1,4 +1,4 @@
-"""Which streams a recording needs."""
+"""Requests for the streams that a recording needs."""
 
 import re
 from collections.abc import Mapping

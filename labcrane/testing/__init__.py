@@ -5,8 +5,8 @@
         def device(self) -> InputDevice:
             return MyStick(MySettings(), ch8())
 
-The fixture returns a component that is built and not yet open. Each contract opens it beside
-stand-ins for the other roles, and runs it.
+In comes a component that is built and not yet open, which the fixture returns; out go failures that
+name the promise it breaks. Each contract opens it beside stand-ins for the other roles.
 """
 
 from labcrane.testing.commands import CommandContract

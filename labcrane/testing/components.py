@@ -1,4 +1,4 @@
-"""What every component must do, whatever its role, and every plugin."""
+"""Contract of every component, whatever its role, and of every plugin."""
 
 import time
 from collections.abc import Callable

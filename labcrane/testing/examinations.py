@@ -2,7 +2,8 @@
 
 from labcrane.core.findings import Finding, Verdict
 from labcrane.core.roles import Component
-from labcrane.registry.offers import Offer, Settings
+from labcrane.core.settings import Settings
+from labcrane.registry.offers import Offer
 
 
 class ExaminationContract:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from labcrane.analysis.cohort import Participant, Status
+from labcrane.analysis.exporter import Exporter
 from labcrane.core.records import Event
-from labcrane.core.roles import Exporter
 from labcrane.machines.kinematics import Arm
 from labcrane.machines.library import load_machine
 from labcrane.machines.machine import Machine
@@ -79,7 +79,9 @@ def _context(name: str) -> dict[str, Any]:
         "pilot": False,
         "rate_hz": RATE_HZ,
         "protocol": "sessions: [{name: only}]",
-        "machine": (files("labcrane") / "machines" / "ch8.yaml").read_text(encoding="utf-8"),
+        "machine": (files("labcrane") / "machines" / "data" / "ch8.yaml").read_text(
+            encoding="utf-8"
+        ),
         "versions": {"labcrane": "0"},
         "trial_units": {"movement_time": "s", "distance": "m", "error": "m"},
     }

@@ -1,4 +1,4 @@
-"""What every questionnaire must do."""
+"""Contract of questionnaires."""
 
 import numpy as np
 

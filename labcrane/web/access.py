@@ -1,4 +1,4 @@
-"""Who may see and ask what: a token opens a page once, a cookie keeps it open for the run."""
+"""Access to pages: a token opens a page once, a cookie keeps it open for the run."""
 
 import secrets
 from collections.abc import Callable, Mapping

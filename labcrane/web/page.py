@@ -1,4 +1,4 @@
-"""What a page knows, and how it asks: shared by everything that is shown."""
+"""Page context: what every page knows, and how it asks."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

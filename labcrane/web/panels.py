@@ -1,4 +1,4 @@
-"""How hard the joints work: torques, as the machine reports them."""
+"""Panels of the supervisor's page: joint torques, and the views' cameras."""
 
 import math
 from functools import partial

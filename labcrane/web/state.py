@@ -1,4 +1,4 @@
-"""What is known of a session, from its events: what both pages show."""
+"""State of a session as both pages show it, from its events."""
 
 import json
 from collections import Counter, deque

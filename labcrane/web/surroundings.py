@@ -1,4 +1,4 @@
-"""What stands around the machine in a scenario: things and the human figure, where they are now."""
+"""Surroundings of the machine: objects and the human figure, where they are now."""
 
 import math
 from collections.abc import Sequence

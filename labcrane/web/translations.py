@@ -1,4 +1,4 @@
-"""What the pages say around a questionnaire, in the participant's language."""
+"""Translations of the pages' own wording into the participant's language."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

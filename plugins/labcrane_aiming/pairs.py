@@ -1,4 +1,4 @@
-"""Where the circles are."""
+"""Pairs of circles, and where they are."""
 
 import math
 from dataclasses import dataclass

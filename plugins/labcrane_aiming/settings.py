@@ -1,4 +1,4 @@
-"""What a protocol may say about the aiming task."""
+"""Settings of the aiming task."""
 
 from typing import Annotated, Literal
 

@@ -1,4 +1,4 @@
-"""What describes the data set as a whole."""
+"""Dataset description of a BIDS export."""
 
 import csv
 import json

@@ -1,4 +1,4 @@
-"""How BIDS writes names, tables and descriptions."""
+"""File names, tables and descriptions as BIDS writes them."""
 
 import json
 from collections.abc import Mapping

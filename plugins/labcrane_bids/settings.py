@@ -1,4 +1,4 @@
-"""What can be chosen for exports as BIDS."""
+"""Settings of exports as BIDS."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What both cranes have in common: their signals, their drives and their looks."""
+"""Common part of both cranes: their signals, their drives and their visual shape."""
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What hangs on the tip, as URDF text, and where it is."""
+"""Hanging load on the tip, as URDF text, and where it is."""
 
 import math
 from collections.abc import Sequence

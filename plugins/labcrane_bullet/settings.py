@@ -1,4 +1,4 @@
-"""What a protocol can set of either crane."""
+"""Settings of either crane."""
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 

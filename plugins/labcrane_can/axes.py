@@ -1,4 +1,4 @@
-"""What a panel gives in each tick, live or replayed."""
+"""Axes of a panel in each tick, live or replayed."""
 
 from collections.abc import Sequence
 

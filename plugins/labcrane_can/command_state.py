@@ -1,4 +1,4 @@
-"""What a panel last asked of each joint."""
+"""Command state: what a panel last asked of each joint."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol

@@ -1,4 +1,4 @@
-"""Whether a bus can be opened, and what a panel says on it."""
+"""Bus examination: whether it can be opened, and what a panel says on it."""
 
 import time
 from collections import Counter

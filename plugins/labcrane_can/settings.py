@@ -1,4 +1,4 @@
-"""What a protocol may say about a panel on a CAN bus."""
+"""Settings of a panel on a CAN bus."""
 
 import re
 from typing import Annotated

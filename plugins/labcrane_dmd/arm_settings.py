@@ -1,4 +1,4 @@
-"""What a protocol may say about the arm and its valves."""
+"""Settings of the arm and its valves."""
 
 from typing import Annotated
 

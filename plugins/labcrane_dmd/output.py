@@ -1,4 +1,4 @@
-"""Where models, tables and figures are written."""
+"""Output folder of models, tables and figures."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,4 +1,4 @@
-"""When a joint is loaded beyond what its drive can give."""
+"""Overload of a joint beyond what its drive can give."""
 
 from collections.abc import Sequence
 

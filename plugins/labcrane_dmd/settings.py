@@ -1,4 +1,4 @@
-"""How a model is fitted; written into it, so that it can be fitted again."""
+"""Settings of a fit; written into the model, so that it can be fitted again."""
 
 from typing import Literal
 

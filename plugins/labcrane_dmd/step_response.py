@@ -1,4 +1,4 @@
-"""How a joint sets off: the valve's dead time and the lag with which it opens."""
+"""Step response of a joint: the valve's dead time and the lag with which it opens."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""How well a model tells the speeds at signals that it was not fitted to."""
+"""Validation of a model at signals that it was not fitted to."""
 
 import csv
 from collections.abc import Iterable, Iterator, Sequence

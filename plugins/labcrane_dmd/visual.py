@@ -1,4 +1,4 @@
-"""What the arm looks like: a box for its foot, one along every link, and one for each jaw."""
+"""Visual shape of the arm: a box for its foot, one along every link, one for each jaw."""
 
 from labcrane import Body, Machine, ProtocolError, link_boxes
 from labcrane_dmd.arm_settings import JawsSettings

@@ -1,4 +1,4 @@
-"""What a protocol may say about a control station behind the open gateway protocol."""
+"""Settings of a control station behind the open gateway protocol."""
 
 from pydantic import Field, PositiveFloat
 

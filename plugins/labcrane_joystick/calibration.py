@@ -1,4 +1,4 @@
-"""What was found out about the two sticks, and the file that keeps it."""
+"""Calibration of the two sticks, and the file that keeps it."""
 
 import os
 from collections.abc import Mapping, Sequence

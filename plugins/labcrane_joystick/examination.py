@@ -1,4 +1,4 @@
-"""Whether the two sticks are fit for a study: told apart, centred, moving, and fast enough."""
+"""Stick examination: told apart, centred, moving, and fast enough for a study."""
 
 import time
 from collections.abc import Callable, Iterator, Sequence

@@ -1,4 +1,4 @@
-"""What the Linux kernel does to an axis before SDL sees it."""
+"""Kernel's treatment of an axis before SDL sees it (Linux)."""
 
 import os
 import struct

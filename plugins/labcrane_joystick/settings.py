@@ -1,4 +1,4 @@
-"""What a protocol can say about the joysticks."""
+"""Settings of the joysticks."""
 
 from pydantic import Field
 

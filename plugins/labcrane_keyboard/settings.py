@@ -1,4 +1,4 @@
-"""What a protocol may say about the keyboard."""
+"""Settings of the keyboard."""
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from labcrane import Exporter, Participant, RecordingError, SessionRecord
+from labcrane import Exporter, Participant, RecordingError, SessionRecord, codebook_of, measures_of
 from labcrane_matlab.settings import MatlabSettings
 
 if TYPE_CHECKING:
@@ -36,8 +36,8 @@ class Matlab(Exporter):
         from scipy.io import savemat
 
         for participant in participants:
-            measures = participant.measures()
-            book = participant.codebook(measures)
+            measures = measures_of(participant)
+            book = codebook_of(participant, measures)
             trials = book[book["table"] == "trials"]
             content = {
                 "participant": participant.name,

@@ -1,4 +1,4 @@
-"""What can be chosen for exports to MATLAB."""
+"""Settings of exports to MATLAB."""
 
 from labcrane import Settings
 

@@ -1,4 +1,4 @@
-"""How an operator gets the tip into a target: aim, move, look, correct."""
+"""Aiming of an operator: aim, move, look, correct."""
 
 import math
 from enum import Enum, auto

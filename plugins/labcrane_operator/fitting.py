@@ -1,4 +1,4 @@
-"""What strokes say of the operator who made them, with 95 % intervals."""
+"""Fit of an operator to strokes, with 95 % intervals."""
 
 import math
 from collections.abc import Mapping

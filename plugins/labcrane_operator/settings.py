@@ -1,4 +1,4 @@
-"""How a simulated operator moves. Every default is invented, none is fitted to people."""
+"""Settings of simulated operators. Every default is invented, none is fitted to people."""
 
 from pathlib import Path
 

@@ -59,9 +59,9 @@ def labcrane_questionnaires() -> list[Offer[Questionnaire]]:
 
 def _from_the_lab(name: str) -> Offer[Questionnaire]:
     def build(settings: LabTextSettings, machine: Machine) -> Questionnaire:
-        from labcrane_questionnaires import sart, slots, ssq
+        from labcrane_questionnaires import licensed_scales, sart, ssq
 
-        makers = {"ssq": ssq.Ssq, "sart": sart.Sart, **slots.SLOTS}
+        makers = {"ssq": ssq.Ssq, "sart": sart.Sart, **licensed_scales.SLOTS}
         return makers[name](settings.text)
 
     return offer(name, LabTextSettings, build)

@@ -1,4 +1,4 @@
-"""What a study reports of its participants; nothing that could name one."""
+"""Demographics that a study reports of its participants; nothing that could name one."""
 
 from collections.abc import Mapping, Sequence
 

@@ -1,4 +1,4 @@
-"""What a protocol can set about its questionnaires."""
+"""Settings of the questionnaires."""
 
 from pathlib import Path
 from typing import Any, Literal

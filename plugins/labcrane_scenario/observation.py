@@ -1,4 +1,4 @@
-"""What the state says of a scene: forces, overloads, drops, and where everything is."""
+"""Observation of a scene: forces, overloads, drops, and where everything is."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a protocol may say about scenarios and those who run them without a person."""
+"""Settings of scenarios and of those who run them without a person."""
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 

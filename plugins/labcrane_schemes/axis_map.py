@@ -1,4 +1,4 @@
-"""Which axis does what, from the names a protocol writes."""
+"""Axis map: which axis does what, from the names a protocol writes."""
 
 from collections.abc import Mapping, Sequence
 

@@ -1,4 +1,4 @@
-"""What a protocol may say about a scheme."""
+"""Settings of the schemes."""
 
 from typing import Annotated, Literal
 

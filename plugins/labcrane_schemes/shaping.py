@@ -1,4 +1,4 @@
-"""What a stick's deflection asks for: dead zone, then a cubic."""
+"""Shaping of a stick's deflection: dead zone, then a cubic."""
 
 import math
 

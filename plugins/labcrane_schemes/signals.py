@@ -1,4 +1,4 @@
-"""What every scheme logs each tick beside its command."""
+"""Signals that every scheme logs each tick beside its command."""
 
 import numpy as np
 

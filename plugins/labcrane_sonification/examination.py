@@ -1,4 +1,4 @@
-"""Whether the sound device is there, and takes the rate and the block that are asked for."""
+"""Sound examination: whether the device is there and takes the rate and block asked for."""
 
 import sys
 

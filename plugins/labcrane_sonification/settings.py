@@ -1,4 +1,4 @@
-"""What a protocol can set of the tone."""
+"""Settings of the tone."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""What the tone is like, as a pure function of where the tip is."""
+"""Tone as a pure function of where the tip is."""
 
 import math
 from dataclasses import astuple, dataclass

@@ -1,4 +1,4 @@
-"""What a protocol may say about the sphere."""
+"""Settings of the sphere."""
 
 from typing import Literal
 

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
-from labcrane import Exporter, Participant
+from labcrane import Exporter, Participant, codebook_of, measures_of
 from labcrane_tables.frames import snake
 from labcrane_tables.settings import PsychDsSettings
 from labcrane_tables.tables import write_csv
@@ -26,8 +26,8 @@ class PsychDs(Exporter):
         for participant in participants:
             context = participant.context
             title, study = str(context.get("title", "")), str(context.get("study", ""))
-            measures = participant.measures()
-            book = participant.codebook(measures)
+            measures = measures_of(participant)
+            book = codebook_of(participant, measures)
             table = snake(measures)
             written = dict(zip(map(str, measures), map(str, table), strict=True))
             for row in book[book["table"] == "trials"].itertuples(index=False):

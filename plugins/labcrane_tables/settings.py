@@ -1,4 +1,4 @@
-"""What can be chosen for exports as tables."""
+"""Settings of exports as tables."""
 
 from typing import Literal
 

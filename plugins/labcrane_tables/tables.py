@@ -7,7 +7,7 @@ from pathlib import Path
 from shutil import copyfile
 from typing import TYPE_CHECKING, Any
 
-from labcrane import Exporter, Participant, SessionRecord
+from labcrane import Exporter, Participant, SessionRecord, codebook_of, measures_of
 from labcrane_tables.frames import snake, stream_tables
 from labcrane_tables.settings import TableSettings
 
@@ -41,9 +41,9 @@ class Tables(Exporter):
         events = _Growing(folder / "events")
         for participant in participants:
             people.append(_person(participant))
-            measures = participant.measures()
+            measures = measures_of(participant)
             trials.append(snake(measures))
-            codebooks.append(participant.codebook(measures))
+            codebooks.append(codebook_of(participant, measures))
             for number, session in participant.sessions():
                 events.add(_events(participant, number, session))
                 self._streams(participant, number, session, folder / "streams")

@@ -1,4 +1,4 @@
-"""Where things are in the picture, in pixels: areas of interest for eye tracking."""
+"""Areas of interest for eye tracking: where things are in the picture, in pixels."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Whether there is a display, the monitor that is asked for, and something that draws."""
+"""Display examination: whether there is one, the monitor asked for, and a renderer."""
 
 import re
 import subprocess

@@ -1,4 +1,4 @@
-"""What stands around the machine: ground, trees and a stack of logs. Always the same."""
+"""Forest around the machine: ground, trees and a stack of logs. Always the same."""
 
 import math
 from dataclasses import dataclass

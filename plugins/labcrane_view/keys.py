@@ -1,4 +1,4 @@
-"""Which keys are down while the window has the focus."""
+"""Keys that are down while the window has the focus."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""Which monitors there are, and where the desktop puts them."""
+"""Monitors that there are, and where the desktop puts them."""
 
 import re
 import subprocess

@@ -1,4 +1,4 @@
-"""What lies flat over the picture: text, the photodiode's patch, and the turned-over picture."""
+"""Overlay of the picture: text, the photodiode's patch, and the turned-over picture."""
 
 from collections.abc import Sequence
 from typing import Any

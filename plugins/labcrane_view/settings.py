@@ -1,4 +1,4 @@
-"""What a protocol can set of a view."""
+"""Settings of a view."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal

@@ -13,6 +13,7 @@ import pytest
 from labcrane.analysis.advice import familiarity, fatigue, suggest
 from labcrane.analysis.cohort import find_cohort
 from labcrane.analysis.indicator import Indicator, Performance, indicate
+from labcrane.analysis.indicator_settings import IndicatorSettings, Weights
 from labcrane.analysis.operator_tests import OperatorTest, completion, operator_tests
 from labcrane.analysis.report.workbook import write_workbook
 from labcrane.cli.app import main
@@ -21,7 +22,6 @@ from labcrane.errors import LabcraneError, RecordingError
 from labcrane.participants.enrolment import exclude
 from labcrane.participants.folders import Places
 from labcrane.participants.register import Entry, changed
-from labcrane.protocol.evaluation import IndicatorSettings, Weights
 from labcrane.recording.journal import Column, SessionJournal
 from labcrane.recording.participant_file.writer import consolidate
 

@@ -64,7 +64,7 @@ def test_descriptions_are_found_by_key_with_those_that_are_inherited() -> None:
 def test_a_model_whose_source_is_nowhere_has_a_schema_without_words() -> None:
     program = (
         "from labcrane.files.model import StrictModel\n"
-        "class Typed(Documented):\n"
+        "class Typed(StrictModel):\n"
         "    length: float\n"
         "    'In metres.'\n"
         "print(Typed.model_json_schema()['properties'])\n"

@@ -43,6 +43,6 @@ def test_tasks_that_show_other_signals_are_named_with_what_they_show() -> None:
     tasks = {"aim": SimpleNamespace(signals=SIGNALS[:2]), "idle": SimpleNamespace(signals=())}
     study = SimpleNamespace(protocol=SimpleNamespace(rate_hz=240.0), machine=None)
     with pytest.raises(
-        ProtocolError, match=r"'aim' shows left, joint.angle; 'rest' shows nothing; put them into"
+        ProtocolError, match=r"'aim' shows left, joint.angle; 'idle' shows nothing; put them into"
     ):
         describe(Rig(device, device, device, tasks), study, participant_seed=1)

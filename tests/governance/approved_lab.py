@@ -7,7 +7,7 @@ from governed import Lab
 from labcrane import ProtocolError
 from labcrane.session.eligibility import check_eligibility
 
-MACHINE = (Path(__file__).parents[2] / "labcrane" / "machines" / "ch8.yaml").read_text()
+MACHINE = (Path(__file__).parents[2] / "labcrane" / "machines" / "data" / "ch8.yaml").read_text()
 
 
 def approved_lab(folder: Path) -> Lab:

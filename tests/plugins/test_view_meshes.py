@@ -140,7 +140,7 @@ def test_a_mesh_that_cannot_be_read_is_named(
         read_mesh(MeshFile(file=tmp_path / name))
 
 
-CRANE = Path(__file__).parents[2] / "labcrane" / "machines" / "ch8.yaml"
+CRANE = Path(__file__).parents[2] / "labcrane" / "machines" / "data" / "ch8.yaml"
 
 
 def a_machine_study(folder: Path, mesh: str) -> Path:

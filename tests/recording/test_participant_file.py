@@ -278,7 +278,7 @@ def test_an_unknown_session_is_named_with_those_there_are(recording: Recording) 
 
 def test_importing_the_reader_loads_neither_pandas_nor_h5py() -> None:
     code = (
-        "import sys, json, labcrane.recording.recording, labcrane.recording.recover;"
+        "import sys, json, labcrane.recording.participant_file.recover;"
         "print(json.dumps([m for m in ('pandas', 'h5py') if m in sys.modules]))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)

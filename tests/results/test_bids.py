@@ -15,6 +15,7 @@ import pytest
 
 from labcrane import ProtocolError
 from labcrane.analysis.cohort import Cohort
+from labcrane.analysis.measures import measures_of
 from labcrane.testing import ch8
 from labcrane_bids.bids import Bids
 from labcrane_bids.settings import BidsSettings
@@ -110,7 +111,7 @@ def test_what_the_validator_misses(folder: Path, cohort: Cohort, system: str) ->
 
 def test_events_are_seconds_from_the_first_sample(folder: Path, cohort: Cohort) -> None:
     events = pd.read_csv(folder / f"{MOTION}_events.tsv", sep="\t", na_values="n/a")
-    measured = cohort.included[0].measures()
+    measured = measures_of(cohort.included[0])
     starts = events[(events["trial_type"] == "trial.start") & events["response_time"].notna()]
     np.testing.assert_allclose(starts["response_time"], measured["reaction_time"])
     np.testing.assert_allclose(starts["onset"], measured["started"] - 100.0, atol=1e-9)

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from labcrane.analysis.cohort import find_cohort
+from labcrane.analysis.measures import measures_of
 from labcrane.analysis.statistics.fitts import WIDTH_FACTOR, difficulty, regress, throughput
 from labcrane.analysis.statistics.learning import CURVES, fit_curve, learning_curves
 from results.recorded import STUDY, record, study
@@ -138,7 +139,7 @@ def simulated(folder: Path, gain: float) -> pd.DataFrame:
         OPERATOR % gain if line.startswith("operator:") else line for line in STUDY.splitlines()
     ).replace("distances: [2, 3],", "distances: [2, 3, 4, 6],")
     record(study(folder, text), folder / "data", "P001")
-    return find_cohort(folder / "data").included[0].measures()
+    return measures_of(find_cohort(folder / "data").included[0])
 
 
 def test_fitts_law_of_a_simulated_operator_is_found_again(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from scipy.io import loadmat
 
 from labcrane import RecordingError
 from labcrane.analysis.cohort import Cohort
+from labcrane.analysis.measures import measures_of
 from labcrane_matlab import matlab
 from labcrane_matlab.matlab import Matlab, fields
 from labcrane_matlab.settings import MatlabSettings
@@ -37,7 +38,7 @@ printf('columns|%d|%d\\n', numel(fieldnames(s.trials)), sum(isnan(s.trials.movem
 @needs_octave
 def test_read_labcrane_loads_everything_in_one_call(folder: Path, cohort: Cohort) -> None:
     said = table(octave(READ, folder))
-    measured = pd.concat([person.measures() for person in cohort.included])
+    measured = pd.concat([measures_of(person) for person in cohort.included])
     np.testing.assert_array_equal(np.array(said["time"], float), measured["movement_time"])
     assert said["pair"] == [measured["pair"].iloc[0], "s"]
     assert said["who"] == ["P002", "complete"]

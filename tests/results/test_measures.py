@@ -7,13 +7,13 @@ import pytest
 
 from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.gaze import Looks, gaze_measures, looks
-from labcrane.analysis.measures import MEASURES, MeasureSettings, measure_session
+from labcrane.analysis.measures import MEASURES, MeasureSettings, measure_session, measures_of
 from labcrane.analysis.movements import cut, groups, machine_of
 from labcrane.testing.exporters import MOVEMENT_S, a_participant
 
 
 def test_a_minimum_jerk_movement_has_its_closed_forms(tmp_path) -> None:
-    table = a_participant(tmp_path).measures()
+    table = measures_of(a_participant(tmp_path))
     assert len(table) == 4
     first = table.iloc[0]
     assert first["sub_movements"] == 1
@@ -29,7 +29,7 @@ def test_a_minimum_jerk_movement_has_its_closed_forms(tmp_path) -> None:
 
 
 def test_recorded_results_and_measures_agree(cohort: Cohort) -> None:
-    table = cohort.included[0].measures()
+    table = measures_of(cohort.included[0])
     np.testing.assert_allclose(table["peak_speed_tip"], table["peak_speed"], rtol=1e-12)
     way = table["path_ratio"]
     assert (way >= 1.0).all()
@@ -52,7 +52,7 @@ def test_settings_change_what_depends_on_them(cohort: Cohort) -> None:
 def test_a_movement_without_an_end_has_no_measures_but_its_error(data) -> None:
     from labcrane.analysis.cohort import find_cohort
 
-    ended = find_cohort(data, ["half-finished"]).included[2].measures().iloc[-1]
+    ended = measures_of(find_cohort(data, ["half-finished"]).included[2]).iloc[-1]
     assert ended["outcome"] == "ended"
     assert math.isnan(ended["sparc"])
     assert math.isnan(ended["path_ratio"])
@@ -63,7 +63,7 @@ def test_dwell_and_first_look_are_those_of_the_eyes(cohort: Cohort) -> None:
     _, session = next(cohort.included[0].sessions())
     seen = looks(session)
     assert seen is not None
-    table = cohort.included[0].measures()
+    table = measures_of(cohort.included[0])
     for row in table.itertuples():
         assert row.dwell_during_1 == pytest.approx(0.5 * row.movement_time, abs=0.3)
         assert 0.0 <= row.dwell_before_1 <= row.reaction_time + 1e-9

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from labcrane.analysis.cohort import Cohort, Status, find_cohort
+from labcrane.analysis.measures import measures_of
 from labcrane.analysis.quality import exclusions, is_result, loop_quality, sync_quality
 from labcrane.analysis.report.report import write_report
 from labcrane.cli.app import main
@@ -71,7 +72,7 @@ def test_figure_tables_hold_the_means_of_participants_means(folder: Path) -> Non
 def test_trials_that_are_no_results_are_listed_with_the_reason(data: Path) -> None:
     cohort = find_cohort(data, ["half-finished"])
     ended = cohort.included[2]
-    measures = ended.measures()
+    measures = measures_of(ended)
     out = exclusions(measures)
     assert set(out["why"]) == {"outcome ended"}
     assert len(out) + is_result(measures).sum() == len(measures)

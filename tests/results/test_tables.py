@@ -9,7 +9,8 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from labcrane.analysis.cohort import Cohort, Measured
+from labcrane.analysis.cohort import Cohort
+from labcrane.analysis.measures import Measured, measures_of
 from labcrane_tables.psychds import PsychDs
 from labcrane_tables.settings import PsychDsSettings, TableSettings
 from labcrane_tables.tables import Tables
@@ -24,7 +25,7 @@ def folder(cohort: Cohort, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_pandas_and_arrow_read_what_was_measured(folder: Path, cohort: Cohort) -> None:
-    measured = pd.concat([person.measures() for person in cohort.included], ignore_index=True)
+    measured = pd.concat([measures_of(person) for person in cohort.included], ignore_index=True)
     for read in (pd.read_csv(folder / "trials.csv"), pd.read_parquet(folder / "trials.parquet")):
         assert list(read) == list(measured)
         for name in ("movement_time", "sparc", "reversals", "dwell_during_1"):
@@ -70,7 +71,7 @@ def test_read_r_loads_everything_in_one_call(folder: Path, cohort: Cohort) -> No
     assert said["streams"][0] == (
         "P001_ses-01_eyes P001_ses-01_frames P002_ses-01_eyes P002_ses-01_frames"
     )
-    measured = pd.concat([person.measures() for person in cohort.included])
+    measured = pd.concat([measures_of(person) for person in cohort.included])
     np.testing.assert_allclose(np.array(said["time"], float), measured["movement_time"], rtol=1e-15)
     assert said["na"] == ["0", "0"]
     _, session = next(cohort.included[0].sessions())
@@ -105,7 +106,7 @@ def test_psych_ds_describes_columns_by_the_names_they_are_written_under(
 ) -> None:
     """A task may name its results with dots, as scenarios do; CSV files have underscores."""
     person = cohort.included[0]
-    table = person.measures().rename(columns={"peak_speed": "Peak.Speed"})
+    table = measures_of(person).rename(columns={"peak_speed": "Peak.Speed"})
     measured = Measured(person.name, person.path, person.status, person.why, table)
     PsychDs(PsychDsSettings()).export([measured], tmp_path)
     about = json.loads((tmp_path / "dataset_description.json").read_text(encoding="utf-8"))

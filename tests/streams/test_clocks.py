@@ -21,9 +21,9 @@ from streams.emulation import (
     until_ready,
 )
 
-from labcrane.streams.recorder.companions import raw_of
 from labcrane.streams.sync.correction import Treatment, correct
 from labcrane.streams.sync.dejitter import Dejitter
+from labcrane.streams.sync.raw import raw_of
 from labcrane.streams.sync.resync import resync
 
 EXACT = Treatment(rate_hz=1000.0)

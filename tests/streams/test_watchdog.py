@@ -6,8 +6,15 @@ import numpy as np
 import pytest
 
 from labcrane.recording.xdf.header import Channel, StreamHeader
-from labcrane.streams.recorder.health import Condition, Counter, Health, complaints, condition, rate
-from labcrane.streams.recorder.inlet import Flow
+from labcrane.streams.recorder.health import (
+    Condition,
+    Counter,
+    Flow,
+    Health,
+    complaints,
+    condition,
+    rate,
+)
 
 EEG = StreamHeader("EEG", "EEG", (Channel("Cz"), Channel("Sample Counter")), rate_hz=500.0)
 MARKS = StreamHeader("Marks", "Markers", (Channel("mark"),), "string")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from labcrane.analysis.cohort import Cohort, Participant, Status
-from labcrane.analysis.measures import DEFAULTS, MEASURES, MeasureSettings, measure_participant
+from labcrane.analysis.measures import DEFAULTS, MEASURES, MeasureSettings, measures_of
 from labcrane.analysis.quality import exclusions, is_result, loop_quality, sync_quality
 from labcrane.analysis.report import figures
 from labcrane.analysis.report.html import Page
@@ -81,7 +81,7 @@ def _one(
     participant: Participant, settings: MeasureSettings, folder: Path
 ) -> "tuple[str, pd.DataFrame, pd.DataFrame, pd.DataFrame]":
     """Write one participant's page; return name, movements, and quality of loop and clocks."""
-    own = measure_participant(participant, settings)
+    own = measures_of(participant, settings)
     loop, sync = loop_quality(participant), sync_quality(participant)
     _participant_page(participant, own, loop, sync, folder)
     return participant.name, own, loop, sync

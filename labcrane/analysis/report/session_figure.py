@@ -11,10 +11,10 @@ if TYPE_CHECKING:
 
 def draw(session: "SessionRecord", path: Path) -> None:
     """Draw the counted movements of a session into a PNG file."""
-    import matplotlib as mpl  # noqa: PLC0415 - loads for a second
+    import matplotlib as mpl
 
     mpl.use("agg")
-    from matplotlib.figure import Figure  # noqa: PLC0415
+    from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12, 5.4), layout="constrained")
     above, speed = figure.subplots(1, 2)
@@ -26,7 +26,7 @@ def draw(session: "SessionRecord", path: Path) -> None:
 
 
 def _draw_from_above(session: "SessionRecord", axes: "Axes") -> None:
-    from matplotlib.patches import Circle  # noqa: PLC0415
+    from matplotlib.patches import Circle
 
     state = session.streams["state"]
     for _, trial in session.trials.iterrows():

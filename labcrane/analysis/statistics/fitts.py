@@ -95,7 +95,7 @@ def throughput(movements: "pd.DataFrame") -> "pd.DataFrame":
     Parameters
     ----------
     movements
-        Of :func:`labcrane.analysis.measures.measure_participant`, successful ones only.
+        Of :func:`labcrane.analysis.measures.measures_of`, successful ones only.
     """
     import pandas as pd
 

@@ -1,4 +1,4 @@
-"""Whether F, degrees of freedom, p and eta squared of a report can belong together."""
+"""Reported statistics: whether F, degrees of freedom, p and eta squared can belong together."""
 
 from dataclasses import dataclass
 

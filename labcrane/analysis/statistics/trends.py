@@ -1,4 +1,4 @@
-"""Whether a measure changes along the session, and what it depends on."""
+"""Trends of a measure along the session, and what they depend on."""
 
 import math
 from collections.abc import Sequence

@@ -42,8 +42,8 @@ def export(
     scheduler: Scheduler = None,
 ) -> None:
     """Export recordings for R, MATLAB, BIDS, Psych-DS or EEG programs."""
+    from labcrane.analysis.exporter import Exporter
     from labcrane.analysis.movements import machine_of
-    from labcrane.core.roles import Exporter
     from labcrane.registry.call_monitor import CallMonitor
     from labcrane.registry.registry import discover
 

@@ -110,7 +110,7 @@ def demo(
     from labcrane.recording.participant_file.reader import open_recording
 
     order = SessionConfig(
-        Path(str(files("labcrane") / "demo.yaml")), "P001", 1, data, simulated=True
+        Path(str(files("labcrane.cli") / "demo.yaml")), "P001", 1, data, simulated=True
     )
     number = 1
     while order.visit().folder.path.exists():  # a demo can be run again; nothing is overwritten

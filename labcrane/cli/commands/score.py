@@ -9,7 +9,7 @@ from labcrane.cli.commands.results import cohort_of
 from labcrane.cli.output import out
 
 if TYPE_CHECKING:
-    from labcrane.protocol.evaluation import IndicatorSettings
+    from labcrane.analysis.indicator_settings import IndicatorSettings
 
 HALF_FINISHED = "half-finished"
 
@@ -50,7 +50,7 @@ def score(
 
 
 def _settings(path: Path) -> "IndicatorSettings":
+    from labcrane.analysis.indicator_settings import IndicatorSettings
     from labcrane.files.yaml import YamlFile
-    from labcrane.protocol.evaluation import IndicatorSettings
 
     return YamlFile.read(path).checked(IndicatorSettings)

@@ -134,7 +134,7 @@ def _movements(
     import pandas as pd
 
     from labcrane.analysis.cohort import find_cohort
-    from labcrane.analysis.measures import measure_participant
+    from labcrane.analysis.measures import measures_of
     from labcrane.analysis.quality import is_result
     from labcrane.parallel import work
     from labcrane.recording.data_folder import DataFolder
@@ -143,7 +143,7 @@ def _movements(
     wanted = [person for person in people if DataFolder.pseudonym(person.name) in names]
     with progress_bar("measure", len(wanted)) as advance:
         tables = []
-        for table in work(measure_participant, wanted, workers, scheduler):
+        for table in work(measures_of, wanted, workers, scheduler):
             tables.append(table)
             advance()
     everything = pd.concat(tables, ignore_index=True)

@@ -1,4 +1,4 @@
-"""How XDF 1.0 packs its chunks (https://github.com/sccn/xdf/wiki/Specifications).
+"""Chunks as XDF 1.0 packs them (https://github.com/sccn/xdf/wiki/Specifications).
 
 A chunk is a variable-length length, a tag of two bytes and the content; all numbers are little
 endian. labcrane always writes lengths and sample counts in four bytes, so that chunks of equal

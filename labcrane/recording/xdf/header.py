@@ -1,4 +1,4 @@
-"""What a stream holds, as XDF and LSL describe it."""
+"""Stream header: what a stream holds, as XDF and LSL describe it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

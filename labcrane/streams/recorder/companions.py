@@ -15,23 +15,12 @@ from labcrane.recording.foreign_streams import (
     ARRIVALS,
     NOTES,
     PROBES,
-    RecordedStream,
     companion_headers,
 )
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.streams.probes import Probe
-from labcrane.streams.sync.raw import RawStream
 from labcrane.types import FloatArray
-
-OPENED = "opened"
-"""The first note of every part: counts of samples start anew with it."""
-
-RESET = "reset"
-"""A note of a source that was replaced."""
-
-COUNTER_GAP = "counter gap"
-"""A note of samples that the source's own counter left out; ``missing`` says how many."""
 
 
 class RecordedStreamWriter:
@@ -72,39 +61,3 @@ class RecordedStreamWriter:
         """Write a note."""
         text = json.dumps({"event": event, **data}, ensure_ascii=False)
         self._writer.write_texts(self._notes, [time], [[text]])
-
-
-def raw_of(recorded: RecordedStream) -> RawStream:
-    """Return the times of a recorded stream, for correction.
-
-    Parameters
-    ----------
-    recorded
-        As read from journals of labcrane or of another recorder, whose clock offsets count as
-        probes with an unknown round trip.
-    """
-    probes = recorded.probes
-    if not len(probes) and len(recorded.offsets):
-        when, offset = recorded.offsets.T
-        probes = np.column_stack([when, offset, np.zeros(len(when)), when + offset])
-    return RawStream.of(
-        recorded.time_raw,
-        probes=probes,
-        arrivals=recorded.arrivals,
-        resets=_resets(recorded),
-    )
-
-
-def _resets(recorded: RecordedStream) -> FloatArray:
-    """Return when the source was replaced, and among which samples of all parts together."""
-    found: list[list[float]] = []
-    part = -1
-    for note in recorded.notes:
-        event = note.data.get("event")
-        if event == OPENED:
-            part += 1
-        elif event == RESET:
-            first = recorded.starts[max(part, 0)]
-            low, high = note.data["samples"]
-            found.append([note.time, first + low, first + high])
-    return np.array(found, dtype=np.float64).reshape(-1, 3)

@@ -1,17 +1,15 @@
-"""Whether streams flow, now."""
+"""Health of streams: what has come of each, and how it flows now."""
 
 import math
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from labcrane.recording.xdf.header import StreamHeader
-
-if TYPE_CHECKING:
-    from labcrane.streams.recorder.inlet import Flow
+from labcrane.streams.probes import Probe
 
 COUNTERS = frozenset({"counter", "samplecounter", "packetcounter", "framenumber"})
 
@@ -20,6 +18,30 @@ OFFSET_AGE_S = 6.0
 RATE_TOLERANCE = 0.05
 RTT_S = 0.02
 WINDOW_S = 5.0
+
+
+@dataclass
+class Flow:
+    """What has come so far; read by the watchdog while the inlet's threads write it.
+
+    Times are ours, in seconds; ``last`` is NaN before the first sample.
+    """
+
+    samples: int = 0
+    last: float = float("nan")
+    arrivals: list[tuple[float, int]] = field(default_factory=list)
+    probe: Probe | None = None
+    probes: int = 0
+    resets: int = 0
+    missing: int = 0
+    fault: str | None = None
+
+    def came(self, time: float, count: int) -> None:
+        """Count samples that arrived, and keep the last ten seconds of it."""
+        self.samples += count
+        self.last = time
+        self.arrivals = [(t, n) for t, n in self.arrivals if t > time - 10.0]
+        self.arrivals.append((time, self.samples))
 
 
 class Condition(StrEnum):

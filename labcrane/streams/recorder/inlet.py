@@ -3,18 +3,18 @@
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from labcrane.errors import RecordingError
+from labcrane.recording.foreign_streams import COUNTER_GAP, OPENED, RESET
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.recording.xdf.writer import XdfWriter
-from labcrane.streams.probes import ClockProbe, Probe, was_reset
-from labcrane.streams.recorder.companions import COUNTER_GAP, OPENED, RESET, RecordedStreamWriter
-from labcrane.streams.recorder.health import Counter
+from labcrane.streams.probes import ClockProbe, was_reset
+from labcrane.streams.recorder.companions import RecordedStreamWriter
+from labcrane.streams.recorder.health import Counter, Flow
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -28,30 +28,6 @@ BUFFER_S = 360
 
 SILENT_S = 1.0
 MOST = 8192
-
-
-@dataclass
-class Flow:
-    """What has come so far; read by the watchdog while the inlet's threads write it.
-
-    Times are ours, in seconds; ``last`` is NaN before the first sample.
-    """
-
-    samples: int = 0
-    last: float = float("nan")
-    arrivals: list[tuple[float, int]] = field(default_factory=list)
-    probe: Probe | None = None
-    probes: int = 0
-    resets: int = 0
-    missing: int = 0
-    fault: str | None = None
-
-    def came(self, time: float, count: int) -> None:
-        """Count samples that arrived, and keep the last ten seconds of it."""
-        self.samples += count
-        self.last = time
-        self.arrivals = [(t, n) for t, n in self.arrivals if t > time - 10.0]
-        self.arrivals.append((time, self.samples))
 
 
 class Inlet:

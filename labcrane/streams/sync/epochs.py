@@ -1,4 +1,4 @@
-"""Where a source's clock changed: at which probe, and at which sample.
+"""Epochs of a source's clock: at which probe, and at which sample, it changed.
 
 A source that restarts, or a computer that sleeps, goes on with another clock. Its probes say that,
 a second too late; the samples say when.

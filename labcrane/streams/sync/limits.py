@@ -1,4 +1,4 @@
-"""What a study demands of its time stamps."""
+"""Limits that a study sets to the error of its time stamps."""
 
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""How right a stream's corrected times are."""
+"""Quality of a stream's corrected times."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

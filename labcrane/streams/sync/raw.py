@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labcrane.errors import RecordingError
+from labcrane.recording.foreign_streams import OPENED, RESET, RecordedStream
 from labcrane.types import FloatArray
 
 
@@ -69,3 +70,39 @@ class RawStream:
         counts, times = self.arrivals.T
         chunk = np.searchsorted(counts, np.arange(len(self.stamps)), side="right")
         return np.asarray(times[np.minimum(chunk, len(times) - 1)])
+
+
+def raw_of(recorded: RecordedStream) -> RawStream:
+    """Return the times of a recorded stream, for correction.
+
+    Parameters
+    ----------
+    recorded
+        As read from journals of labcrane or of another recorder, whose clock offsets count as
+        probes with an unknown round trip.
+    """
+    probes = recorded.probes
+    if not len(probes) and len(recorded.offsets):
+        when, offset = recorded.offsets.T
+        probes = np.column_stack([when, offset, np.zeros(len(when)), when + offset])
+    return RawStream.of(
+        recorded.time_raw,
+        probes=probes,
+        arrivals=recorded.arrivals,
+        resets=_resets(recorded),
+    )
+
+
+def _resets(recorded: RecordedStream) -> FloatArray:
+    """Return when the source was replaced, and among which samples of all parts together."""
+    found: list[list[float]] = []
+    part = -1
+    for note in recorded.notes:
+        event = note.data.get("event")
+        if event == OPENED:
+            part += 1
+        elif event == RESET:
+            first = recorded.starts[max(part, 0)]
+            low, high = note.data["samples"]
+            found.append([note.time, first + low, first + high])
+    return np.array(found, dtype=np.float64).reshape(-1, 3)

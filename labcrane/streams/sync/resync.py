@@ -6,8 +6,8 @@ from dataclasses import asdict
 from labcrane.errors import RecordingError
 from labcrane.recording.foreign_streams import Correction, RecordedStream
 from labcrane.recording.xdf.header import Description, StreamHeader
-from labcrane.streams.recorder.companions import raw_of
 from labcrane.streams.sync.correction import Corrected, Treatment, correct
+from labcrane.streams.sync.raw import raw_of
 
 
 def treatment_of(header: StreamHeader) -> Treatment:

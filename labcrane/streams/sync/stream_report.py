@@ -1,4 +1,4 @@
-"""How right one stream's time stamps are, and what to do where they are not."""
+"""Report on one stream's time stamps, and what to do where they are not right."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from labcrane.core.findings import Finding, Verdict, worst
-from labcrane.recording.foreign_streams import RecordedStream
-from labcrane.streams.recorder.companions import COUNTER_GAP, RESET
+from labcrane.recording.foreign_streams import COUNTER_GAP, RESET, RecordedStream
 from labcrane.streams.sync.limits import Limits
 from labcrane.streams.sync.quality import Quality
 

@@ -1,4 +1,4 @@
-"""How right the time stamps of a session are, and what to do where they are not.
+"""Sync report of a session: how right its time stamps are, what to do where they are not.
 
 Made at the end of a session, before the participant leaves; kept in the participant file.
 """

@@ -1,0 +1,21 @@
+"""Settings of components: the model of what a protocol writes beside ``use``."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import AfterValidator, ValidationInfo
+
+from labcrane.files.model import StrictModel
+
+
+class Settings(StrictModel):
+    """Base of every plugin's settings: unknown keys are errors, values never change."""
+
+
+def _beside(path: Path, info: ValidationInfo) -> Path:
+    return info.context["folder"] / path if info.context else path
+
+
+StudyPath = Annotated[Path, AfterValidator(_beside)]
+"""A file of the study in a component's settings: a relative path counts from the folder of the
+protocol that names it."""
