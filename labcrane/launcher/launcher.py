@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from labcrane.feedback.processes import FeedbackProcesses, log_requests
 from labcrane.launcher.hang_detector import HangDetector
 from labcrane.launcher.session_process import Ended, SessionConfig, serve
+from labcrane.launcher.signal_reporter import SignalReporter, monitor_config
 from labcrane.recording.crash_marker import read_whereabouts
 from labcrane.recording.paths import parts
 from labcrane.session.commands import Command, Order, QueueConsole
@@ -75,6 +76,7 @@ class Launcher:
         self._recorder: RecorderHandle | None = None
         self._crew: FeedbackProcesses | None = None
         self._lost: set[str] = set()
+        self._signals = SignalReporter(say)
         self._kept: list[Command] = []
         self.sync_report: SyncReport | None = None
 
@@ -97,7 +99,7 @@ class Launcher:
         if self._order.feedback:
             requests += log_requests(visit)
         if requests:
-            self._recorder = RecorderHandle(visit.streams_journal, requests)
+            self._recorder = RecorderHandle(visit.streams_journal, requests, monitor_config(visit))
         report = None
         try:
             if self._order.feedback:
@@ -126,6 +128,7 @@ class Launcher:
         told: list[str] = []
         while recorder is not None and not recorder.ready:
             recorder.watch()
+            self._kept += self._signals.news(recorder)
             if recorder.status and recorder.complaints() != told:
                 told = recorder.complaints()
                 self._say("waiting for streams:\n" + "\n".join(f"  {line}" for line in told))
@@ -203,6 +206,8 @@ class Launcher:
             return
         if recorder.watch():
             self._say("the recorder died and was started again")
+        for news in self._signals.news(recorder):
+            self._send(pipe, news)
         lost = recorder.lost() if recorder.status else {RECORDER}
         for what in sorted(lost - self._lost):
             self._send(pipe, Command(Order.LOST, what))

@@ -24,6 +24,9 @@ PROBES = "probes"
 ARRIVALS = "arrivals"
 NOTES = "notes"
 
+SIGNAL = "signal"
+"""A note of a fault of a signal that was found (``bad``), or that is there no more."""
+
 OPENED = "opened"
 """The first note of every part: counts of samples start anew with it."""
 

@@ -31,9 +31,21 @@ class Order(StrEnum):
     MENDED = "mended"  # and of one that presents
     LOST = "lost"  # said by the launcher: a stream or the recorder failed
     BACK = "back"  # and works again
+    SIGNAL_BAD = "signal bad"  # and of a signal, as JSON: stream, channel, kind, message
+    SIGNAL_GOOD = "signal good"  # and of one that is well again
 
 
-FAULTS = frozenset({Order.LOST, Order.BACK, Order.FAILED, Order.LEFT_OUT, Order.MENDED})
+FAULTS = frozenset(
+    {
+        Order.LOST,
+        Order.BACK,
+        Order.FAILED,
+        Order.LEFT_OUT,
+        Order.MENDED,
+        Order.SIGNAL_BAD,
+        Order.SIGNAL_GOOD,
+    }
+)
 """What the launcher says, not people."""
 
 

@@ -1,5 +1,6 @@
 """Pause of a session: held by the examiner, a part in trouble, or a stop rule."""
 
+import json
 from collections.abc import Callable, Iterable
 
 from labcrane.core.records import Value
@@ -81,6 +82,8 @@ class Suspenders:
         elif command.order is Order.BACK:
             self._note("stream.back", {"what": command.text})
             self.release(command.text)
+        elif command.order in {Order.SIGNAL_BAD, Order.SIGNAL_GOOD}:
+            self._note(f"signal.{command.order.value.split()[1]}", json.loads(command.text))
         else:
             self._feedback(command)
 

@@ -21,6 +21,7 @@ from labcrane.recording.foreign_streams import Conclude, RecordedStream, read_st
 from labcrane.recording.journal_reader import JournalState, SessionLog, read_journal
 from labcrane.recording.participant_file.columns import node_names, write_attributes, write_text
 from labcrane.recording.participant_file.session_group import write_session
+from labcrane.recording.participant_file.signal_faults import write_signal_faults
 from labcrane.recording.participant_file.stream_group import write_streams
 from labcrane.recording.paths import parts, session_of
 
@@ -192,6 +193,7 @@ def _write(beside: Path, path: Path, session: _Session, conclude: Conclude | Non
         write_session(group, session.log, session.journals)
         conclusion = conclude(context) if conclude else None
         write_streams(group, session.streams, conclusion.correct if conclusion else None)
+        write_signal_faults(group, session.log, session.streams)
         if conclusion and conclusion.report:
             report = conclusion.report(session.log)
             write_text(group, SYNC_REPORT, json.dumps(report, ensure_ascii=False, allow_nan=False))

@@ -8,7 +8,7 @@ import json
 import subprocess
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -29,13 +29,30 @@ class RecorderHandle:
         The last line of the recorder's own report; empty before it has spoken.
     restarts
         How often it had to be started again.
+
+    Parameters
+    ----------
+    journal, requests
+        Where the streams go, and which.
+    monitors
+        What looks at their signals, as of :class:`labcrane.monitoring.config.MonitorConfig`; None
+        for nothing.
     """
 
-    def __init__(self, journal: Path, requests: Sequence[StreamRequest]) -> None:
+    def __init__(
+        self,
+        journal: Path,
+        requests: Sequence[StreamRequest],
+        monitors: Mapping[str, Any] | None = None,
+    ) -> None:
         self.status: dict[str, Any] = {}
         self.restarts = 0
         self._orders = json.dumps(
-            {"journal": str(journal), "streams": [asdict(request) for request in requests]}
+            {
+                "journal": str(journal),
+                "streams": [asdict(request) for request in requests],
+                "monitors": monitors,
+            }
         )
         self._spare = _Recorder()
         self._process = self._start()
@@ -62,6 +79,28 @@ class RecorderHandle:
             if not (stream["sane"] or stream["warnings"] or stream["misfits"]):
                 lines.append(f"{stream['label']}: {stream['condition']}")
         return list(dict.fromkeys(lines))
+
+    def signals(self) -> dict[tuple[str, str, str], str]:
+        """Return what is wrong with signals: the message by stream, channel and kind of fault.
+
+        Streams have the study's names; the channel is empty for a whole stream.
+        """
+        return {
+            (stream["label"], fault["channel"], fault["kind"]): fault["message"]
+            for stream in self.status.get("streams", ())
+            for fault in stream["signals"]
+        }
+
+    def unwatched(self) -> list[str]:
+        """Return which monitors look no more, one line for each."""
+        died = self.status.get("signals")
+        lines = [died] if died else []
+        for stream in self.status.get("streams", ()):
+            lines += [
+                f"{stream['label']}: monitor {name!r} was left out: {why}"
+                for name, why in stream["unwatched"].items()
+            ]
+        return lines
 
     def watch(self) -> bool:
         """Start the recorder again if it has died; whether it had."""

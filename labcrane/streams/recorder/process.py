@@ -49,11 +49,15 @@ class RecorderConfig:
         What to record.
     grace_s
         How long it goes on when whoever started it has died.
+    monitors
+        What looks at the signals, as of :class:`labcrane.monitoring.config.MonitorConfig`; None for
+        nothing.
     """
 
     journal: Path
     streams: tuple[StreamRequest, ...]
     grace_s: float = 3.0
+    monitors: Mapping[str, Any] | None = None
 
     @classmethod
     def of(cls, fields: Mapping[str, Any]) -> "RecorderConfig":
@@ -87,7 +91,7 @@ def run(orders: RecorderConfig, resolver: "pylsl.ContinuousResolver | None" = No
     ``resolver`` is one that has looked around already.
     """
     check_clock()
-    recorder = Recorder(orders.journal, orders.streams, resolver)
+    recorder = Recorder(orders.journal, orders.streams, resolver, orders.monitors)
     teller = _Teller()
     with _no_blocking(STATUS_FD):
         try:

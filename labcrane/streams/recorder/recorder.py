@@ -1,7 +1,7 @@
 """Records the streams of others: whatever was asked for, late or again after a restart."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ from labcrane.recording.paths import next_part
 from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.streams.recorder.health import Condition, Health, complaints, condition, rate
 from labcrane.streams.recorder.inlet import Inlet
+from labcrane.streams.recorder.signal_feed import SignalFeed
 from labcrane.streams.request import StreamRequest, unstable_id
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ class Recorder:
         journal: Path,
         requests: Sequence[StreamRequest],
         resolver: "pylsl.ContinuousResolver | None" = None,
+        monitors: Mapping[str, Any] | None = None,
     ) -> None:
         self._requests = tuple(requests)
         self._writer = XdfWriter(next_part(journal))
@@ -43,6 +45,7 @@ class Recorder:
         self._streams: dict[tuple[str, str, str], _Recorded] = {}
         self._since: dict[str, float] = {}
         self._fault: str | None = None
+        self._feed = None if monitors is None else SignalFeed(monitors)
 
     @property
     def path(self) -> Path:
@@ -59,6 +62,8 @@ class Recorder:
             if key not in self._streams:
                 self._start(key, info)
         self._find_duplicates(found, now)
+        if self._feed is not None:
+            self._feed.look()
 
     def health(self) -> list[Health]:
         """Return how each stream is now, also those asked for that are not there."""
@@ -78,11 +83,14 @@ class Recorder:
             "ready": all(one.sane for one in streams if one.required) and not faults,
             "faults": sorted(str(fault) for fault in faults),
             "streams": [one.as_json() for one in streams],
+            "signals": self._feed.fault if self._feed else None,
         }
 
     def close(self) -> bool:
         """Write down all that has come and close the journal; whether all of it went in."""
         whole = [one.inlet.close() for one in self._streams.values()]
+        if self._feed is not None:
+            self._feed.close()
         try:
             self._writer.close()
         except RecordingError as error:  # the disk is still full: footers are missing, no samples
@@ -100,7 +108,7 @@ class Recorder:
         warnings = list(misfits)
         if (unstable := unstable_id(info.source_id())) is not None:
             warnings.append(unstable)
-        inlet = Inlet(info, self._writer, request.counter, (*warnings,))
+        inlet = Inlet(info, self._writer, request.counter, (*warnings,), self._feed)
         self._streams[key] = _Recorded(request, inlet, misfits, warnings)
 
     def _find_duplicates(self, found: "list[pylsl.StreamInfo]", now: float) -> None:
@@ -129,7 +137,7 @@ def a_resolver() -> "pylsl.ContinuousResolver":
 
 def _health(recorded: _Recorded, now: float) -> Health:
     inlet, flow, info = recorded.inlet, recorded.inlet.flow, recorded.inlet.info
-    probe = flow.probe
+    probe, signals = flow.probe, inlet.signals
     # The time of the measurement on our clock, not the time when liblsl told of it.
     age = None if probe is None else now - (probe.remote_time + probe.offset)
     health = Health(
@@ -152,6 +160,8 @@ def _health(recorded: _Recorded, now: float) -> Health:
         resets=flow.resets,
         misfits=recorded.misfits,
         warnings=list(recorded.warnings),
+        signals=list(signals.faults.values()) if signals else [],
+        unwatched=signals.failed if signals else {},
     )
     health.warnings.extend(complaints(health))
     return health
