@@ -13,6 +13,8 @@ WINDOW_S = 30.0
 SKEW_S = 5.0
 """How long probes must have come until they tell a skew."""
 
+FEW_PROBES = 3
+
 GAP = 1.5
 """An interval of more periods is a gap."""
 
@@ -166,8 +168,9 @@ def _clock(probes: list[Probe]) -> tuple[float | None, float | None, float | Non
     trips = np.array([probe.rtt for probe in probes])
     skew = None
     if times[-1] - times[0] >= SKEW_S:
-        good = trips <= np.quantile(trips, 0.25)  # the quick ones are the right ones
-        if good.sum() > 2:  # noqa: PLR2004 - a line through two says nothing of itself
+        # The quick ones are the right ones; but of few, a line takes three.
+        good = trips <= max(2.0 * trips.min(), np.sort(trips)[: min(len(trips), FEW_PROBES)][-1])
+        if good.sum() >= FEW_PROBES:
             # Offset is ours minus the source's: a clock that runs fast has a falling one.
             skew = -1e6 * float(np.polyfit(times[good] - times[0], offsets[good], 1)[0])
     return float(offsets[-1]), float(trips.min()), skew

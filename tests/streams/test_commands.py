@@ -1,6 +1,7 @@
 """The commands about streams and recordings, as a user types them."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -28,13 +29,13 @@ def source() -> Iterator[str]:
     sender.wait()
 
 
-def labcrane(*arguments: object) -> subprocess.CompletedProcess[str]:
+def labcrane(*arguments: object, columns: int = 200) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "labcrane", *map(str, arguments)],
         capture_output=True,
         text=True,
         check=False,
-        env={**os.environ, "COLUMNS": "200"},
+        env={**os.environ, "COLUMNS": str(columns)},
     )
 
 
@@ -48,12 +49,27 @@ def recorded(source: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_streams_lists_type_rate_units_host_and_offset(source: str) -> None:
     done = labcrane("streams")
-    (line,) = (line for line in done.stdout.splitlines() if source in line)
-    assert "Amplifier" in line
-    assert "EEG" in line
-    assert "100" in line
-    assert "microvolts" in line
-    assert "+0.000" in line or "-0.000" in line  # the same clock
+    lines = done.stdout.splitlines()
+    (at,) = (at for at, line in enumerate(lines) if source in line)
+    assert lines[at - 2] == "Amplifier: EEG, 2 channels at 100 Hz, in 1, microvolts"
+    assert re.search(r"on .+, clock [+-]0\.000\d{3} s", lines[at - 1])  # the same clock
+
+
+def test_streams_are_watched_until_it_is_known_how_they_come(source: str) -> None:
+    done = labcrane("streams", "--watch", "--seconds", 12, columns=80)
+    assert done.returncode == 0, done.stderr
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    about = " ".join(done.stdout.partition("Amplifier: ")[2].split("Amplifier: ")[0].split())
+    assert about.startswith("EEG, 2 channels at 100 Hz, in 1, microvolts clock ")
+    assert re.search(r"clock [+-]0\.000\d{3} s, [+-]\d+\.\d ppm, round trip \d+\.\d\d ms", about)
+    assert "0 lost by its counter" in about
+    assert "signal alive" in about
+
+
+def test_what_belongs_to_the_watch_is_refused_without_it() -> None:
+    done = labcrane("streams", "--seconds", 8)
+    assert done.returncode != 0
+    assert "--seconds and --protocol belong to --watch; add it" in done.stderr
 
 
 def test_streams_are_recorded_without_an_experiment(recorded: Path) -> None:

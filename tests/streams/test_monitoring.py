@@ -286,7 +286,7 @@ def long_view(faults: tuple[SignalFault, ...]) -> StreamView:
         skew_ppm=-43.2,
         silent=0.01,
     )
-    return StreamView(stream.name, "lab-pc", stream, reading, faults, True, ())
+    return StreamView(stream.name, "lab-pc", stream, reading, faults, watched=True, trouble=())
 
 
 def test_the_watch_fits_eighty_columns_and_cuts_nothing_off() -> None:
