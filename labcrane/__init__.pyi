@@ -47,6 +47,7 @@ from .errors import (
     ProtocolError,
     RecordingError,
 )
+from .files.yaml import read_yaml
 from .machines.actuator import ACTUATOR_PRESETS, Actuator, ActuatorSettings
 from .machines.inverse_kinematics import reach
 from .machines.kinematics import Arm, jacobian, link_frames
@@ -148,6 +149,7 @@ __all__ = [
     "quietly_imported",
     "reach",
     "read_placed",
+    "read_yaml",
     "signals_of",
     "urdf",
     "urdf_joint",

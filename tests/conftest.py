@@ -1,9 +1,19 @@
-"""LSL on this computer only, apart from any other test run, before anything imports pylsl."""
+"""LSL on this computer only, apart from any other test run, before anything imports pylsl.
 
+Tests run in several processes at once, each with an LSL session of its own, and take what they need
+of the computer in turn: see ``needs`` and ``pytest_runtest_protocol``.
+"""
+
+import fcntl
 import os
 import signal
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+
+import pytest
+from needs import need, not_tried
 
 from labcrane.streams.network import LOOPBACK
 
@@ -11,7 +21,80 @@ _FOLDER = tempfile.TemporaryDirectory(prefix="labcrane-tests-")
 _CONFIG = Path(_FOLDER.name) / "lsl_api.cfg"
 _CONFIG.write_text(LOOPBACK.replace("[lab]", f"[lab]\nSessionID = labcrane-tests-{os.getpid()}"))
 os.environ["LSLAPICFG"] = str(_CONFIG)
+# One thread each: the processes would take the cores from each other.
+for _library in ("OMP", "OPENBLAS", "MKL"):
+    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 # What a shell starts in the background ignores interrupts, and so does all that it starts itself:
 # tests interrupt programs as a person does.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+WAITING = 1
+"""Processes beyond one a core: many tests wait, for a session in real time or for a device."""
+
+TURNS = "LABCRANE_TEST_TURNS"
+"""Names the folder that the processes of a run share, for their locks."""
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    if not hasattr(config, "workerinput"):
+        os.environ[TURNS] = _FOLDER.name
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """Return how many processes ``-n auto`` starts."""
+    return len(os.sched_getaffinity(0)) + WAITING
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Keep the tests of a file in one process, which makes their fixtures once."""
+    for item in items:
+        if item.get_closest_marker("xdist_group") is None and _shares(item):
+            item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
+
+
+def _shares(item: pytest.Item) -> bool:
+    """Whether a test has a fixture that others of its file have too."""
+    fixtures = getattr(item, "_fixtureinfo", None)
+    if fixtures is None:
+        return False
+    made = (one for found in fixtures.name2fixturedefs.values() for one in found)
+    return any(one.scope in {"module", "class"} for one in made)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """Let a test that is ``quiet`` run while no other process of this run has one."""
+    quiet = item.get_closest_marker("quiet") is not None
+    with _turn(fcntl.LOCK_EX if quiet else fcntl.LOCK_SH):
+        return (yield)
+
+
+@contextmanager
+def _turn(how: int) -> Iterator[None]:
+    folder = Path(os.environ[TURNS])
+    with (folder / "queue").open("w") as queue, (folder / "computer").open("w") as computer:
+        # Whoever wants the computer alone waits in the queue; nobody overtakes.
+        fcntl.flock(queue, fcntl.LOCK_EX)
+        fcntl.flock(computer, how)
+        fcntl.flock(queue, fcntl.LOCK_UN)
+        yield
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    for mark in item.iter_markers("needs"):
+        need(*mark.args)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """End by saying what was not tried, and why."""
+    skipped = terminalreporter.stats.get("skipped", [])
+    reasons = [one.longrepr[2] for one in skipped if isinstance(one.longrepr, tuple)]
+    lines = not_tried(reasons)
+    if terminalreporter.config.getoption("markexpr") == "not long and not soak":
+        lines.append("what takes minutes is not tried either: pytest -m long, pytest -m soak")
+    if lines:
+        terminalreporter.section("not tried on this computer")
+        for line in lines:
+            terminalreporter.line(line)

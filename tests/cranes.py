@@ -1,22 +1,18 @@
 """Cranes for tests: built as a rig builds them, opened, driven."""
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
+from needs import needs
 
 from labcrane import Dynamics, FloatArray, Machine
 from labcrane.testing import RATE_HZ, make_run
 from labcrane_bullet import labcrane_dynamics
 
-needs_bullet = pytest.mark.skipif(
-    find_spec("pybullet") is None and not os.environ.get("CI"),
-    reason="pybullet has no wheels for this Python",
-)
+needs_bullet = needs("pybullet")
 CRANES = ["kinematic_crane", pytest.param("bullet_crane", marks=needs_bullet)]
 MACHINES = ["ch8", "ch8_cranelike"]
 cranes = pytest.mark.parametrize("name", CRANES)

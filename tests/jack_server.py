@@ -1,28 +1,25 @@
-"""A JACK server without hardware, and whether it may run in real time here."""
+"""A JACK server without hardware."""
 
 import os
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-PRIORITY = 70
-
-
-def real_time_is_allowed() -> bool:
-    """Try, in a process of its own, whether this user may have JACK's real-time priority."""
-    asked = f"import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param({PRIORITY}))"
-    done = subprocess.run([sys.executable, "-c", asked], capture_output=True, check=False)
-    return done.returncode == 0
+from needs import REAL_TIME_PRIORITY, need
 
 
 @contextmanager
 def a_jack_server(folder: Path, *, real_time: bool = False) -> Iterator[tuple[str, Path]]:
     """Start a JACK server whose blocks are due in time; give its name and its log."""
+    need("jackd", "jack_wait", *(["real-time priorities"] if real_time else []))
     name, log = f"labcrane-{os.getpid()}", folder / "jack.log"
     driver = ["-d", "dummy", "-r", "48000", "-p", "1024"]
-    how = ["--realtime", "--realtime-priority", str(PRIORITY)] if real_time else ["--no-realtime"]
+    how = (
+        ["--realtime", "--realtime-priority", str(REAL_TIME_PRIORITY)]
+        if real_time
+        else ["--no-realtime"]
+    )
     with log.open("w") as file:
         server = subprocess.Popen(["jackd", "-n", name, *how, *driver], stdout=file, stderr=file)
         try:

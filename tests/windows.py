@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
-import pytest
+from needs import GRAPHICS, need
 
 from labcrane import Frame, Run, link_boxes
 from labcrane.testing import TARGETS, ch8, crane_at, make_run, make_target
@@ -33,6 +33,7 @@ def make_frame(number: int = 0) -> Frame:
 
 @contextmanager
 def a_view(**settings: object) -> Iterator[View]:
+    need(*GRAPHICS)
     view = View(ViewSettings(**{"display": "hidden", "size": SIZE, "hud": ()} | settings), MACHINE)
     try:
         view.open(a_scene())
@@ -79,6 +80,7 @@ def magenta(picture: np.ndarray) -> np.ndarray:
 @contextmanager
 def an_x_server(*more: str) -> Iterator[str]:
     """Start an X server, and give its display; the server itself chooses the number."""
+    need("Xvfb")
     read, write = os.pipe()
     arguments = [
         "Xvfb",
@@ -92,12 +94,7 @@ def an_x_server(*more: str) -> Iterator[str]:
         "-noreset",  # or it refuses new clients for a moment when the last one has gone
         *more,
     ]
-    try:
-        server = subprocess.Popen(arguments, pass_fds=[write], stderr=subprocess.DEVNULL)
-    except FileNotFoundError:
-        if os.environ.get("CI"):
-            raise
-        pytest.skip("needs Xvfb")
+    server = subprocess.Popen(arguments, pass_fds=[write], stderr=subprocess.DEVNULL)
     os.close(write)
     with os.fdopen(read) as numbers:
         number = numbers.readline().strip()

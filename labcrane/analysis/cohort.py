@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from labcrane.errors import ProtocolError, RecordingError
+from labcrane.files.yaml import parse_yaml
 from labcrane.recording.participant_file.reader import Recording, SessionRecord, open_recording
 from labcrane.recording.paths import participant_path
 
@@ -217,6 +218,4 @@ def _unfinished(session: SessionRecord) -> str | None:
 
 def _planned(protocol: str) -> int:
     """Return how many sessions a protocol has."""
-    from ruamel.yaml import YAML
-
-    return len(YAML(typ="safe").load(protocol)["sessions"])
+    return len(parse_yaml(protocol, "the recorded protocol")["sessions"])

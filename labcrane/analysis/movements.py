@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from labcrane.files.yaml import parse_yaml
 from labcrane.machines.machine import Machine
 from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.types import FloatArray
@@ -87,9 +88,7 @@ def groups(session: SessionRecord) -> dict[str, "pd.DataFrame"]:
 
 def machine_of(session: SessionRecord) -> Machine:
     """Return the machine that was operated."""
-    from ruamel.yaml import YAML
-
-    return Machine.model_validate(YAML(typ="safe").load(session.context["machine"]))
+    return Machine.model_validate(parse_yaml(session.context["machine"], "the recorded machine"))
 
 
 def movements(session: SessionRecord) -> Iterator[Movement]:

@@ -8,13 +8,10 @@ from importlib.metadata import EntryPoint, entry_points, version
 from pathlib import Path
 from typing import Any
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
-
 from labcrane.approval.source_tree import hashes
 from labcrane.errors import ProtocolError
 from labcrane.files.atomic import sha256
-from labcrane.files.yaml import YamlFile
+from labcrane.files.yaml import YamlFile, parse_yaml
 from labcrane.protocol.study import Study
 from labcrane.registry.entry_points import PROJECT
 from labcrane.registry.registry import Registry
@@ -164,8 +161,8 @@ def content_of_text(text: str, *, data: bool) -> dict[str, Any]:
 def _parsed(text: str) -> Any:
     """Return YAML, of which JSON is a part, as plain data; None if it is none."""
     try:
-        return _json_like(YAML(typ="safe").load(text))
-    except YAMLError:
+        return _json_like(parse_yaml(text, "a file of the study"))
+    except ProtocolError:
         return None
 
 

@@ -9,10 +9,12 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
+from typing import Annotated
 
 import typer
 
 from labcrane.cli import plugin_groups as extension
+from labcrane.cli.help import Plain, Sections
 from labcrane.errors import LabcraneError, ProtocolError
 
 MODULES = {
@@ -71,11 +73,12 @@ def commands(words: Sequence[str]) -> typer.Typer:
         add_completion=first not in known,  # its options come before a command
         pretty_exceptions_enable=False,
         rich_markup_mode=None,  # what draws boxes round the help takes longer than all the rest
+        cls=Sections,
     )
     app.callback()(_labcrane)
     everything = COMPLETING in os.environ
     if first in known:
-        app.command(first)(_function(known[first], first))
+        app.command(first, cls=Plain)(_function(known[first], first))
         return app
     for name, module in known.items():
         run = _function(module, name)
@@ -108,5 +111,20 @@ def _stub(run: Callable[..., None]) -> Callable[[], None]:
     return stub
 
 
-def _labcrane() -> None:
+def _version(asked: bool) -> None:  # noqa: FBT001 - as typer calls it
+    if asked:
+        from labcrane.doctor.versions import versions
+
+        for line in versions():
+            typer.echo(line)
+        raise typer.Exit
+
+
+def _labcrane(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_version, is_eager=True, help="what a bug report needs"),
+    ] = False,
+) -> None:
     """Studies of people operating cranes and manipulators."""
+    del version  # it has been printed

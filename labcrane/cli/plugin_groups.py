@@ -7,6 +7,7 @@ from importlib.machinery import ModuleSpec
 
 import typer
 
+from labcrane.cli.help import Plain
 from labcrane.errors import PluginError
 from labcrane.registry.entry_points import PROJECT, declared
 
@@ -54,7 +55,7 @@ def fill(app: typer.Typer, group: str, commands: Mapping[str, Callable[..., None
     for there in app.registered_groups:
         if there.name == group and there.typer_instance is not None:
             for name, run in commands.items():
-                there.typer_instance.command(name, short_help=first_line(run))(run)
+                there.typer_instance.command(name, cls=Plain, short_help=first_line(run))(run)
 
 
 def first_line(run: Callable[..., None]) -> str:

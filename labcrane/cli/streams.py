@@ -8,23 +8,10 @@ if TYPE_CHECKING:
     from labcrane.core.signals import SignalFault
     from labcrane.monitoring.stream_meter import StreamReading
     from labcrane.monitoring.watch import StreamView
-    from labcrane.streams.discovery import FoundStream
 
 WIDTH = 80
 MOST_LABELS = 6
 SILENT_S = 1.0
-
-
-def found_lines(one: "FoundStream") -> Iterator[str]:
-    """Yield what is known of a stream that was found."""
-    yield f"{one.name}: {_head(one.type, one.rate_hz, one.channels, one.units)}"
-    clock = "clock unknown"
-    if one.offset_s is not None and one.rtt_s is not None:
-        clock = f"clock {one.offset_s:+.6f} s, round trip {1e3 * one.rtt_s:.2f} ms"
-    yield f"  on {one.host}, {clock}"
-    yield f"  source id {one.source_id or '-'}"
-    for warning in one.warnings:
-        yield from _wrapped("", warning)
 
 
 def watched_lines(view: "StreamView", width: int = WIDTH) -> Iterator[str]:

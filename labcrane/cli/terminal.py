@@ -4,7 +4,9 @@ Both run in threads of their own, so that a slow terminal never makes the loop w
 """
 
 import codecs
+import math
 import os
+import re
 import select
 import sys
 import threading
@@ -16,7 +18,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from labcrane.cli.questionnaire import Sheet, Sheets, sheet_line
 from labcrane.core.items import AnswerError
-from labcrane.core.records import Event
+from labcrane.core.records import Event, is_done
 from labcrane.core.roles import Questionnaire
 from labcrane.session.commands import Command, Order, QueueConsole
 
@@ -114,7 +116,7 @@ class Terminal:
         while (event := self._console.events.get()) is not None:
             self._sheet = self._sheets(event, self._sheet)
             if event.name == "trial.end" and event.data["counted"]:
-                if not event.data["practice"] and event.data["outcome"] != "repeated":
+                if is_done(event.data):
                     self._progress.advance(self._bar)
                 self._progress.print(_trial_line(event.data), markup=False, highlight=False)
             elif line := _event_line(event):
@@ -214,9 +216,17 @@ def _trial_line(data: Mapping[str, object]) -> str:
     measures = [
         f"{name.replace('_', ' ')} {value:.3g} {unit}"
         for name, unit in (("movement_time", "s"), ("error", "m"))
-        if isinstance(value := data.get(name), float)
+        if isinstance(value := data.get(name), float) and math.isfinite(value)
     ]
     return f"trial {data['trial']}: {', '.join([str(data['outcome']), *measures])}"
+
+
+FOLDERS = re.compile(r"(?<=\()/[^():]*/(?=[^/():]+:\d+\))")
+"""The folders of a place in the code; they are in the record, and too long for a line here."""
+
+
+def _short(why: str) -> str:
+    return FOLDERS.sub("", why)
 
 
 def _event_line(event: Event) -> str | None:
@@ -231,7 +241,7 @@ def _event_line(event: Event) -> str | None:
         case "block.start":
             return f"block {data['block']}: {data['block_name']}"
         case "input.lost" | "disk.lost" | "plugin.slow":
-            return f"{event.name.upper().replace('.', ' ')}: {data['why']}"
+            return f"{event.name.upper().replace('.', ' ')}: {_short(str(data['why']))}"
         case "stream.lost" | "feedback.awaited":
             return f"{event.name.upper().replace('.', ' ')}: {data['what']}"
         case "input.back" | "disk.back" | "stream.back":

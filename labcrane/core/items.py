@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from labcrane.core.records import Value
+from labcrane.limits import LimitError, check_text
 
 Kind = Literal["scale", "number", "choice", "text"]
 
@@ -75,7 +76,7 @@ class Item:
         if self.kind in {"choice", "text"}:
             fits = isinstance(answer, str) and bool(answer.strip())
             if fits and (self.kind == "text" or answer in self.choices):
-                return str(answer)
+                return _written(str(answer))
         elif _is_number(answer) and self._on_scale(float(str(answer))):
             return float(str(answer))
         raise AnswerError(f"item {self.name!r} takes {self.takes}, not {answer!r}")
@@ -104,6 +105,15 @@ class Score:
     name: str
     lowest: float
     highest: float
+
+
+def _written(answer: str) -> str:
+    """Return a text as it is; JSON can hold what no page can show, as halves of surrogates."""
+    try:
+        check_text(answer, "answer")
+    except LimitError as error:
+        raise AnswerError(str(error)) from None
+    return answer
 
 
 def _is_number(answer: object) -> bool:

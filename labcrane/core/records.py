@@ -211,7 +211,9 @@ class SessionState:
     block, block_name, practice
         The block under way.
     trial, trials
-        Number of the trial, 0 between trials, and how many the session has.
+        Number of the trial, 0 between trials, and how many counted ones the session has.
+    counted, done
+        Which of the counted trials is running, 0 for none, and how many are over.
     active
         Names of the cues and sounds that are switched on; empty between trials.
     settings
@@ -236,6 +238,8 @@ class SessionState:
     practice: bool = False
     trial: int = 0
     trials: int = 0
+    counted: int = 0
+    done: int = 0
     active: tuple[str, ...] = ()
     settings: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
     counts: Mapping[str, int] = field(default_factory=dict)
@@ -244,6 +248,19 @@ class SessionState:
     hint: str = ""
     hint_time: float = 0.0
     scene: str = ""
+
+
+def is_counted(about: Mapping[str, Value]) -> bool:
+    """Whether a trial is one that the study is about: no practice, and not just the way to it.
+
+    ``about`` is what the trial's events say of it.
+    """
+    return bool(about.get("counted")) and not about.get("practice")
+
+
+def is_done(ended: Mapping[str, Value]) -> bool:
+    """Whether a counted trial is over for good, by its ``trial.end``."""
+    return is_counted(ended) and ended.get("outcome") != "repeated"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -18,7 +18,7 @@ READING_S = 120.0
 
 @dataclass(frozen=True, slots=True)
 class Owed:
-    """A questionnaire after a trial that a process died before or in the middle of.
+    """A questionnaire after a trial that a session stopped before or in the middle of.
 
     Attributes
     ----------
@@ -62,7 +62,9 @@ class PlannedBlock:
     feedback
         What is switched on in each trial, by the trial's number; empty in a study without.
     owed
-        What a process that died was still to ask after the last trial.
+        What a session that stopped was still to ask after trials that are over.
+    streak
+        How many counted trials in a row had succeeded before it stopped.
     """
 
     name: str
@@ -78,6 +80,7 @@ class PlannedBlock:
     ask: tuple[str, ...] = ()
     feedback: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
     owed: tuple[Owed, ...] = ()
+    streak: int = 0
 
     @property
     def expected_s(self) -> float:
@@ -92,7 +95,7 @@ class PlannedStep:
     Attributes
     ----------
     answered
-        What was answered of its questionnaires before the session's process died.
+        What was answered of its questionnaires before the session stopped.
     """
 
     number: int
@@ -123,6 +126,8 @@ class SessionPlan:
         The participant's place in the design, counted from 1.
     group
         Between-subject group; "" when the study has none.
+    held
+        Who held the session when it stopped, and holds it still.
     """
 
     participant: str
@@ -132,11 +137,26 @@ class SessionPlan:
     steps: tuple[PlannedStep, ...]
     slot: int = 1
     group: str = ""
+    held: frozenset[str] = frozenset()
 
     @property
     def blocks(self) -> tuple[PlannedBlock, ...]:
         """The blocks among the steps."""
         return tuple(step.block for step in self.steps if step.block)
+
+    @property
+    def trials(self) -> tuple[Trial, ...]:
+        """The trials that a study is about, which whoever counts trials counts.
+
+        Practice and what only leads to the next trial are not among them.
+        """
+        return tuple(
+            trial
+            for block in self.blocks
+            if not block.practice
+            for trial in block.trials
+            if trial.planned.counted
+        )
 
     @property
     def expected_s(self) -> float:

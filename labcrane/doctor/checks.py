@@ -4,9 +4,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from labcrane.core.findings import Finding
+from labcrane.core.findings import Finding, Verdict
 from labcrane.doctor import clock, components, disk, scheduling
 from labcrane.doctor.report import Check, as_data, diagnosis, latest
+from labcrane.doctor.versions import versions
 from labcrane.protocol.study import Study
 from labcrane.registry.registry import Registry
 
@@ -39,6 +40,7 @@ def examine(
         Whether a person is there to move the controls.
     """
     rate_hz = study.protocol.rate_hz if study else RATE_HZ
+    yield from _checks("version", (Finding(Verdict.PASS, line) for line in versions()))
     yield from _checks("clock", clock.examine())
     yield from _checks("scheduling", scheduling.examine(rate_hz))
     yield from _checks("disk", disk.examine(data, needed_bytes))

@@ -3,12 +3,15 @@
 Each look is made in a process of its own: a driver that crashes or hangs is a finding.
 """
 
+import faulthandler
 import multiprocessing
 import os
+import re
 import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -21,6 +24,9 @@ from labcrane.registry.registry import ROLES, Registry, discover
 
 WAIT_S = 30.0
 """How long a look may take; with a person who moves things, ten times as long."""
+
+START_S = 10.0
+"""How much longer is waited: a process must start, and say at the end where it stands."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,14 +97,15 @@ def examine(look: Look, *, move: bool) -> Sequence[Finding]:
 def _examine(look: Look, complaints: Path, *, move: bool) -> Sequence[Finding]:
     context = multiprocessing.get_context("spawn")
     ours, theirs = context.Pipe(duplex=False)
-    arguments = (theirs, look, move, str(complaints))
+    wait_s = WAIT_S * (10.0 if move else 1.0)
+    arguments = (theirs, look, move, str(complaints), wait_s)
     process = context.Process(target=_look, args=arguments, name=f"examine {look.name}")
     process.start()
     theirs.close()
-    wait_s = WAIT_S * (10.0 if move else 1.0)
     try:
-        if not ours.poll(wait_s):
-            return [_fault(look, f"did not answer within {wait_s:g} s")]
+        if not ours.poll(wait_s + START_S):
+            where = _stuck(complaints.read_text(errors="replace"))
+            return [_fault(look, f"did not answer within {wait_s:g} s{where}")]
         found: Sequence[Finding] = ours.recv()
     except EOFError:
         process.join()
@@ -120,10 +127,40 @@ def _fault(look: Look, what: str) -> Finding:
     return Finding(Verdict.FAIL, f"looking at {look.role} {look.name!r} {what}", fix)
 
 
-def _look(pipe: Connection, look: Look, move: bool, complaints: str) -> None:  # noqa: FBT001
+FRAME = re.compile(r'^  File "(?P<path>.+)", line (?P<line>\d+) in (?P<name>.+)$', re.MULTILINE)
+
+
+def _stuck(complaints: str) -> str:
+    """Return where a look has stood still, as faulthandler wrote it at the end of its time.
+
+    What hangs is most often a library; which call of the plugin's led there says more.
+    """
+    *_, main = complaints.rpartition("(most recent call first):")
+    calls = list(takewhile(lambda call: call["path"] != __file__, FRAME.finditer(main)))
+    if not calls:
+        return ""
+    inner, *outer = calls
+    said = f"; it stood still in {inner['name']}() ({Path(inner['path']).name}:{inner['line']})"
+    here = Path(inner["path"]).parent
+    for call in outer:
+        if Path(call["path"]).parent != here:
+            place = f"{Path(call['path']).name}:{call['line']}"
+            return f"{said}, called by {call['name']}() ({place})"
+    return said
+
+
+def _look(
+    pipe: Connection,
+    look: Look,
+    move: bool,  # noqa: FBT001
+    complaints: str,
+    wait_s: float,
+) -> None:
     # Sound libraries fill the terminal with what they did not find; it is kept for a crash.
     with Path(complaints).open("a") as file:
         os.dup2(file.fileno(), sys.stderr.fileno())
+    # Even what hangs in C and lets no Python run is seen by this.
+    faulthandler.dump_traceback_later(wait_s, file=sys.stderr)
     registry = discover(study=look.study)
     (role,) = (role for role, entry in ROLES.items() if entry.word == look.role)
     examine = registry.offers[role][look.name].examine

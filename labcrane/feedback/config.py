@@ -41,6 +41,8 @@ class FeedbackConfig:
         What was measured of its delay, if anything was.
     recorded
         Whether there is a recorder, without which it presents nothing; a preview has none.
+    streams
+        Descriptions of the session's streams by name, when there are any yet.
     """
 
     name: str
@@ -52,6 +54,7 @@ class FeedbackConfig:
     cues: Mapping[str, Part] = field(default_factory=dict)
     measured: Measured | None = None
     recorded: bool = True
+    streams: Mapping[str, str] = field(default_factory=dict)
 
     def as_json(self) -> str:
         """Return the order as one line."""
@@ -65,6 +68,7 @@ class FeedbackConfig:
             "cues": {name: asdict(part) for name, part in self.cues.items()},
             "measured": asdict(self.measured) if self.measured else None,
             "recorded": self.recorded,
+            "streams": dict(self.streams),
         }
         return json.dumps(fields)
 
@@ -82,4 +86,5 @@ class FeedbackConfig:
             {name: Part(**part) for name, part in found["cues"].items()},
             measured_of(found["measured"]) if found["measured"] else None,
             found["recorded"],
+            found["streams"],
         )

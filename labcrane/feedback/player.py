@@ -58,7 +58,7 @@ def _wait(keepers: Sequence[FeedbackHandle], say: Callable[[str], None]) -> None
     while not all(keeper.ready or keeper.given_up for keeper in keepers):
         for keeper in keepers:
             for news in keeper.watch():
-                say(f"feedback {news.text}")
+                say(f"feedback {news}")
         time.sleep(LOOK_S)
     if all(keeper.given_up for keeper in keepers):
         raise DeviceError("nothing can be shown or sounded here; --to FOLDER writes files instead")

@@ -1,23 +1,22 @@
 """A feedback process: one view or sound, fed with the newest frame.
 
-``python -m labcrane.feedback.process`` reads its order, one line of JSON, from the standard input
-and ends when that is closed or says ``stop``. It reports on its standard output, a line of JSON
-each time: ``ready`` with the component's metadata, ``presents`` from the first frame on, ``beat``
-while it lives, ``failed`` with the reason.
+It is started by a :class:`labcrane.processes.handle.ProcessHandle` with a
+:class:`labcrane.feedback.config.FeedbackConfig`, is told the session's streams when there are any,
+and ends when its parent does. It reports ``ready`` with the component's metadata, ``presents`` from
+the first frame on, ``beat`` while it lives, ``failed`` with the reason.
 """
 
-import json
-import os
 import sys
 import threading
 import time
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TextIO
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
 
 from labcrane.core.records import Frame
 from labcrane.errors import LabcraneError
 from labcrane.feedback.config import FeedbackConfig
 from labcrane.feedback.presenter import Presenter
+from labcrane.processes.parent import Parent
 from labcrane.registry.registry import discover
 from labcrane.registry.traceback import told
 
@@ -31,6 +30,7 @@ if TYPE_CHECKING:
 
 WAIT_S = 0.05
 BEAT_S = 0.2
+LISTEN_S = 1.0
 
 
 class FeedbackProcess:
@@ -43,12 +43,16 @@ class FeedbackProcess:
         self._beaten = 0.0
         self._presented = 0
         self._presents = False
-        self._resolver: pylsl.ContinuousResolver | None = None
+        self._offered = order.streams
         self._pictures: PictureOutlet | None = None
 
     def stop(self) -> None:
         """Stop after the frame under way."""
         self._stop.set()
+
+    def offer(self, streams: Mapping[str, str]) -> None:
+        """Take the session's streams, by name and description."""
+        self._offered = streams
 
     def run(self) -> None:
         """Present until stopped; raises what the component raises."""
@@ -117,21 +121,24 @@ class FeedbackProcess:
     def _found(self, *names: str) -> "dict[str, pylsl.StreamInfo]":
         """Wait for the session's streams of these names; none when stopped first.
 
-        A search in the background: one that waits may take seconds longer than it was told, and
-        what is not heard of for so long is killed.
+        The launcher tells them; where there is none, as in a preview, they are searched for.
         """
-        import pylsl  # noqa: PLC0415
-
-        from labcrane.streams.outlets import source_id  # noqa: PLC0415
+        from labcrane.streams.outlets import source_id  # noqa: PLC0415 - liblsl
+        from labcrane.streams.search import Search, known_stream  # noqa: PLC0415
 
         ours = source_id(self._order.source, "")
-        # Kept: to end a search takes as long as one that waits.
-        self._resolver = pylsl.ContinuousResolver(pred=f"starts-with(source_id, '{ours}')")
-        while not self._stop.wait(WAIT_S):
-            self._beat()
-            found = {info.name(): info for info in self._resolver.results()}
-            if all(name in found for name in names):
-                return found
+        search = None if self._order.recorded else Search(f"starts-with(source_id, '{ours}')")
+        try:
+            while not self._stop.wait(WAIT_S):
+                self._beat()
+                known = {name: known_stream(text) for name, text in self._offered.items()}
+                found = {name: info for name, info in known.items() if info is not None}
+                found |= {info.name(): info for info in (search.results() if search else ())}
+                if all(name in found for name in names):
+                    return found
+        finally:
+            if search:
+                search.close()
         return {}
 
     def _beat(self) -> None:
@@ -141,38 +148,32 @@ class FeedbackProcess:
             self._say({"beat": self._presented})
 
 
-def _reporter(status: TextIO) -> Callable[[dict[str, Any]], None]:
-    def say(message: dict[str, Any]) -> None:
-        try:
-            status.write(json.dumps(message) + "\n")
-            status.flush()
-        except BrokenPipeError:
-            pass  # the launcher is gone, and the closed input stops this process
-
-    return say
-
-
 def main() -> int:
     """Run one feedback process; return its exit status."""
-    # Sound and graphics libraries print to the standard output, which is ours for reports.
-    status = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)
-    say = _reporter(status)
-    process = FeedbackProcess(FeedbackConfig.from_json(sys.stdin.readline()), say)
+    parent = Parent()
+    order = parent.order()
+    if order is None:
+        return 0
+    process = FeedbackProcess(FeedbackConfig.from_json(order), parent.tell)
 
     def listen() -> None:
-        sys.stdin.readline()
+        while not parent.gone.is_set():
+            parent.wait(LISTEN_S)
+            for streams in parent.messages():
+                process.offer(streams)
         process.stop()
 
     threading.Thread(target=listen, name="from-launcher", daemon=True).start()
     try:
         process.run()
     except LabcraneError as error:
-        say({"failed": str(error)})
+        parent.tell({"failed": str(error)})
         return 1
     except Exception as error:
-        say({"failed": told(error)})
+        parent.tell({"failed": told(error)})
         raise  # a plugin's mistake: its author needs the traceback
+    finally:
+        parent.close()
     return 0
 
 

@@ -1,7 +1,7 @@
 """All feedback processes of a run."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from labcrane.core.records import Run
@@ -13,7 +13,7 @@ from labcrane.feedback.handle import FeedbackHandle
 from labcrane.protocol import rig
 from labcrane.protocol.components import ComponentSpec
 from labcrane.protocol.study import Study
-from labcrane.session.commands import Command, Order
+from labcrane.session.commands import FeedbackLost, FeedbackReady
 from labcrane.session.session import Visit
 from labcrane.streams.feedback_log import log_source
 from labcrane.streams.request import StreamRequest
@@ -28,7 +28,7 @@ class FeedbackProcesses:
         policy = visit.study.protocol.on_fault.feedback_lost
         self._required = policy != "continue"
         self.keepers = [FeedbackHandle(order, policy) for order in _orders_of(visit)]
-        self._news: list[Command] = []
+        self._news: list[FeedbackLost | FeedbackReady] = []
 
     def wait(self, say: Callable[[str], None], ended: Callable[[], bool]) -> bool:
         """Wait until all are ready or left out; whether the session may start.
@@ -48,22 +48,25 @@ class FeedbackProcesses:
                         "{feedback_lost: continue} would go on without it)"
                     )
                 self._news += (news := keeper.watch())
-                for command in news:
-                    say(f"feedback {command.text}")
+                for report in news:
+                    say(f"feedback {report}")
             if ended():
                 return False
             time.sleep(LOOK_S)
         return True
 
-    def watch(self, say: Callable[[str], None]) -> list[Command]:
+    def watch(self, say: Callable[[str], None]) -> list[FeedbackLost | FeedbackReady]:
         """Look after all processes; return what the session is to be told, also of its start."""
-        news = [command for keeper in self.keepers for command in keeper.watch()]
-        for command in news:
-            word = "is ready" if command.order is Order.MENDED else "failed"
-            name, _, text = command.text.partition(": ")
-            say(f"feedback {name} {word}" + (f": {text}" if text else ""))
+        news = [report for keeper in self.keepers for report in keeper.watch()]
+        for report in news:
+            say(f"feedback {report}")
         before, self._news = self._news, []
         return before + news
+
+    def offer(self, streams: Mapping[str, str]) -> None:
+        """Tell all processes the session's streams, by name and description."""
+        for keeper in self.keepers:
+            keeper.offer(streams)
 
     def stop(self) -> None:
         """Stop all processes."""

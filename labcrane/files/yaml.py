@@ -1,7 +1,9 @@
 """A YAML file that remembers where everything stands, so that every mistake gets a line."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
+from datetime import date
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -9,9 +11,27 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.error import MarkedYAMLError
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.reader import ReaderError
 
 from labcrane.errors import ProtocolError, suggestion
+from labcrane.limits import LIMITS, LimitError, check_size, foreign
+
+DEEPEST = LIMITS["YAML file"].depth
+MOST_MARKS = 20_000
+"""Marks of YAML in a file: they, more than its length, are what reading it takes time for."""
+
+MOST_VALUES = 50_000
+"""Values in a file once every alias stands for what it names."""
+
+MOST_BITS = 1000
+"""Of a whole number: Python writes down no more than 4,300 digits."""
+
+GARBLED = (ValueError, LookupError, TypeError, ArithmeticError, AttributeError, AssertionError)
+
+_MARKS = re.compile(r"[,:\[\]{}\n-]")
+_BRACKETS = re.compile(r"[\[\]{}]")
+_STAIRS = re.compile(r"(?:[-?:] *){50}| {200}")
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 Place = tuple[str | int, ...]
@@ -43,19 +63,9 @@ class YamlFile:
     @classmethod
     def read(cls, path: Path) -> "YamlFile":
         """Read ``path``; a file that is missing or no YAML raises :class:`ProtocolError`."""
-        try:
-            text = path.read_text(encoding="utf-8")
-            marked = YAML(typ="rt").load(text)
-        except FileNotFoundError:
-            raise ProtocolError(
-                f"{path} does not exist; check its name, and the folder you are in"
-            ) from None
-        except (OSError, UnicodeDecodeError) as error:
-            raise ProtocolError(f"{path} cannot be read: {error}") from error
-        except MarkedYAMLError as error:
-            line = error.problem_mark.line + 1 if error.problem_mark else 1
-            raise ProtocolError(f"{path}:{line}: this is no YAML: {error.problem}") from error
-        return cls(path, text, _plain(marked), marked)
+        text = read_text(path)
+        marked = _load(text, str(path))
+        return cls(path, text, _plain(marked, str(path)), marked)
 
     def line(self, place: Place) -> int:
         """Return the line, counted from 1, of the key or list item at ``place``.
@@ -164,14 +174,141 @@ def _name(place: Place) -> str:
     return text or "the file"
 
 
-def _plain(node: Any) -> Any:
-    if isinstance(node, CommentedMap):
-        return {str(key): _plain(value) for key, value in node.items()}
-    if isinstance(node, CommentedSeq):
-        return [_plain(value) for value in node]
-    if isinstance(node, bool) or node is None:
+def read_text(path: Path) -> str:
+    """Return the text of a file in UTF-8 that people write.
+
+    Raises
+    ------
+    ProtocolError
+        There is none, it is larger than such files are, or no text.
+    """
+    try:
+        check_size(path.stat().st_size, "YAML file", "it")
+        if not path.is_file():
+            raise ProtocolError(f"{path} is no file; give a YAML file")
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise ProtocolError(
+            f"{path} does not exist; check its name, and the folder you are in"
+        ) from None
+    except LimitError as error:
+        raise ProtocolError(f"{path} cannot be read: {error}; split it up") from None
+    except (OSError, ValueError) as error:  # a path with a NUL, bytes that are no UTF-8
+        raise ProtocolError(f"{path} cannot be read: {error}") from error
+
+
+def read_yaml(path: Path) -> Any:
+    """Return the content of a YAML file as plain values, dates as dates.
+
+    Raises
+    ------
+    ProtocolError
+        As :func:`read_text`, or the text is no YAML.
+    """
+    return parse_yaml(read_text(path), str(path))
+
+
+def parse_yaml(text: str, name: str) -> Any:
+    """Return the content of a text of YAML as plain values, dates as dates.
+
+    Parameters
+    ----------
+    name
+        What the text is, for the message when it is none.
+
+    Raises
+    ------
+    ProtocolError
+        It is no YAML, or longer, deeper or larger behind its aliases than may be.
+    """
+    return _plain(_load(text, name), name)
+
+
+def _scalar(node: Any, name: str) -> Any:
+    if node is None or isinstance(node, bool | date | bytes):
         return node
+    if isinstance(node, int) and node.bit_length() > MOST_BITS:
+        raise ProtocolError(f"{name} holds a whole number of {node.bit_length()} bits; write less")
+    if isinstance(node, str) and (sign := foreign(node)) is not None:
+        raise ProtocolError(
+            f"{name} holds the character U+{ord(sign):04X} in {str(node)[:40]!r}, which is no "
+            "writing; leave it out"
+        )
     for kind in (int, float, str):
         if isinstance(node, kind):
             return kind(node)
-    return node
+    raise ProtocolError(f"{name} holds {str(node)[:40]!r} with a tag; write plain values")
+
+
+def _load(text: str, name: str) -> Any:
+    try:
+        check_size(len(text), "YAML file", "it")
+    except LimitError as error:
+        raise ProtocolError(f"{name} cannot be read: {error}; split it up") from None
+    if len(_MARKS.findall(text)) > MOST_MARKS:
+        raise ProtocolError(
+            f"{name} has more than {MOST_MARKS} commas, colons, brackets, dashes and line ends; "
+            "split it up"
+        )
+    if (line := _too_deep(text)) is not None:
+        raise ProtocolError(f"{name}:{line}: nested deeper than {DEEPEST} levels; write it flat")
+    try:
+        # Also where no line is asked for: the plain loader copies each merge into the next.
+        return YAML(typ="rt", pure=True).load(text)
+    except MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 1
+        raise ProtocolError(f"{name}:{line}: this is no YAML: {error.problem}") from error
+    except ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        raise ProtocolError(
+            f"{name}:{line}: this is no YAML: it holds the character U+{_code(error):04X}, which "
+            "no text may; remove it"
+        ) from error
+    except RecursionError:
+        raise ProtocolError(
+            f"{name} is nested deeper than {DEEPEST} levels; write it flat"
+        ) from None
+    # Impossible dates, numbers of too many digits, tags on what they do not fit, and whatever else
+    # ruamel.yaml stumbles over: it does not say what it raises.
+    except (YAMLError, *GARBLED) as error:
+        raise ProtocolError(f"{name}: this is no YAML: {str(error) or repr(error)}") from error
+
+
+def _code(error: ReaderError) -> int:
+    return error.character if isinstance(error.character, int) else ord(error.character)
+
+
+def _too_deep(text: str) -> int | None:
+    """Return the line in which brackets, dashes or indentation nest too deep; None if none does.
+
+    What looks nested inside quotes counts as well: nobody writes so.
+    """
+    depth = 0
+    for number, line in enumerate(text.split("\n"), start=1):
+        if _STAIRS.match(line):
+            return number
+        for sign in _BRACKETS.findall(line):
+            depth = depth + 1 if sign in "[{" else max(0, depth - 1)
+            if depth > DEEPEST:
+                return number
+    return None
+
+
+def _plain(node: Any, name: str) -> Any:
+    """Return a node as plain values; what aliases repeat is counted as often as it is there."""
+    left = [MOST_VALUES]
+
+    def plain(node: Any, depth: int) -> Any:
+        left[0] -= 1
+        if left[0] < 0 or depth > 2 * DEEPEST:
+            raise ProtocolError(
+                f"{name} holds more than {MOST_VALUES} values, or itself, behind its aliases; "
+                "write fewer of them"
+            )
+        if isinstance(node, Mapping):
+            return {str(key): plain(value, depth + 1) for key, value in node.items()}
+        if isinstance(node, list | tuple | Set):
+            return [plain(value, depth + 1) for value in node]
+        return _scalar(node, name)
+
+    return plain(node, 0)

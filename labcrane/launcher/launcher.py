@@ -6,19 +6,31 @@ the participant file, to be gone on with by ``labcrane resume``.
 """
 
 import multiprocessing
+import queue
+import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import TYPE_CHECKING, Any
 
 from labcrane.feedback.processes import FeedbackProcesses, log_requests
 from labcrane.launcher.hang_detector import HangDetector
-from labcrane.launcher.session_process import Ended, SessionConfig, serve
+from labcrane.launcher.session_process import Ended, Offered, SessionConfig, serve
 from labcrane.launcher.signal_reporter import SignalReporter, monitor_config
 from labcrane.recording.crash_marker import read_whereabouts
 from labcrane.recording.paths import parts
-from labcrane.session.commands import Command, Order, QueueConsole
+from labcrane.session.commands import (
+    Command,
+    Message,
+    MessageError,
+    Order,
+    QueueConsole,
+    StreamBack,
+    StreamLost,
+    encode,
+)
 from labcrane.session.eligibility import check_eligibility
 from labcrane.session.session import Visit, finish
 from labcrane.streams.recorder.handle import RecorderHandle
@@ -31,6 +43,9 @@ LOOK_S = 0.05
 """How often the launcher looks after its processes: a dead recorder must be back in a second."""
 
 RECORDER = "recorder"
+
+MOST_WAITING = 1000
+"""So many messages may wait for a session that does not take them; it hangs, and is soon killed."""
 
 FOR_THE_RECORD = (Order.NOTE, Order.DENIED)
 """What is kept for the session when it is said while streams and feedback are waited for."""
@@ -55,6 +70,43 @@ class Outcome:
     sync_report: SyncReport | None = None
 
 
+class MessageSender:
+    """Sends messages to the session from a thread of its own.
+
+    A session that hangs takes none, and whoever writes to its pipe waits: the launcher must not,
+    for it is the launcher that finds out.
+    """
+
+    def __init__(self, pipe: Connection, say: Callable[[str], None]) -> None:
+        self._pipe = pipe
+        self._say = say
+        self._waiting: queue.Queue[bytes | None] = queue.Queue(MOST_WAITING)
+        self._thread = threading.Thread(target=self._send, name="to-session", daemon=True)
+        self._thread.start()
+
+    def send(self, message: Message) -> None:
+        """Have a message sent, without waiting; say so when it cannot be."""
+        try:
+            self._waiting.put_nowait(encode(message))
+        except MessageError as error:
+            self._say(str(error))
+        except queue.Full:
+            self._say(f"the session takes no messages; {MOST_WAITING} wait, and one was dropped")
+
+    def close(self) -> None:
+        """Send what waits, if the session still takes it."""
+        with suppress(queue.Full):
+            self._waiting.put_nowait(None)
+        self._thread.join(LOOK_S)
+
+    def _send(self) -> None:
+        while (line := self._waiting.get()) is not None:
+            try:
+                self._pipe.send_bytes(line)
+            except OSError:
+                return  # the session has ended this very moment
+
+
 class Launcher:
     """Runs one visit.
 
@@ -77,7 +129,7 @@ class Launcher:
         self._crew: FeedbackProcesses | None = None
         self._lost: set[str] = set()
         self._signals = SignalReporter(say)
-        self._kept: list[Command] = []
+        self._kept: list[Message] = []
         self.sync_report: SyncReport | None = None
 
     def run(self) -> Outcome:
@@ -155,23 +207,27 @@ class Launcher:
         process = context.Process(target=serve, args=(self._order, theirs), name="session")
         process.start()
         theirs.close()
+        sender = MessageSender(ours, self._say)
         try:
-            return self._watch(process, ours)
+            return self._watch(process, ours, sender.send)
         finally:
+            sender.close()
             ours.close()
             process.join()
 
-    def _watch(self, process: "SpawnProcess", pipe: Connection) -> int | None:
+    def _watch(
+        self, process: "SpawnProcess", pipe: Connection, send: Callable[[Message], None]
+    ) -> int | None:
         """Return the exit code of a session that died, None of one that ended in order."""
         stillness = HangDetector(self._visit.whereabouts, self._say)
         while True:
             try:
                 for command in (*self._kept, *self._console.commands()):
-                    self._send(pipe, command)
+                    send(command)
                 self._kept.clear()
                 ready = wait([pipe, process.sentinel], LOOK_S)
             except KeyboardInterrupt:
-                self._send(pipe, Command(Order.END))
+                send(Command(Order.END))
                 continue
             # Also when it has died: what it said before is in the pipe.
             ended = self._pass_events(pipe) if ready else None
@@ -184,10 +240,10 @@ class Launcher:
                 return process.exitcode
             if stillness.hangs():
                 process.kill()  # its journal is whole; the exit code is passed on as any other
-            self._watch_streams(pipe)
+            self._watch_streams(send)
             if self._crew:
                 for news in self._crew.watch(self._say):
-                    self._send(pipe, news)
+                    send(news)
 
     def _pass_events(self, pipe: Connection) -> Ended | None:
         try:
@@ -195,32 +251,29 @@ class Launcher:
                 message = pipe.recv()
                 if isinstance(message, Ended):
                     return message
-                self._console.report(message)
+                if isinstance(message, Offered):
+                    if self._crew:
+                        self._crew.offer(message.streams)
+                else:
+                    self._console.report(message)
         except (EOFError, OSError):
             pass  # it died in the middle of a message; its exit code says how
         return None
 
-    def _watch_streams(self, pipe: Connection) -> None:
+    def _watch_streams(self, send: Callable[[Message], None]) -> None:
         recorder = self._recorder
         if recorder is None:
             return
         if recorder.watch():
-            self._say("the recorder died and was started again")
+            self._say("a recorder died: the other one has all streams, and a new one was started")
         for news in self._signals.news(recorder):
-            self._send(pipe, news)
+            send(news)
         lost = recorder.lost() if recorder.status else {RECORDER}
         for what in sorted(lost - self._lost):
-            self._send(pipe, Command(Order.LOST, what))
+            send(StreamLost(what))
         for what in sorted(self._lost - lost):
-            self._send(pipe, Command(Order.BACK, what))
+            send(StreamBack(what))
         if lost != self._lost and lost:
             for line in recorder.complaints():
                 self._say(line)
         self._lost = lost
-
-    @staticmethod
-    def _send(pipe: Connection, command: Command) -> None:
-        try:
-            pipe.send(command)
-        except OSError:
-            return  # the session has ended this very moment

@@ -1,12 +1,13 @@
 """The session as a process of its own, talking to its launcher over one pipe.
 
-The pipe carries commands to the session, and events and how it ended from it, as pickled records.
+The pipe carries messages to the session, as JSON of a declared size, and events and how it ended
+from it, as pickled records.
 """
 
 import queue
 import signal
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -15,9 +16,20 @@ from labcrane.core.records import Event
 from labcrane.errors import LabcraneError
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
-from labcrane.session.commands import Command, Order
+from labcrane.session.commands import (
+    MOST_BYTES,
+    Command,
+    LauncherGone,
+    Message,
+    MessageError,
+    Order,
+    decode,
+)
 from labcrane.session.resume import Policy
 from labcrane.session.session import Visit, record
+
+MOST_A_TICK = 16
+"""Orders taken up in one tick; what else has come waits for the next."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,39 +74,56 @@ class Ended:
     error: LabcraneError | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Offered:
+    """Said when the session's streams are there: their descriptions by name."""
+
+    streams: Mapping[str, str]
+
+
 class PipeConsole:
     """The launcher at the other end of a pipe.
 
-    A thread sends, so that a launcher that does not read never makes the loop wait. When the
-    launcher is gone the session ends: nobody could stop it any more.
+    One thread sends and one receives, so that a launcher that does not read, or stops in the
+    middle of a message, never makes the loop wait. When the launcher is gone the session ends:
+    nobody could stop it any more.
     """
 
     def __init__(self, pipe: Connection) -> None:
         self._pipe = pipe
-        self._alone = False
-        self._outgoing: queue.SimpleQueue[Event | Ended] = queue.SimpleQueue()
+        self._incoming: queue.SimpleQueue[Message] = queue.SimpleQueue()
+        self._outgoing: queue.SimpleQueue[Event | Offered | Ended] = queue.SimpleQueue()
         self._sender = threading.Thread(target=self._send, name="to-launcher", daemon=True)
         self._sender.start()
+        threading.Thread(target=self._receive, name="from-launcher", daemon=True).start()
 
-    def commands(self) -> list[Command]:
-        given: list[Command] = []
-        if self._alone:
-            return given
-        try:
-            while self._pipe.poll():
-                given.append(self._pipe.recv())
-        except (EOFError, OSError):
-            self._alone = True
-            given += [Command(Order.NOTE, "the launcher is gone"), Command(Order.END)]
+    def commands(self) -> list[Message]:
+        given: list[Message] = []
+        while len(given) < MOST_A_TICK and not self._incoming.empty():  # not in the usual tick
+            given.append(self._incoming.get_nowait())
         return given
 
     def report(self, event: Event) -> None:
         self._outgoing.put(event)
 
+    def offer(self, streams: Mapping[str, str]) -> None:
+        """Say which streams there are, so that nobody on this computer searches for them."""
+        self._outgoing.put(Offered(streams))
+
     def end(self, ended: Ended) -> None:
         """Say how the session ended, after everything else, and wait until it is sent."""
         self._outgoing.put(ended)
         self._sender.join()
+
+    def _receive(self) -> None:
+        while True:
+            try:
+                self._incoming.put(decode(self._pipe.recv_bytes(MOST_BYTES)))
+            except MessageError as error:
+                self._incoming.put(Command(Order.DENIED, str(error)))
+            except (EOFError, OSError):
+                self._incoming.put(LauncherGone())
+                return
 
     def _send(self) -> None:
         while True:
@@ -112,7 +141,7 @@ def serve(order: SessionConfig, pipe: Connection) -> None:
     # An interrupt from the keyboard reaches the launcher too, which ends the session in order.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     console = PipeConsole(pipe)
-    console.end(_ended(lambda: record(order.visit(), console)))
+    console.end(_ended(lambda: record(order.visit(), console, console.offer)))
 
 
 def _ended(run: Callable[[], None]) -> Ended:

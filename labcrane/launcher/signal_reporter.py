@@ -1,10 +1,9 @@
 """News of signals, from the recorder to the people and into the session's record."""
 
-import json
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from labcrane.session.commands import Command, Order
+from labcrane.session.commands import SignalReport
 from labcrane.session.session import Visit
 from labcrane.streams.recorder.handle import RecorderHandle
 
@@ -25,7 +24,7 @@ class SignalReporter:
         self._told: dict[Key, str] = {}
         self._unwatched: list[str] = []
 
-    def news(self, recorder: RecorderHandle) -> list[Command]:
+    def news(self, recorder: RecorderHandle) -> list[SignalReport]:
         """Return what has changed since the last call, for the session; people are told here."""
         if not recorder.status:  # it was started again: nothing is known
             return []
@@ -39,19 +38,13 @@ class SignalReporter:
             self._say(f"{_named(key)}: {key[2]}: {now[key]}")
         for key in before.keys() - now.keys():
             self._say(f"{_named(key)}: {key[2]} no more")
-        bad = [_command(Order.SIGNAL_BAD, key, now[key]) for key in sorted(now.keys() - before)]
-        good = [_command(Order.SIGNAL_GOOD, key, "") for key in sorted(before.keys() - now)]
+        bad = [SignalReport(*key, now[key], bad=True) for key in sorted(now.keys() - before)]
+        good = [SignalReport(*key, "", bad=False) for key in sorted(before.keys() - now)]
         return bad + good
 
 
 def _named(key: Key) -> str:
     return " ".join(part for part in key[:2] if part)
-
-
-def _command(order: Order, key: Key, message: str) -> Command:
-    stream, channel, kind = key
-    told = {"stream": stream, "channel": channel, "kind": kind, "message": message}
-    return Command(order, json.dumps(told, ensure_ascii=False))
 
 
 def monitor_config(visit: Visit) -> Mapping[str, Any] | None:

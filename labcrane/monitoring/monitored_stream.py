@@ -40,6 +40,11 @@ class MonitoredStream:
         self._now: dict[tuple[str, str], SignalFault] = {}
 
     @property
+    def monitors(self) -> tuple[str, ...]:
+        """The names of those that look at it."""
+        return tuple(self._monitors)
+
+    @property
     def watched(self) -> bool:
         """Whether any monitor looks at it."""
         return bool(self._monitors)

@@ -37,7 +37,7 @@ def serve(builder: MonitorBuilder, messages: IO[bytes], answers: IO[str]) -> int
         number = message["number"]
         if "stream" in message:
             streams[number] = _begin(builder, message["stream"])
-            answer: dict[str, Any] = {"watched": streams[number].watched, "changes": []}
+            answer: dict[str, Any] = {"monitors": streams[number].monitors, "changes": []}
         else:
             times, samples = _samples(messages, message)
             changes = streams[number].look(times, samples)

@@ -12,8 +12,8 @@ from pydantic import (
 )
 
 from labcrane.core.settings import Settings
-from labcrane.errors import suggestion
-from labcrane.files.yaml import Place, YamlFile
+from labcrane.errors import ProtocolError, suggestion
+from labcrane.files.yaml import Place, YamlFile, read_text
 from labcrane.protocol.design import Criterion
 
 
@@ -111,10 +111,10 @@ def read_sessions(source: YamlFile) -> Any:
             found.append(session)
             continue
         parsed = [_step(source, (*place, "steps", at), step) for at, step in enumerate(steps)]
-        whole = [step for step in parsed if step is not None]
-        # What is wrong with a step has been noted; the model need not complain about none.
-        stand_in = [] if whole else [{"kind": "break"}]
-        found.append({**session, "steps": whole or stand_in})
+        # What is wrong with a step has been noted; one that is right stands in for it, so that
+        # every other keeps its place, and its line.
+        whole = [{"kind": "break"} if step is None else step for step in parsed]
+        found.append({**session, "steps": whole})
     return found
 
 
@@ -163,7 +163,7 @@ def _instructions(source: YamlFile, place: Place, value: Any) -> dict[str, Any] 
         return None
     path = source.path.parent / value
     try:
-        return {"kind": "instructions", "file": value, "text": path.read_text(encoding="utf-8")}
-    except OSError:
-        source.problem(place, f"instructions file {str(path)!r} does not exist or cannot be read")
+        return {"kind": "instructions", "file": value, "text": read_text(path)}
+    except ProtocolError as error:
+        source.problem(place, f"instructions: {error}")
         return None

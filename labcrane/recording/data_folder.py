@@ -80,11 +80,22 @@ class DataFolder:
             raise RecordingError(self._cannot_write(error.strerror)) from error
         if not os.access(self.path, os.W_OK | os.X_OK):
             raise RecordingError(self._cannot_write("permission denied"))
+        self.check_new(session)
+
+    def check_new(self, session: int) -> None:
+        """Make sure that ``session`` has not been begun.
+
+        Raises
+        ------
+        ProtocolError
+            It has: nothing is ever overwritten.
+        """
         if session in self.sessions():
             done = ", ".join(map(str, self.sessions()))
+            pilot = ", or any other number, for a pilot" if "-PILOT" in self.name else ""
             raise ProtocolError(
                 f"participant {self.name} has already run session {session} (recorded in "
-                f"{self.path}: {done}); check the number, or give the next session"
+                f"{self.path}: {done}); check the number, or give the next session{pilot}"
             )
 
     def check_space(self, expected_s: float, bytes_per_s: float, reserve_s: float) -> None:

@@ -5,9 +5,12 @@ with the number of the stream it belongs to in ``desc/of``.
 """
 
 import json
+import math
+import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.recording.journal_reader import JournalState, SessionLog, state
+from labcrane.recording.overlap import Union, sample_keys, union
 from labcrane.recording.xdf.header import Channel, StreamHeader
 from labcrane.recording.xdf.reader import XdfFile, XdfStream, read_xdf
 from labcrane.recording.xdf.samples import Texts
@@ -27,8 +31,11 @@ NOTES = "notes"
 SIGNAL = "signal"
 """A note of a fault of a signal that was found (``bad``), or that is there no more."""
 
+MONITORS = "monitors"
+"""A note of the monitors that look at the signal from now on; what others told has ended."""
+
 OPENED = "opened"
-"""The first note of every part: counts of samples start anew with it."""
+"""The first note of every part: its recorder began to receive the stream."""
 
 RESET = "reset"
 """A note of a source that was replaced."""
@@ -79,7 +86,7 @@ class RecordedStream:
     offsets
         Clock offsets as XDF has them, shape ``(n_offsets, 2)``.
     starts
-        Index of the first sample of each part.
+        Index of the first sample, and of the first one after each time without any recorder.
     """
 
     header: StreamHeader
@@ -150,9 +157,11 @@ def companion_headers(header: StreamHeader, number: int) -> dict[str, StreamHead
 def read_streams(paths: Sequence[Path]) -> tuple[list[RecordedStream], list[JournalState]]:
     """Read the parts of a journal of streams; a stream goes on where its source was the same.
 
-    Sources without a source id cannot be known again: each part has a stream of its own.
+    Parts may overlap: two recorders write at once, so that the death of one loses nothing. What
+    both have is there once (:mod:`labcrane.recording.overlap`). A source without a source id is
+    known again while its program runs, by the uid that LSL gives it.
     """
-    streams: dict[object, RecordedStream] = {}
+    found: dict[object, list[RecordedStream]] = {}
     states = []
     for part, path in enumerate(paths):
         file = read_xdf(path)
@@ -160,12 +169,35 @@ def read_streams(paths: Sequence[Path]) -> tuple[list[RecordedStream], list[Jour
         seen: Counter[object] = Counter()
         for stream in _streams(file):
             header = stream.header
-            source = header.source_id or f"part {part}"
+            source = header.source_id or _uid(header) or f"part {part}"
             key: object = (header.name, source, header.format, header.labels)
             seen[key] += 1
-            key = key, seen[key]
-            streams[key] = _continued(streams[key], stream) if key in streams else stream
-    return list(streams.values()), states
+            found.setdefault((key, seen[key]), []).append(stream)
+    return [_of_parts(streams) for streams in found.values()], states
+
+
+def _uid(header: StreamHeader) -> str:
+    found = re.search(r"<uid>([^<]+)</uid>", header.text or "")
+    return found[1] if found else ""
+
+
+def _of_parts(streams: list[RecordedStream]) -> RecordedStream:
+    """Return one stream of what each part has of it, in the order in which they were opened."""
+    opened = [_opened(stream) for stream in streams]
+    if None not in opened:
+        streams = [streams[at] for at in np.argsort(np.array(opened, float), kind="stable")]
+    return reduce(_continued, streams)
+
+
+def _opened(stream: RecordedStream) -> float | None:
+    """Return when its recorder began to receive a stream; None of files of other recorders."""
+    return next((note.time for note in stream.notes if note.data.get("event") == OPENED), None)
+
+
+def _last_heard(stream: RecordedStream) -> float:
+    """Return when a recorder is last known to have lived."""
+    times = [stream.arrivals[:, 1], stream.probes[:, 3]]
+    return max((float(each.max()) for each in times if len(each)), default=-math.inf)
 
 
 def _streams(file: XdfFile) -> list[RecordedStream]:
@@ -215,24 +247,94 @@ def _parsed(text: str) -> Mapping[str, Any]:
 
 
 def _continued(before: RecordedStream, after: RecordedStream) -> RecordedStream:
-    """Append the next part of a stream."""
-    count = len(before.time_raw)
+    """Return a stream with what another part has of it, each sample once.
+
+    LSL sends a new receiver nothing of what was before: a part that was opened after the last sign
+    of life of those before has none of their samples.
+    """
+    opened, ended = _opened(after), _last_heard(before)
+    if overlap := opened is not None and opened <= ended:
+        found = union(_keys(before), _keys(after))
+    else:
+        count = len(before.time_raw)
+        here = np.arange(len(after.time_raw)) + count
+        found = Union(np.arange(count), here, count + len(here))
+    texts: Texts = []
+    if before.texts or after.texts:
+        texts = [()] * found.size
+        for stream, places in ((after, found.second), (before, found.first)):
+            for place, row in zip(places.tolist(), stream.texts, strict=True):
+                texts[place] = row
+    late = after.probes[:, 3] > ended if overlap else slice(None)
+    notes = [_moved(note, found.first) for note in before.notes]
+    notes += [
+        _moved(note, found.second)
+        for note in after.notes
+        if not overlap or note.time > ended or note.data.get("event") == OPENED
+    ]
+    goes_on = () if overlap else (len(before.time_raw),)
     return replace(
         before,
-        time_raw=np.concatenate([before.time_raw, after.time_raw]),
-        data=np.concatenate([before.data, after.data]),
-        texts=before.texts + after.texts,
-        probes=np.concatenate([before.probes, after.probes]),
-        arrivals=np.concatenate([before.arrivals, np.add(after.arrivals, (count, 0.0))]),
-        notes=before.notes + tuple(_shifted(note, count) for note in after.notes),
-        offsets=np.concatenate([before.offsets, after.offsets]),
-        starts=(*before.starts, count),
+        time_raw=_merged(found, before.time_raw, after.time_raw),
+        data=_merged(found, before.data, after.data),
+        texts=texts,
+        probes=np.concatenate([before.probes, after.probes[late]]),
+        arrivals=_arrivals(found, before.arrivals, after.arrivals, overlap=overlap),
+        notes=tuple(sorted(notes, key=lambda note: note.time) if overlap else notes),
+        offsets=np.concatenate([before.offsets, _later(after.offsets, after.probes, late)]),
+        starts=(*before.starts, *goes_on),
     )
 
 
-def _shifted(note: Note, count: int) -> Note:
+def _keys(stream: RecordedStream) -> "npt.NDArray[np.uint64]":
+    return sample_keys(stream.time_raw, stream.data, stream.texts)
+
+
+def _merged(found: Union, before: npt.NDArray[Any], after: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    whole = np.empty((found.size, *before.shape[1:]), before.dtype)
+    if len(after) or len(before):
+        whole[found.second[: len(after)]] = after
+        whole[found.first[: len(before)]] = before
+    return whole
+
+
+def _arrivals(found: Union, before: FloatArray, after: FloatArray, *, overlap: bool) -> FloatArray:
+    """Return how many samples had come when: what the second tells once the first is silent."""
+    first, second = _counted(before, found.first), _counted(after, found.second)
+    if overlap and len(first):
+        ahead = (second[:, 0] > first[-1, 0]) & (second[:, 1] > first[-1, 1])
+        second = second[ahead]
+    return np.concatenate([first, second])
+
+
+def _counted(arrivals: FloatArray, places: npt.NDArray[np.int64]) -> FloatArray:
+    """Let counts be of the whole stream: a count of n is the place of sample n - 1, plus one."""
+    counts = np.clip(arrivals[:, 0].astype(int), 0, len(places))
+    of_whole = np.r_[places[0] if len(places) else 0, places + 1]
+    return np.column_stack([of_whole[counts], arrivals[:, 1]]).astype(np.float64)
+
+
+def _later(
+    offsets: FloatArray, probes: FloatArray, late: "npt.NDArray[np.bool_] | slice"
+) -> FloatArray:
+    """Return the XDF offsets of the probes that are kept; each probe has one, in order."""
+    if isinstance(late, slice) or not len(offsets):
+        return offsets
+    kept = np.isin(offsets[:, 0], probes[late][:, 0])
+    return offsets[kept]
+
+
+def _moved(note: Note, places: npt.NDArray[np.int64]) -> Note:
     """Let the samples a note names count from the stream's first one, not from its part's."""
-    samples = note.data.get("samples")
-    if not isinstance(samples, list):
-        return note
-    return Note(note.time, {**note.data, "samples": [number + count for number in samples]})
+
+    def place(number: int) -> int:
+        if number < len(places):
+            return int(places[number])
+        return int(places[-1]) + 1 + number - len(places) if len(places) else number
+
+    data = dict(note.data)
+    if isinstance(numbers := data.get("samples"), list):
+        data["samples"] = [place(number) for number in numbers]
+    if isinstance(number := data.get("sample"), int):
+        data["sample"] = place(number)
+    return Note(note.time, data)

@@ -7,6 +7,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from labcrane.files.yaml import parse_yaml, read_yaml
 from labcrane.protocol.referenced_files import write_files
 from labcrane.protocol.study import Study
 from labcrane.recording.participant_file.reader import SessionRecord
@@ -25,12 +26,9 @@ def restore(
 
     A given ``protocol`` stays where it is, unless a ``machine`` is put into it.
     """
-    from ruamel.yaml import YAML  # noqa: PLC0415 - only a replay needs it here
-
     if protocol is not None and machine is None:
         return protocol
-    text = record.protocol if protocol is None else protocol.read_text(encoding="utf-8")
-    content = YAML(typ="safe").load(text)
+    content = read_yaml(protocol) if protocol else parse_yaml(record.protocol, "the protocol")
     described = machine.read_text(encoding="utf-8") if machine else record.context["machine"]
     (folder / "machine.yaml").write_text(described, encoding="utf-8")
     content["machine"] = "machine.yaml"
@@ -69,12 +67,10 @@ def _put_in_questionnaires(content: Mapping[str, Any], record: SessionRecord) ->
 
 def differing_parts(record: SessionRecord, study: Study) -> tuple[str, ...]:
     """Return every part that matters and is not what it was, in words."""
-    from ruamel.yaml import YAML  # noqa: PLC0415
-
     context = record.context
     found = list(_versions(context.get("versions", {})))
-    yaml = YAML(typ="safe")
-    then, now = yaml.load(context["machine"]), yaml.load(study.machine_text)
+    then = parse_yaml(context["machine"], "the machine as it was")
+    now = parse_yaml(study.machine_text, f"the machine of {study.path}")
     found += _compared("machine", then, now)
     for part, choice in study.choices.items():
         if part.startswith(MOVING):

@@ -1,7 +1,7 @@
 """Script of a recorded session: what entered it from outside, tick by tick."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,29 @@ from labcrane.core.records import Event, Frame
 from labcrane.core.roles import InputDevice
 from labcrane.core.signals import Signal, signals_of
 from labcrane.recording.participant_file.reader import SessionRecord
-from labcrane.session.commands import Command, Order
+from labcrane.session.commands import (
+    Command,
+    FeedbackLost,
+    FeedbackReady,
+    LauncherGone,
+    Message,
+    Order,
+    StreamBack,
+    StreamLost,
+)
 from labcrane.session.questionnaire import SIMULATION
 from labcrane.types import FloatArray
+
+REPORTS: Mapping[str, Callable[[Mapping[str, Any]], Message]] = {
+    "stream.lost": lambda data: StreamLost(data["what"]),
+    "stream.back": lambda data: StreamBack(data["what"]),
+    "feedback.lost": lambda data: FeedbackLost(
+        data["what"], data["why"], left_out=bool(data.get("left_out"))
+    ),
+    "feedback.ready": lambda data: FeedbackReady(data["what"], data["facts"]),
+    "launcher.gone": lambda data: LauncherGone(),
+}
+"""The report of which an event tells, by the event's name."""
 
 
 class RecordOver(Exception):  # noqa: N818 - ends a loop, and is no error
@@ -49,7 +69,7 @@ class Script:
         self.disk_trouble: str | None = None
         self.awaited: set[str] = set()
         self._disk: dict[int, str | None] = {}
-        self._orders: dict[int, list[Command]] = {}
+        self._orders: dict[int, list[Message]] = {}
         self._tick = -1
         events = record.events
         for tick, name, data in zip(events["tick"], events["name"], events["data"], strict=True):
@@ -59,20 +79,18 @@ class Script:
         """Note what an event says came from outside."""
         part, _, what = name.rpartition(".")
         if part == "order":
-            self._order(tick, Command(Order(what), data.get("text", ""), data.get("by", "")))
+            self._order(
+                tick,
+                Command(Order(what), data.get("text", ""), data.get("by", ""), data.get("at", "")),
+            )
         elif part == "questionnaire" and data.get("by", SIMULATION) != SIMULATION:
             self._answer(tick, what, data)
         elif name == "page.denied":
             self._order(tick, Command(Order.DENIED, data["why"], data["by"]))
-        elif part == "stream" and what in {"lost", "back"}:
-            self._order(tick, Command(Order(what), data["what"]))
-        elif part == "feedback" and what == "lost":
-            order = Order.LEFT_OUT if data.get("left_out") else Order.FAILED
-            self._order(tick, Command(order, f"{data['what']}: {data['why']}"))
+        elif (report := REPORTS.get(name)) is not None:
+            self._order(tick, report(data))
         elif part == "feedback" and what == "awaited":
             self.awaited.add(data["what"])
-        elif part == "feedback" and what == "ready":
-            self._order(tick, Command(Order.MENDED, f"{data['what']}: {data['facts']}"))
         elif part == "input" and what in {"lost", "back"}:
             self.input.faults.append((tick, data.get("why")))
         elif part == "disk" and what in {"lost", "back"}:
@@ -88,10 +106,10 @@ class Script:
         elif (what == "refused" and not data["item"]) or (what == "end" and data["handed_in"]):
             self._order(tick, Command(Order.SUBMIT, "", data["by"]))
 
-    def _order(self, tick: int, command: Command) -> None:
+    def _order(self, tick: int, command: Message) -> None:
         self._orders.setdefault(tick, []).append(command)
 
-    def commands(self) -> list[Command]:
+    def commands(self) -> list[Message]:
         """Return the orders of this tick."""
         self._tick += 1
         self.disk_trouble = self._disk.get(self._tick, self.disk_trouble)

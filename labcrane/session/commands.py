@@ -1,12 +1,23 @@
-"""Commands of the people in the room, and what the session tells them."""
+"""Messages to a session: what people order, and what processes report; and what it tells them.
+
+A message crosses the pipe to the session's process as JSON of a declared size, and is read back by
+its types, so that nothing else can come out of the pipe.
+"""
 
 import queue
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Protocol
+from typing import Literal, Protocol
 
-from labcrane.core.records import Event
+from pydantic import TypeAdapter, ValidationError
+
+from labcrane.core.records import Event, Value
+from labcrane.errors import LabcraneError
+from labcrane.limits import LimitError, check_text
+
+MOST_BYTES = 65_536
+"""Size of the largest message to a session, as JSON: about forty pages of text."""
 
 
 class Order(StrEnum):
@@ -26,27 +37,15 @@ class Order(StrEnum):
     CONSENT = "consent"  # to the text of this version, given before the session begins
     DENIED = "denied"  # said by a page: somebody without the right asked for something
     SETTING = "setting"  # change a setting of a cue or sound: tone.far=3
-    FAILED = "failed"  # said by the launcher of a view or sound: tone: why
-    LEFT_OUT = "left out"  # and of one that is not started again
-    MENDED = "mended"  # and of one that presents
-    LOST = "lost"  # said by the launcher: a stream or the recorder failed
-    BACK = "back"  # and works again
-    SIGNAL_BAD = "signal bad"  # and of a signal, as JSON: stream, channel, kind, message
-    SIGNAL_GOOD = "signal good"  # and of one that is well again
 
 
-FAULTS = frozenset(
-    {
-        Order.LOST,
-        Order.BACK,
-        Order.FAILED,
-        Order.LEFT_OUT,
-        Order.MENDED,
-        Order.SIGNAL_BAD,
-        Order.SIGNAL_GOOD,
-    }
-)
-"""What the launcher says, not people."""
+KINDS = {
+    Order.ANSWER: "answer",
+    Order.NOTE: "note",
+    Order.HINT: "hint",
+    Order.SETTING: "setting",
+}
+"""Which of the limits holds for an order's words; that of an order for the rest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +55,116 @@ class Command:
     order: Order
     text: str = ""
     by: str = ""  # which page; empty for the terminal
+    at: str = ""  # the address from which a page asked
+    kind: Literal["command"] = "command"
+
+
+@dataclass(frozen=True, slots=True)
+class StreamLost:
+    """A stream of somebody else, or the recorder of all, has failed."""
+
+    what: str
+    kind: Literal["stream lost"] = "stream lost"
+
+
+@dataclass(frozen=True, slots=True)
+class StreamBack:
+    """It works again."""
+
+    what: str
+    kind: Literal["stream back"] = "stream back"
+
+
+@dataclass(frozen=True, slots=True)
+class SignalReport:
+    """A signal of a stream has gone bad, or is well again."""
+
+    stream: str
+    channel: str
+    fault: str
+    message: str
+    bad: bool
+    kind: Literal["signal"] = "signal"
+
+
+@dataclass(frozen=True, slots=True)
+class FeedbackLost:
+    """A view or sound has failed, and is left out or started again."""
+
+    what: str
+    why: str
+    left_out: bool = False
+    kind: Literal["feedback lost"] = "feedback lost"
+
+    def __str__(self) -> str:
+        return f"{self.what} failed: {self.why}"
+
+
+@dataclass(frozen=True, slots=True)
+class FeedbackReady:
+    """A view or sound presents; ``facts`` is what it says of itself."""
+
+    what: str
+    facts: str = ""
+    kind: Literal["feedback ready"] = "feedback ready"
+
+    def __str__(self) -> str:
+        return f"{self.what} is ready" + (f": {self.facts}" if self.facts else "")
+
+
+@dataclass(frozen=True, slots=True)
+class LauncherGone:
+    """The launcher has died: nobody could stop the session any more, so it ends."""
+
+    kind: Literal["launcher gone"] = "launcher gone"
+
+
+ProcessReport = StreamLost | StreamBack | SignalReport | FeedbackLost | FeedbackReady | LauncherGone
+"""What becomes of the other processes of a run: said by the launcher, not by people."""
+
+Message = Command | ProcessReport
+
+MESSAGE: TypeAdapter[Message] = TypeAdapter(Message)
+
+
+class MessageError(LabcraneError):
+    """Something that cannot be sent to a session."""
+
+
+def encode(message: Message) -> bytes:
+    """Return a message as it crosses the pipe.
+
+    Raises
+    ------
+    MessageError
+        It is larger than a message may be.
+    """
+    # Half of a character that takes two cannot be written; it is shown as what it is.
+    if isinstance(message, Command):
+        text = message.text.encode("utf-8", "backslashreplace").decode("utf-8")
+        message = replace(message, text=text)
+    line = MESSAGE.dump_json(message)
+    if len(line) > MOST_BYTES:
+        what = message.order if isinstance(message, Command) else message.kind
+        raise MessageError(
+            f"{what}: {len(line):,} bytes, and a session takes {MOST_BYTES:,} at most; "
+            "say it shorter"
+        )
+    return line
+
+
+def decode(line: bytes) -> Message:
+    """Return the message that :func:`encode` wrote.
+
+    Raises
+    ------
+    MessageError
+        It is none.
+    """
+    try:
+        return MESSAGE.validate_json(line)
+    except ValidationError as error:
+        raise MessageError(f"{len(line)} bytes that are no message to a session") from error
 
 
 def by_whom(command: Command) -> str:
@@ -63,11 +172,25 @@ def by_whom(command: Command) -> str:
     return command.by or "terminal"
 
 
+def whence(command: Command) -> dict[str, Value]:
+    """Return from which address a page ordered, as data of an event; nothing for the terminal."""
+    return {"at": command.at} if command.at else {}
+
+
+def beyond_limits(command: Command) -> str | None:
+    """Return why an order's words may not enter, or None when they may."""
+    try:
+        check_text(command.text, KINDS.get(command.order, "order"))
+    except LimitError as error:
+        return str(error)
+    return None
+
+
 class Console(Protocol):
     """Whoever gives orders and looks on: the terminal and the pages, or a simulation."""
 
-    def commands(self) -> list[Command]:
-        """Return the orders given since the last call, without waiting."""
+    def commands(self) -> Sequence[Message]:
+        """Return what was said since the last call, without waiting."""
         ...
 
     def report(self, event: Event) -> None:
@@ -84,7 +207,14 @@ class QueueConsole:
         self.listeners: list[Callable[[Event], None]] = []
 
     def give(self, command: Command) -> None:
-        """Give an order; the session takes it up at its next tick."""
+        """Give an order; the session takes it up at its next tick.
+
+        What may not enter becomes the news that it was refused: it never reaches a pipe.
+        """
+        why = beyond_limits(command)
+        if why is not None:
+            why = f"{command.order.value}: {why}"
+            command = Command(Order.DENIED, why, by_whom(command), command.at)
         self._orders.put(command)
 
     def commands(self) -> list[Command]:

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from pydantic import ValidationError
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from labcrane.core.records import Value
 from labcrane.core.settings import Settings
+from labcrane.errors import ProtocolError
+from labcrane.files.yaml import parse_yaml
 from labcrane.protocol.components import ComponentSpec
 
 
@@ -48,8 +48,8 @@ class FeedbackSettings:
         if key not in fields:
             raise ValueError(f"{name} has no setting {key!r}; it has {', '.join(fields)}")
         try:
-            value = YAML(typ="safe", pure=True).load(written)
-        except YAMLError:
+            value = parse_yaml(written, "a setting")
+        except ProtocolError:
             raise ValueError(
                 f"{written!r} cannot be read as a value; write a number, a word, true or false"
             ) from None

@@ -1,14 +1,21 @@
 """Pause of a session: held by the examiner, a part in trouble, or a stop rule."""
 
-import json
 from collections.abc import Callable, Iterable
 
 from labcrane.core.records import Value
 from labcrane.protocol.protocol import OnFault
-from labcrane.session.commands import Command, Order
+from labcrane.session.commands import (
+    FeedbackLost,
+    FeedbackReady,
+    LauncherGone,
+    ProcessReport,
+    SignalReport,
+    StreamBack,
+    StreamLost,
+)
 
-EXAMINER, INPUT, DISK, STOP = "examiner", "input", "disk", "stop rule"
-"""Who can hold a session, beside lost streams and feedback: it goes on when nobody does."""
+INPUT, DISK = "input", "disk"
+"""What can hold a session beside people, lost streams and feedback."""
 
 
 class Suspenders:
@@ -73,31 +80,35 @@ class Suspenders:
             self._note(f"{part}.back", {})
             self.release(part)
 
-    def report(self, command: Command) -> None:
-        """Take up what the launcher says of a stream or a feedback process."""
-        if command.order is Order.LOST:
-            self._note("stream.lost", {"what": command.text})
-            if self._on_fault.stream_lost == "pause":
-                self.hold(command.text)
-        elif command.order is Order.BACK:
-            self._note("stream.back", {"what": command.text})
-            self.release(command.text)
-        elif command.order in {Order.SIGNAL_BAD, Order.SIGNAL_GOOD}:
-            self._note(f"signal.{command.order.value.split()[1]}", json.loads(command.text))
-        else:
-            self._feedback(command)
+    def report(self, report: ProcessReport) -> None:
+        """Take up what the launcher says of another process."""
+        match report:
+            case StreamLost(what):
+                self._note("stream.lost", {"what": what})
+                if self._on_fault.stream_lost == "pause":
+                    self.hold(what)
+            case StreamBack(what):
+                self._note("stream.back", {"what": what})
+                self.release(what)
+            case SignalReport(stream, channel, fault, message, bad):
+                about: dict[str, Value] = {"stream": stream, "channel": channel, "kind": fault}
+                name = "signal.bad" if bad else "signal.good"
+                self._note(name, about | ({"message": message} if bad else {}))
+            case FeedbackReady(what, facts):
+                self._note("feedback.ready", {"what": what, "facts": facts})
+                self.awaited.discard(what)
+                self.release(f"feedback {what}")
+            case FeedbackLost():
+                self._feedback_lost(report)
+            case LauncherGone():
+                self._note("launcher.gone", {})
+                self.ending.append("the launcher is gone")
 
-    def _feedback(self, command: Command) -> None:
-        name, _, why = command.text.partition(": ")
-        who = f"feedback {name}"
-        if command.order is Order.MENDED:
-            self._note("feedback.ready", {"what": name, "facts": why})
-            self.awaited.discard(name)
-            self.release(who)
-            return
-        left_out = command.order is Order.LEFT_OUT
-        self._note("feedback.lost", {"what": name, "why": why, "left_out": left_out})
-        if left_out:
-            self.awaited.discard(name)
+    def _feedback_lost(self, lost: FeedbackLost) -> None:
+        who = f"feedback {lost.what}"
+        about: dict[str, Value] = {"what": lost.what, "why": lost.why, "left_out": lost.left_out}
+        self._note("feedback.lost", about)
+        if lost.left_out:
+            self.awaited.discard(lost.what)
         if self._on_fault.feedback_lost == "pause" and who not in self.by:
             self.hold(who)

@@ -11,17 +11,20 @@ class WarmUp:
     ----------
     over
         Whether no more of the practice is needed.
+    streak
+        How many in a row have succeeded.
     """
 
     def __init__(self) -> None:
         self.over = False
-        self._streak = 0
+        self.streak = 0
         self._number = 0
 
     def begin(self, block: PlannedBlock) -> bool:
         """Return whether ``block`` is to be run; a further round is not, once practice is over."""
         if block.until is None or self._number == 0:
-            self.over, self._streak = False, 0
+            self.streak = block.streak  # of before the session stopped; it counts on
+            self.over = block.until is not None and self.streak >= block.until.successes
         self._number = 0 if block.until is None else self._number + 1
         wanted = not self.over
         if block.last:
@@ -31,11 +34,11 @@ class WarmUp:
     def count(self, block: PlannedBlock, outcome: Phase) -> None:
         """Take note of a counted trial."""
         if block.until is not None and outcome is not Phase.REPEATED:
-            self._streak = self._streak + 1 if outcome is Phase.SUCCESS else 0
-            self.over = self.over or self._streak >= block.until.successes
+            self.streak = self.streak + 1 if outcome is Phase.SUCCESS else 0
+            self.over = self.over or self.streak >= block.until.successes
 
     def verdict(self, block: PlannedBlock) -> dict[str, Value] | None:
         """Return what to record at the end of ``block``; None while practice goes on."""
         if block.until is None or not (self.over or block.last):
             return None
-        return {"met": self.over, "in_a_row": self._streak, "wanted": block.until.successes}
+        return {"met": self.over, "in_a_row": self.streak, "wanted": block.until.successes}

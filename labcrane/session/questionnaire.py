@@ -11,10 +11,11 @@ from labcrane.core.records import Trial, Value
 from labcrane.core.roles import Questionnaire
 from labcrane.design.plan import SessionPlan
 from labcrane.design.seeds import derive
+from labcrane.limits import LimitError, read_json
 from labcrane.participants.personal_data import personal
 from labcrane.protocol.study import Study
 from labcrane.recording.participant_file.questionnaires import ANSWER, END, SCORE
-from labcrane.session.commands import Command, Order, by_whom
+from labcrane.session.commands import Command, Order, by_whom, whence
 
 Said = tuple[str, dict[str, Value]]
 """Name and data of an event that follows."""
@@ -23,6 +24,10 @@ SIMULATION = "simulation"
 """Who answers for a simulated participant."""
 
 START, REFUSED = "questionnaire.start", "questionnaire.refused"
+
+ANSWER_KIND = "answer"
+UNREAD = "unread"
+"""Item of an answer that was refused before it was read: beyond the limits, or no JSON."""
 
 
 class QuestionnaireForm:
@@ -35,7 +40,7 @@ class QuestionnaireForm:
     about
         Where in the session it is asked: step, and trial if it follows one.
     answered
-        What was answered before the session's process died.
+        What was answered before the session stopped.
 
     Attributes
     ----------
@@ -65,14 +70,17 @@ class QuestionnaireForm:
         """Take an answer, as JSON of questionnaire, item and value; return what is to be said."""
         data: dict[str, Value] = {**self._about, "by": by}
         try:
-            given = json.loads(text)
+            given = read_json(text, ANSWER_KIND)
             item, value = self._find(given)
             answer = item.check(value)
             if isinstance(answer, str) and (found := personal(answer)):
                 # What names a person must not be in the record, not even as a refused answer.
                 why = f"an answer must not hold {found}; write it without"
                 return REFUSED, {**data, "given": "", "item": item.name, "why": why}
-        except (AnswerError, json.JSONDecodeError) as error:
+        except LimitError as error:
+            # Nor what no page could show.
+            return REFUSED, {**data, "given": "", "item": UNREAD, "why": str(error)}
+        except AnswerError as error:
             return REFUSED, {**data, "given": text, "item": _item_of(text), "why": str(error)}
         self._answers[item.name] = answer
         return ANSWER, {**data, "item": item.name, "value": answer}
@@ -88,12 +96,15 @@ class QuestionnaireForm:
             why = f"{', '.join(open_items)} have no answer; answer or decline them"
             return REFUSED, {**self._about, "by": by, "given": "", "item": "", "why": why}
         self.over = True
-        return self._end(by, handed_in=True)
+        return self._end(by, handed_in=True, done=True)
 
-    def leave(self) -> Said:
-        """Return the event with which it ends without having been handed in."""
+    def leave(self, *, done: bool) -> Said:
+        """Return the event with which it ends without having been handed in.
+
+        ``done`` is whether it need not be asked again.
+        """
         self.over = True
-        return self._end("", handed_in=False)
+        return self._end("", handed_in=False, done=done)
 
     def scores(self) -> dict[str, float]:
         """Return every score; NaN where it needs an answer that is missing."""
@@ -107,7 +118,7 @@ class QuestionnaireForm:
             yield self.take(answer, SIMULATION)
         yield self.hand_in(SIMULATION)
 
-    def _end(self, by: str, *, handed_in: bool) -> Said:
+    def _end(self, by: str, *, handed_in: bool, done: bool) -> Said:
         missing = sum(self._answers.get(name) is None for name in self._items)
         scores: dict[str, Value] = {
             f"{SCORE}{name}": None if math.isnan(value) else value
@@ -117,6 +128,7 @@ class QuestionnaireForm:
             **self._about,
             "by": by,
             "handed_in": handed_in,
+            "done": done,
             "missing": missing,
             **scores,
         }
@@ -159,7 +171,7 @@ class QuestionnaireRun:
     Parameters
     ----------
     answered
-        What was answered before the session's process died.
+        What was answered before the session stopped.
     after
         The trial it follows; None when it is a step of its own.
 
@@ -201,13 +213,18 @@ class QuestionnaireRun:
     def handle(self, command: Command) -> Said:
         """Take an answer, or hand the questionnaire in; return what is said of it."""
         if command.order is Order.SUBMIT:
-            return self._inquiry.hand_in(by_whom(command))
-        return self._inquiry.take(command.text, by_whom(command))
+            name, data = self._inquiry.hand_in(by_whom(command))
+        else:
+            name, data = self._inquiry.take(command.text, by_whom(command))
+        return name, {**data, **whence(command)}
 
-    def end(self) -> Iterator[Said]:
-        """Yield what is said at its end: that it was left, and the stop rules that it meets."""
+    def end(self, *, skipped: bool) -> Iterator[Said]:
+        """Yield what is said at its end: that it was left, and the stop rules that it meets.
+
+        One that was left and not skipped is owed: the session has ended.
+        """
         if not self.over:
-            yield self._inquiry.leave()
+            yield self._inquiry.leave(done=skipped)
         scores = self._inquiry.scores()
         for rule in self._rules:
             if scores[rule.score] > rule.above:  # a score that is NaN stops nobody

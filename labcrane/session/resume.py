@@ -1,7 +1,13 @@
-"""Resume point: how far a session has come, and what is left of it."""
+"""Progress of a session, and what it still owes: for going on after any stop.
 
-from collections.abc import Mapping, Sequence
+Nothing is written for this alone. What a session owes is worked out from its plan and the events in
+its journal, by the same fold while it runs and afterwards; so a session that was killed reads like
+one that was ended by order.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
@@ -11,51 +17,141 @@ from labcrane.core.records import Phase, Trial, Value
 from labcrane.design.plan import Owed, PlannedBlock, PlannedStep, SessionPlan, next_attempt
 from labcrane.errors import ProtocolError
 from labcrane.protocol.study import Study
-from labcrane.recording.journal_reader import SessionLog, read_journal
+from labcrane.recording.journal_reader import LoggedEvent, SessionLog, read_journal
 from labcrane.recording.paths import parts
+from labcrane.session.practice import WarmUp
 
 Policy = Literal["continue", "redo_trial", "redo_block"]
+
+BROKEN = frozenset({Phase.ENDED, Phase.INTERRUPTED})
+"""How an attempt ends that the session stopped in the middle of."""
+
+COMPLETE, INCOMPLETE = "complete", "incomplete"
+"""Why a session ended that nobody ended: it owes nothing, or what the policy gave up."""
+
+KILLED = "its process died"
+"""How a session stopped that has said nothing of an end."""
 
 
 @dataclass
 class Progress:
-    """What a session's journals say of how far it came.
+    """What a session's events say of how far it came.
 
     Attributes
     ----------
-    complete
-        Whether it ran to its end.
+    stop
+        Why it last stopped, in words; :data:`KILLED` when it has not said so.
+    called_complete
+        Whether it has called itself complete.
     steps
-        Numbers of the steps that are done.
+        Numbers of the steps that ran to their end.
     attempts
         The last attempt of every trial that was begun, by trial number.
     done
-        Numbers of the trials that need no further attempt.
+        How every trial ended that needs no further attempt, by trial number.
+    broken
+        Numbers of the trials whose last attempt was cut off.
+    begun
+        What was said at the start of every trial, by trial number.
     interrupted
         What was said of the trial that was under way when the process died; None between trials.
     angles
         Last joint angles in rad, shape ``(n_joints,)``; empty when there is no frame.
+    time
+        When the last frame was due, in seconds; None without one.
     answers
         What was answered, by step and questionnaire.
     handed_in
         Steps and questionnaires that need not be asked again.
     rated, ratings
         The same of what is asked after trials, by trial and questionnaire.
-    last
-        Number of the last trial that ended; None before the first.
+    held
+        Who of the people in the room held it: the examiner, a stop rule.
     """
 
-    complete: bool = False
+    stop: str = KILLED
+    called_complete: bool = False
     steps: set[int] = field(default_factory=set)
     attempts: dict[int, int] = field(default_factory=dict)
-    done: set[int] = field(default_factory=set)
+    done: dict[int, Phase] = field(default_factory=dict)
+    broken: set[int] = field(default_factory=set)
+    begun: dict[int, Mapping[str, Any]] = field(default_factory=dict)
     interrupted: Mapping[str, Any] | None = None
     angles: tuple[float, ...] = ()
+    time: float | None = None
     answers: dict[tuple[int, str], dict[str, Value]] = field(default_factory=dict)
     handed_in: set[tuple[int, str]] = field(default_factory=set)
     ratings: dict[tuple[int, str], dict[str, Value]] = field(default_factory=dict)
     rated: set[tuple[int, str]] = field(default_factory=set)
-    last: int | None = None
+    held: set[str] = field(default_factory=set)
+
+    def take(self, name: str, data: Mapping[str, Any], *, closes: bool = True) -> None:
+        """Take up an event.
+
+        Parameters
+        ----------
+        closes
+            Whether the end of a step or a questionnaire that does not say so was one of its own,
+            and not the session's: journals before version 0.2 do not say so.
+        """
+        match name:
+            case "session.start":
+                self.stop, self.called_complete = KILLED, False
+            case "session.end":
+                self.stop = str(data["reason"])
+                self.called_complete = self.stop == COMPLETE
+            case "session.failed":
+                self.stop = str(data["why"])
+            case "session.resumed":
+                for number in numbers(data["void"]):
+                    self.done.pop(number, None)
+            case "step.end" if data.get("done", closes):
+                self.steps.add(data["step"])
+            case "trial.start" | "trial.end":
+                self._take_trial(name, data)
+            case "questionnaire.answer" | "questionnaire.end":
+                self._take_questionnaire(name, data, closes=closes)
+            case "pause.start" | "pause.end" | "stop_rule.met":
+                self._take_hold(name, data)
+
+    def _take_trial(self, name: str, data: Mapping[str, Any]) -> None:
+        number = data["trial"]
+        if name == "trial.start":
+            self.attempts[number] = data["attempt"]
+            self.begun[number] = self.interrupted = data
+            self.done.pop(number, None)  # of two attempts the later one counts
+            self.broken.discard(number)
+            for asked in [key for key in self.rated | set(self.ratings) if key[0] == number]:
+                self.rated.discard(asked)
+                self.ratings.pop(asked, None)
+            return
+        self.interrupted = None
+        outcome = Phase(data["outcome"])
+        if outcome in BROKEN:
+            self.broken.add(number)
+        elif outcome is not Phase.REPEATED:
+            self.done[number] = outcome
+
+    def _take_questionnaire(self, name: str, data: Mapping[str, Any], *, closes: bool) -> None:
+        rating = "trial" in data
+        key = (data["trial"] if rating else data["step"], data["questionnaire"])
+        if name == "questionnaire.answer":
+            given = (self.ratings if rating else self.answers).setdefault(key, {})
+            given[data["item"]] = data["value"]
+        elif data.get("done", data["handed_in"] or closes):
+            (self.rated if rating else self.handed_in).add(key)
+
+    def _take_hold(self, name: str, data: Mapping[str, Any]) -> None:
+        if name == "pause.end":
+            self.held.discard(data["by"])
+        elif name == "stop_rule.met":
+            self.held.add(STOP)
+        elif data["by"] in {EXAMINER, STOP}:
+            self.held.add(data["by"])
+
+
+EXAMINER, STOP = "examiner", "stop rule"
+"""The people who can hold a session: it goes on when they say so, also after a resumption."""
 
 
 def progress(journal: Path, joints: Sequence[str]) -> Progress:
@@ -73,36 +169,27 @@ def progress(journal: Path, joints: Sequence[str]) -> Progress:
             "labcrane run"
         )
     log, _ = read_journal(found)
-    so_far = Progress(angles=_last_angles(log, joints))
-    for event in log.events:
-        _take(so_far, event.name, event.data)
+    time = float(log.time[-1]) if len(log.time) else None
+    so_far = Progress(angles=_last_angles(log, joints), time=time)
+    for event, closes in _with_closing(log.events):
+        so_far.take(event.name, event.data, closes=closes)
     return so_far
 
 
-def _take(so_far: Progress, name: str, data: Mapping[str, Any]) -> None:
-    match name:
-        case "session.end":
-            so_far.complete = data["reason"] == "complete"
-        case "step.end" if not so_far.complete:
-            so_far.steps.add(data["step"])
-        case "questionnaire.answer" if "trial" in data:
-            rating = so_far.ratings.setdefault((data["trial"], data["questionnaire"]), {})
-            rating[data["item"]] = data["value"]
-        case "questionnaire.end" if "trial" in data:
-            so_far.rated.add((data["trial"], data["questionnaire"]))
-        case "questionnaire.answer":
-            asked = so_far.answers.setdefault((data["step"], data["questionnaire"]), {})
-            asked[data["item"]] = data["value"]
-        case "questionnaire.end":
-            so_far.handed_in.add((data["step"], data["questionnaire"]))
-        case "trial.start":
-            so_far.attempts[data["trial"]] = data["attempt"]
-            so_far.interrupted = data
-        case "trial.end":
-            so_far.interrupted, so_far.last = None, data["trial"]
-            again = {Phase.REPEATED, Phase.ENDED, Phase.INTERRUPTED}
-            if data["outcome"] not in again:
-                so_far.done.add(data["trial"])
+def _with_closing(events: Sequence[LoggedEvent]) -> Iterator[tuple[LoggedEvent, bool]]:
+    """Yield events, and whether an end among them was its own: not that of an ending session."""
+    last_ticks = {
+        (event.part, event.tick)
+        for event in events
+        if event.name == "session.end" and event.data["reason"] != COMPLETE
+    }
+    ordered = False
+    for event in events:
+        if event.name == "session.start":
+            ordered = False
+        elif event.name == "order.end" and event.data.get("refused") is None:
+            ordered = True
+        yield event, not (ordered or (event.part, event.tick) in last_ticks)
 
 
 def _last_angles(log: SessionLog, joints: Sequence[str]) -> tuple[float, ...]:
@@ -111,21 +198,82 @@ def _last_angles(log: SessionLog, joints: Sequence[str]) -> tuple[float, ...]:
     return tuple(float(column[-1]) for column in whole) if len(whole) == len(joints) else ()
 
 
+def check_recorded(plan: SessionPlan, so_far: Progress) -> None:
+    """Make sure that what was recorded is of this plan.
+
+    Raises
+    ------
+    ProtocolError
+        A trial was recorded that the plan does not have, or has otherwise.
+    """
+    planned = {
+        trial.number: {
+            "block": block.number,
+            "block_name": block.name,
+            "practice": block.practice,
+            "counted": trial.planned.counted,
+            **trial.planned.condition,
+        }
+        for block in plan.blocks
+        for trial in block.trials
+    }
+    for number, said in sorted(so_far.begun.items()):
+        about = planned.get(number, {})
+        wrong = [name for name, value in about.items() if said.get(name) != value]
+        if wrong or not about:
+            was = ", ".join(f"{name} {said.get(name)!r}" for name in wrong) or "recorded"
+            has = ", ".join(f"{name} {about[name]!r}" for name in wrong) or "no such trial"
+            raise ProtocolError(
+                f"the session was begun by another plan: trial {number} was {was}, and the plan "
+                f"has {has}; go on with the protocol, and the place in the design, with which it "
+                "was begun"
+            )
+
+
+class Ledger:
+    """Keeps account of what a session owes, event by event.
+
+    Parameters
+    ----------
+    whole
+        The whole session's plan, whatever was done of it before.
+    so_far
+        What was done of it before this process; None when nothing was.
+    """
+
+    def __init__(self, study: Study, whole: SessionPlan, so_far: Progress | None = None) -> None:
+        self._study = study
+        self._whole = whole
+        self._so_far = so_far or Progress()
+        self.take = self._so_far.take
+
+    def owed(self) -> SessionPlan:
+        """Return what is still owed, given up or not."""
+        return remaining(self._study, self._whole, self._so_far, "redo_trial")
+
+
 def remaining(study: Study, plan: SessionPlan, so_far: Progress, policy: Policy) -> SessionPlan:
     """Return what is left of a plan.
 
-    Steps that are done are left out. Of the block that was under way, the trials that are done are
-    left out as well, unless the policy is to redo the block; the interrupted trial is redone unless
-    the policy is to continue with the next one. What is run again is a new attempt.
+    A trial is done when its last attempt came to an end of its own or was skipped; whatever else a
+    step consists of is done when it says so itself. Of a block with trials left all are redone
+    when the policy is to redo the block; a trial that was cut off is redone unless the policy is to
+    continue with the next one. What is run again is a new attempt.
     """
+    warm_up = WarmUp()
     steps = []
     for step in plan.steps:
-        if step.number in so_far.steps:
-            continue
-        block = _rest(study, plan, step.block, so_far, policy) if step.block else None
-        if step.block is None or (block and (block.trials or block.owed)):
-            steps.append(_unasked(replace(step, block=block), so_far))
-    return replace(plan, steps=tuple(steps))
+        if step.block:
+            block = _rest(study, plan, step.block, so_far, policy, warm_up)
+            if block.trials or block.owed:
+                steps.append(replace(step, block=block))
+        elif step.questionnaires:
+            unasked = _unasked(step, so_far)
+            if unasked.questionnaires:
+                steps.append(unasked)
+        elif step.number not in so_far.steps:
+            steps.append(step)
+    return replace(plan, steps=tuple(steps), held=frozenset(so_far.held))
 
 
 def _unasked(step: PlannedStep, so_far: Progress) -> PlannedStep:
@@ -136,37 +284,94 @@ def _unasked(step: PlannedStep, so_far: Progress) -> PlannedStep:
 
 
 def _rest(
-    study: Study, plan: SessionPlan, block: PlannedBlock, so_far: Progress, policy: Policy
+    study: Study,
+    plan: SessionPlan,
+    block: PlannedBlock,
+    so_far: Progress,
+    policy: Policy,
+    warm_up: WarmUp,
 ) -> PlannedBlock:
-    begun = [trial for trial in block.trials if trial.number in so_far.attempts]
-    if policy == "redo_block" and begun:
-        attempt = 1 + max(so_far.attempts[trial.number] for trial in begun)
-        again = [next_attempt(study, plan, trial, attempt) for trial in block.trials]
-        return replace(block, trials=tuple(again))
-    left: list[Trial] = []
+    wanted = warm_up.begin(block)
+    before = warm_up.streak
     for trial in block.trials:
-        if trial.number in so_far.done:
-            continue
-        if trial.number not in so_far.attempts:
-            left.append(trial)
-        elif policy != "continue":
-            left.append(next_attempt(study, plan, trial, so_far.attempts[trial.number] + 1))
-    return replace(block, trials=tuple(left), owed=_owed(block, so_far))
-
-
-def _owed(block: PlannedBlock, so_far: Progress) -> tuple[Owed, ...]:
-    """Return what was still to be asked after the last trial when the process died."""
-    after = [
-        trial
-        for trial in block.trials
-        if trial.number == so_far.last and trial.number in so_far.done and trial.planned.counted
+        if trial.planned.counted and trial.number in so_far.done:
+            warm_up.count(block, so_far.done[trial.number])
+    left: list[Trial] = []
+    if wanted and not warm_up.over:
+        left = [trial for trial in block.trials if trial.number not in so_far.done]
+    begun = [trial.number for trial in block.trials if trial.number in so_far.attempts]
+    if policy == "redo_block" and left and begun:
+        attempt = 1 + max(so_far.attempts[number] for number in begun)
+        again = [next_attempt(study, plan, trial, attempt) for trial in block.trials]
+        return replace(block, trials=tuple(again), streak=before)
+    if policy == "continue":
+        cut_off = so_far.broken | ({so_far.interrupted["trial"]} if so_far.interrupted else set())
+        left = [trial for trial in left if trial.number not in cut_off]
+    again = [
+        next_attempt(study, plan, trial, so_far.attempts[trial.number] + 1)
+        if trial.number in so_far.attempts
+        else trial
+        for trial in left
     ]
-    return tuple(
-        Owed(trial, name, so_far.ratings.get((trial.number, name), {}))
-        for trial in after
-        for name in block.ask
-        if (trial.number, name) not in so_far.rated
-    )
+    owed = tuple(_owed(block, so_far))
+    return replace(block, trials=tuple(again), owed=owed, streak=warm_up.streak)
+
+
+def _owed(block: PlannedBlock, so_far: Progress) -> Iterator[Owed]:
+    """Yield what is still to be asked after trials that are done."""
+    for trial in block.trials:
+        if trial.planned.counted and trial.number in so_far.done:
+            for name in block.ask:
+                if (trial.number, name) not in so_far.rated:
+                    yield Owed(trial, name, so_far.ratings.get((trial.number, name), {}))
+
+
+def resumption(plan: SessionPlan, so_far: Progress, policy: Policy) -> dict[str, Value]:
+    """Return what the record says of a resumption: how it stopped, what is owed and repeated.
+
+    ``void`` are the trials that were done and are redone with their block.
+    """
+    left = [trial for block in plan.blocks for trial in block.trials]
+    again = [trial.number for trial in left if trial.number in so_far.attempts]
+    return {
+        "after": so_far.stop,
+        "policy": policy,
+        "owed": owed_text(plan),
+        "repeats": spans(again),
+        "void": spans([number for number in again if number in so_far.done]),
+    }
+
+
+def owed_text(plan: SessionPlan) -> str:
+    """Return what a plan consists of in words, for people and the record; empty for nothing."""
+    return "; ".join(text for step in plan.steps for text in _step_texts(step))
+
+
+def _step_texts(step: PlannedStep) -> Iterator[str]:
+    block = step.block
+    if block is None:
+        asked = " ".join(step.questionnaires)
+        yield f"step {step.number}: {step.kind}" + (f" {asked}" if asked else "")
+        return
+    for owed in block.owed:
+        yield f"step {step.number}: {owed.questionnaire} after trial {owed.after.number}"
+    if block.trials:
+        trials = spans([trial.number for trial in block.trials])
+        yield f"step {step.number}: {step.kind} {block.name!r}, trials {trials}"
+
+
+def spans(wanted: Sequence[int]) -> str:
+    """Return whole numbers as text: ``1-3 5``."""
+    found = sorted(set(wanted))
+    gaps = [at for at, (one, two) in enumerate(pairwise(found), start=1) if two > one + 1]
+    runs = [found[start:end] for start, end in pairwise([0, *gaps, len(found)]) if start < end]
+    return " ".join(f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs)
+
+
+def numbers(text: str) -> list[int]:
+    """Return the numbers that :func:`spans` wrote."""
+    ends = [[int(end) for end in run.split("-")] for run in text.split()]
+    return [number for run in ends for number in range(run[0], run[-1] + 1)]
 
 
 def within_limits(study: Study, angles: Sequence[float]) -> tuple[float, ...]:

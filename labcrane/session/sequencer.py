@@ -11,14 +11,23 @@ from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan, next_at
 from labcrane.participants.personal_data import personal
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
-from labcrane.session.commands import FAULTS, Command, Order, by_whom
+from labcrane.session.commands import (
+    Command,
+    Message,
+    Order,
+    beyond_limits,
+    by_whom,
+    whence,
+)
 from labcrane.session.live_settings import FeedbackSettings
-from labcrane.session.pause import DISK, EXAMINER, INPUT, STOP, Suspenders
+from labcrane.session.pause import DISK, INPUT, Suspenders
 from labcrane.session.practice import WarmUp
 from labcrane.session.questionnaire import QuestionnaireRun
+from labcrane.session.resume import COMPLETE, EXAMINER, INCOMPLETE, STOP, Ledger, owed_text
 from labcrane.session.trial import TrialRun
 
 Ticks = Generator[None, Frame, None]
+
 
 NOT_ASKED = {
     Order.ANSWER: "no questionnaire is asked",
@@ -39,6 +48,8 @@ class Sequencer:
         no telling.
     awaits
         The views and sounds that must present before the first step begins.
+    ledger
+        Keeps account of what the session owes when it ends; of ``plan`` unless it was resumed.
 
     Attributes
     ----------
@@ -54,6 +65,7 @@ class Sequencer:
         *,
         waits: bool,
         awaits: Iterable[str] = (),
+        ledger: Ledger | None = None,
     ) -> None:
         self._study = study
         self._plan = plan
@@ -62,9 +74,8 @@ class Sequencer:
         self._rate_hz = study.protocol.rate_hz
         self._settings = FeedbackSettings({**study.cues, **study.sounds})
         self._notes: list[tuple[str, dict[str, Value]]] = []  # stamped with the tick they fall in
-        self._held = Suspenders(
-            study.protocol.on_fault, lambda *note: self._notes.append(note), awaits
-        )
+        self._ledger = ledger or Ledger(study, plan)
+        self._held = Suspenders(study.protocol.on_fault, self._say, awaits)
         self._attempt: TrialRun | None = None
         self._stage = ""
         self._step = 0
@@ -73,7 +84,7 @@ class Sequencer:
         self._warm_up = WarmUp()
         self.over = False
         self._script = self._session()
-        next(self._script)
+        next(self._script, None)  # a session that owes nothing ends at its first tick
 
     @property
     def moving(self) -> bool:
@@ -81,16 +92,20 @@ class Sequencer:
         return self._attempt is not None and not self._held.by
 
     def handle(
-        self, commands: Sequence[Command], lost_input: str | None, disk_trouble: str | None
+        self, commands: Sequence[Message], lost_input: str | None, disk_trouble: str | None
     ) -> None:
         """Take up orders, and what has become of the operator's controls and of the disk."""
         for command in commands:
-            if command.order in FAULTS:
+            if not isinstance(command, Command):
                 self._held.report(command)
             elif command.order is Order.DENIED:
-                self._note("page.denied", why=command.text, by=by_whom(command))
-            elif self._asking is not None and command.order in {Order.ANSWER, Order.SUBMIT}:
-                self._notes.append(self._asking.handle(command))
+                self._note("page.denied", why=command.text, by=by_whom(command), **whence(command))
+            elif (
+                (asking := self._asking) is not None
+                and not asking.over  # and not handed in twice in one tick
+                and command.order in {Order.ANSWER, Order.SUBMIT}
+            ):
+                self._say(*asking.handle(command))
             else:
                 self._obey(command)
         self._held.watch(INPUT, lost_input)
@@ -111,19 +126,26 @@ class Sequencer:
     def _session(self) -> Ticks:
         while self._held.awaited and not self._held.ending:
             yield
+        if self._waits:
+            for who in sorted(self._plan.held):
+                self._held.hold(who)
+            yield from self._decided()
         for step in self._plan.steps:
             if self._held.ending:
                 break
             self._step = step.number
             self._note("step.start", step=step.number, kind=step.kind)
             yield from self._run(step)
-            self._note("step.end", step=step.number, kind=step.kind)
+            done = not self._held.ending
+            self._note("step.end", step=step.number, kind=step.kind, done=done)
         if STOP in self._held:
             self._note("participant.dropout", why="ended while a stop rule was met")
-        self._note("session.end", reason=", ".join(self._held.ending) or "complete")
+        owed = owed_text(self._ledger.owed())
+        why = ", ".join(self._held.ending) or (INCOMPLETE if owed else COMPLETE)
+        self._note("session.end", reason=why, owed=owed)
 
     def _run(self, step: PlannedStep) -> Ticks:
-        if step.block and not self._warm_up.begin(step.block):
+        if step.block and not self._warm_up.begin(step.block) and not step.block.owed:
             pass  # practice has been enough; the step is done, also for who goes on later
         elif step.block:
             yield from self._block(step.block)
@@ -173,7 +195,7 @@ class Sequencer:
             if self._held.ending or (block.until and self._warm_up.over):
                 break
         self._note("block.end", **about)
-        if (verdict := self._warm_up.verdict(block)) is not None:
+        if not self._held.ending and (verdict := self._warm_up.verdict(block)) is not None:
             self._note("practice.end", **about, **verdict)
 
     def _trial(self, block: PlannedBlock, trial: Trial) -> Ticks:
@@ -189,6 +211,7 @@ class Sequencer:
             frame = yield
             attempt.evaluate(frame, self._wished_end())
         self._enter("")
+        self._ledger.take("trial.end", attempt.row)
         if trial.planned.counted:
             self._warm_up.count(block, attempt.phase)
         if attempt.phase is Phase.REPEATED:
@@ -201,15 +224,21 @@ class Sequencer:
             self._study, self._plan, name, self._step, answered, after
         )
         self._enter("questionnaire")
-        self._notes.extend(asking.begin(simulated=not self._waits))
+        for said in asking.begin(simulated=not self._waits):
+            self._say(*said)
         yield
         while not (asking.over or Order.SKIP in self._wishes or self._held.ending):
             yield
         self._asking = None
-        self._notes.extend(asking.end())
+        for said in asking.end(skipped=Order.SKIP in self._wishes):
+            self._say(*said)
         self._enter("")
         if self._waits and asking.alarming:
             self._held.hold(STOP)
+        yield from self._decided()
+
+    def _decided(self) -> Ticks:
+        """Wait until a stop rule that was met has been decided on."""
         while STOP in self._held and not self._held.ending:
             yield
 
@@ -229,10 +258,16 @@ class Sequencer:
     # Orders
 
     def _obey(self, command: Command) -> None:
-        refused = self._refusal(command)
+        # Every door has looked already; the loop must not fall when one has not.
+        beyond = beyond_limits(command)
+        refused = beyond or self._refusal(command)
         # What names a person must not be in the record, not even as a refused note.
-        text = "" if personal(command.text) else command.text
-        about: dict[str, Value] = {"refused": refused, "by": by_whom(command)}
+        text = "" if beyond or personal(command.text) else command.text
+        about: dict[str, Value] = {
+            "refused": refused,
+            "by": by_whom(command),
+            **whence(command),
+        }
         self._note(f"order.{command.order}", text=text, **about)
         if refused is not None:
             return
@@ -288,7 +323,11 @@ class Sequencer:
     # What is written down
 
     def _note(self, name: str, **data: Value) -> None:
+        self._say(name, data)
+
+    def _say(self, name: str, data: dict[str, Value]) -> None:
         self._notes.append((name, data))
+        self._ledger.take(name, data)
 
     def _stamped(self, frame: Frame) -> tuple[Event, ...]:
         if not self._notes:

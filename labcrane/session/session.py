@@ -27,7 +27,18 @@ from labcrane.session.eligibility import check_eligibility, close_visit
 from labcrane.session.metadata import context
 from labcrane.session.overruns import OverrunReporter
 from labcrane.session.postprocess import SessionConclusion
-from labcrane.session.resume import Policy, Progress, progress, remaining, within_limits
+from labcrane.session.resume import (
+    INCOMPLETE,
+    Ledger,
+    Policy,
+    Progress,
+    check_recorded,
+    owed_text,
+    progress,
+    remaining,
+    resumption,
+    within_limits,
+)
 from labcrane.session.sequencer import Sequencer
 from labcrane.streams.sync.sync_report import SyncReport
 
@@ -126,8 +137,15 @@ def finish(visit: Visit) -> SyncReport | None:
     return made[-1].sync_report
 
 
-def record(visit: Visit, console: Console) -> None:
+def record(
+    visit: Visit, console: Console, offer: Callable[[Mapping[str, str]], None] | None = None
+) -> None:
     """Run a session to its end and write its journal.
+
+    Parameters
+    ----------
+    offer
+        Is told the streams of frames and context, by name and description, once they are there.
 
     Raises
     ------
@@ -137,11 +155,11 @@ def record(visit: Visit, console: Console) -> None:
     study = visit.study
     admission = check_eligibility(visit)
     whole = plan_session(study, visit.participant, visit.session, admission.slot)
-    so_far, plan = _go_on(visit, whole) if visit.resumed else (None, whole)
+    so_far, plan = go_on(visit, whole) if visit.resumed else (None, whole)
     if so_far is None:
         visit.folder.claim(visit.session)
     the_rig = rig.build(study, simulated=visit.simulated)
-    clock: Clock = ManualClock() if visit.fast else SystemClock()
+    clock = _clock(visit, so_far)
     died = read_whereabouts(visit.whereabouts) if visit.resumed else None
     with (
         _watching(visit, the_rig),
@@ -153,12 +171,20 @@ def record(visit: Visit, console: Console) -> None:
         visit.folder.check_space(plan.expected_s, second, RESERVE_S)
         about = context(visit, plan, the_rig, this_run) | admission.context
         awaits = (*study.views, *study.sounds) if visit.feedback else ()
-        course = Sequencer(study, plan, the_rig, waits=not visit.simulated, awaits=awaits)
+        opening = list(_opening(about, so_far, died, clock.now()))
+        if so_far is not None:
+            resumed = resumption(plan, so_far, policy_of(visit))
+            opening.append(Event("session.resumed", clock.now(), resumed))
+        ledger = Ledger(study, whole, so_far)
+        for event in opening:
+            ledger.take(event.name, event.data)
+        waits = not visit.simulated
+        course = Sequencer(study, plan, the_rig, waits=waits, awaits=awaits, ledger=ledger)
         log = _log(visit, this_run, clock, reserve=round(RESERVE_S * second))
         try:
-            for event in _opening(about, so_far, died, clock.now()):
+            for event in opening:
                 log.note(event)
-            with _outlets(visit, plan, this_run) as outlets:
+            with _outlets(visit, plan, this_run, offer) as outlets:
                 sinks = [*outlets, _teller(console)]
                 if not visit.fast:
                     sinks.append(OverrunReporter(study.oversight, this_run.rate_hz, log, console))
@@ -189,15 +215,46 @@ def _log(visit: Visit, this_run: Run, clock: Clock, reserve: int) -> FrameLog:
     return BatchLog(journal, this_run) if visit.fast else FrameLog(journal, this_run, reserve)
 
 
-def _go_on(visit: Visit, whole: SessionPlan) -> tuple[Progress, SessionPlan]:
+def _clock(visit: Visit, so_far: Progress | None) -> Clock:
+    """Return the session's clock; a simulated one goes on where the last part ended."""
+    if not visit.fast:
+        return SystemClock()
+    if so_far is None or so_far.time is None:
+        return ManualClock()
+    return ManualClock(start=so_far.time + 1.0 / visit.study.protocol.rate_hz)
+
+
+def policy_of(visit: Visit) -> Policy:
+    """Return where a visit goes on: as it says itself, or as the protocol does."""
+    return visit.policy or visit.study.protocol.on_fault.session_died
+
+
+def go_on(visit: Visit, whole: SessionPlan) -> tuple[Progress, SessionPlan]:
+    """Return how far a session came that stopped, and what is left of it.
+
+    Raises
+    ------
+    ProtocolError
+        It was never begun, was begun by another plan, or owes nothing.
+    """
     so_far = progress(visit.journal, visit.study.machine.names)
-    if so_far.complete:
+    check_recorded(whole, so_far)
+    left = remaining(visit.study, whole, so_far, policy_of(visit))
+    if left.steps:
+        return so_far, left
+    if so_far.called_complete and not remaining(visit.study, whole, so_far, "redo_trial").steps:
         raise ProtocolError(
             f"session {visit.session} of {visit.folder.name} ran to its end, so there is nothing "
             "to go on with; labcrane recover makes its participant file"
         )
-    policy = visit.policy or visit.study.protocol.on_fault.session_died
-    return so_far, remaining(visit.study, whole, so_far, policy)
+    if so_far.stop == INCOMPLETE:
+        given_up = owed_text(remaining(visit.study, whole, so_far, "redo_trial"))
+        raise ProtocolError(
+            f"session {visit.session} of {visit.folder.name} owes nothing that policy "
+            f"{policy_of(visit)!r} would repeat; it gave up {given_up}; to repeat that, give "
+            "--policy redo_trial"
+        )
+    return so_far, left  # all is done, and only its end is still to be said
 
 
 def _opening(
@@ -236,21 +293,23 @@ def _teller(console: Console) -> Callable[[Frame], None]:
 
 @contextmanager
 def _outlets(
-    visit: Visit, plan: SessionPlan, this_run: Run
+    visit: Visit,
+    plan: SessionPlan,
+    this_run: Run,
+    offer: Callable[[Mapping[str, str]], None] | None,
 ) -> Iterator[list[Callable[[Frame], None]]]:
     if visit.fast:  # its stamps are not the computer's time, so nobody could use the streams
         yield []
         return
-    from labcrane.streams.context import ContextOutlet  # noqa: PLC0415
-    from labcrane.streams.frames import FrameOutlet  # noqa: PLC0415
+    from labcrane.streams.context import CONTEXT, ContextOutlet  # noqa: PLC0415
+    from labcrane.streams.frames import FRAME, FrameOutlet  # noqa: PLC0415
     from labcrane.streams.outlets import Outlets  # noqa: PLC0415 - loads liblsl
 
-    trials = sum(len(block.trials) for block in plan.blocks)
-    outlets = (
-        Outlets(this_run, visit.source),
-        FrameOutlet(this_run, visit.source),
-        ContextOutlet(this_run, visit.source, trials),
-    )
+    frames = FrameOutlet(this_run, visit.source)
+    about = ContextOutlet(this_run, visit.source, len(plan.trials))
+    outlets = (Outlets(this_run, visit.source), frames, about)
+    if offer:
+        offer({FRAME: frames.description, CONTEXT: about.description})
     try:
         yield [outlet.push for outlet in outlets]
     finally:

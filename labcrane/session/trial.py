@@ -14,6 +14,8 @@ class TrialRun:
         Where the trial stands.
     about
         What every event of the trial says of it.
+    row
+        Its row of the trial table, when it has ended; empty before.
     """
 
     def __init__(self, task: Task, block: PlannedBlock, trial: Trial, rate_hz: float) -> None:
@@ -31,6 +33,7 @@ class TrialRun:
         }
         if block.feedback:
             self.about["feedback"] = "+".join(block.feedback[trial.number]) or "none"
+        self.row: dict[str, Value] = {}
         self.completion: bool | None = None
         self._trial = trial
         self._task = task
@@ -69,7 +72,8 @@ class TrialRun:
             self.phase = wish
         frame.phase = self.phase
         if self.phase.over:
-            frame.events += (Event("trial.end", frame.tick.due, self._row(frame, judgement)),)
+            self.row = self._row(frame, judgement)
+            frame.events += (Event("trial.end", frame.tick.due, self.row),)
 
     def _of_this_trial(self, event: Event) -> Event:
         return Event(event.name, event.time, {"trial": self._trial.number, **event.data})

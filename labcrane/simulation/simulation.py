@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
+from labcrane.analysis.parallel import work
 from labcrane.core.records import Event
 from labcrane.design.plan import plan_session
 from labcrane.errors import ProtocolError, RecordingError
 from labcrane.files.atomic import make_folder, write_text
 from labcrane.files.lock import alone_in
-from labcrane.parallel import work
 from labcrane.protocol.study import Study, load
 from labcrane.recording.data_folder import DataFolder
 from labcrane.registry.registry import discover

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
-from labcrane.core.records import Event, Frame, Run, SessionState
+from labcrane.core.records import Event, Frame, Run, SessionState, is_counted, is_done
 from labcrane.recording.run_codec import write_run
 from labcrane.streams.outlets import channel, stream_info
 
@@ -41,9 +41,10 @@ def situation_after(situation: SessionState, event: Event) -> SessionState:
         case "trial.start":
             named = data.get("feedback", "none")
             active = () if named == "none" else tuple(named.split("+"))
-            return replace(now, trial=data["trial"], active=active)
+            counted = now.done + 1 if is_counted(data) else 0
+            return replace(now, trial=data["trial"], active=active, counted=counted)
         case "trial.end":
-            return replace(now, trial=0, active=())
+            return replace(now, trial=0, active=(), counted=0, done=now.done + is_done(data))
         case "scene.placed":
             return replace(now, scene=data["things"])
         case "feedback.setting":
@@ -79,6 +80,11 @@ class ContextOutlet:
         self._scene = write_run(run)
         self._situation = SessionState(trials=trials)
         self._due = float("-inf")
+
+    @property
+    def description(self) -> str:
+        """The stream as XML: whoever has it needs no search."""
+        return "" if self._outlet is None else str(self._outlet.get_info().as_xml())
 
     def push(self, frame: Frame) -> None:
         """Take up what happened in a frame, and send the context if it changed or is due."""

@@ -51,6 +51,11 @@ class FrameOutlet:
         self._row = np.zeros(len(columns))
         self._samples = Samples(info, len(columns))
 
+    @property
+    def description(self) -> str:
+        """The stream as XML: whoever has it needs no search."""
+        return self._samples.description
+
     def push(self, frame: Frame) -> None:
         """Send a frame. Does not wait for any receiver."""
         row, start = self._row, len(HEAD)

@@ -121,6 +121,11 @@ class Samples:
             raise StreamError(f"liblsl refused a sample with error {status}")
 
     @property
+    def description(self) -> str:
+        """The stream as XML: whoever has it needs no search."""
+        return "" if self._outlet is None else str(self._outlet.get_info().as_xml())
+
+    @property
     def taken(self) -> bool:
         """Whether somebody receives them."""
         return self._outlet is not None and bool(self._outlet.have_consumers())

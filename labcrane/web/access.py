@@ -7,12 +7,12 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs
 
-from labcrane.session.commands import FAULTS, Order
+from labcrane.session.commands import Order
 
 SUPERVISOR, PARTICIPANT = "supervisor", "participant"
 
 RIGHTS: Mapping[str, frozenset[Order]] = {
-    SUPERVISOR: frozenset(Order) - FAULTS - {Order.DENIED},
+    SUPERVISOR: frozenset(Order) - {Order.DENIED},
     PARTICIPANT: frozenset({Order.ANSWER, Order.SUBMIT, Order.CONSENT}),
 }
 """What each page may ask of the session."""

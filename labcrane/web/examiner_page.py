@@ -71,9 +71,7 @@ def _status(desk: PageContext) -> None:
 
 def _facts(desk: PageContext) -> list[str]:
     board, live = desk.board, desk.live
-    trials = [
-        trial for block in desk.plan.blocks for trial in block.trials if trial.planned.counted
-    ]
+    trials = desk.plan.trials
     left = sum(trial.planned.expected_s for trial in trials[board.trials_done :])
     found = [f"trials {board.trials_done} of {len(trials)}", f"about {left / 60:.0f} min left"]
     if board.trial:

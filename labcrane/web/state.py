@@ -5,7 +5,7 @@ from collections import Counter, deque
 from collections.abc import Mapping
 from typing import Any
 
-from labcrane.core.records import Event, Value
+from labcrane.core.records import Event, Value, is_done
 
 KEPT = 200
 """Newest events that a page can show."""
@@ -115,7 +115,7 @@ class SessionView:
         elif what == "end":
             self.trial, self.things = {}, ""
             self.last_trial = data
-            self.trials_done += bool(data.get("counted"))
+            self.trials_done += is_done(data)
 
     def _form(self, what: str, data: Mapping[str, Value]) -> None:
         match what:

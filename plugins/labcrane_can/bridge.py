@@ -1,5 +1,6 @@
 """From a CAN bus to the open gateway protocol and back (docs/gateway.md)."""
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -15,6 +16,7 @@ RATE_HZ = 50.0
 FULL_PERCENT = 0.4
 FLOW = "gateway.flow"
 LOOK_S = 0.2
+MOST_AT_ONCE = 64
 
 
 class Bridge:
@@ -103,12 +105,15 @@ class Bridge:
         if self._flow is None:
             return
         sample, stamp = None, None
-        while (next_ := self._flow.pull_sample(timeout=0.0))[1] is not None:
+        for _ in range(MOST_AT_ONCE):
+            next_ = self._flow.pull_sample(timeout=0.0)
+            if next_[1] is None:
+                break
             sample, stamp = next_
         if stamp is None or sample is None:
             return
-        for flow, valve in zip(sample, self._valves, strict=True):
-            if valve is not None:
+        for flow, valve in zip(sample, self._valves, strict=False):
+            if valve is not None and isinstance(flow, float) and math.isfinite(flow):
                 percent = flow * FULL_PERCENT
                 self._listener.send(
                     *encode_flow(ESTIMATED, valve, percent, self._settings.own_node)

@@ -1,5 +1,6 @@
 """Command state: what a panel last asked of each joint."""
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -25,11 +26,16 @@ class CanFrame(Protocol):
 
 @dataclass(slots=True)
 class Asked:
-    """A joint's last command: its signal, whether the valve is to float, and when it came."""
+    """A joint's last command: its signal, whether the valve is to float, and when it came.
+
+    ``wrong`` says what came in its place since, in words: a panel that sends no number is broken,
+    and what it asked before counts no more.
+    """
 
     signal: float = 0.0
     floats: bool = False
     time: float = -1e9
+    wrong: str = ""
 
 
 class PanelCommands:
@@ -79,14 +85,17 @@ class PanelCommands:
         """Return each joint's signal and float at ``now`` in s, and whether the panel is there."""
         fresh = [now - asked.time <= self._timeout for asked in self.asked.values()]
         pairs = list(zip(self.asked.values(), fresh, strict=True))
-        signals = [asked.signal if new else 0.0 for asked, new in pairs]
+        signals = [asked.signal if new and not asked.wrong else 0.0 for asked, new in pairs]
         return signals, [asked.floats and new for asked, new in pairs], any(fresh)
 
     def silent(self, now: float) -> str | None:
         """Return which valves fell silent at ``now`` in s while they were open, in words.
 
-        Panels may leave out valves that are shut, but no valve is shut by silence.
+        Panels may leave out valves that are shut, but no valve is shut by silence. Nor by what is
+        no number: that is told at once.
         """
+        if wrong := [asked.wrong for asked in self.asked.values() if asked.wrong]:
+            return f"{'; '.join(wrong)}; see what is wrong with the panel"
         fallen = [
             f"{joint} at {asked.signal:g}"
             for joint, asked in self.asked.items()
@@ -125,6 +134,7 @@ class PanelCommands:
         asked = self.asked[self._joints[command.valve]]
         asked.signal, asked.time = float(command.signal), time
         asked.floats = command.state is State.FLOAT
+        asked.wrong = ""
 
     def _take_described(self, frame: CanFrame, time: float) -> None:
         found = self._signals.get(frame.arbitration_id)
@@ -135,14 +145,27 @@ class PanelCommands:
         if len(frame.data) < message.length:
             self.refuse(f"{message.name} has {len(frame.data)} bytes instead of {message.length}")
             return
-        values: Any = message.decode(bytes(frame.data), decode_choices=False)
+        try:
+            values: Any = message.decode(bytes(frame.data), decode_choices=False)
+        except (ValueError, LookupError, ArithmeticError, TypeError) as error:
+            # cantools raises DecodeError, a ValueError, and what its parts raise
+            self.refuse(f"{message.name} cannot be decoded: {error}")
+            return
         for signal, joint in joints.items():
-            value = float(values[signal]) / self._full * FULL
-            if abs(value) > FULL * (1 + 1e-9):
-                self.refuse(f"{message.name}.{signal} is {values[signal]}, beyond {self._full:g}")
-                continue
-            asked = self.asked[joint]
+            if signal in values:  # a multiplexed one is not in every frame
+                self._take_signal(f"{message.name}.{signal}", values[signal], joint, time)
+
+    def _take_signal(self, name: str, given: float, joint: str, time: float) -> None:
+        asked = self.asked[joint]
+        value = float(given) / self._full * FULL
+        if not math.isfinite(value):
+            asked.wrong = f"{name} is {given}, which is no number"
+            self.refuse(asked.wrong)
+        elif abs(value) > FULL * (1 + 1e-9):
+            self.refuse(f"{name} is {given}, beyond {self._full:g}")
+        else:
             asked.signal, asked.floats, asked.time = float(round(value)), False, time
+            asked.wrong = ""
 
     def _ours(self, frame: CanFrame) -> bool:
         identifier = frame.arbitration_id

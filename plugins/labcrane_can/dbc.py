@@ -10,6 +10,11 @@ if TYPE_CHECKING:
     from cantools.database import Message
 
 
+MOST_BYTES = 1_000_000
+
+GARBLED = (ValueError, LookupError, TypeError, ArithmeticError, AttributeError, RecursionError)
+
+
 def signal_names(path: Path) -> dict[str, str]:
     """Return every signal of a DBC file by its name in lower case, as ``Message.Signal``.
 
@@ -53,7 +58,15 @@ def _messages(path: Path | None) -> "list[Message]":
     import cantools  # noqa: PLC0415 - loads for a moment
 
     try:
-        found: Any = cantools.database.load_file(str(path))
-    except (OSError, ValueError, cantools.Error) as error:
+        found: Any = cantools.database.load_string(_text(path), "dbc")
+    # What cantools' parsers raise on damaged files is not documented.
+    except (OSError, cantools.Error, *GARBLED) as error:
         raise ProtocolError(f"map {str(path)!r} is no DBC file: {error}") from error
     return list(found.messages)
+
+
+def _text(path: Path | None) -> str:
+    size = Path(path or "").stat().st_size
+    if size > MOST_BYTES:
+        raise ValueError(f"it has {size} bytes; the most are {MOST_BYTES}")
+    return Path(path or "").read_text(encoding="cp1252")  # as cantools reads DBC files

@@ -62,6 +62,16 @@ class Listener:
         self._shut()
 
     def _work(self) -> None:
+        """Read until it is over: whatever a bus brings about is told, and the bus opened anew."""
+        while not self._over.is_set():
+            try:
+                self._read()
+            except Exception as error:  # noqa: BLE001 - a dead thread would leave the panel dead
+                self._shut()
+                self.lost = f"what {self._settings.bus} brought cannot be read: {error!r}"
+                self._over.wait(AGAIN_S)
+
+    def _read(self) -> None:
         import can  # noqa: PLC0415
 
         while not self._over.is_set():

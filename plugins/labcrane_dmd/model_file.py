@@ -8,9 +8,8 @@ from typing import Any, Literal
 
 from pydantic import Field, NonNegativeFloat, ValidationError, model_validator
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
-from labcrane import ProtocolError, Settings
+from labcrane import ProtocolError, Settings, read_yaml
 from labcrane_dmd.interpolation import Layer
 from labcrane_dmd.model import Direction, Model, Segment, Source
 from labcrane_dmd.output import written
@@ -122,9 +121,9 @@ def load(path: Path | str, between: Between | None = None) -> Model:
         The file is missing, or no model; the message says where it goes wrong.
     """
     try:
-        written = YAML(typ="safe").load(Path(path).read_text(encoding="utf-8"))
+        written = read_yaml(Path(path))
         text = ModelText.model_validate(written)
-    except (OSError, UnicodeDecodeError, YAMLError) as error:
+    except ProtocolError as error:
         raise ProtocolError(f"model {str(path)!r} cannot be read: {error}") from error
     except ValidationError as error:
         first = error.errors()[0]

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 
 FULL = 250.0
 FLOW_HZ = 50.0
+MOST_A_TICK = 64
+"""Samples taken in one tick; a station that sends more is read on in the next."""
+
 LOOK_S = 0.2
 """Time between looks for the station's stream, in a thread of their own: they may take long."""
 
@@ -88,8 +91,11 @@ class Station(InputDevice):
         if inlet is None:
             return
         newest: Sequence[float] | None = None
-        while (sample := inlet.pull_sample(timeout=0.0))[1] is not None:
-            newest = sample[0]
+        for _ in range(MOST_A_TICK):
+            sample, stamp = inlet.pull_sample(timeout=0.0)
+            if stamp is None:
+                break
+            newest = sample
         if newest is None:
             return
         signals = [newest[place] for place in self._order]
@@ -116,13 +122,20 @@ class Station(InputDevice):
         import pylsl  # noqa: PLC0415
 
         try:
-            labels = inlet.info(timeout=2.0).get_channel_labels() or []
+            info = inlet.info(timeout=2.0)
+            labels = info.get_channel_labels() or []
             inlet.open_stream(timeout=2.0)
         except (
             pylsl.util.TimeoutError,
             pylsl.util.LostError,
         ) as error:
             self._complaint = f"it was there and is gone again ({error})"
+            return
+        if info.channel_format() == pylsl.cf_string or len(labels) > info.channel_count():
+            self._complaint = (
+                f"it has {info.channel_count()} channels of format {info.channel_format()}, and "
+                f"{len(labels)} names; send numbers, and a name for each channel"
+            )
             return
         if missing := [joint for joint in self._joints if joint not in labels]:
             self._complaint = (

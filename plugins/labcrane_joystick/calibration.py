@@ -7,9 +7,8 @@ from typing import Any, Self
 
 from pydantic import Field, ValidationError, model_validator
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
-from labcrane import DeviceError, Settings
+from labcrane import DeviceError, ProtocolError, Settings, read_yaml
 
 RUN_AGAIN = "run 'python -m labcrane_joystick' to identify and calibrate the sticks"
 REMOVE = f"remove it and {RUN_AGAIN}"
@@ -126,11 +125,11 @@ def save(path: Path, model: str, found: Calibrations) -> None:
 
 
 def _read(path: Path) -> Mapping[str, Any]:
-    try:
-        content = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    if not path.exists():
         return {}
-    except (OSError, UnicodeDecodeError, YAMLError) as error:
+    try:
+        content = read_yaml(path)
+    except ProtocolError as error:
         raise DeviceError(f"{path} cannot be read: {error}; {REMOVE}") from error
     if not isinstance(content, dict):
         raise DeviceError(f"{path} must hold a mapping of joystick models; {REMOVE}")

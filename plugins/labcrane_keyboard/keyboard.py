@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 FIRST_LOOK_S = 1.0
 """How long opening waits for the view, which is there before the session."""
 
+MOST_A_TICK = 64
+"""Samples taken in one tick; a view that sends more is read on in the next."""
+
 LOOK_S = 0.2
 """Time between later looks, in a thread of their own: they may take long."""
 
@@ -97,11 +100,23 @@ class Keyboard(InputDevice):
         if not self._seen:  # what there is now counts from now: the first sample is on its way
             self._seen, self._came = True, now
         newest = None
-        while (sample := inlet.pull_sample(timeout=0.0))[1] is not None:
-            newest = sample[0]
-        if newest is not None:
-            self._came = now
-            self._wanted = [newest[more] - newest[less] for less, more in self._pairs]
+        for _ in range(MOST_A_TICK):
+            sample, stamp = inlet.pull_sample(timeout=0.0)
+            if stamp is None:
+                break
+            newest = sample
+        if newest is None:
+            return
+        states = [newest[key] for pair in self._pairs for key in pair]
+        wrong = [state for state in states if not 0.0 <= state <= 1.0]  # NaN too
+        if wrong:
+            self._complaint = (
+                f"view {self._settings.view!r} sent the key state {wrong[0]:g}, which is not "
+                "within 0 and 1"
+            )
+            return
+        self._came, self._complaint = now, ""
+        self._wanted = [newest[more] - newest[less] for less, more in self._pairs]
 
     def _look_on(self) -> None:
         while self._inlet is None and not self._over.wait(LOOK_S):
@@ -117,10 +132,17 @@ class Keyboard(InputDevice):
             return
         inlet = pylsl.StreamInlet(here[0], max_buflen=2, recover=True)
         try:
-            labels = inlet.info(timeout=2.0).get_channel_labels() or []
+            info = inlet.info(timeout=2.0)
+            labels = info.get_channel_labels() or []
             inlet.open_stream(timeout=2.0)
         except (pylsl.util.TimeoutError, pylsl.util.LostError):
             return  # gone again; it is looked for once more
+        if info.channel_format() == pylsl.cf_string or len(labels) > info.channel_count():
+            self._complaint = (
+                f"stream {self._stream!r} has {info.channel_count()} channels of format "
+                f"{info.channel_format()}, and {len(labels)} names; it is no view's"
+            )
+            return
         sent = [label.removeprefix("key.") for label in labels if label.startswith("key.")]
         missing = [key for pair in self._settings.axes.values() for key in pair if key not in sent]
         if missing:

@@ -4,10 +4,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import ConfigDict, Field, ValidationInfo, field_validator, model_validator
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
-from labcrane import Item, Settings, StudyPath
+from labcrane import Item, ProtocolError, Settings, StudyPath, read_yaml
 
 NAME = r"^[a-z][a-z0-9_]*$"
 
@@ -85,8 +83,8 @@ def _lab_file(name: str, info: ValidationInfo) -> Any:
     """Return what a YAML file beside the protocol holds."""
     path = (info.context or {}).get("folder", Path()) / name
     try:
-        return YAML(typ="safe").load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, YAMLError) as error:
+        return read_yaml(path)
+    except ProtocolError as error:
         raise ValueError(f"the lab's file {str(path)!r} cannot be read: {error}") from None
 
 

@@ -5,22 +5,28 @@ import sys
 from labcrane import DeviceError, Finding, Prompt, Verdict
 from labcrane_sonification import real_time
 from labcrane_sonification.settings import SonificationSettings
-from labcrane_sonification.synth import server
+from labcrane_sonification.synth import server, silent_server
 
 LONG_S = 0.02
 """Length of a block beyond which the delay of a sound is noticed."""
 
 
 def examine(settings: SonificationSettings, ask: Prompt | None) -> list[Finding]:
-    """Open the sound system as a session would, play nothing, and close it."""
+    """Open the sound system as a session would, play nothing, and close it.
+
+    A sound device is not started: pyo 1.0.6 stops one while it holds Python's global lock, for
+    which the device's thread may be waiting, and both then wait for ever.
+    """
     del ask  # nothing needs to be moved
+    started = settings.driver == "jack" and sys.platform == "linux"  # its thread is looked at
     try:
-        made = server(settings)
+        made = server(settings) if started else silent_server(settings)
     except DeviceError as error:
         return [Finding.failed(error)]
     block, rate = int(made.getBufferSize()), float(made.getSamplingRate())
-    found = _scheduling() if settings.driver == "jack" and sys.platform == "linux" else []
-    made.stop()
+    found = _scheduling() if started else []
+    if started:
+        made.stop()
     made.shutdown()
     text = (
         f"{_name(settings)} takes {rate:.0f} Hz in blocks of {block} samples: "

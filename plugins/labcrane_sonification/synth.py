@@ -24,6 +24,19 @@ LIMIT = 0.98
 
 def server(settings: SonificationSettings) -> Any:
     """Return a sound server that plays, or raise :class:`DeviceError`."""
+    made = silent_server(settings)
+    made.start()
+    return made
+
+
+def silent_server(settings: SonificationSettings) -> Any:
+    """Return a sound server that has opened its device and plays nothing yet.
+
+    Raises
+    ------
+    DeviceError
+        There is no such device, or it does not take the rate and the block.
+    """
     made = _server(settings, settings.driver)
     # pyo 1.1.0 does not refuse a missing device: it ends the process with a segmentation fault
     # (belangeo/pyo #15, #121).
@@ -43,7 +56,6 @@ def server(settings: SonificationSettings) -> Any:
             f"rate_hz is {settings.rate_hz}, but the {settings.driver} sound system runs at "
             f"{rate}; write that, or start the system at the other rate"
         )
-    made.start()
     return made
 
 

@@ -70,7 +70,6 @@ class Hud:
     def lines(self, frame: Frame, situation: SessionState) -> list[str]:
         """Return the lines to be shown; one that has nothing to say is left out."""
         words = self._words
-        of = f" / {situation.trials}" if situation.trials else ""
         practice = f" ({words['practice']})" if situation.practice else ""
         there = next(self._targets.find(frame.task), None)
         away = math.dist(frame.state[self._tip], there.centre) if there else 0.0
@@ -81,7 +80,9 @@ class Hud:
             "block": f"{words['block']} {situation.block}: {situation.block_name}{practice}"
             if situation.block
             else "",
-            "trial": f"{words['trial']} {frame.trial}{of}" if frame.trial else "",
+            "trial": f"{words['trial']} {situation.counted} / {situation.trials}"
+            if situation.counted
+            else "",
             "distance": f"{words['distance']} {away:.2f} m" if there else "",
             "time": f"{words['time']} {frame.elapsed:.1f} s" if frame.trial else "",
             "speed": f"{words['speed']} {speed:.2f} m/s",

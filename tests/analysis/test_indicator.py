@@ -2,13 +2,12 @@
 
 import csv
 import math
-import os
-import shutil
 import subprocess
 from datetime import date
 from pathlib import Path
 
 import pytest
+from needs import need
 
 from labcrane.analysis.advice import familiarity, fatigue, suggest
 from labcrane.analysis.cohort import find_cohort
@@ -198,15 +197,20 @@ def test_a_folder_without_tests_says_what_a_test_is(tmp_path: Path) -> None:
 
 def converted(book: Path, sheet: int) -> list[list[str]]:
     """Let LibreOffice open the workbook, work it out, and write one sheet as text."""
-    office = shutil.which("soffice")
-    if office is None:
-        if os.environ.get("CI"):
-            pytest.fail("CI needs libreoffice-calc-nogui")
-        pytest.skip("LibreOffice is not installed")
+    need("soffice")
     how = f"csv:Text - txt - csv (StarCalc):44,34,76,1,,0,false,true,false,false,false,{sheet}"
     home = f"-env:UserInstallation=file://{book.parent}/office"
     subprocess.run(
-        [office, home, "--headless", "--convert-to", how, "--outdir", str(book.parent), str(book)],
+        [
+            "soffice",
+            home,
+            "--headless",
+            "--convert-to",
+            how,
+            "--outdir",
+            str(book.parent),
+            str(book),
+        ],
         check=True,
         capture_output=True,
         timeout=120,

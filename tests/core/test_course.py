@@ -11,7 +11,7 @@ from labcrane import InputDevice
 from labcrane.core.records import Phase
 from labcrane.protocol import rig
 from labcrane.protocol.study import Study
-from labcrane.session.commands import Command, Order
+from labcrane.session.commands import Command, FeedbackLost, FeedbackReady, Order
 
 
 @pytest.fixture
@@ -134,9 +134,9 @@ def test_people_are_waited_for(tmp_path: Path) -> None:
 
 def test_no_step_begins_before_all_feedback_presents_or_is_left_out(study: Study) -> None:
     orders = {
-        20: give(Order.FAILED, "tone: it hangs"),
-        40: give(Order.MENDED, "screen: renderer software"),
-        60: give(Order.LEFT_OUT, "tone: it hangs; it is left out"),
+        20: [FeedbackLost("tone", "it hangs")],
+        40: [FeedbackReady("screen", "renderer software")],
+        60: [FeedbackLost("tone", "it hangs; it is left out", left_out=True)],
     }
     seen = rehearse(study, orders, awaits=("screen", "tone"))
     assert [event.data["what"] for event in seen.events("feedback.awaited")] == ["screen", "tone"]

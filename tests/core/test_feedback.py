@@ -23,7 +23,7 @@ from labcrane.design.plan import plan_session
 from labcrane.feedback.processes import FeedbackProcesses
 from labcrane.protocol.study import Study
 from labcrane.recording.run_codec import read_run, write_run
-from labcrane.session.commands import Command, Order
+from labcrane.session.commands import Command, FeedbackLost, FeedbackReady, Order
 from labcrane.session.session import Visit, run
 from labcrane.streams.context import situation_after
 from labcrane.testing import TARGETS, ch8, make_run
@@ -136,8 +136,8 @@ def test_a_setting_that_cannot_be_is_refused(text: str, why: str, tmp_path: Path
 
 def test_a_failed_process_pauses_the_session_if_the_protocol_says_so(tmp_path: Path) -> None:
     orders = {
-        50: [Command(Order.FAILED, "tone: it hangs")],
-        90: [Command(Order.MENDED, "tone: driver jack")],
+        50: [FeedbackLost("tone", "it hangs")],
+        90: [FeedbackReady("tone", "driver jack")],
     }
     pausing = FED + "on_fault: {feedback_lost: pause}\n"
     seen = rehearse(a_study(tmp_path, pausing), orders)

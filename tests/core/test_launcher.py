@@ -1,7 +1,6 @@
 """What people say before a session runs, and recorders that do not end as they should."""
 
-import subprocess
-import sys
+import os
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,7 @@ from labcrane.launcher import launcher as launcher_module
 from labcrane.launcher.launcher import Launcher
 from labcrane.launcher.session_process import SessionConfig
 from labcrane.session.commands import Command, Order, QueueConsole
-from labcrane.streams.recorder import handle as recorder_keeper
+from labcrane.streams.recorder import handle as recorder_handle
 from labcrane.streams.recorder.handle import RecorderHandle
 
 
@@ -73,50 +72,41 @@ def test_a_note_that_is_given_while_streams_are_waited_for_is_in_the_record(
 
 STOPS_BUT_HANGS_AS_A_SPARE = """
 import sys, time
-if not sys.stdin.readline():
+from pathlib import Path
+from labcrane.processes.parent import Parent
+parent = Parent()
+orders = parent.order()
+if orders is None:
     time.sleep(600)
-print('{"ready": true}', flush=True)
-open(sys.argv[1], "w").write(sys.stdin.readline())
+parent.tell({"ready": True})
+while not (said := parent.messages()):
+    parent.wait(1.0)
+orders.journal.with_name(f"heard-{orders.part}").write_text(" ".join(said))
+parent.close()
 """
 
 
 def test_a_spare_recorder_that_hangs_keeps_no_recorder_from_closing_its_journal(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    heard, started = tmp_path / "heard", []
-
-    class Stubborn(recorder_keeper._Recorder):
-        def __init__(self) -> None:
-            command = [sys.executable, "-c", STOPS_BUT_HANGS_AS_A_SPARE, str(heard)]
-            pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-            subprocess.Popen.__init__(self, command, **pipes)
-            started.append(self)
-
-    monkeypatch.setattr(recorder_keeper, "_Recorder", Stubborn)
+    (tmp_path / "hanging_spare.py").write_text(STOPS_BUT_HANGS_AS_A_SPARE)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    monkeypatch.setattr(recorder_handle, "MODULE", "hanging_spare")
     keeper = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
     wait_for(lambda: keeper.ready, 60.0)
-    monkeypatch.setattr(recorder_keeper, "PATIENCE_S", 3.0)
+    monkeypatch.setattr(recorder_handle, "PATIENCE_S", 3.0)
     keeper.stop()
-    assert heard.read_text() == "stop\n"
-    assert [process.returncode for process in started] == [0, -9]
+    assert [(tmp_path / f"heard-{part}").read_text() for part in (1, 2)] == ["stop", "stop"]
+    assert [one.exit_code for one in keeper._recorders] == [0, 0]
+    assert [one.exit_code for one in keeper._spares] == [-9, -9]
 
 
 def test_a_recorder_that_dies_as_it_is_given_its_orders_is_replaced(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    class Dying(recorder_keeper._Recorder):
-        def __init__(self) -> None:
-            pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-            subprocess.Popen.__init__(self, [sys.executable, "-c", ""], **pipes)
-            self.wait()
-            self.looks = 0
-
-        def poll(self) -> int | None:
-            self.looks += 1
-            return super().poll() if self.looks > 1 else None  # alive when it is chosen
-
-    monkeypatch.setattr(recorder_keeper, "_Recorder", Dying)
+    monkeypatch.setattr(recorder_handle, "MODULE", "labcrane.errors")  # ends at once
     keeper = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
+    wait_for(lambda: all(one.exit_code is not None for one in keeper._recorders))
     assert keeper.watch()
-    assert keeper.restarts == 1
+    assert keeper.restarts == recorder_handle.RECORDERS
     keeper.stop()

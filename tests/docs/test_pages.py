@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from docs.bare_machine import commands
 from docs.page import PAGES, ROOT, Reader, blocks
+from needs import missing, need
 
 RUN = {"python", "sh", "r", "octave", "matlab", "yaml", "toml", "json", "xml", ""}
 """Languages of blocks; one without a language lists files that are there."""
@@ -45,12 +46,17 @@ def follow(
 ) -> None:
     monkeypatch.chdir(folder)
     monkeypatch.syspath_prepend(folder)
+    lacking: set[str] = set()
     for block in blocks(page):
         if (
             block.why_not
             or "bare machine" in block.marks
             or ("long" in block.marks and not also_long)
         ):
+            continue
+        if here := [name for name in block.needs if missing(name)]:
+            lacking.update(here)
+            reader.prepare(block)  # blocks that follow may need it
             continue
         try:
             reader.follow(block)
@@ -61,6 +67,7 @@ def follow(
                 "<!-- not run: REASON --> on the line above (tests/docs/page.py has all marks)"
             )
             raise
+    need(*sorted(lacking))  # the rest of the page was followed
 
 
 def test_blocks_have_a_language_that_is_run_or_a_reason_why_not() -> None:

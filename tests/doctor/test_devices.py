@@ -8,7 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from needs import needs
 from slcan_adapter import SlcanAdapter
+from windows import an_x_server
 
 from labcrane import Finding, Offer, Settings, Verdict
 from labcrane.testing import ExaminationContract
@@ -99,20 +101,8 @@ def test_a_silent_bus_and_no_adapter_are_told_apart(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def x_server() -> Iterator[str]:
-    read, write = os.pipe()
-    arguments = ["Xvfb", "-displayfd", str(write), "-screen", "0", "1000x700x24"]
-    try:
-        server = subprocess.Popen(arguments, pass_fds=[write], stderr=subprocess.DEVNULL)
-    except FileNotFoundError:
-        if os.environ.get("CI"):
-            raise
-        pytest.skip("needs Xvfb")
-    os.close(write)
-    with os.fdopen(read) as numbers:
-        number = numbers.readline().strip()
-    yield f":{number}"
-    server.terminate()
-    server.wait()
+    with an_x_server() as display:
+        yield display
 
 
 def in_a_process(plugin: str, **environment: str) -> str:
@@ -156,13 +146,35 @@ def test_the_refresh_rate_is_the_one_with_the_star() -> None:
 
 
 def test_a_sound_device_is_named_with_its_block(tmp_path: Path) -> None:
-    config = tmp_path / "asoundrc"
-    config.write_text("pcm.!default { type null }\nctl.!default { type null }\n")
-    found = in_a_process("labcrane_sonification", ALSA_CONFIG_PATH=str(config))
+    found = in_a_process("labcrane_sonification", ALSA_CONFIG_PATH=null_device(tmp_path))
     assert "takes 48000 Hz in blocks of 256 samples: 5.3 ms each" in found
 
 
-@pytest.mark.skipif(not os.environ.get("CI"), reason="this computer may have a sound device")
+def test_a_sound_device_is_opened_without_being_started(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Once started, it cannot be stopped for certain: see labcrane_sonification.examination.
+    code = (
+        "import pyo\n"
+        "pyo.Server.start = pyo.Server.stop = lambda self: print('touched')\n"
+        "from labcrane_sonification import labcrane_feedback\n"
+        "(offer,) = labcrane_feedback()\n"
+        "for one in offer.examine(offer.settings(), None): print(one.verdict, one.text)"
+    )
+    monkeypatch.setenv("ALSA_CONFIG_PATH", null_device(tmp_path))
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "touched" not in done.stdout
+    assert "PASS sound device" in done.stdout
+
+
+def null_device(folder: Path) -> str:
+    """Return an ALSA configuration whose only device takes everything and sounds nothing."""
+    config = folder / "asoundrc"
+    config.write_text("pcm.!default { type null }\nctl.!default { type null }\n")
+    return str(config)
+
+
+@needs("no sound card")
 def test_a_computer_without_sound_fails_and_does_not_crash() -> None:
     assert in_a_process("labcrane_sonification").startswith(
         "FAIL there is no sound output device connect one"

@@ -74,7 +74,12 @@ def lamp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> type[labcrane.Setti
             "looking at feedback 'lamp' ended its process with exit code 3; "
             "the last it said was 'lamp: burnt out'",
         ),
-        ("hangs", Verdict.FAIL, "looking at feedback 'lamp' did not answer within 4 s"),
+        (
+            "hangs",
+            Verdict.FAIL,
+            "looking at feedback 'lamp' did not answer within 1 s; it "
+            "stood still in examine() (labcrane_doctors_lamp.py:15)",
+        ),
     ],
 )
 def test_a_plugins_look_cannot_harm_the_doctor(
@@ -84,7 +89,7 @@ def test_a_plugins_look_cannot_harm_the_doctor(
     verdict: Verdict,
     text: str,
 ) -> None:
-    monkeypatch.setattr(components, "WAIT_S", 4.0 if does == "hangs" else 30.0)
+    monkeypatch.setattr(components, "WAIT_S", 1.0 if does == "hangs" else 30.0)
     look = Look("feedback lamp", "feedback", "lamp", lamp.model_validate({"does": does}))
     (found,) = components.examine(look, move=False)
     assert (found.verdict, found.text) == (verdict, text)

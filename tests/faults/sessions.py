@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import h5py
 import psutil
@@ -68,14 +69,25 @@ def session_process(launcher: "subprocess.Popen[str]") -> psutil.Process | None:
     return None
 
 
+def recorders(launcher: "subprocess.Popen[str]") -> list[psutil.Process]:
+    """Return the recorder processes of a launcher that write a journal of streams."""
+    return [
+        child
+        for child in _children(launcher)
+        if any("_streams" in file.path for file in _files(child))
+    ]
+
+
 def recorder_process(launcher: "subprocess.Popen[str]") -> psutil.Process | None:
-    """Return the recorder process of a launcher that writes a journal, while there is one."""
-    for child in _children(launcher):
-        if any("labcrane.streams.recorder" in part for part in child.cmdline()) and any(
-            file.path.endswith(".xdf") for file in child.open_files()
-        ):
-            return child
-    return None
+    """Return one of the recorder processes of a launcher, while there is one."""
+    return next(iter(recorders(launcher)), None)
+
+
+def _files(process: psutil.Process) -> list[Any]:
+    try:
+        return process.open_files()
+    except (psutil.NoSuchProcess, psutil.AccessDenied):
+        return []
 
 
 def _children(launcher: "subprocess.Popen[str]") -> list[psutil.Process]:

@@ -1,8 +1,6 @@
 """A minute of a session's sound on a busy computer, without one block missing."""
 
 import math
-import os
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +8,7 @@ import pytest
 from busy_computer import a_busy_computer
 from faults.jack_session import Examiner, a_jack_session
 from faults.sessions import unique
-from jack_server import real_time_is_allowed
+from needs import needs
 from simple_crane import FORM
 
 from labcrane.core.records import Event
@@ -58,13 +56,7 @@ class Ending(Examiner):
 
 @pytest.mark.long
 @pytest.mark.timeout(900)
-@pytest.mark.skipif(
-    shutil.which("jackd") is None and not os.environ.get("CI"), reason="needs jackd"
-)
-@pytest.mark.skipif(
-    not real_time_is_allowed() and not os.environ.get("CI"),
-    reason="needs real-time priorities: docs/lab.md says how a user is allowed them",
-)
+@needs("jackd", "real-time priorities")
 def test_a_minute_of_sound_in_real_time_has_no_underrun(tmp_path: Path) -> None:
     # What runs on a core that stands still, as on a computer that is shared, is late whatever its
     # priority: an underrun then says nothing about the sound, and the attempt is made again.

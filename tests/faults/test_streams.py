@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from faults.sessions import STUDY, labcrane, recorder_process, unique, wait_for
+from faults.sessions import STUDY, labcrane, recorders, unique, wait_for
 
 from labcrane import open_recording
 
@@ -20,6 +20,7 @@ streams:
 """
 
 
+RECORDERS = 2
 RECORDER_KILLS = 4
 
 
@@ -115,10 +116,14 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
         sender.start(first=100_000)
         said.until("eeg is back")
         for kill in range(RECORDER_KILLS):
-            wait_for(lambda: recorder_process(process) is not None)
-            recorder_process(process).kill()
-            said.until("STREAM LOST: recorder", times=kill + 1)
-            said.until("recorder is back", times=kill + 1)
+            wait_for(lambda: len(recorders(process)) == RECORDERS)
+            recorders(process)[kill % 2].kill()
+            said.until("a recorder died", times=kill + 1)
+        wait_for(lambda: len(recorders(process)) == RECORDERS)
+        for recorder in recorders(process):
+            recorder.kill()
+        said.until("STREAM LOST", times=2)
+        said.until(" is back", times=2)
         said.order("note all is well again")
         said.order("end")
         yield folder / "data" / "P001-PILOT" / "P001-PILOT.h5", said.end()
@@ -151,17 +156,18 @@ def test_a_lost_stream_pauses_the_session_until_it_is_back(session) -> None:
     assert ("stream.lost", "gaze") not in names  # it is not required
 
 
-def test_a_killed_recorder_is_back_within_a_second_and_a_half(session) -> None:
+def test_a_killed_recorder_costs_nothing_and_both_at_once_at_most_a_second(session) -> None:
     path, _ = session
-    parts = sorted(path.parent.glob("ses-01_streams*.xdf"))
-    assert len(parts) == 1 + RECORDER_KILLS
+    assert len(list(path.parent.glob("ses-01_streams*.xdf"))) == RECORDERS + RECORDER_KILLS + 2
     stream = open_recording(path).session(1).streams["Amplifier"]
     counter = stream.data["Counter"].to_numpy()
     restarted = counter >= 100_000
-    # The sender never stopped: what is missing in its count are the recorder's gaps.
+    assert (np.diff(counter) > 0).all()  # each sample once, in order
+    # The sender never stopped: what is missing in its count is the gap of both recorders.
     gaps = np.flatnonzero(np.diff(counter[restarted]) > 1)
-    assert 1 <= len(gaps) <= RECORDER_KILLS
-    assert np.diff(stream.time_raw[restarted])[gaps].max() <= 1.5
+    assert len(gaps) <= 1
+    if len(gaps):
+        assert np.diff(stream.time_raw[restarted])[gaps].max() <= 1.0
 
 
 def test_the_gaps_and_what_to_do_are_in_the_sync_report(session) -> None:
@@ -169,6 +175,6 @@ def test_the_gaps_and_what_to_do_are_in_the_sync_report(session) -> None:
     report = open_recording(path).session(1).sync_report
     assert report["verdict"] == "FAIL"
     (amplifier,) = (one for one in report["streams"] if one["name"] == "Amplifier")
-    assert any("gap" in finding["text"] for finding in amplifier["findings"])
+    assert amplifier["findings"]
     assert any("gaze was never on the network" in one["text"] for one in report["missing"])
     assert "sync report: FAIL" in said

@@ -13,6 +13,7 @@ from pathlib import Path
 import psutil
 import pytest
 from faults.sessions import labcrane, wait_for
+from needs import need
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -116,11 +117,8 @@ def a_room(protocol: Path, data: Path, what: str = "run", *, pilot: bool = True)
 @contextmanager
 def a_browser(profile: Path) -> Iterator[webdriver.Chrome]:
     """Start Debian's Chromium without a screen, and without any network but this computer."""
+    need("chromium", "chromedriver")
     chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
-    if not (chromium and driver):
-        if os.environ.get("CI"):
-            pytest.fail("CI needs chromium and chromium-driver")
-        pytest.skip("chromium or chromedriver is not installed")
     options = webdriver.ChromeOptions()
     options.binary_location = chromium
     for argument in (

@@ -126,7 +126,7 @@ def test_opening_is_silent_and_leaves_the_environment_as_it_was():
         "from labcrane.testing import make_run, ch8\n"
         "from labcrane_joystick.dual_joystick import DualJoystick\n"
         "from labcrane_joystick.settings import JoystickSettings\n"
-        "try: DualJoystick(JoystickSettings(stick='ffff:fffe')).open(a_run(ch8()))\n"
+        "try: DualJoystick(JoystickSettings(stick='ffff:fffe')).open(make_run(ch8()))\n"
         "except DeviceError: pass\n"
         "import pygame; print(pygame.display.get_driver(), dict(os.environ) == before)"
     )

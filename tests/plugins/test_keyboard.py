@@ -1,7 +1,6 @@
 """The keyboard: ramps against closed forms, and real keys in a real window."""
 
 import os
-import shutil
 import subprocess
 import sys
 import time
@@ -13,6 +12,7 @@ import numpy as np
 import pylsl
 import pytest
 from gone_stream import goes_once
+from needs import needs
 from pydantic import ValidationError
 from windows import an_x_server
 
@@ -188,9 +188,7 @@ def a_window(view: str, display: str) -> Iterator["subprocess.Popen[str]"]:
         process.stdout.close()
 
 
-@pytest.mark.skipif(
-    shutil.which("xdotool") is None and not os.environ.get("CI"), reason="needs xdotool"
-)
+@needs("xdotool", "Xvfb")
 def test_real_keys_in_a_real_window_move_the_axes() -> None:
     view = f"window{os.getpid()}"
 

@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,20 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from busy_computer import a_busy_computer
-from jack_server import a_jack_server, real_time_is_allowed, underruns
+from jack_server import a_jack_server, underruns
+from needs import needs
 
 from labcrane_sonification import real_time
 from labcrane_sonification.underruns import WINDOW, Underruns
 
 PERIOD_S = 1024 / 48000
 ATTEMPTS = 3
-needs_jack = pytest.mark.skipif(
-    shutil.which("jackd") is None and not os.environ.get("CI"), reason="needs jackd"
-)
-needs_real_time = pytest.mark.skipif(
-    not real_time_is_allowed() and not os.environ.get("CI"),
-    reason="needs real-time priorities: docs/lab.md says how a user is allowed them",
-)
+needs_jack = needs("jackd")
+needs_real_time = needs("real-time priorities")
 
 
 def counted(begun: np.ndarray) -> int:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from needs import GRAPHICS, needs
 from windows import (
     MACHINE,
     POSE,
@@ -30,6 +31,7 @@ from labcrane_view.settings import CAMERAS, CameraSettings, ViewSettings
 from labcrane_view.view import View
 
 
+@needs(*GRAPHICS)
 class TestView(FeedbackContract):
     """Offered as "view"."""
 
@@ -193,7 +195,7 @@ def test_text_is_written_in_the_operators_language() -> None:
     pictures = []
     for language in ("en", "de", "pl"):
         with a_view(language=language, hud=("distance", "trial"), renderer="software") as view:
-            view.update(SessionState(trials=3))
+            view.update(SessionState(trials=3, counted=1))
             view.present(make_frame())
             pictures.append(view.picture()[:60, :250])
     assert len({picture.tobytes() for picture in pictures}) == 3

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cranes import needs_bullet
+from needs import GRAPHICS, needs
 
 from labcrane import (
     FloatArray,
@@ -34,7 +35,7 @@ from labcrane_view.areas import Projection
 from labcrane_view.settings import CameraSettings, ViewSettings
 from labcrane_view.view import View
 
-pytestmark = needs_bullet
+pytestmark = [needs_bullet, needs(*GRAPHICS)]
 
 RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"
 SCENES = ("carry", "casualty", "extract", "reach_over", "reach_through", "touch")

@@ -5,23 +5,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
+from needs import UNSHARE, needs
 
-UNSHARE = ["unshare", "--user", "--map-root-user", "--mount"]
-
-
-def can_mount() -> bool:
-    command = [*UNSHARE, "sh", "-c", "mount -t tmpfs none /mnt"]
-    try:
-        return subprocess.run(command, capture_output=True, check=False).returncode == 0
-    except FileNotFoundError:
-        return False
-
-
-needs_mounts = pytest.mark.skipif(
-    not (os.environ.get("CI") or can_mount()), reason="no user namespaces with mounts here"
-)
-
+needs_mounts = needs("mounts")
 
 FULL_DISK = """
 import sys

@@ -1,22 +1,13 @@
 """Programs of others that must read what labcrane writes."""
 
 import os
-import shutil
 import subprocess
 from pathlib import Path
 
-import pytest
+from needs import needs
 
-
-def needs(program: str, package: str) -> pytest.MarkDecorator:
-    """Skip on a laptop without the program; never where CI promises to install it."""
-    missing = shutil.which(program) is None
-    reason = f"{program} is not installed (Debian: {package})"
-    return pytest.mark.skipif(missing and os.environ.get("CI") != "true", reason=reason)
-
-
-needs_r = needs("Rscript", "r-base-core r-bioc-rhdf5 r-cran-hdf5r r-cran-afex")
-needs_octave = needs("octave-cli", "octave")
+needs_r = needs("Rscript", "afex", "hdf5r", "rhdf5")
+needs_octave = needs("octave-cli")
 
 
 def r(script: str, *arguments: object) -> str:

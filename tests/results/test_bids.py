@@ -3,7 +3,6 @@
 import gzip
 import io
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from needs import needs
 
 from labcrane import ProtocolError
 from labcrane.analysis.cohort import Cohort
@@ -56,9 +56,7 @@ def errors(folder: Path) -> list[str]:
     return [f"{i['code']} {i.get('location')}" for i in issues if i["severity"] == "error"]
 
 
-validated = pytest.mark.skipif(
-    VALIDATOR is None and os.environ.get("CI") != "true", reason="pip install bids-validator-deno"
-)
+validated = needs("bids-validator-deno")
 
 
 @validated

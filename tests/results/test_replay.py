@@ -12,11 +12,11 @@ from labcrane.analysis.measures import measure_session
 from labcrane.cli.app import main
 from labcrane.recording.participant_file.reader import open_recording
 from labcrane.replay.replay import replay
-from labcrane.session.commands import Command, Order
+from labcrane.session.commands import Command, Order, StreamBack, StreamLost
 from results.recorded import STUDY, record, study
 
 ROOT = Path(__file__).parents[2]
-CH8 = Path(labcrane.__file__).parent / "machines" / "data" / "ch8.yaml"
+CH8 = Path(labcrane.__file__).parent / "machines" / "ch8.yaml"
 
 
 @pytest.fixture(scope="module")
@@ -90,8 +90,8 @@ def test_orders_are_given_again_at_their_ticks(tmp_path: Path) -> None:
         420: [Command(Order.START)],
         600: [Command(Order.REPEAT)],
         900: [Command(Order.SKIP), Command(Order.NOTE, "coughs")],
-        1500: [Command(Order.LOST, "eeg")],
-        1600: [Command(Order.BACK, "eeg")],
+        1500: [StreamLost("eeg")],
+        1600: [StreamBack("eeg")],
         4000: [Command(Order.END)],
     }
     path = record(study(tmp_path), tmp_path / "data", "P001", simulated=True, orders=orders)

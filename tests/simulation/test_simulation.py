@@ -186,7 +186,7 @@ def test_a_participant_who_leaves_has_no_later_session(study: Path, tmp_path: Pa
 
 
 def test_work_of_a_core_that_was_lost_is_done_again(tmp_path: Path) -> None:
-    from labcrane.parallel import work
+    from labcrane.analysis.parallel import work
 
     given = [(tmp_path / "mark", number) for number in range(4)]
     assert sorted(work(die_once, given, workers=2)) == [0, 1, 2, 3]
@@ -194,9 +194,9 @@ def test_work_of_a_core_that_was_lost_is_done_again(tmp_path: Path) -> None:
 
 
 def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    from labcrane.parallel import work
+    from labcrane.analysis.parallel import work
 
-    monkeypatch.setattr("labcrane.parallel.CONNECT_S", 1.0)
+    monkeypatch.setattr("labcrane.analysis.parallel.CONNECT_S", 1.0)
     with pytest.raises(LabcraneError, match=r"no Dask scheduler answers at 'tcp://127\.0\.0\.1:1'"):
         list(work(die_once, [(Path(), 0)], scheduler="tcp://127.0.0.1:1"))
 

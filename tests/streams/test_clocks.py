@@ -3,12 +3,11 @@
 The whole table, with long runs and a busy computer, is ``python -m benchmarks.sync``.
 """
 
-import os
-import shutil
 import time
 
 import numpy as np
 import pytest
+from needs import need
 from streams.emulation import (
     Lab,
     Skew,
@@ -34,8 +33,7 @@ SECONDS = 22.0
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory):
-    if shutil.which("gcc") is None and not os.environ.get("CI"):
-        pytest.skip("gcc is needed to emulate another clock")
+    need("gcc")
     return build(tmp_path_factory.mktemp("skew"))
 
 
@@ -90,7 +88,7 @@ def test_the_sources_clock_is_known(recorded):
     streams = recorded.streams()
     drift = resync(streams["Drifting"]).quality
     assert drift.drift_ppm == pytest.approx(100.0, abs=5.0)
-    assert drift.probe_age_s < 5.0
+    assert 0.0 <= drift.probe_age_s < SECONDS
     assert drift.unprobed == drift.unsure == drift.gaps == 0
     assert resync(streams["Moments"]).quality.drift_ppm == pytest.approx(0.0, abs=5.0)
 

@@ -1,6 +1,5 @@
 """Signals are watched in a process of their own: what is found, and what a bad monitor can do."""
 
-import json
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,14 +10,13 @@ import numpy as np
 import pytest
 
 from labcrane import FloatArray, SignalChannel, SignalFault, SignalMonitor, SignalStream
-from labcrane.cli.streams import found_lines, watched_lines
+from labcrane.cli.streams import watched_lines
 from labcrane.monitoring.monitored_stream import MonitoredStream
 from labcrane.monitoring.stream_meter import StreamMeter, StreamReading
 from labcrane.monitoring.watch import StreamView
-from labcrane.recording.foreign_streams import OPENED, Note
+from labcrane.recording.foreign_streams import MONITORS, SIGNAL, Note
 from labcrane.recording.participant_file.signal_faults import write_signal_faults
 from labcrane.recording.xdf.header import Channel, StreamHeader
-from labcrane.streams.discovery import FoundStream
 from labcrane.streams.probes import Probe
 from labcrane.streams.recorder.signal_feed import LIVES, SignalFeed, SignalTap
 
@@ -109,9 +107,15 @@ class Noted:
         config = {"protocol": str(folder / "study.yaml"), "use": [{"use": "odd"}]}
         self.feed = SignalFeed(config, hang_s)
         self.notes: list[dict[str, object]] = []
-        self.tap = SignalTap(self.feed, lambda event, **data: self.notes.append(data))
+        self.tap = SignalTap(self.feed, self.note)
         self.tap.begin(HEADER)
         self.first = 0
+
+    def note(self, event: str, **data: object) -> None:
+        if event == SIGNAL:
+            self.notes.append(data)
+        else:
+            assert (event, data) == (MONITORS, {"names": ["odd"]})
 
     def give(self, a: float, b: float = 0.0) -> None:
         samples = np.column_stack([np.full(10, a), np.full(10, b)])
@@ -220,8 +224,12 @@ def test_trials_are_flagged_with_the_faults_that_touch_them(tmp_path: Path) -> N
         assert [text.decode() for text in touched["channel"][:]] == ["Cz", "Cz", "Pz"]
 
 
-def test_a_fault_ends_with_the_recorder_that_told_it(tmp_path: Path) -> None:
-    notes = [note(100.0, bad=True), Note(200.0, {"event": OPENED}), note(250.0, bad=False)]
+def test_a_fault_ends_with_the_monitors_that_told_it(tmp_path: Path) -> None:
+    notes = [
+        note(100.0, bad=True),
+        Note(200.0, {"event": MONITORS, "names": []}),
+        note(250.0, bad=False),
+    ]
     with written(notes, [], tmp_path / "x.h5") as file:
         assert file["signal_faults/end"][:].tolist() == [200.0]
 
@@ -303,26 +311,3 @@ def test_the_watch_fits_eighty_columns_and_cuts_nothing_off() -> None:
     ):
         assert words in text
     assert "signal alive" in " ".join(" ".join(watched_lines(long_view(()))).split())
-
-
-def test_the_list_of_streams_shows_every_name_whole() -> None:
-    name, source = "labcrane.aiming.P001.ses-01.frames", "labcrane/aiming/P001/ses-01/frames"
-    found = FoundStream(
-        name,
-        "labcrane.frames",
-        source,
-        "lab-pc",
-        "u",
-        "float32",
-        30,
-        240.0,
-        ("rad",),
-        1e-6,
-        1e-4,
-        (),
-    )
-    lines = list(found_lines(found))
-    assert lines[0].startswith(f"{name}: labcrane.frames, 30 channels at 240 Hz")
-    assert lines[1] == "  on lab-pc, clock +0.000001 s, round trip 0.10 ms"
-    assert lines[2] == f"  source id {source}"
-    assert json.dumps(lines)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from labcrane.analysis.cohort import Cohort, Participant, Status
 from labcrane.analysis.measures import DEFAULTS, MEASURES, MeasureSettings, measures_of
+from labcrane.analysis.parallel import work
 from labcrane.analysis.quality import exclusions, is_result, loop_quality, sync_quality
 from labcrane.analysis.report import figures
 from labcrane.analysis.report.html import Page
@@ -15,7 +16,6 @@ from labcrane.analysis.statistics.anova import repeated_measures
 from labcrane.analysis.statistics.fitts import throughput
 from labcrane.analysis.statistics.learning import learning_curves
 from labcrane.analysis.statistics.trends import holm, linear_trend, mixed_model
-from labcrane.parallel import work
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,7 +44,7 @@ def write_report(
     progress
         Told how many participants are done, of how many.
     workers, scheduler
-        Who does it; see :func:`labcrane.parallel.work`.
+        Who does it; see :func:`labcrane.analysis.parallel.work`.
     """
     import pandas as pd
 

@@ -12,7 +12,7 @@ from labcrane.cli.output import out
 from labcrane.errors import ProtocolError
 
 if TYPE_CHECKING:
-    from labcrane.design.plan import SessionPlan
+    from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan
 
 
 def check(protocol: ProtocolPath, as_json: AsJson = False) -> None:
@@ -88,6 +88,16 @@ def _row(session: "SessionPlan") -> dict[str, object]:
         "slot": session.slot,
         "seed": session.seed,
         "expected_s": session.expected_s,
+        "steps": [
+            {
+                "number": step.number,
+                "kind": step.kind,
+                "block": step.block.number if step.block else None,
+                "questionnaires": list(step.questionnaires),
+                "expected_s": step.expected_s,
+            }
+            for step in session.steps
+        ],
         "blocks": [
             {
                 "number": block.number,
@@ -112,12 +122,28 @@ def _print(plans: "Sequence[SessionPlan]") -> None:
         groups = {block.group for block in plan.blocks if block.group}
         group = f", group {', '.join(sorted(groups))}" if groups else ""
         out.print(f"{plan.participant}: slot {plan.slot}{group}, seed {plan.seed}", markup=False)
-        for block in plan.blocks:
-            counted = sum(trial.planned.counted for trial in block.trials)
-            practice = " (practice)" if block.practice else ""
-            orders = [f"{factor}: {', '.join(levels)}" for factor, levels in block.levels.items()]
-            about = f"{counted} trials, {block.expected_s / 60:.1f} minutes"
-            line = f"block {block.number} {block.name}{practice}: {'; '.join([about, *orders])}"
+        for step in plan.steps:
+            line = _block(step.block) if step.block else _other(step)
             width = out.console.width
             whole_line = fill(line, width, initial_indent="  ", subsequent_indent="    ")
             out.print(whole_line, markup=False)
+
+
+def _block(block: "PlannedBlock") -> str:
+    counted = sum(trial.planned.counted for trial in block.trials)
+    practice = " (practice)" if block.practice else ""
+    orders = [f"{factor}: {', '.join(levels)}" for factor, levels in block.levels.items()]
+    asked = [f"after each: {', '.join(block.ask)}"] if block.ask else []
+    about = f"{counted} trials, {block.expected_s / 60:.1f} minutes"
+    return f"block {block.number} {block.name}{practice}: {'; '.join([about, *orders, *asked])}"
+
+
+def _other(step: "PlannedStep") -> str:
+    """Return what a step is that has no trials."""
+    if step.kind == "break":
+        return f"break of {step.seconds:g} s"
+    if step.questionnaires:
+        return f"questionnaire: {', '.join(step.questionnaires)}"
+    from textwrap import shorten
+
+    return f"{step.kind}: {shorten(step.text, 60, placeholder=' ...')}"

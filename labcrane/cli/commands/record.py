@@ -38,15 +38,22 @@ def streams(
         return
     if seconds is not None or protocol is not None:
         raise ProtocolError("--seconds and --protocol belong to --watch; add it")
-    from labcrane.cli.streams import found_lines
     from labcrane.streams.discovery import discover
 
     found = discover(wait)
     if not found:
         out.print(f"no stream answered within {wait:g} s")
     for one in found:
-        for line in found_lines(one):
-            out.print(line, markup=False)
+        # No table: names and source ids are longer than a terminal's columns.
+        rate = f"{one.rate_hz:g} Hz" if one.rate_hz else "irregular"
+        clock = "unknown" if one.offset_s is None else f"{one.offset_s:+.6f} s"
+        units = ", ".join(dict.fromkeys(one.units)) or "no units"
+        out.print(f"{one.name}: {one.type or 'no type'}, {rate}", markup=False)
+        out.print(f"  channels: {one.channels} ({units})", markup=False)
+        out.print(f"  host: {one.host}, clock offset {clock}", markup=False)
+        out.print(f"  source id: {one.source_id or 'none'}", markup=False)
+        for warning in one.warnings:
+            out.print(f"{one.name}: {warning}", markup=False)
 
 
 def _watch(wait: float, seconds: float | None, protocol: Path | None) -> None:

@@ -72,7 +72,7 @@ def _measured(cohort: "Cohort", workers: int, scheduler: str | None) -> "Sequenc
     if workers == 1 and scheduler is None:
         return cohort.included
     from labcrane.analysis.measures import measure_ahead
-    from labcrane.parallel import work
+    from labcrane.analysis.parallel import work
 
     with progress_bar("measure", len(cohort.included)) as advance:
         done = {}
@@ -230,14 +230,15 @@ def _counted(participants: "Sequence[Participant]", advance: Any) -> "Iterator[P
 def _settings(model: Any, words: list[str], name: str) -> Any:
     """Return an exporter's settings from NAME=VALUE; values are YAML, as in a protocol."""
     from pydantic import ValidationError
-    from ruamel.yaml import YAML
+
+    from labcrane.files.yaml import parse_yaml
 
     given = {}
     for word in words:
         key, separator, value = word.partition("=")
         if not separator:
             raise ProtocolError(f"--set {word!r} sets nothing; write NAME=VALUE")
-        given[key] = YAML(typ="safe").load(value)
+        given[key] = parse_yaml(value, f"--set {key}")
     try:
         return model.model_validate(given)
     except ValidationError as error:

@@ -12,7 +12,6 @@ from labcrane.cli.output import out
 from labcrane.errors import LabcraneError, ProtocolError
 
 if TYPE_CHECKING:
-    from labcrane.design.plan import SessionPlan
     from labcrane.launcher.session_process import SessionConfig
 
 Participant = Annotated[str, typer.Option(help="pseudonym: P001")]
@@ -132,7 +131,7 @@ def _run_fast(order: "SessionConfig") -> Path:
     visit = replace(order.visit(), fast=True)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
-    with Terminal(console, out.console, _counted(plan), keys=False):
+    with Terminal(console, out.console, len(plan.trials), keys=False):
         return run_session(visit, console)
 
 
@@ -146,11 +145,13 @@ def _launch(order: "SessionConfig", *, page: bool) -> None:
     from labcrane.session.commands import QueueConsole
 
     visit = order.visit()
+    if not order.resumed:
+        visit.folder.check_new(order.session)  # before anything is shown
     ask_for_consent(visit, page=page)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
     keys, asked = not visit.simulated, visit.study.questionnaires
-    shown, count = out.console, _counted(plan)
+    shown, count = out.console, len(plan.trials)
     with Terminal(console, shown, count, keys=keys, questionnaires=asked) as terminal:
         launcher = Launcher(order, console, terminal.say)
         with (
@@ -172,12 +173,3 @@ def _launch(order: "SessionConfig", *, page: bool) -> None:
             f"participant file; go on with: labcrane resume {order.protocol} --participant "
             f"{order.participant} --session {order.session}"
         )
-
-
-def _counted(plan: "SessionPlan") -> int:
-    return sum(
-        trial.planned.counted
-        for block in plan.blocks
-        if not block.practice
-        for trial in block.trials
-    )

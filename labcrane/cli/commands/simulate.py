@@ -135,8 +135,8 @@ def _movements(
 
     from labcrane.analysis.cohort import find_cohort
     from labcrane.analysis.measures import measures_of
+    from labcrane.analysis.parallel import work
     from labcrane.analysis.quality import is_result
-    from labcrane.parallel import work
     from labcrane.recording.data_folder import DataFolder
 
     people = find_cohort(folder.resolve(), ["simulated"]).included

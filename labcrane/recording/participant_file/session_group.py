@@ -98,12 +98,35 @@ def _own_trial(event: LoggedEvent, otherwise: float) -> float:
     return float(trial) if isinstance(trial, int | float) else otherwise
 
 
+REPEATED = "repeated"
+CUT_OFF = frozenset({REPEATED, "ended", "interrupted"})
+"""Outcomes of attempts that are no result anyway."""
+
+
+def _trial_rows(log: SessionLog) -> list[Mapping[str, Any]]:
+    """Return the end of every counted attempt; of two attempts only the later one has a result.
+
+    An attempt that was over and was run again with its block becomes ``repeated``: what it was at
+    first is in the events.
+    """
+    begun = [event.data for event in log.events if event.name == "trial.start"]
+    last: dict[Any, int] = {}
+    for data in begun:
+        last[data.get("trial")] = max(last.get(data.get("trial"), 1), data.get("attempt", 1))
+    rows = []
+    for event in log.events:
+        data = event.data
+        if event.name != TRIAL_END or data.get(COUNTED) is not True:
+            continue
+        redone = data.get("attempt", 1) < last.get(data.get("trial"), 1)
+        if redone and data.get("outcome") not in CUT_OFF:
+            data = {**data, "outcome": REPEATED}
+        rows.append(data)
+    return rows
+
+
 def _write_trials(group: "h5py.Group", log: SessionLog) -> None:
-    rows = [
-        event.data
-        for event in log.events
-        if event.name == TRIAL_END and event.data.get(COUNTED) is True
-    ]
+    rows = _trial_rows(log)
     units = log.context.get("trial_units", {})
     columns = list(dict.fromkeys(name for row in rows for name in row if name != COUNTED))
     for number, (name, safe) in enumerate(node_names(columns)):

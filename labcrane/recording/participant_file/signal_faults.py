@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane.recording.foreign_streams import OPENED, SIGNAL, RecordedStream
+from labcrane.recording.foreign_streams import MONITORS, SIGNAL, RecordedStream
 from labcrane.recording.journal_reader import SessionLog
 from labcrane.recording.participant_file.columns import write_numbers, write_texts
 
@@ -48,7 +48,7 @@ def fault_times(stream: RecordedStream) -> Iterator[FaultTime]:
 
     for note in stream.notes:
         event = note.data.get("event")
-        if event == OPENED:  # another recorder: what the one before had told ends with it
+        if event == MONITORS:  # of another recorder: what those before had told has ended
             for key in list(began):
                 yield ended(key, note.time)
         elif event == SIGNAL:

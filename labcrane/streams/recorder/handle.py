@@ -1,42 +1,47 @@
-"""Keeps a recorder process running for as long as a recording lasts.
+"""Recorder processes that run for as long as a recording lasts: two write, two more wait.
 
-A spare process has loaded everything and waits for its orders, so that a recorder that dies is
-replaced at once.
+Both write all streams, each into its own part of the journal, so that what is lost with one is in
+the other (:mod:`labcrane.recording.overlap`). As many have loaded everything and wait: they take
+over at once, even when both die in one moment.
 """
 
-import json
-import subprocess
-import sys
-import threading
+import time
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
+from labcrane.processes.handle import Patience, ProcessHandle
+from labcrane.recording.paths import part_number, parts
+from labcrane.streams.recorder.process import STOP, RecorderConfig
 from labcrane.streams.request import StreamRequest
+
+MODULE = "labcrane.streams.recorder.process"
 
 PATIENCE_S = 15.0
 """How long a recorder may take to close its journal when it is told to stop, or a spare to end."""
 
+OF_SIGNALS = ("signals", "unwatched")
+"""What of a stream's status only the recorder beside the monitors knows."""
+
+RECORDERS = 2
+SPARES = 2
+
 
 class RecorderHandle:
-    """Starts the recorder, starts it again when it dies, and knows what it last said.
+    """Starts the recorders, replaces one that dies, and knows what they last said.
 
     Attributes
     ----------
-    status
-        The last line of the recorder's own report; empty before it has spoken.
     restarts
-        How often it had to be started again.
+        How many had to be replaced.
 
     Parameters
     ----------
     journal, requests
         Where the streams go, and which.
     monitors
-        What looks at their signals, as of :class:`labcrane.monitoring.config.MonitorConfig`; None
-        for nothing.
+        What looks at their signals, as of :class:`labcrane.monitoring.config.MonitorConfig`: beside
+        one of the recorders, for all see the same. None for nothing.
     """
 
     def __init__(
@@ -45,17 +50,34 @@ class RecorderHandle:
         requests: Sequence[StreamRequest],
         monitors: Mapping[str, Any] | None = None,
     ) -> None:
-        self.status: dict[str, Any] = {}
         self.restarts = 0
-        self._orders = json.dumps(
-            {
-                "journal": str(journal),
-                "streams": [asdict(request) for request in requests],
-                "monitors": monitors,
-            }
-        )
-        self._spare = _Recorder()
-        self._process = self._start()
+        self._journal = journal
+        self._requests = tuple(requests)
+        self._monitors = monitors
+        self._monitoring: _Recorder | None = None
+        self._recorders: list[_Recorder] = []
+        self._part = max((part_number(part) for part in parts(journal)), default=0)
+        self._known: tuple[str, ...] = ()
+        self._spares = [_Recorder() for _ in range(RECORDERS + SPARES)]
+        for _ in range(RECORDERS):
+            self._recorders.append(self._began())
+
+    @property
+    def status(self) -> dict[str, Any]:
+        """The last report of who has recorded longest; empty before any has spoken."""
+        for recorder in self._recorders:
+            if recorder.exit_code is None and recorder.status:
+                return recorder.status | {"streams": self._with_signals(recorder.status)}
+        return {}
+
+    def _with_signals(self, status: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """Return a recorder's streams with what the one beside the monitors knows of them."""
+        monitoring = self._monitoring.status if self._monitoring else {}
+        known = {_key(stream): stream for stream in monitoring.get("streams", ())}
+        return [
+            stream | {name: known.get(_key(stream), stream)[name] for name in OF_SIGNALS}
+            for stream in status.get("streams", ())
+        ]
 
     @property
     def ready(self) -> bool:
@@ -93,7 +115,7 @@ class RecorderHandle:
 
     def unwatched(self) -> list[str]:
         """Return which monitors look no more, one line for each."""
-        died = self.status.get("signals")
+        died = self._monitoring.status.get("monitors") if self._monitoring else None
         lines = [died] if died else []
         for stream in self.status.get("streams", ()):
             lines += [
@@ -103,72 +125,59 @@ class RecorderHandle:
         return lines
 
     def watch(self) -> bool:
-        """Start the recorder again if it has died; whether it had."""
-        if self._process.poll() is None:
-            return False
-        self._process.hang_up()
-        self.restarts += 1
-        self.status = {}
-        self._process = self._start()
-        return True
+        """Replace recorders that have died; whether one had."""
+        for spare in [one for one in self._spares if one.exit_code is not None]:
+            spare.kill()
+            self._spares[self._spares.index(spare)] = _Recorder()
+        dead = [one for one in self._recorders if one.exit_code is not None]
+        for recorder in dead:
+            recorder.kill()
+            self.restarts += 1
+            self._known = tuple(recorder.status.get("known", self._known))
+            self._recorders.remove(recorder)
+            self._recorders.append(self._began())
+        return bool(dead)
 
     def stop(self) -> None:
-        """Let the recorder write down what has come and close its journal."""
-        process = self._process
-        with suppress(BrokenPipeError):  # when it has died its journal is as whole as it can be
-            process.stdin.write("stop\n")
-        process.hang_up()
-        process.end()
-        self._listener.join()
-        self._spare.hang_up()  # it ends without having been told anything
-        self._spare.end()
-        self._spare.stdout.close()
+        """Let the recorders write down what has come and close their journals."""
+        for recorder in self._recorders:
+            recorder.tell(STOP)
+        deadline = time.monotonic() + PATIENCE_S
+        for recorder in (*self._recorders, *self._spares):
+            recorder.stop(max(deadline - time.monotonic(), 1.0))
 
-    def _start(self) -> "_Recorder":
-        """Give the spare recorder its orders, and have another one ready."""
-        ready = self._spare if self._spare.poll() is None else _Recorder()
-        process, self._spare = ready, _Recorder()
-        with suppress(BrokenPipeError):  # it died this very moment: the next look replaces it
-            process.stdin.write(self._orders + "\n")
-            process.stdin.flush()
-        self._listener = threading.Thread(
-            target=self._listen, args=(process, self.restarts), daemon=True
+    def _began(self) -> "_Recorder":
+        """Give a recorder that waits its orders, and have another one ready."""
+        recorder = self._spares.pop(0)
+        self._part += 1
+        monitors = None
+        if self._monitors is not None and self._monitoring not in self._recorders:
+            self._monitoring, monitors = recorder, self._monitors
+        recorder.tell(
+            RecorderConfig(
+                self._journal,
+                self._requests,
+                part=self._part,
+                known=self._known,
+                monitors=monitors,
+            )
         )
-        self._listener.start()
-        return process
-
-    def _listen(self, process: "_Recorder", life: int) -> None:
-        with process.stdout as lines:
-            for line in lines:
-                if life == self.restarts:  # and not what a dead one had still to say
-                    self.status = json.loads(line)
+        if len(self._spares) < SPARES:
+            self._spares.append(_Recorder())
+        return recorder
 
 
-class _Recorder(subprocess.Popen[str]):
-    """A recorder process that waits for its orders."""
-
-    stdin: IO[str]
-    stdout: IO[str]
+class _Recorder(ProcessHandle):
+    """A recorder process that waits for its orders, and what it last said."""
 
     def __init__(self) -> None:
-        super().__init__(
-            [sys.executable, "-m", "labcrane.streams.recorder.process"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            # It closes its journal when told to, not when a key is pressed.
-            start_new_session=True,
-        )
+        self.status: dict[str, Any] = {}
+        super().__init__(MODULE, "recorder", Patience(stop_s=PATIENCE_S), self._hear_of)
+        self.start()
 
-    def hang_up(self) -> None:
-        """Let it hear no more."""
-        with suppress(BrokenPipeError):
-            self.stdin.close()
+    def _hear_of(self, status: dict[str, Any]) -> None:
+        self.status = status
 
-    def end(self) -> None:
-        """Wait until it has ended, as it was told to; one that hangs is killed."""
-        try:
-            self.wait(PATIENCE_S)
-        except subprocess.TimeoutExpired:
-            self.kill()
-            self.wait()
+
+def _key(stream: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(str(stream[name]) for name in ("label", "name", "type", "source_id"))

@@ -1,40 +1,55 @@
 """The process that records the streams of others, and outlives the session.
 
-It is started with its orders as JSON, and finds whatever it was asked for, late or again after a
-restart. Its own journal is closed some seconds after its pipe ends, so that nothing of the end is
-lost; a recorder that was killed is started again and writes the next part.
+It finds whatever it was asked for, late or again after a restart. Its own journal is closed some
+seconds after whoever started it has died, so that nothing of the end is lost.
+
+A launcher starts it by a :class:`labcrane.processes.handle.ProcessHandle`, before there is anything
+to record: it has loaded everything and waits for its :class:`RecorderConfig`. It is told ``stop``,
+and tells every second how each stream is, and whether all that is required flows. By hand, its
+orders are JSON, ``stop`` is a line of its standard input, a status a line of its standard output:
 
     python -m labcrane.streams.recorder.process '{"journal": "ses-01_streams.xdf", "streams": []}'
-
-Without the JSON it waits for it as the first line of its standard input.
-
-It reads ``stop`` on its standard input, and writes a line of JSON on its standard output every
-second: how each stream is, and whether all that is required flows.
 """
 
-import contextlib
 import json
 import os
-import select
+import queue
 import signal
 import sys
+import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from labcrane.errors import StreamError
+from labcrane.processes.parent import Parent
 from labcrane.streams.outlets import check_clock
-from labcrane.streams.recorder.recorder import Recorder, a_resolver
+from labcrane.streams.recorder.recorder import Recorder
 from labcrane.streams.request import StreamRequest
-
-if TYPE_CHECKING:
-    import pylsl
 
 LOOK_S = 0.25
 STATUS_S = 1.0
+STOP = "stop"
 STATUS_FD = 1
+
+
+class Chief(Protocol):
+    """Whoever tells a recorder when to stop, and is told how it is."""
+
+    gone: threading.Event
+    """Set when it has died."""
+
+    def messages(self) -> list[Any]:
+        """Return what it has said since the last call."""
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for a message or its end."""
+
+    def tell(self, message: Mapping[str, Any]) -> None:
+        """Tell it something without waiting for it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,11 +59,15 @@ class RecorderConfig:
     Attributes
     ----------
     journal
-        The first part; a later recorder writes the next one.
+        The first part.
     streams
         What to record.
     grace_s
         How long it goes on when whoever started it has died.
+    part
+        Which part it writes, counted from 1; None for the first that there is not yet.
+    known
+        Descriptions of streams that another recorder has found, so that they need no search.
     monitors
         What looks at the signals, as of :class:`labcrane.monitoring.config.MonitorConfig`; None for
         nothing.
@@ -57,6 +76,8 @@ class RecorderConfig:
     journal: Path
     streams: tuple[StreamRequest, ...]
     grace_s: float = 3.0
+    part: int | None = None
+    known: tuple[str, ...] = ()
     monitors: Mapping[str, Any] | None = None
 
     @classmethod
@@ -75,106 +96,117 @@ class RecorderConfig:
 def main(arguments: Sequence[str]) -> int:
     """Record until told to stop; the process's exit status.
 
-    Without arguments the process loads what it needs, looks around for streams, and waits for its
-    orders, a line of JSON on the standard input: a spare recorder takes over at once.
+    Without arguments the process loads what it needs and waits for its orders from the launcher.
     """
     if arguments:
-        return run(RecorderConfig.of(json.loads(arguments[0])))
-    resolver = a_resolver()
-    orders = await_orders()
-    return run(RecorderConfig.of(json.loads(orders)), resolver) if orders else 0
+        terminal = _Terminal()
+        status = run(RecorderConfig.of(json.loads(arguments[0])), terminal)
+        terminal.close()
+        return status
+    import pylsl  # noqa: F401, PLC0415 - loaded before there is something to record
+
+    parent = Parent()
+    if (orders := parent.order()) is None:
+        return 0
+    status = run(orders, parent)
+    parent.close()
+    return status
 
 
-def run(orders: RecorderConfig, resolver: "pylsl.ContinuousResolver | None" = None) -> int:
-    """Record until told to stop, or until whoever started it has died.
-
-    ``resolver`` is one that has looked around already.
-    """
+def run(orders: RecorderConfig, chief: Chief) -> int:
+    """Record until told to stop, or until whoever started it has died."""
     check_clock()
-    recorder = Recorder(orders.journal, orders.streams, resolver, orders.monitors)
-    teller = _Teller()
-    with _no_blocking(STATUS_FD):
-        try:
-            for due in _watch(orders):
-                recorder.look()
-                if due:
-                    teller.tell(recorder.status())
-        finally:
-            whole = recorder.close()
-            if not whole:
-                teller.tell(recorder.status())
+    recorder = Recorder(orders.journal, orders.streams, orders.part, orders.known, orders.monitors)
+    try:
+        for due in _watch(orders, chief):
+            recorder.look()
+            if due:
+                chief.tell(recorder.status())
+    finally:
+        whole = recorder.close()
+        if not whole:
+            chief.tell(recorder.status())
     return 0 if whole else 1
 
 
-def await_orders() -> str:
-    """Return the line of orders that comes on the standard input; nothing when none comes.
-
-    Read byte by byte: what a buffer holds back, select does not see afterwards.
-    """
-    line = b""
-    while (byte := os.read(0, 1)) not in (b"", b"\n"):
-        line += byte
-    return line.decode()
-
-
-def _watch(orders: RecorderConfig) -> Iterator[bool]:
+def _watch(orders: RecorderConfig, chief: Chief) -> Iterator[bool]:
     """Yield several times a second until it is time to end; True when a status is due."""
-    stopped, inputs = _signals(), {0}
+    asked = _signals()
     ends = float("inf")
     due = 0.0
     while time.monotonic() < ends:
-        ready, _, _ = select.select([*inputs, stopped], [], [], LOOK_S)
-        if stopped in ready or (0 in ready and _told_to_stop(inputs)):
+        if STOP in chief.messages() or asked.is_set():
             return
-        if ends == float("inf") and not inputs:  # what the session's streams still send is recorded
-            ends = time.monotonic() + orders.grace_s
+        if chief.gone.is_set():
+            if ends == float("inf"):  # what the session's streams still send is recorded
+                ends = time.monotonic() + orders.grace_s
+            asked.wait(LOOK_S)
+        else:
+            chief.wait(LOOK_S)
         status = time.monotonic() >= due
         if status:
             due = time.monotonic() + STATUS_S
         yield status
 
 
-def _told_to_stop(inputs: set[int]) -> bool:
-    """Whether the line just read says stop; at the pipe's end it is listened to no more."""
-    text = os.read(0, 4096)
-    if not text:
-        inputs.discard(0)
-    return b"stop" in text
-
-
-def _signals() -> int:
-    """Return a descriptor that becomes readable when the process is asked to end."""
-    told, tell = os.pipe()
-    os.set_blocking(tell, False)
+def _signals() -> threading.Event:
+    """Return what is set when the process is asked to end."""
+    asked = threading.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: None)
-    signal.set_wakeup_fd(tell)
-    return told
+        signal.signal(number, lambda *_: asked.set())
+    return asked
 
 
-@contextlib.contextmanager
-def _no_blocking(descriptor: int) -> Iterator[None]:
-    """Let writes fail rather than wait for a reader that hangs."""
-    before = os.get_blocking(descriptor)
-    os.set_blocking(descriptor, False)
-    try:
-        yield
-    finally:
-        os.set_blocking(descriptor, before)
+class _Terminal:
+    """Whoever started the recorder by hand: reads lines and writes lines, in threads.
 
-
-class _Teller:
-    """Writes lines of status; a reader that hangs or has died misses some, but gets whole ones."""
+    A reader that hangs or has died misses some lines, but gets whole ones.
+    """
 
     def __init__(self) -> None:
-        self._rest = b""
+        self.gone = threading.Event()
+        self._news = threading.Event()
+        self._incoming: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._outgoing: queue.Queue[bytes] = queue.Queue(1)
+        self._speaker = threading.Thread(target=self._speak, daemon=True)
+        self._speaker.start()
+        threading.Thread(target=self._hear, daemon=True).start()
 
-    def tell(self, status: Mapping[str, Any]) -> None:
-        """Write a line unless the reader has not taken the one before."""
-        if not self._rest:
-            self._rest = json.dumps(status).encode() + b"\n"
-        with contextlib.suppress(BlockingIOError, BrokenPipeError):
-            self._rest = self._rest[os.write(STATUS_FD, self._rest) :]
+    def messages(self) -> list[str]:
+        self._news.clear()
+        found = []
+        with suppress(queue.Empty):
+            while True:
+                found.append(self._incoming.get_nowait())
+        return found
+
+    def wait(self, seconds: float) -> bool:
+        return self._news.wait(seconds)
+
+    def tell(self, message: Mapping[str, Any]) -> None:
+        with suppress(queue.Full):
+            self._outgoing.put_nowait(json.dumps(message).encode() + b"\n")
+
+    def close(self) -> None:
+        with suppress(queue.Full):
+            self._outgoing.put(b"", timeout=1.0)
+        self._speaker.join(1.0)
+
+    def _hear(self) -> None:
+        rest = b""
+        while text := os.read(0, 4096):
+            *lines, rest = (rest + text).split(b"\n")
+            for line in lines:
+                self._incoming.put(line.decode(errors="replace").strip())
+            self._news.set()
+        self.gone.set()
+        self._news.set()
+
+    def _speak(self) -> None:
+        with suppress(OSError):
+            while line := self._outgoing.get():
+                while line:
+                    line = line[os.write(STATUS_FD, line) :]
 
 
 if __name__ == "__main__":

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from labcrane.errors import RecordingError
-from labcrane.recording.paths import next_part
+from labcrane.recording.paths import next_part, part_path
 from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.streams.recorder.health import Condition, Health, complaints, condition, rate
 from labcrane.streams.recorder.inlet import Inlet
 from labcrane.streams.recorder.signal_feed import SignalFeed
 from labcrane.streams.request import StreamRequest, unstable_id
+from labcrane.streams.search import Search, known_stream
 
 if TYPE_CHECKING:
     import pylsl
@@ -30,22 +31,38 @@ class _Recorded:
 
 
 class Recorder:
-    """Records what is asked for as soon as it is there. Call ``look`` several times a second."""
+    """Records what is asked for as soon as it is there. Call ``look`` several times a second.
+
+    Parameters
+    ----------
+    journal
+        The first part.
+    requests
+        What to record.
+    part
+        Which part is written, counted from 1; by default the first that there is not yet.
+    known
+        Descriptions of streams that another recorder has found: they are received at once.
+    """
 
     def __init__(
         self,
         journal: Path,
         requests: Sequence[StreamRequest],
-        resolver: "pylsl.ContinuousResolver | None" = None,
+        part: int | None = None,
+        known: Sequence[str] = (),
         monitors: Mapping[str, Any] | None = None,
     ) -> None:
         self._requests = tuple(requests)
-        self._writer = XdfWriter(next_part(journal))
-        self._resolver = resolver or a_resolver()
+        self._writer = XdfWriter(next_part(journal) if part is None else part_path(journal, part))
         self._streams: dict[tuple[str, str, str], _Recorded] = {}
         self._since: dict[str, float] = {}
         self._fault: str | None = None
         self._feed = None if monitors is None else SignalFeed(monitors)
+        for info in map(known_stream, known):
+            if info is not None:
+                self._start(info)
+        self._search = Search(forget_s=FORGET_S)
 
     @property
     def path(self) -> Path:
@@ -54,13 +71,11 @@ class Recorder:
 
     def look(self) -> None:
         """Start to record what has appeared."""
-        found = [info for info in self._resolver.results() if self._wanted(info) is not None]
+        found = [info for info in self._search.results() if self._wanted(info) is not None]
         now = time.monotonic()
         self._since = {info.uid(): self._since.get(info.uid(), now) for info in found}
         for info in found:
-            key = (info.source_id() or info.uid(), info.name(), info.type())
-            if key not in self._streams:
-                self._start(key, info)
+            self._start(info)
         self._find_duplicates(found, now)
         if self._feed is not None:
             self._feed.look()
@@ -83,11 +98,13 @@ class Recorder:
             "ready": all(one.sane for one in streams if one.required) and not faults,
             "faults": sorted(str(fault) for fault in faults),
             "streams": [one.as_json() for one in streams],
-            "signals": self._feed.fault if self._feed else None,
+            "known": [one.inlet.info.as_xml() for one in self._streams.values()],
+            "monitors": self._feed.fault if self._feed else None,
         }
 
     def close(self) -> bool:
         """Write down all that has come and close the journal; whether all of it went in."""
+        self._search.close()
         whole = [one.inlet.close() for one in self._streams.values()]
         if self._feed is not None:
             self._feed.close()
@@ -100,9 +117,11 @@ class Recorder:
     def _wanted(self, info: "pylsl.StreamInfo") -> StreamRequest | None:
         return next((one for one in self._requests if one.matches(info)), None)
 
-    def _start(self, key: tuple[str, str, str], info: "pylsl.StreamInfo") -> None:
+    def _start(self, info: "pylsl.StreamInfo") -> None:
+        """Record a stream, unless it is recorded already or nobody asked for it."""
+        key = (info.source_id() or info.uid(), info.name(), info.type())
         request = self._wanted(info)
-        if request is None:
+        if request is None or key in self._streams:
             return
         misfits = request.misfits(info.channel_count(), info.nominal_srate())
         warnings = list(misfits)
@@ -126,13 +145,6 @@ class Recorder:
                 if warning not in recorded.warnings:
                     recorded.warnings.append(warning)
                     recorded.inlet.note("warning", text=warning)
-
-
-def a_resolver() -> "pylsl.ContinuousResolver":
-    """Return a resolver that begins to look around at once, and goes on."""
-    import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
-
-    return pylsl.ContinuousResolver(forget_after=FORGET_S)
 
 
 def _health(recorded: _Recorded, now: float) -> Health:

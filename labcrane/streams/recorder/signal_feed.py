@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.core.signals import SignalChannel, SignalStream
-from labcrane.recording.foreign_streams import SIGNAL
+from labcrane.recording.foreign_streams import MONITORS, SIGNAL
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.streams.request import OURS
 from labcrane.types import FloatArray
@@ -69,6 +69,8 @@ class SignalTap:
 
     def hear(self, answer: Mapping[str, Any]) -> None:
         """Take up what the monitors answer, and note beside the stream what has changed."""
+        if "monitors" in answer:
+            self._note(MONITORS, names=answer["monitors"])
         for change in answer["changes"]:
             key = change["channel"], change["kind"]
             if change["bad"]:

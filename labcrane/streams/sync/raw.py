@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labcrane.errors import RecordingError
-from labcrane.recording.foreign_streams import OPENED, RESET, RecordedStream
+from labcrane.recording.foreign_streams import RESET, RecordedStream
 from labcrane.types import FloatArray
 
 
@@ -94,15 +94,10 @@ def raw_of(recorded: RecordedStream) -> RawStream:
 
 
 def _resets(recorded: RecordedStream) -> FloatArray:
-    """Return when the source was replaced, and among which samples of all parts together."""
-    found: list[list[float]] = []
-    part = -1
-    for note in recorded.notes:
-        event = note.data.get("event")
-        if event == OPENED:
-            part += 1
-        elif event == RESET:
-            first = recorded.starts[max(part, 0)]
-            low, high = note.data["samples"]
-            found.append([note.time, first + low, first + high])
+    """Return when the source was replaced, and among which samples of the whole stream."""
+    found = [
+        [note.time, *map(float, note.data["samples"])]
+        for note in recorded.notes
+        if note.data.get("event") == RESET
+    ]
     return np.array(found, dtype=np.float64).reshape(-1, 3)

@@ -49,10 +49,10 @@ def work(
 def _on_cores(
     do: Callable[[OrderT], ResultT], orders: Sequence[OrderT], workers: int
 ) -> Iterator[ResultT]:
-    from concurrent.futures import as_completed  # noqa: PLC0415 - only for many workers
-    from concurrent.futures.process import BrokenProcessPool  # noqa: PLC0415
+    from concurrent.futures import as_completed
+    from concurrent.futures.process import BrokenProcessPool
 
-    from loky import ProcessPoolExecutor  # noqa: PLC0415
+    from loky import ProcessPoolExecutor
 
     left = list(orders)
     why: Exception | None = None
@@ -81,8 +81,8 @@ def _on_cluster(
     do: Callable[[OrderT], ResultT], orders: Sequence[OrderT], scheduler: str
 ) -> Iterator[ResultT]:
     try:
-        from distributed import Client, as_completed  # noqa: PLC0415 - an extra, and slow to load
-        from distributed.scheduler import KilledWorker  # noqa: PLC0415
+        from distributed import Client, as_completed
+        from distributed.scheduler import KilledWorker
     except ModuleNotFoundError as error:
         raise PluginError(
             "--scheduler needs Dask, which is not installed; install labcrane[cluster]"

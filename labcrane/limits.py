@@ -1,0 +1,182 @@
+"""Limits of everything that enters from outside: one table, and the checks that keep to it.
+
+A limit is kept at the door, in the process of whoever sends, before a pipe or the loop is reached.
+Every check takes time that grows no faster than what it is given. docs/security.md prints the
+table; a test compares the two.
+"""
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+class LimitError(ValueError):
+    """Something from outside is larger, deeper or of another alphabet than may enter."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """What one kind of input may be.
+
+    Attributes
+    ----------
+    most, unit
+        Its size.
+    depth
+        How deep lists and mappings in it may be nested; 0 where nothing can be.
+    alphabet
+        What it may be made of, in words.
+    door
+        The module that checks it, and so the process: that of the sender.
+    otherwise
+        What becomes of what is refused.
+    """
+
+    most: int
+    unit: str
+    depth: int
+    alphabet: str
+    door: str
+    otherwise: str
+
+
+TEXT = "Unicode without control characters, halves of surrogates and marks that turn the direction"
+EVENT = "refused with an event; the session goes on"
+ERROR = "an error with file, line and what to do"
+LOST = "the input is lost: command to zero, pause, event; back with the next good value"
+
+LIMITS: Mapping[str, Limit] = {
+    "answer": Limit(8_000, "characters", 4, f"JSON of {TEXT}", "web.page, session.commands", EVENT),
+    "note": Limit(4_000, "characters", 0, TEXT, "web.page, session.commands", EVENT),
+    "hint": Limit(500, "characters", 0, TEXT, "web.page, session.commands", EVENT),
+    "setting": Limit(
+        200, "characters", 0, "one line without YAML's marks", "web.page, session.commands", EVENT
+    ),
+    "order": Limit(200, "characters", 0, TEXT, "web.page, session.commands", EVENT),
+    "request body": Limit(
+        32_000, "bytes", 0, "any", "web.guard", "status 413 before it is buffered"
+    ),
+    "message of a page": Limit(
+        64_000, "bytes", 0, "any", "web.guard", "the socket is closed with 1009"
+    ),
+    "requests of one address": Limit(
+        200, "requests a second", 0, "any", "web.guard", "status 429; one event a second"
+    ),
+    "orders of one page": Limit(
+        20, "orders a second", 0, "any", "web.page", "refused; one event a second"
+    ),
+    "sockets": Limit(100, "connections", 0, "any", "web.service", "status 503"),
+    "CAN frame": Limit(
+        4_000, "frames a second", 0, "finite signals within full flow", "labcrane_can", LOST
+    ),
+    "gateway sample": Limit(
+        64, "samples a tick", 0, "finite numbers, -250 to 250", "labcrane_gateway", LOST
+    ),
+    "key sample": Limit(
+        64, "samples a tick", 0, "finite numbers, 0 to 1", "labcrane_keyboard", LOST
+    ),
+    "stream header": Limit(
+        1_000_000, "characters", 32, "XML without a document type", "recording.xdf.header", ERROR
+    ),
+    "stream channels": Limit(
+        4_096, "channels", 0, "a format of XDF, a finite rate", "recording.xdf.header", ERROR
+    ),
+    "YAML file": Limit(
+        256_000,
+        "bytes",
+        50,
+        "UTF-8; 20,000 marks, 50,000 values after aliases",
+        "files.yaml",
+        ERROR,
+    ),
+    "DBC file": Limit(1_000_000, "bytes", 0, "a DBC file", "labcrane_can", ERROR),
+    "mesh": Limit(100_000_000, "bytes", 0, "STL, OBJ or glTF", "machines.mesh", ERROR),
+    "participant file": Limit(
+        5_000_000, "values a column", 0, "HDF5 without links and data outside", "recording", ERROR
+    ),
+}
+"""By kind of input."""
+
+# Everything that a page, a terminal, XML or JSON shows otherwise than it is: control characters but
+# tab and line ends, halves of surrogates, noncharacters, and what turns the direction of writing.
+_FOREIGN = re.compile(
+    "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
+)
+# A setting is one plain value: no anchors, tags, lists, mappings, block texts or further documents.
+_SETTING = re.compile(r"[&*!|>%@`\[\]{}#\n\r\t]")
+
+
+def check_size(size: int, kind: str, what: str = "") -> None:
+    """Raise :class:`LimitError` where ``size`` is more than a ``kind`` of input may have."""
+    limit = LIMITS[kind]
+    if size > limit.most:
+        raise LimitError(
+            f"{what or f'a {kind}'} has {size} {limit.unit}; the most are {limit.most}"
+        )
+
+
+def check_text(text: str, kind: str) -> None:
+    """Raise :class:`LimitError` where ``text`` may not enter as this ``kind`` of input."""
+    check_size(len(text), kind, f"the {kind}")
+    if (sign := foreign(text)) is not None:
+        raise LimitError(
+            f"the {kind} holds the character U+{ord(sign):04X}, which is no writing; leave it out"
+        )
+    if kind == "setting" and (found := _SETTING.search(text)):
+        raise LimitError(
+            f"the setting holds {found[0]!r}; it is one plain value in one line: name.key=value"
+        )
+
+
+def foreign(text: str) -> str | None:
+    """Return the first character in ``text`` that is no writing; None where there is none."""
+    found = _FOREIGN.search(text)
+    return found[0] if found else None
+
+
+def read_json(text: str, kind: str) -> Any:
+    """Return what a text of JSON holds.
+
+    Raises
+    ------
+    LimitError
+        It is too long, nested too deep, of another alphabet, or no JSON.
+    """
+    check_text(text, kind)
+    most = LIMITS[kind].depth
+    # What has so few brackets cannot be nested deeper: the loop need not look at every sign.
+    if text.count("[") + text.count("{") > most and _deepest(text) > most:
+        raise LimitError(f"the {kind} is nested deeper than {most} levels; write it flat")
+    try:
+        # Whole numbers as floats: Python refuses more than 4,300 digits.
+        return json.loads(text, parse_int=_number)
+    except (ValueError, RecursionError) as error:
+        raise LimitError(f"the {kind} is no JSON: {error}") from error
+
+
+def _number(digits: str) -> float | int:
+    """Return a whole number; as a float when it is larger than any that is asked for."""
+    return int(digits) if len(digits) < 20 else float(digits)  # noqa: PLR2004 - 64 bits
+
+
+def _deepest(text: str) -> int:
+    depth = deepest = 0
+    inside = escaped = False
+    for sign in text:
+        if inside:
+            if escaped:
+                escaped = False
+            elif sign == "\\":
+                escaped = True
+            else:
+                inside = sign != '"'
+        elif sign == '"':
+            inside = True
+        elif sign in "[{":
+            depth += 1
+            deepest = max(deepest, depth)
+        elif sign in "]}":
+            depth -= 1
+    return deepest

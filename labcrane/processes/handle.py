@@ -1,0 +1,245 @@
+"""Handle of a child process: starts it, hears it, tells it, starts it again, ends it.
+
+A child is a module run by ``python -m``. It is told its order and messages on its standard input
+and answers on its standard output, pickled (:class:`labcrane.processes.parent.Parent` is its side).
+Threads read and write, so that neither a child that hangs nor one that dies makes anybody wait, on
+any system: nothing is polled that only some of them can poll.
+"""
+
+import math
+import pickle
+import queue
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import IO, Any
+
+
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """How long a child may take, in seconds.
+
+    Attributes
+    ----------
+    start_s
+        Until it is ready, without having been heard of.
+    silent_s
+        Without having been heard of, once it is ready.
+    stop_s
+        To end when it is told to; then it is killed.
+    restarts
+        How many starts in a row may come to nothing before it is left out.
+    """
+
+    start_s: float = math.inf
+    silent_s: float = math.inf
+    stop_s: float = 5.0
+    restarts: float = math.inf
+
+
+@dataclass
+class _Life:
+    """One process, and what it has said."""
+
+    process: "subprocess.Popen[bytes]"
+    input: IO[bytes]
+    output: IO[bytes]
+    heard: float = field(default_factory=time.monotonic)
+    outgoing: "queue.SimpleQueue[bytes | None]" = field(default_factory=queue.SimpleQueue)
+    threads: list[threading.Thread] = field(default_factory=list)
+
+
+class ProcessHandle:
+    """A child process that is started, and perhaps started again.
+
+    Parameters
+    ----------
+    module
+        What it runs; it finds its parent by :class:`labcrane.processes.parent.Parent`.
+    name
+        What people call it.
+    patience
+        How long it may take for what.
+    take
+        Is given each message, in a thread, as it comes; without it they wait in :meth:`messages`.
+
+    Attributes
+    ----------
+    ready
+        Whether the present process could begin its work; set by whoever understands its messages.
+    restarts
+        How often it was started again.
+    given_up
+        Whether it is left out: it came to nothing too often.
+    """
+
+    def __init__(
+        self,
+        module: str,
+        name: str,
+        patience: Patience = Patience(),
+        take: Callable[[Any], None] | None = None,
+    ) -> None:
+        self.name = name
+        self.ready = False
+        self.restarts = 0
+        self.given_up = False
+        self._module = module
+        self._patience = patience
+        self._take = take
+        self._fruitless = 0
+        self._incoming: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._news = threading.Event()
+        self._life: _Life | None = None
+
+    def start(self, order: object = None) -> None:
+        """Start a process and tell it its order; without one it waits for what it is told."""
+        if self._life is not None:
+            raise AssertionError(f"{self.name} is started once; restart starts it again")
+        self._life = self._begun(order)
+
+    @property
+    def pid(self) -> int:
+        """The number of the present process."""
+        return self._present.process.pid
+
+    @property
+    def exit_code(self) -> int | None:
+        """The exit code of the present process; None while it lives."""
+        return self._present.process.poll()
+
+    @property
+    def failure(self) -> str | None:
+        """Return why the present process is of no use, in words; None while all is well."""
+        if (code := self.exit_code) is not None:
+            return f"its process ended with exit code {code}"
+        silent = time.monotonic() - self._present.heard
+        patience = self._patience.silent_s if self.ready else self._patience.start_s
+        return f"it has not been heard of for {silent:.0f} s" if silent > patience else None
+
+    def tell(self, message: object) -> None:
+        """Tell the process something, without waiting for it; nobody hears it when it has died."""
+        self._present.outgoing.put(pickle.dumps(message))
+
+    def messages(self) -> list[Any]:
+        """Return what it has said since the last call."""
+        self._news.clear()
+        found = []
+        with suppress(queue.Empty):
+            while True:
+                found.append(self._incoming.get_nowait())
+        return found
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for a message or the process's end; whether there is one."""
+        return self._news.wait(seconds)
+
+    def worked(self) -> None:
+        """Note that the present process did what it is for: restarts are counted anew."""
+        self._fruitless = 0
+
+    def restart(self, order: object) -> bool:
+        """End the present process and start another; False when that came to nothing too often.
+
+        Call it when :attr:`failure` says why.
+        """
+        self.kill()
+        if self._fruitless >= self._patience.restarts:
+            self.given_up = True
+            return False
+        self._fruitless += 1
+        self.restarts += 1
+        self.ready = False
+        self._life = self._begun(order)
+        return True
+
+    def stop(self, patience_s: float | None = None) -> int:
+        """Let the process end in order, and kill it when it does not; its exit code.
+
+        ``patience_s`` is how long it may take, by default as its :class:`Patience` says.
+        """
+        life = self._present
+        life.outgoing.put(None)
+        try:
+            life.process.wait(self._patience.stop_s if patience_s is None else patience_s)
+        except subprocess.TimeoutExpired:
+            life.process.kill()
+        return self._buried(life)
+
+    def kill(self) -> int:
+        """End the process at once; its exit code."""
+        life = self._present
+        life.process.kill()
+        life.outgoing.put(None)
+        return self._buried(life)
+
+    @property
+    def _present(self) -> _Life:
+        if self._life is None:
+            raise AssertionError(f"{self.name} has not been started")
+        return self._life
+
+    def _begun(self, order: object) -> _Life:
+        first = None if order is None else pickle.dumps(order)
+        process = subprocess.Popen(  # noqa: S603 - a module of ours
+            [sys.executable, "-m", self._module],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            **_apart(),
+        )
+        if process.stdin is None or process.stdout is None:
+            raise AssertionError("it is started with pipes")
+        life = _Life(process, process.stdin, process.stdout)
+        if first is not None:
+            life.outgoing.put(first)
+        life.threads = [
+            threading.Thread(target=work, args=(life,), name=f"{word} {self.name}", daemon=True)
+            for work, word in ((self._hear, "hear"), (_speak, "tell"))
+        ]
+        for thread in life.threads:
+            thread.start()
+        return life
+
+    def _hear(self, life: _Life) -> None:
+        while True:
+            try:
+                message = pickle.load(life.output)  # noqa: S301 - our own child
+            except (EOFError, pickle.UnpicklingError, OSError, ValueError):
+                break  # it ended, perhaps in the middle of a message
+            life.heard = time.monotonic()
+            if self._take is not None:
+                self._take(message)
+            else:
+                self._incoming.put(message)
+            self._news.set()
+        life.process.wait()
+        self._news.set()
+
+    @staticmethod
+    def _buried(life: _Life) -> int:
+        code = life.process.wait()
+        for thread in life.threads:
+            thread.join()
+        life.output.close()
+        return code
+
+
+def _speak(life: _Life) -> None:
+    """Write what there is to tell; after the last of it, or when nobody hears it, hang up."""
+    with suppress(OSError):
+        while (message := life.outgoing.get()) is not None:
+            life.input.write(message)
+            life.input.flush()
+    with suppress(OSError):
+        life.input.close()
+
+
+def _apart() -> Mapping[str, Any]:
+    """Return how a child is kept from the terminal's interrupts: it ends when it is told to."""
+    if sys.platform == "win32":
+        return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+    return {"start_new_session": True}

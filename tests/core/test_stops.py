@@ -1,0 +1,362 @@
+"""Stops and resumptions of every kind against a model: what is owed is done, and done once."""
+
+import json
+import random
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pytest
+from core.stoppable import block, idle_rig, stoppable, with_steps
+from hypothesis import HealthCheck, Phase, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import (
+    RuleBasedStateMachine,
+    initialize,
+    precondition,
+    rule,
+    run_state_machine_as_test,
+)
+
+from labcrane import ProtocolError
+from labcrane.design.plan import plan_session
+from labcrane.errors import DeviceError
+from labcrane.protocol.steps import Step
+from labcrane.protocol.study import Study
+from labcrane.recording.journal_reader import LoggedEvent, SessionLog, read_journal
+from labcrane.recording.participant_file.session_group import _trial_rows
+from labcrane.recording.paths import parts
+from labcrane.session import session as session_module
+from labcrane.session.commands import Command, LauncherGone, Order
+from labcrane.session.resume import Progress, _with_closing, progress, remaining
+from labcrane.session.session import Visit, record
+
+RESULTS = {"success", "failure", "timeout", "skipped"}
+OPEN = ("ended", "interrupted")
+
+
+class GoneError(Exception):
+    """Stands for a process that is gone."""
+
+
+class Room:
+    """People who start what waits and answer what is asked, until the session stops.
+
+    Parameters
+    ----------
+    stop, after
+        How it stops, and after how many ticks; None lets it run.
+    dice
+        Draws orders in between, and the answers.
+    """
+
+    def __init__(self, stop: str | None, after: int, dice: random.Random) -> None:
+        self._stop, self._after = stop, after
+        self._dice = dice
+        self._news: list[Any] = []
+        self.busy = stop is not None
+
+    def report(self, event) -> None:
+        self._news.append(event)
+
+    def commands(self):
+        self._after -= 1
+        if self._stop and self._after <= 0:
+            if self._stop in {"kill", "power cut"}:
+                raise GoneError
+            if self._stop == "fault":
+                raise DeviceError("it broke")
+            return [LauncherGone() if self._stop == "launcher" else Command(Order.END)]
+        news, self._news = self._news, []
+        given = [order for event in news for order in self._after_event(event)]
+        if self.busy and self._dice.random() < 0.05:
+            given.append(Command(self._dice.choice([Order.SKIP, Order.REPEAT, Order.NOTE]), "x"))
+        return given
+
+    def _after_event(self, event) -> Iterator[Command]:
+        if event.name in {"waiting", "pause.start"}:
+            yield Command(Order.START)
+        if event.name == "questionnaire.start":
+            kept = json.loads(event.data["kept"])
+            for item in ("one", "two"):
+                if item not in kept:
+                    given = {"questionnaire": event.data["questionnaire"], "item": item}
+                    answer = json.dumps({**given, "value": self._dice.randint(5, 10)})
+                    yield Command(Order.ANSWER, answer)
+            yield Command(Order.SUBMIT)
+
+
+SOME = [("rating",), ("other",), ("rating", "other")]
+ASKED = st.sampled_from([(), *SOME])
+STEPS = st.one_of(
+    st.builds(block, st.sampled_from(["block", "reference"]), st.integers(1, 4), ASKED, st.none()),
+    st.builds(
+        block,
+        st.just("practice"),
+        st.integers(1, 4),
+        ASKED,
+        st.none() | st.tuples(st.integers(1, 3), st.integers(1, 3)),
+    ),
+    st.builds(Step, kind=st.just("break"), seconds=st.sampled_from([0.0, 0.3, 0.5])),
+    st.just(Step(kind="instructions", text="Read this")),
+    st.just(Step(kind="consent")),
+    st.builds(
+        Step,
+        kind=st.just("questionnaire"),
+        questionnaires=st.sampled_from(SOME),
+    ),
+)
+STOPS = ("kill", "power cut", "fault", "launcher", "order")
+POLICIES = st.sampled_from([None, "redo_trial", "redo_block", "continue"])
+
+
+class Stops(RuleBasedStateMachine):
+    """One session that is stopped and resumed, and what its journal must say of it."""
+
+    folder: Path
+    study: Study
+    context = staticmethod(lambda *_: {})
+
+    @initialize(steps=st.lists(STEPS, min_size=1, max_size=5), people=st.booleans())
+    def plan(self, *, steps: list[Step], people: bool) -> None:
+        self._scratch = TemporaryDirectory(dir=self.folder)
+        study = with_steps(self.study, steps)
+        self.visit = Visit(
+            study, "P001", 1, Path(self._scratch.name), fast=True, pilot=True, simulated=not people
+        )
+        self.whole = plan_session(study, "P001", 1)
+        self.policies: set[str] = set()
+        self.over = False
+
+    def live(self, stop: str | None, after: int, seed: int, policy: str | None) -> None:
+        """Run one process: the session's first, or one that goes on."""
+        resumed = bool(parts(self.visit.journal))
+        before = self.owed if resumed else None
+        held = resumed and self.stop_rule_is_open()
+        visit = replace(self.visit, resumed=resumed, policy=policy)
+        begun = len(parts(self.visit.journal))
+        refused = ""
+        try:
+            record(visit, Room(stop, after, random.Random(seed)))
+        except ProtocolError as error:
+            refused = str(error)
+        except (GoneError, DeviceError):
+            pass
+        if refused:
+            assert resumed
+            assert policy == "continue"
+            assert "owes nothing that policy 'continue'" in refused
+            return
+        assert len(parts(self.visit.journal)) == begun + 1
+        if resumed:
+            self.policies.add(policy or "redo_trial")
+        if stop == "power cut":
+            self.tear(seed)
+        self.look()
+        self.check(resumed=resumed, before=before, held=held, policy=policy or "redo_trial")
+
+    def tear(self, seed: int) -> None:
+        """Let the last part lose what was not on the disk yet, down to its header."""
+        journal = parts(self.visit.journal)[-1]
+        whole = journal.read_bytes()
+        first = whole.find(b"session.start")
+        journal.write_bytes(whole[: random.Random(seed).randint(max(first, 0), len(whole))])
+
+    def look(self) -> None:
+        """Read the journal, as a resumption does."""
+        self.events: list[LoggedEvent] = read_journal(parts(self.visit.journal))[0].events
+        so_far = progress(self.visit.journal, self.visit.study.machine.names)
+        self.owed = remaining(self.visit.study, self.whole, so_far, "redo_trial")
+
+    def stop_rule_is_open(self) -> bool:
+        if self.visit.simulated:
+            return False
+        last = [
+            event.name
+            for event in self.events
+            if event.name == "stop_rule.met"
+            or (event.name == "pause.end" and event.data["by"] == "stop rule")
+        ]
+        return bool(last) and last[-1] == "stop_rule.met"
+
+    def check(self, *, resumed: bool, before, held: bool, policy: str) -> None:
+        events = self.events
+        part = max(event.part for event in events) if events else 0
+        mine = [event for event in events if event.part == part]
+        names = [event.name for event in mine]
+        if held and "step.start" in names:
+            pauses = [at for at, event in enumerate(mine) if event.name == "pause.start"]
+            assert mine[pauses[0]].data["by"] == "stop rule"
+            assert pauses[0] < names.index("step.start"), "it goes on when somebody says so"
+        if resumed and policy == "redo_trial":
+            owed = {trial.number for each in before.blocks for trial in each.trials}
+            begun = {event.data["trial"] for event in mine if event.name == "trial.start"}
+            assert begun <= owed, "nothing is repeated that was done"
+        ends = [event for event in mine if event.name == "session.end"]
+        reasons = [event.data["reason"] for event in ends]
+        if reasons == ["complete"]:
+            self.over = True
+            self.every_counted_trial_is_recorded_once()
+            self.every_question_is_asked_to_its_end_once()
+            self.every_other_step_is_done()
+        for event in ends:
+            left = {trial.number for each in self.owed.blocks for trial in each.trials}
+            assert bool(event.data["owed"]) == bool(self.owed.steps)
+            assert numbers_in(event.data["owed"]) == left
+
+    def every_counted_trial_is_recorded_once(self) -> None:
+        events = self.events
+        ends = [event.data for event in events if event.name == "trial.end"]
+        attempts = [(data["trial"], data["attempt"]) for data in ends]
+        assert len(set(attempts)) == len(attempts), "no attempt has two ends"
+        log = SessionLog(events=events)
+        rows = [row for row in _trial_rows(log) if row["outcome"] in RESULTS]
+        results = {row["trial"]: row["outcome"] for row in rows}
+        assert len(rows) == len(results), "no trial has two results"
+        assert sorted(results) == sorted(self.due(results))
+
+    def due(self, results: Mapping[int, str]) -> Iterator[int]:
+        """Yield the counted trials that have to have a result: of practice, until it is enough."""
+        group, streak, over = None, 0, False
+        for step in self.whole.steps:
+            mine = step.block
+            if mine is None:
+                continue
+            if mine.until is None or group is None:
+                streak, over = 0, False
+            group = None if mine.until is None or mine.last else mine.number
+            for trial in mine.trials:
+                if over or not trial.planned.counted:
+                    continue
+                yield trial.number
+                streak = streak + 1 if results.get(trial.number) == "success" else 0
+                over = mine.until is not None and streak >= mine.until.successes
+
+    def every_question_is_asked_to_its_end_once(self) -> None:
+        ended = [event.data for event in self.events if event.name == "questionnaire.end"]
+        done = [
+            (data["step"], data.get("trial"), data["questionnaire"])
+            for data in ended
+            if data["done"]
+        ]
+        results = {
+            row["trial"]: row["outcome"]
+            for row in _trial_rows(SessionLog(events=self.events))
+            if row["outcome"] in RESULTS
+        }
+        due = [
+            (step.number, None, name) for step in self.whole.steps for name in step.questionnaires
+        ]
+        counted = set(self.due(results))
+        due += [
+            (step.number, trial.number, name)
+            for step in self.whole.steps
+            if step.block
+            for trial in step.block.trials
+            if trial.number in counted
+            for name in step.block.ask
+        ]
+        assert set(done) == set(due)
+        if "redo_block" not in self.policies:
+            assert len(done) == len(due)
+
+    def every_other_step_is_done(self) -> None:
+        done = {
+            event.data["step"]
+            for event in self.events
+            if event.name == "step.end" and event.data["done"]
+        }
+        plain = [step for step in self.whole.steps if not (step.block or step.questionnaires)]
+        assert done >= {step.number for step in plain}
+
+    @precondition(lambda self: not self.over)
+    @rule(
+        stop=st.sampled_from(STOPS),
+        after=st.integers(1, 60),
+        seed=st.integers(0, 2**32),
+        policy=POLICIES,
+    )
+    def stopped(self, stop: str, after: int, seed: int, policy: str | None) -> None:
+        self.live(stop, after, seed, policy)
+
+    @precondition(lambda self: self.over)
+    @rule(policy=st.sampled_from([None, "redo_trial"]))
+    def resumed_for_nothing(self, policy: str | None) -> None:
+        with pytest.raises(ProtocolError, match="ran to its end"):
+            record(replace(self.visit, resumed=True, policy=policy), Room(None, 0, None))
+
+    @precondition(lambda self: not self.over and "redo_block" not in self.policies)
+    @rule()
+    def read_as_before_the_new_events(self) -> None:
+        """What is owed follows from the events of old journals as well."""
+        journal = parts(self.visit.journal)
+        if not journal or self.torn:
+            return
+        old = Progress()
+        for event, closes in _with_closing(self.events):
+            data = {key: event.data[key] for key in event.data if key not in {"done", "owed"}}
+            if event.name != "session.resumed":
+                old.take(event.name, data, closes=closes)
+        left = remaining(self.visit.study, self.whole, old, "redo_trial")
+        assert left.steps == self.owed.steps
+
+    @property
+    def torn(self) -> bool:
+        """Whether an ending was cut off in its middle: journals of before cannot tell it."""
+        events = self.events
+        return any(event.name == "launcher.gone" for event in events) and not any(
+            event.name == "session.end" for event in events
+        )
+
+    def teardown(self) -> None:
+        if not hasattr(self, "visit"):
+            return
+        if not self.over:
+            self.live(None, 0, 1, "redo_trial")
+            assert self.over, "undisturbed it comes to its end"
+        self._scratch.cleanup()
+
+
+def numbers_in(owed: str) -> set[int]:
+    found: set[int] = set()
+    for part in owed.split("; "):
+        _, _, spans = part.partition(", trials ")
+        for span in spans.split():
+            first, _, last = span.partition("-")
+            found |= set(range(int(first), int(last or first) + 1))
+    return found
+
+
+@pytest.fixture
+def stops(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> type[Stops]:
+    study = stoppable(tmp_path)
+    # What a session knows of the computer and its packages takes longer than all its ticks.
+    monkeypatch.setattr(session_module, "context", lambda *_: {})
+    monkeypatch.setattr(session_module.rig, "build", lambda study, simulated: idle_rig(study))
+    return type("StopsHere", (Stops,), {"folder": tmp_path, "study": study})
+
+
+def play(stops: type[Stops], sequences: int) -> None:
+    run_state_machine_as_test(
+        stops,
+        settings=settings(
+            max_examples=sequences,
+            stateful_step_count=8,
+            deadline=None,
+            derandomize=True,
+            phases=[Phase.generate, Phase.shrink],
+            suppress_health_check=list(HealthCheck),
+        ),
+    )
+
+
+def test_whatever_stops_a_session_it_owes_what_is_left_and_no_more(stops: type[Stops]) -> None:
+    play(stops, 250)
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(3600)
+def test_two_thousand_sequences_of_stops_owe_what_is_left(stops: type[Stops]) -> None:
+    play(stops, 2000)

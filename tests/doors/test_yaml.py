@@ -1,0 +1,195 @@
+"""Whatever a YAML file holds, ``check`` says what is wrong with it, and soon."""
+
+import copy
+import itertools
+import json
+import random
+import re
+import shutil
+import time
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from labcrane import LabcraneError, ProtocolError, read_yaml
+from labcrane.cli.app import main
+from labcrane.files.yaml import YamlFile, parse_yaml
+from labcrane.protocol.study import load
+from labcrane.registry.registry import Registry, discover
+
+PROTOCOLS = Path(__file__).parents[2] / "protocols"
+
+NINE = "abcdefghi"
+BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"{now}: &{now} [{', '.join(['*' + before] * 9)}]\n" for before, now in itertools.pairwise(NINE)
+)
+MERGES = "a: &a {x: 1}\n" + "".join(
+    f"{now}: &{now} {{<<: [{', '.join(['*' + before] * 9)}]}}\n"
+    for before, now in itertools.pairwise(NINE)
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("title: a\n\x07", ":2: this is no YAML: it holds the character U+0007, which no text may"),
+        ("day: 2001-99-99", ": this is no YAML: month must be in 1..12"),
+        ("[" * 3000, ":1: nested deeper than 50 levels; write it flat"),
+        ("a:\n" + "- " * 2000, ":2: nested deeper than 50 levels; write it flat"),
+        (BOMB, " holds more than 50000 values, or itself, behind its aliases; write fewer of them"),
+        ("title: " + "x" * 5_000_000, " cannot be read: it has 5000007 bytes; the most are 256000"),
+        ("a: [" + "1, " * 20_001 + "1]", " has more than 20000 commas, colons, brackets, dashes"),
+        ("a: 0b" + "1" * 90_000, " holds a whole number of 90000 bits; write less"),
+        ('a: "\\ud800"', " holds the character U+D800 in "),
+        ("a: !!python/object:os.system x", " holds 'x' with a tag; write plain values"),
+        ("a: !!int x", ": this is no YAML: invalid literal for int()"),
+        ("a: &a [*b]", ":1: this is no YAML: found undefined alias 'b'"),
+    ],
+)
+def test_a_hostile_file_is_refused_with_file_and_reason(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    path = tmp_path / "hostile.yaml"
+    path.write_text(text)
+    for read in (read_yaml, YamlFile.read):
+        with pytest.raises(ProtocolError, match=re.escape(f"{path}{message}")):
+            read(path)
+
+
+def test_bytes_that_are_no_text_and_folders_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "wide.yaml").write_bytes("title: ü".encode("utf-16"))
+    with pytest.raises(ProtocolError, match=r"wide.yaml cannot be read: 'utf-8' codec"):
+        read_yaml(tmp_path / "wide.yaml")
+    with pytest.raises(ProtocolError, match="is no file; give a YAML file"):
+        read_yaml(tmp_path)
+
+
+def test_aliases_and_merges_mean_what_they_always_did() -> None:
+    text = "one: &one {x: 1, y: [2, 3]}\ntwo: {<<: *one, x: 4}\nthree: *one\n"
+    assert parse_yaml(text, "aliases") == {
+        "one": {"x": 1, "y": [2, 3]},
+        "two": {"x": 4, "y": [2, 3]},
+        "three": {"x": 1, "y": [2, 3]},
+    }
+    assert parse_yaml(MERGES, "merges")["i"] == {"x": 1}  # by the plain loader it takes a minute
+
+
+@pytest.mark.parametrize(
+    ("steps", "message"),
+    [
+        ("[true]", "a step is one of consent, instructions, questionnaire, practice, reference"),
+        ("[null, {block: {task: aiming}}]", "with a value, not None"),
+        ("[{}, {block: {task: aiming}}]", "with a value, not {}"),
+        ("[{block: }]", "must be a mapping of keys, but is None"),
+        ("[]", "should have at least 1 item"),
+    ],
+)
+def test_a_step_that_is_none_is_told_with_its_line(
+    tmp_path: Path, capsys, steps: str, message: str
+) -> None:
+    text = (PROTOCOLS / "retrieval" / "protocol.yaml").read_text()
+    shutil.copytree(PROTOCOLS, tmp_path / "protocols")
+    path = tmp_path / "protocols" / "retrieval" / "wrong.yaml"
+    path.write_text(text.partition("sessions:")[0] + f"sessions: [{{name: a, steps: {steps}}}]\n")
+    assert main(["check", str(path)]) == 2
+    said = capsys.readouterr().err.replace("\n", " ")
+    assert message in re.sub(r"\s+", " ", said)
+
+
+VALUES = [
+    None, True, False, 0, -1, 1, 1e308, 2**70, "", "x", "\x00", "a/b", "../..", "/etc/passwd",
+    "ü" * 50, [], [[]], [True], [None], {}, {"a": {}}, {"use": None}, {"use": []}, "2001-01-01",
+    [1, 2], ["x"], -0.5, 10**9, {"use": "x"}, "nul", ".", "consent",
+]  # fmt: skip
+
+
+def places_in(node: object, at: tuple = ()) -> list[tuple]:
+    if isinstance(node, dict):
+        inside = list(node.items())
+    elif isinstance(node, list):
+        inside = list(enumerate(node))
+    else:
+        inside = []
+    return [at, *(place for key, value in inside for place in places_in(value, (*at, key)))]
+
+
+def wrong(data: dict, dice: random.Random) -> dict:
+    """Return a protocol with some places changed, left out or renamed."""
+    data = copy.deepcopy(data)
+    for _ in range(dice.choice([1, 1, 2, 4])):
+        *way, last = dice.choice(places_in(data)[1:] or [("labcrane",)])
+        node = data
+        for step in way:
+            node = node[step]
+        match dice.randrange(4):
+            case 0 if isinstance(node, dict):
+                node[str(dice.choice(VALUES))] = node.pop(last, None)
+            case 1 if len(node) > 1:
+                node.pop(last)
+            case _:
+                node[last] = dice.choice(VALUES)
+    return data
+
+
+def fuzz_protocols(folder: Path, registry: Registry, count: int, seed: int) -> None:
+    shutil.copytree(PROTOCOLS, folder)
+    found = [path for path in sorted(folder.rglob("*.yaml")) if "labcrane: 1" in path.read_text()]
+    whole = {path: read_yaml(path) for path in found}
+    dice = random.Random(seed)
+    for _ in range(count):
+        path = dice.choice(found)
+        changed = path.with_name("changed.yaml")
+        changed.write_text(json.dumps(wrong(whole[path], dice)))
+        before = time.process_time()
+        try:
+            load(changed, registry)
+        except LabcraneError as error:
+            assert str(error)  # noqa: PT017 - many changes are harmless
+        assert time.process_time() - before < 1.0, changed.read_text()
+
+
+def test_a_protocol_with_anything_in_any_place_is_checked_without_a_traceback(
+    tmp_path: Path,
+) -> None:
+    fuzz_protocols(tmp_path / "protocols", discover(), 60, seed=155)
+
+
+@pytest.mark.soak
+def test_many_protocols_with_anything_in_any_place(tmp_path: Path) -> None:
+    fuzz_protocols(tmp_path / "protocols", discover(), 20_000, seed=156)
+
+
+TOKENS = st.sampled_from(
+    [
+        *"[]{},:-?&*!|>'\"%@`#\n ",
+        "a",
+        "1",
+        "<<",
+        "&a ",
+        "*a",
+        "!!int ",
+        "!!set ",
+        "2001-01-01",
+        "\n  ",
+        "---",
+        "...",
+        "0x",
+        "1e9",
+        ".nan",
+        "\\x",
+        "\x85",
+        "\ufeff",
+        "\t",
+    ]
+)
+
+
+@settings(max_examples=800, deadline=None)
+@given(st.lists(TOKENS, max_size=40).map("".join) | st.text(max_size=60))
+def test_any_text_is_yaml_or_is_told_to_be_none(text: str) -> None:
+    try:
+        json.dumps(parse_yaml(text, "a text"), default=str).encode()
+    except ProtocolError as error:
+        assert str(error).startswith("a text")  # noqa: PT017 - some of it is YAML
