@@ -14,8 +14,10 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
+from benchmarks.own_process import Use, used
 from benchmarks.table import Row
 
 PROTOCOL = Path(__file__).parents[1] / "protocols" / "aiming" / "protocol.yaml"
@@ -44,23 +46,6 @@ def multiply(recording: Path, folder: Path, count: int) -> Path:
     return folder
 
 
-def run(*words: str) -> tuple[float, float]:
-    """Run a command; return its seconds of processor time and its largest memory in MB."""
-    program = (
-        "import resource, sys; from labcrane.cli.app import main; status = main(sys.argv[1:]); "
-        "used = resource.getrusage(resource.RUSAGE_SELF); "
-        "print(used.ru_utime + used.ru_stime, used.ru_maxrss / 1024); sys.exit(status)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program, *words, "--include", "simulated"],
-        check=True,
-        capture_output=True,
-        text=True,
-    )
-    seconds, memory = map(float, done.stdout.split()[-2:])
-    return seconds, memory
-
-
 def bare_s(data: Path) -> float:
     """Return the processor's seconds per participant for reading every number with h5py alone."""
     import h5py  # noqa: PLC0415 - loads for a second
@@ -73,19 +58,51 @@ def bare_s(data: Path) -> float:
     return (time.process_time() - began) / len(files)
 
 
+COMMANDS = {("report",): 700.0, ("export", "--to", "tables"): 600.0}
+"""What is measured, and how much longer than reading the files it may take."""
+
+
 def rows(participants: int = 9) -> list[Row]:
-    """Return what report and export take for each participant beside reading the files."""
+    """Return what report and export take beside reading the files, and how that grows."""
     found = []
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
-        data = multiply(record(root / "one", 4), root / "data", participants)
-        least = bare_s(data)
-        for words in (["report"], ["export", "--to", "tables"]):
-            out = root / f"out-{words[0]}"
-            seconds, _ = run(words[0], str(data), "--out", str(out), *words[1:])
-            what = f"{' '.join(words)}, s per participant"
-            found.append(Row("analysis", what, seconds / participants, least, "h5py alone"))
+        short, long = record(root / "short", 4), record(root / "long", 8)
+        many = multiply(short, root / "many", participants)
+        few = multiply(short, root / "few", participants // 3)
+        longer = multiply(long, root / "longer", participants // 3)
+        least = bare_s(many)
+        for words, limit in COMMANDS.items():
+            all_, some, twice = (measured(words, data) for data in (many, few, longer))
+            what = " ".join(words)
+            each, usual = all_.processor_s / participants, some.processor_s / (participants // 3)
+            found += [
+                Row("analysis", f"{what}, s per participant", each, least, "h5py alone", limit),
+                Row(
+                    "analysis", f"{what}, {participants} participants, s each", each, usual,
+                    f"{participants // 3} participants", 1.1,
+                ),
+                Row(
+                    "analysis", f"{what}, {participants} participants, MB at most",
+                    all_.megabytes, some.megabytes, f"{participants // 3} participants", 1.15,
+                ),
+                Row(
+                    "analysis", f"{what}, sessions twice as long, s", twice.processor_s,
+                    some.processor_s, "as they are", 2.2,
+                ),
+                Row(
+                    "analysis", f"{what}, sessions twice as long, MB at most", twice.megabytes,
+                    some.megabytes, "as they are", 1.3,
+                ),
+            ]  # fmt: skip
     return found
+
+
+def measured(words: Sequence[str], data: Path) -> Use:
+    """Run a command on a data folder, and leave nothing of it."""
+    with tempfile.TemporaryDirectory() as out:
+        options = ["--out", f"{out}/out", *words[1:], "--include", "simulated"]
+        return used(words[0], str(data), *options)
 
 
 def main() -> None:
@@ -103,16 +120,14 @@ def main() -> None:
         files = {n: record(root / f"length{n}", n) for n in {n for _, n in cases}}
         for count, movements in cases:
             data = multiply(files[movements], root / f"data-{count}-{movements}", count)
-            for at, words in enumerate((["report"], ["export", "--to", "tables"])):
-                out = root / f"out-{count}-{movements}-{at}"
-                seconds, memory = run(words[0], str(data), "--out", str(out), *words[1:])
-                each = seconds / count
+            for words in COMMANDS:
+                use = measured(words, data)
+                each = use.processor_s / count
                 print(
                     f"{' '.join(words):16}{count:12}{8 * movements:11}{each:15.2f}"
-                    f"{1000 * each / (8 * movements):13.1f}{memory:9.0f}",
+                    f"{1000 * each / (8 * movements):13.1f}{use.megabytes:9.0f}",
                     flush=True,
                 )
-                shutil.rmtree(out)
             shutil.rmtree(data)
 
 

@@ -5,7 +5,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from labcrane import Machine, urdf
+from labcrane import Machine
+from labcrane.machines import urdf_of
 
 PASSES = 200
 """Solver passes with which PyBullet alone follows a crane's commands and keeps its limits."""
@@ -40,7 +41,7 @@ class BareEngine:
         pybullet.setGravity(0, 0, -crane.GRAVITY, physicsClientId=client)
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "crane.urdf"
-            path.write_text(urdf(machine))
+            path.write_text(urdf_of(machine))
             flags = pybullet.URDF_USE_INERTIA_FROM_FILE
             self._body = pybullet.loadURDF(
                 str(path), useFixedBase=True, flags=flags, physicsClientId=client

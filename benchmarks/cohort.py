@@ -9,14 +9,12 @@ passes that labcrane's crane is given. Times of one core are the process's own.
 """
 
 import argparse
-import json
-import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
 
 from benchmarks.bare_engine import BareEngine
+from benchmarks.own_process import Use, used
 from benchmarks.table import Row, show
 from labcrane.protocol.study import Study, load
 from labcrane.registry.registry import discover
@@ -50,7 +48,7 @@ def one_core(folder: Path, participants: int) -> list[Row]:
         ticks += count
         for passes in PASSES:
             bare[passes] += bare_s(study, passes, count)
-    goals = {200: 1.5, 400: None}
+    limits = {200: 1.5, 400: 1.1}
     return [
         Row(
             "cohort",
@@ -58,7 +56,7 @@ def one_core(folder: Path, participants: int) -> list[Row]:
             1e6 * ours / ticks,
             1e6 * bare[passes] / ticks,
             f"bare PyBullet, {passes} passes",
-            goals[passes],
+            limits[passes],
         )
         for passes in PASSES
     ]
@@ -81,37 +79,22 @@ def bare_s(study: Study, passes: int, count: int) -> float:
         return time.process_time() - began
 
 
-COMMAND = """
-import json, resource, sys, time
-from labcrane.cli.app import main
-began = time.perf_counter()
-assert main(sys.argv[1:]) == 0
-took = time.perf_counter() - began
-print(json.dumps([took, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024]))
-"""
-
-
-def command(folder: Path, participants: int, workers: int) -> tuple[float, float]:
-    """Run ``labcrane simulate`` in a process of its own; return its seconds and its MB at most."""
+def command(folder: Path, participants: int, workers: int) -> Use:
+    """Run ``labcrane simulate`` in a process of its own; return what it used."""
     words = ["simulate", str(AIMING), "--out", str(folder / f"out-{participants}-{workers}")]
-    words += ["--participants", str(participants), "--workers", str(workers)]
-    done = subprocess.run(
-        [sys.executable, "-c", COMMAND, *words], check=True, capture_output=True, text=True
-    )
-    seconds, megabytes = json.loads(done.stdout.splitlines()[-1])
-    return seconds, megabytes
+    return used(*words, "--participants", str(participants), "--workers", str(workers))
 
 
 def two_cores(folder: Path, participants: int) -> Row:
     """Compare two workers with one."""
-    two, one = (command(folder, participants, workers)[0] for workers in (2, 1))
+    two, one = (command(folder, participants, workers).seconds for workers in (2, 1))
     what = f"{participants} participants with two workers, s"
     return Row("cohort", what, two, one, "with one", 1 / 1.8)
 
 
 def memory(folder: Path, few: int) -> Row:
     """Compare the memory for few participants and for three times as many."""
-    small, large = (command(folder / "memory", count, 1)[1] for count in (few, 3 * few))
+    small, large = (command(folder / "memory", count, 1).megabytes for count in (few, 3 * few))
     return Row("cohort", f"{3 * few} participants, MB at most", large, small, f"{few} of them", 1.1)
 
 

@@ -56,7 +56,9 @@ def steps() -> tuple[float, float]:
 def rows() -> list[Row]:
     """Return what a watched step costs beside a bare one."""
     alone, seen = steps()
-    return [Row("oversight", "a watched step of a crane, us", 1e6 * seen, 1e6 * alone, "unwatched")]
+    return [
+        Row("oversight", "a watched step of a crane, us", 1e6 * seen, 1e6 * alone, "unwatched", 2.5)
+    ]
 
 
 def main() -> None:

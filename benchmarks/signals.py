@@ -12,7 +12,7 @@ import time
 import numpy as np
 
 from benchmarks.table import Row, show
-from labcrane import SignalChannel, SignalStream
+from labcrane.core import SignalChannel, SignalStream
 from labcrane.monitoring.config import MonitorBuilder, MonitorConfig
 from labcrane.monitoring.monitored_stream import MonitoredStream
 

@@ -27,9 +27,16 @@ def rows() -> list[Row]:
         for _ in range(count):
             synth.block()
         bare.append(1e6 * (time.perf_counter() - began) / count)
+    heard_after = _delay(synth)
     synth.close()
-    what, least = "a block of 256 with a change, us", "pyo's block without"
-    return [Row("sound", what, float(np.median(ours)), float(np.median(bare)), least)]
+    each = float(np.median(ours))
+    second = 1e-6 * each * settings.rate_hz / settings.block
+    least = "pyo's block without"
+    return [
+        Row("sound", "a block of 256 with a change, us", each, float(np.median(bare)), least, 2.5),
+        Row("sound", "a second of sound made offline, s", second, 1.0, "the second", 0.05),
+        Row("sound", "blocks until a change is heard", heard_after + 1.0, 1.0, "the next", 1.0),
+    ]
 
 
 def main() -> None:

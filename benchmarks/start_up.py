@@ -23,7 +23,7 @@ CASES = {
     "labcrane --help": ["-m", "labcrane", "--help"],
     "labcrane check": ["-m", "labcrane", "check", str(AIMING)],
 }
-GOALS = {"labcrane --help": 1.5, "labcrane check": 4.0}
+LIMITS = {"labcrane --help": 1.5, "labcrane check": 4.0}
 
 
 def rows() -> list[Row]:
@@ -40,8 +40,8 @@ def rows() -> list[Row]:
                 took[name].append(time.perf_counter() - began)
     bare = min(took["bare"])
     return [
-        Row("start-up", f"{name}, s", min(took[name]), bare, "import typer, rich", goal)
-        for name, goal in GOALS.items()
+        Row("start-up", f"{name}, s", min(took[name]), bare, "import typer, rich", limit)
+        for name, limit in LIMITS.items()
     ]
 
 

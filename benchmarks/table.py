@@ -1,11 +1,12 @@
-"""Table of figures, each beside a bare reference in the same run."""
+"""Rows of every benchmark: a figure, a bare reference from the same run, and a limit."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Row:
-    """One figure.
+    """One figure, and what is promised of it.
 
     Attributes
     ----------
@@ -15,8 +16,8 @@ class Row:
         labcrane's figure and the reference's.
     reference
         What the reference is.
-    goal
-        What the ratio should be at most; None where there is no goal.
+    limit
+        What the ratio may be at most.
     """
 
     subject: str
@@ -24,19 +25,33 @@ class Row:
     ours: float
     bare: float
     reference: str
-    goal: float | None = None
+    limit: float
 
     @property
     def ratio(self) -> float:
         """Ours over bare."""
         return self.ours / self.bare
 
+    @property
+    def kept(self) -> bool:
+        """Whether the ratio is within its limit; one that is no number is not."""
+        return self.ratio <= self.limit
 
-def show(rows: list[Row]) -> None:
+
+def missed(rows: Iterable[Row]) -> list[str]:
+    """Return a line for each row whose ratio is above its limit."""
+    return [
+        f"{row.subject}: {row.what} is {row.ours:.3g}, {row.ratio:.3g} times {row.reference} "
+        f"({row.bare:.3g}); at most {row.limit:g} times is promised"
+        for row in rows
+        if not row.kept
+    ]
+
+
+def show(rows: Iterable[Row]) -> None:
     """Print rows for people."""
     for row in rows:
-        goal = "" if row.goal is None else f" (at most {row.goal:g})"
         print(
             f"{row.subject:10} {row.what}: {row.ours:.3g}; {row.reference}: {row.bare:.3g}; "
-            f"ratio {row.ratio:.2f}{goal}"
+            f"ratio {row.ratio:.3g} (at most {row.limit:g}){'' if row.kept else '  MISSED'}"
         )

@@ -13,7 +13,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -38,8 +38,16 @@ from labcrane.streams.network import use_loopback
 ROUNDS = 7
 TICKS = 2400
 WARM_UP = 200
-RATES_HZ = (240, 500, 1000, 2000)
+RATES_HZ = (240, 500, 1000, 2000, 4000, 8000, 16000)
 PACED_S = 4.0
+FEW = 0.01
+"""Share of late ticks up to which a rate is held."""
+
+LIMITS = {"whole": (1.5, 2.5), "whole, LSL": (1.8, 3.5)}
+"""How much longer than a bare tick a whole one may take: in the median, and in 99 % of ticks."""
+
+SLOWEST = 4.0
+"""How much lower the highest rate held may be than that of a loop that does nothing."""
 
 STUDY = """\
 labcrane: 1
@@ -168,31 +176,52 @@ def rows() -> list[Row]:
     """Return the median cost of a whole tick beside a bare one."""
     use_loopback()
     with tempfile.TemporaryDirectory() as name:
-        found = cost(Path(name))
-    p50 = {kind: float(np.median([np.median(one) for one in each])) for kind, each in found.items()}
-    return [
-        Row("tick", f"{kind}, median us", 1e6 * p50[kind], 1e6 * p50["bare"], "bare PyBullet tick")
-        for kind in ("whole", "whole, LSL")
-    ]
+        found = costs(cost(Path(name)))
+        held = rates(Path(name))
+    what = "shortest tick that is held, LSL, ms"
+    ours, bare = (1e3 / held[kind] for kind in ("whole", "empty"))
+    return [*found, Row("tick", what, ours, bare, "of an empty loop", SLOWEST)]
 
 
-def cost(folder: Path) -> dict[str, list[np.ndarray]]:
+def costs(found: Mapping[str, Sequence[np.ndarray]]) -> list[Row]:
+    """Return what whole ticks cost beside bare ones, from the times of all rounds."""
+    made = []
+    for kind, limits in LIMITS.items():
+        for (word, share), limit in zip((("median", 0.5), ("99 %", 0.99)), limits, strict=True):
+            ours, bare = (
+                1e6 * float(np.median([np.quantile(one, share) for one in found[which]]))
+                for which in (kind, "bare")
+            )
+            made.append(Row("tick", f"{kind}, {word}, us", ours, bare, "bare PyBullet tick", limit))
+    return made
+
+
+KINDS = (("whole", False), ("whole, LSL", True))
+"""Whole ticks, and whether LSL sends them."""
+
+
+def cost(
+    folder: Path,
+    rounds: int = ROUNDS,
+    count: int = TICKS,
+    kinds: Sequence[tuple[str, bool]] = KINDS,
+) -> dict[str, list[np.ndarray]]:
     """Print the cost of a tick, bare and whole; return all times in s."""
     study = study_at(240.0, folder)
-    found: dict[str, list[np.ndarray]] = {"bare": [], "whole": [], "whole, LSL": []}
+    found: dict[str, list[np.ndarray]] = {"bare": [], **{kind: [] for kind, _ in kinds}}
     with BareEngine(study.machine, study.protocol.rate_hz, PASSES) as engine:
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             gc.collect()
-            found["bare"].append(bare_times(engine, TICKS)[WARM_UP:])
-            for name, lsl in (("whole", False), ("whole, LSL", True)):
+            found["bare"].append(bare_times(engine, count)[WARM_UP:])
+            for name, lsl in kinds:
                 clock = ManualClock(time.perf_counter())  # LSL takes only times of the computer
-                ends = [frame.elapsed for frame in whole(study, folder, clock, TICKS, lsl=lsl)]
+                ends = [frame.elapsed for frame in whole(study, folder, clock, count, lsl=lsl)]
                 found[name].append(np.diff(ends)[WARM_UP:])
-    print(f"cost of a tick, {ROUNDS} rounds of {TICKS} ticks, unpaced")
+    print(f"cost of a tick, {rounds} rounds of {count} ticks, unpaced")
     print(f"{'':12} {'p50 us':>8} {'p99 us':>8} {'ratio p50':>18} {'ratio p99':>18}")
     bare_p50, bare_p99 = (np.array([np.quantile(r, q) for r in found["bare"]]) for q in (0.5, 0.99))
-    for name, rounds in found.items():
-        p50, p99 = (np.array([np.quantile(r, q) for r in rounds]) for q in (0.5, 0.99))
+    for name, each in found.items():
+        p50, p99 = (np.array([np.quantile(r, q) for r in each]) for q in (0.5, 0.99))
         print(
             f"{name:12} {np.median(p50) * 1e6:8.1f} {np.median(p99) * 1e6:8.1f} "
             f"{spread(p50 / bare_p50):>18} {spread(p99 / bare_p99):>18}"
@@ -210,11 +239,11 @@ def late(dues: Sequence[float], wakes: Sequence[float], rate_hz: float) -> float
     return float(np.mean(np.subtract(wakes, dues) > 1.0 / rate_hz))
 
 
-def rates(folder: Path) -> None:
-    """Print late ticks at rising rates, for the empty loop and the whole one."""
+def rates(folder: Path) -> dict[str, int]:
+    """Print late ticks at rising rates, until the whole loop falls behind; return what is held."""
     print(f"\nlate ticks over {PACED_S:g} s (woke over one period after due), LSL with a consumer")
     print(f"{'rate Hz':>8} {'empty loop':>12} {'whole loop':>12}")
-    held = {"empty": 0, "whole": 0}
+    held = {"empty": 1, "whole": 1}  # Hz, where not even the lowest is held
     for rate in RATES_HZ:
         count = round(PACED_S * rate)
         empty = [tick for tick, _ in zip(ticks(SystemClock(), rate), range(count), strict=False)]
@@ -225,9 +254,12 @@ def rates(folder: Path) -> None:
         }
         print(f"{rate:8} {shares['empty']:12.2%} {shares['whole']:12.2%}")
         for name, share in shares.items():
-            if share < 0.01:
-                held[name] = max(held[name], rate)
+            if share < FEW:
+                held[name] = rate
+        if shares["whole"] >= FEW and shares["empty"] >= FEW:
+            break
     print(f"held with under 1 % late: empty loop {held['empty']} Hz, whole {held['whole']} Hz")
+    return held
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """Makes the pages that are read off the program itself: every key, every plugin, all decisions.
 
-mkdocs calls :func:`on_files` while it builds the site, so these pages are never out of date and
-never in the repository. ``python docs/generate.py FOLDER`` writes them for reading.
+mkdocs calls :func:`on_files` while it builds the site, so these pages are never out of date. In the
+repository there is a page for each that says so, to which links lead. ``python docs/generate.py
+FOLDER`` writes them for reading.
 """
 
 import re
@@ -19,11 +20,12 @@ from labcrane.core.signals import Signal
 from labcrane.errors import LabcraneError
 from labcrane.machines.library import load_machine
 from labcrane.machines.machine import Machine
-from labcrane.protocol.protocol import Protocol
+from labcrane.protocol.protocol import protocol_model
 from labcrane.protocol.steps import Block, Break
 from labcrane.protocol.study import load
+from labcrane.registry.hookspecs import ROLES
 from labcrane.registry.offers import Offer
-from labcrane.registry.registry import ROLES, Registry, discover
+from labcrane.registry.registry import Registry, discover
 
 HERE = Path(__file__).parent
 PROTOCOLS = HERE.parent / "protocols"
@@ -41,7 +43,7 @@ def pages() -> dict[str, str]:
 
 def protocol_page() -> str:
     """Return every key of a protocol with its type, default and meaning."""
-    schema = Protocol.model_json_schema()
+    schema = protocol_model().model_json_schema()
     parts = {name: part for name, part in schema["$defs"].items() if name not in OWN_WORDS}
     parts |= {"Block": Block.model_json_schema(), "Break": Break.model_json_schema()}
     lines = [
@@ -267,6 +269,8 @@ def on_files(files: Any, config: Any) -> Any:
     from mkdocs.structure.files import File  # noqa: PLC0415 - a hook of mkdocs, and nothing else
 
     for path, text in pages().items():
+        if (stand_in := files.get_file_from_path(path)) is not None:
+            files.remove(stand_in)
         files.append(File.generated(config, path, content=text))
     return files
 

@@ -1,7 +1,9 @@
 """labcrane: studies of people operating cranes and manipulators.
 
-Everything a plugin needs is importable from here, and nothing else is public, except the contract
-tests in ``labcrane.testing``.
+What every plugin needs is importable from here: roles, what flows through a run, settings, offers,
+errors. The rest of what is public is in ``core`` (records, items, shapes), ``machines``,
+``recording``, ``analysis``, ``replay``, ``registry`` (commands, what is not installed) and
+``testing`` (contract tests), each with ``__all__``. Nothing else is public.
 
 The names are listed in ``__init__.pyi``. One is imported from its module when it is asked for the
 first time, so that ``labcrane --help`` loads none of them.

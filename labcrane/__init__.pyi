@@ -1,26 +1,10 @@
 """The public names, and the modules from which they are imported."""
 
-from .analysis.codebook import codebook_of
-from .analysis.cohort import Participant
+from . import analysis, core, machines, participants, recording, registry, replay, testing
 from .analysis.exporter import Exporter
-from .analysis.measures import measures_of
-from .analysis.movements import Movement, movements
 from .core.clock import Tick
-from .core.findings import Finding, Verdict
-from .core.items import AnswerError, Answers, Item, Score, numeric_answers
-from .core.primitives import Cylinder, Shape, Sphere, TargetFinder
-from .core.records import (
-    CameraImage,
-    Event,
-    Frame,
-    Phase,
-    PlannedTrial,
-    Run,
-    SessionState,
-    Trial,
-    TrialStatus,
-    Value,
-)
+from .core.primitives import Cylinder, Sphere
+from .core.records import Event, Frame, Phase, PlannedTrial, Run, Trial, TrialStatus
 from .core.roles import (
     Controller,
     Cue,
@@ -31,54 +15,27 @@ from .core.roles import (
     SignalMonitor,
     Task,
 )
-from .core.settings import Settings, StudyPath
-from .core.signals import (
-    Layout,
-    Signal,
-    SignalChannel,
-    SignalFault,
-    SignalStream,
-    signals_of,
-)
+from .core.settings import Settings
+from .core.signals import Signal
 from .errors import (
     DeviceError,
     LabcraneError,
     PluginError,
     ProtocolError,
     RecordingError,
+    StreamError,
 )
 from .files.yaml import read_yaml
-from .machines.actuator import ACTUATOR_PRESETS, Actuator, ActuatorSettings
-from .machines.inverse_kinematics import reach
-from .machines.kinematics import Arm, jacobian, link_frames
-from .machines.links import link_boxes
-from .machines.machine import Body, Joint, Machine
-from .machines.mesh import MeshFile
-from .machines.scene import Geom, PlacedObject, Scene, ShapeKind, load_scene, place_objects
-from .machines.scene_codec import SCENE_PLACED, read_placed, write_placed
-from .machines.urdf import urdf, urdf_joint, urdf_link
-from .recording.participant_file.reader import SessionRecord, Stream, open_recording
-from .recording.xdf.header import Channel, StreamHeader
-from .recording.xdf.writer import XdfWriter
+from .machines.machine import Machine
+from .recording.participant_file.reader import open_recording
 from .registry.hookspecs import hookimpl
-from .registry.offers import CommandOffer, Offer, Prompt, offer
-from .registry.quiet_import import quietly_imported
+from .registry.offers import Offer, offer
 from .types import FloatArray
 
 __version__: str
+from .streams.newest import NewestSample
 
 __all__ = [
-    "ACTUATOR_PRESETS",
-    "SCENE_PLACED",
-    "Actuator",
-    "ActuatorSettings",
-    "AnswerError",
-    "Answers",
-    "Arm",
-    "Body",
-    "CameraImage",
-    "Channel",
-    "CommandOffer",
     "Controller",
     "Cue",
     "Cylinder",
@@ -87,72 +44,39 @@ __all__ = [
     "Event",
     "Exporter",
     "Feedback",
-    "Finding",
     "FloatArray",
     "Frame",
-    "Geom",
     "InputDevice",
-    "Item",
-    "Joint",
     "LabcraneError",
-    "Layout",
     "Machine",
-    "MeshFile",
-    "Movement",
+    "NewestSample",
     "Offer",
-    "Participant",
     "Phase",
-    "PlacedObject",
     "PlannedTrial",
     "PluginError",
-    "Prompt",
     "ProtocolError",
     "Questionnaire",
     "RecordingError",
     "Run",
-    "Scene",
-    "Score",
-    "SessionRecord",
-    "SessionState",
     "Settings",
-    "Shape",
-    "ShapeKind",
     "Signal",
-    "SignalChannel",
-    "SignalFault",
     "SignalMonitor",
-    "SignalStream",
     "Sphere",
-    "Stream",
-    "StreamHeader",
-    "StudyPath",
-    "TargetFinder",
+    "StreamError",
     "Task",
     "Tick",
     "Trial",
     "TrialStatus",
-    "Value",
-    "Verdict",
-    "XdfWriter",
-    "codebook_of",
+    "analysis",
+    "core",
     "hookimpl",
-    "jacobian",
-    "link_boxes",
-    "link_frames",
-    "load_scene",
-    "measures_of",
-    "movements",
-    "numeric_answers",
+    "machines",
     "offer",
     "open_recording",
-    "place_objects",
-    "quietly_imported",
-    "reach",
-    "read_placed",
+    "participants",
     "read_yaml",
-    "signals_of",
-    "urdf",
-    "urdf_joint",
-    "urdf_link",
-    "write_placed",
+    "recording",
+    "registry",
+    "replay",
+    "testing",
 ]

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labcrane import Arm, FloatArray, Machine
+from labcrane import FloatArray, Machine
+from labcrane.machines import Arm
 from labcrane.testing import RATE_HZ
 
 

@@ -8,7 +8,6 @@ import numpy as np
 from ideal_crane import IdealCrane
 
 from labcrane import (
-    ACTUATOR_PRESETS,
     Controller,
     FloatArray,
     Frame,
@@ -20,6 +19,7 @@ from labcrane import (
     Tick,
     Trial,
 )
+from labcrane.machines import ACTUATOR_PRESETS
 from labcrane.testing import RATE_HZ, ch8, make_run
 from labcrane_bullet.kinematic_crane import KinematicCrane
 from labcrane_bullet.settings import CraneSettings

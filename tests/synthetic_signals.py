@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labcrane import FloatArray, SignalChannel, SignalStream
+from labcrane import FloatArray
+from labcrane.core import SignalChannel, SignalStream
 
 Rng = np.random.Generator
 

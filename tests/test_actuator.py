@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import BaseModel, ValidationError
 
-from labcrane import ACTUATOR_PRESETS, Actuator, ActuatorSettings
+from labcrane.machines import ACTUATOR_PRESETS, Actuator, ActuatorSettings
 from labcrane.testing import RATE_HZ
 
 FULL = (0.5, 0.25)

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from labcrane import Arm, FloatArray, Machine, jacobian, link_frames
+from labcrane import FloatArray, Machine
+from labcrane.machines import Arm, jacobian, link_frames
 from labcrane.machines.kinematics import dh_matrix
 from labcrane.machines.library import load_machine
 

@@ -10,7 +10,8 @@ from dataclasses import replace
 import numpy as np
 from needs import GRAPHICS, need
 
-from labcrane import Frame, Run, link_boxes
+from labcrane import Frame, Run
+from labcrane.machines import link_boxes
 from labcrane.testing import TARGETS, ch8, crane_at, make_run, make_target
 from labcrane_view.settings import CameraSettings, ViewSettings
 from labcrane_view.view import View

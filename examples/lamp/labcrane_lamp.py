@@ -21,10 +21,10 @@ from labcrane import (
     Run,
     Settings,
     Signal,
-    Value,
     hookimpl,
     offer,
 )
+from labcrane.core import Value
 
 labcrane_api = 1
 

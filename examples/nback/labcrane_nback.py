@@ -22,12 +22,12 @@ from labcrane import (
     Offer,
     Run,
     Settings,
-    Shape,
     Signal,
     Sphere,
     hookimpl,
     offer,
 )
+from labcrane.core import Shape
 
 labcrane_api = 1
 

@@ -1,7 +1,7 @@
 """Cohort of a data folder: who is in it, and who counts."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
@@ -89,6 +89,30 @@ class Cohort:
     folder: Path
     included: tuple[Participant, ...]
     left_out: tuple[Participant, ...]
+
+    def without(self, name: str, why: str) -> "Cohort":
+        """Return the cohort without somebody whose data turned out not to be readable.
+
+        Raises
+        ------
+        RecordingError
+            Nobody else is left to be used.
+        """
+        gone = [
+            replace(person, status=Status.UNREADABLE, why=why)
+            for person in self.included
+            if person.name == name
+        ]
+        kept = tuple(person for person in self.included if person.name != name)
+        left_out = tuple(sorted((*self.left_out, *gone), key=lambda person: person.name))
+        if not kept:
+            raise RecordingError(_nobody(self.folder, left_out) + f"; {name}: {why}")
+        return Cohort(self.folder, kept, left_out)
+
+    @property
+    def unreadable(self) -> tuple[Participant, ...]:
+        """Who is left out because of a recording that cannot be used."""
+        return tuple(person for person in self.left_out if person.status is Status.UNREADABLE)
 
     def listing(self) -> "pd.DataFrame":
         """Return everybody with status and reason: what must stand beside every average."""
@@ -181,10 +205,23 @@ def _look(folder: Path, struck: Struck | None) -> Participant:
         recording = open_recording(path)
         if not recording.sessions:
             return Participant(folder.name, path, Status.UNREADABLE, "holds no session")
+        if (hollow := _hollow(recording)) is not None:
+            return Participant(folder.name, path, Status.UNREADABLE, hollow)
         status, why = _judge(recording)
-    except RecordingError as error:
+    except (RecordingError, ProtocolError) as error:  # of the file, of the protocol in it
         return Participant(folder.name, path, Status.UNREADABLE, str(error))
     return Participant(folder.name, path, status, why)
+
+
+def _hollow(recording: Recording) -> str | None:
+    """Return which session holds nothing that could be used; None when all hold something."""
+    for number in recording.sessions:
+        session = recording.session(number)
+        if not session.context:
+            return f"session {number} does not say what it is: the program was killed at its start"
+        if "state" not in session.streams or not len(session.streams["state"].time):
+            return f"session {number} holds no frames: it ended before its first tick"
+    return None
 
 
 def _judge(recording: Recording) -> tuple[Status, str]:
@@ -218,4 +255,8 @@ def _unfinished(session: SessionRecord) -> str | None:
 
 def _planned(protocol: str) -> int:
     """Return how many sessions a protocol has."""
-    return len(parse_yaml(protocol, "the recorded protocol")["sessions"])
+    content = parse_yaml(protocol, "the recorded protocol")
+    sessions = content.get("sessions") if isinstance(content, dict) else None
+    if not isinstance(sessions, list):
+        raise RecordingError("the recorded protocol has no sessions: the file was changed")
+    return len(sessions)

@@ -11,8 +11,10 @@ from labcrane.analysis.gaze import gaze_measures, looks
 from labcrane.analysis.movements import Groups, Movement, cut, groups, machine_of
 from labcrane.analysis.smoothness import ldlj, path_ratio, sparc, sub_movements
 from labcrane.analysis.sticks import coordination, effort, limit_hits, reversals, stick_use
+from labcrane.errors import LabcraneError
 from labcrane.machines.machine import Machine
 from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.recording.participant_file.writer import DAMAGED
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -110,6 +112,14 @@ def measures_of(participant: Participant, settings: MeasureSettings = DEFAULTS) 
         table.insert(3, "session_name", str(session.attrs.get("session_name", "")))
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
+
+
+def measure_or_say_why(participant: Participant) -> tuple[str, str, Measured | None]:
+    """Return a participant's name and measures, or why there are none; a worker's function."""
+    try:
+        return participant.name, "", measure_ahead(participant)
+    except (LabcraneError, *DAMAGED) as error:  # one recording never stops a cohort
+        return participant.name, f"cannot be measured: {error}", None
 
 
 def measure_ahead(participant: Participant) -> Measured:

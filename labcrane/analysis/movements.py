@@ -91,7 +91,7 @@ def machine_of(session: SessionRecord) -> Machine:
     return Machine.model_validate(parse_yaml(session.context["machine"], "the recorded machine"))
 
 
-def movements(session: SessionRecord) -> Iterator[Movement]:
+def movements_of(session: SessionRecord) -> Iterator[Movement]:
     """Yield the movement of each row of a session's trial table."""
     return cut(groups(session), session.trials, float(session.attrs["rate_hz"]))
 

@@ -1,13 +1,17 @@
 """Quality of loop and clocks, one row per session and per stream."""
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from labcrane.analysis.cohort import Participant
+from labcrane.errors import RecordingError
 
 if TYPE_CHECKING:
     import pandas as pd
+
+SHOWN = 5
 
 
 def loop_quality(participant: Participant) -> "pd.DataFrame":
@@ -71,12 +75,50 @@ def sync_quality(participant: Participant) -> "pd.DataFrame":
     return pd.DataFrame(rows)
 
 
+def unprobed(participants: Iterable[Participant]) -> list[str]:
+    """Return the streams whose times rest on no probe of their clock, all or in part, in words.
+
+    Their times are wrong by an amount that nobody knows.
+    """
+    found = []
+    for participant in participants:
+        for number, session in participant.sessions():
+            for name, stream in session.streams.items():
+                if "corrected" not in stream.attrs or not len(stream.time):
+                    continue  # our own: one clock
+                where = f"{name} of {participant.name}, session {number}"
+                missing = float(stream.attrs.get("unprobed", 0.0))
+                if not stream.attrs["corrected"]:
+                    found.append(f"{where} (not corrected)")
+                elif missing:
+                    found.append(f"{where} ({missing:.0f} of {len(stream.time)} samples)")
+    return found
+
+
+def check_probed(participants: Iterable[Participant], *, accept: bool) -> list[str]:
+    """Return the streams whose clock was never probed.
+
+    Raises
+    ------
+    RecordingError
+        There are some, and they are not accepted.
+    """
+    found = unprobed(participants)
+    if found and not accept:
+        more = f" and {len(found) - SHOWN} more" if len(found) > SHOWN else ""
+        raise RecordingError(
+            f"nobody knows how right the times are of {'; '.join(found[:SHOWN])}{more}: their "
+            "clocks were not probed; leave those streams out of the study, or say "
+            "--accept-unprobed, which is noted in what is written"
+        )
+    return found
+
+
 def exclusions(movements: "pd.DataFrame") -> "pd.DataFrame":
     """Return the movements that count for no average, with the reason."""
+    names = ["participant", "session", "trial", "attempt", "outcome", "practice"]
     counted = is_result(movements)
-    out = movements.loc[
-        ~counted, ["participant", "session", "trial", "attempt", "outcome", "practice"]
-    ].copy()
+    out = movements.reindex(columns=names).loc[~counted].copy()
     out["why"] = [
         "practice" if row.practice else f"outcome {row.outcome}"
         for row in out.itertuples(index=False)
@@ -89,4 +131,8 @@ def is_result(movements: "pd.DataFrame") -> "pd.Series[bool]":
 
     A repeated trial's attempts before the last have the outcome ``repeated``.
     """
+    import pandas as pd
+
+    if movements.empty:  # sessions that ended before their first result have no columns either
+        return pd.Series([], index=movements.index, dtype=bool)
     return (movements["outcome"] == "success") & (movements["practice"].astype(float) == 0.0)

@@ -15,7 +15,7 @@ import typer
 
 from labcrane.cli import plugin_groups as extension
 from labcrane.cli.help import Plain, Sections
-from labcrane.errors import LabcraneError, ProtocolError
+from labcrane.errors import LabcraneError, PluginError, ProtocolError
 
 MODULES = {
     "run": ("demo", "run", "resume"),
@@ -28,7 +28,7 @@ MODULES = {
     "simulate": ("simulate", "power"),
     "approval": ("approve", "amend", "methods"),
     "participants": ("participants", "consent", "exclude", "note", "waive", "deviations"),
-    "data": ("erase", "relabel", "transfer"),
+    "data": ("where", "erase", "relabel", "transfer"),
 }
 """Where commands are: a module, and its functions."""
 
@@ -52,16 +52,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
         commands(words)(args=words, prog_name="labcrane")
     except SystemExit as leaving:
         return leaving.code if isinstance(leaving.code, int) else 0
-    except LabcraneError as error:
-        from rich.console import Console
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.startswith("labcrane"):
+            raise
+        from labcrane.registry.offers import LAB
 
-        complaint = Console(stderr=True, soft_wrap=True)
-        for line in (f"labcrane: {error}", *getattr(error, "__notes__", ())):
-            complaint.print(line, markup=False, highlight=False)
+        complain(PluginError(f"this needs {error.name}, which is not installed: {LAB}"))
+        return 1
+    except LabcraneError as error:
+        complain(error)
         return 2 if isinstance(error, ProtocolError) else 1
     finally:
         os.umask(before)
     return 0
+
+
+def complain(error: LabcraneError) -> None:
+    """Say on the standard error what went wrong, and what to do."""
+    from rich.console import Console
+
+    complaint = Console(stderr=True, soft_wrap=True)
+    for line in (f"labcrane: {error}", *getattr(error, "__notes__", ())):
+        complaint.print(line, markup=False, highlight=False)
 
 
 def commands(words: Sequence[str]) -> typer.Typer:

@@ -29,5 +29,7 @@ def print_report(report: "SyncReport") -> None:
             f"missing; lateness p50 {1e3 * loop.lateness_p50_s:.3f} ms, "
             f"p99 {1e3 * loop.lateness_p99_s:.3f} ms, most {1e3 * loop.lateness_max_s:.2f} ms"
         )
+    for line in report.details():
+        out.print(f"  {line}", markup=False)
     for line in report.advice():
         out.print(f"  {line}", markup=False)

@@ -141,7 +141,7 @@ class Run:
         Seeds what belongs to the participant rather than to a trial.
     axes, command, state, task
         What the frame's arrays of the same names hold.
-    steer
+    inverse
         The axes, shape ``(n_axes,)``, with which a practised hand asks this controller for a tip
         velocity in m/s, shape ``(3,)``, in a state, shape ``(n_state,)``. For simulated operators.
     bodies
@@ -228,7 +228,8 @@ class SessionState:
     hint, hint_time
         The examiner's newest hint, empty before the first, and when it was given.
     scene
-        What stands around the machine, as of :func:`labcrane.read_placed`; empty for nothing.
+        What stands around the machine, as of :func:`labcrane.machines.read_placed`; empty for
+        nothing.
     """
 
     step: int = 0

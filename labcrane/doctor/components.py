@@ -20,7 +20,8 @@ from pydantic import ValidationError
 from labcrane.core.findings import Finding, Verdict
 from labcrane.core.settings import Settings
 from labcrane.protocol.study import Study
-from labcrane.registry.registry import ROLES, Registry, discover
+from labcrane.registry.hookspecs import ROLES
+from labcrane.registry.registry import Registry, discover
 
 WAIT_S = 30.0
 """How long a look may take; with a person who moves things, ten times as long."""

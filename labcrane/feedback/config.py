@@ -1,14 +1,21 @@
 """Configuration of a feedback process, as a line of text."""
 
-import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import GetPydanticSchema, PlainSerializer, TypeAdapter
+from pydantic_core import core_schema
 
 from labcrane.core.records import Run
-from labcrane.feedback.delays import Measured, measured_of
+from labcrane.feedback.delays import Measured
 from labcrane.recording.run_codec import read_run, write_run
+
+_AS_TEXT = core_schema.no_info_plain_validator_function(
+    read_run, serialization=core_schema.plain_serializer_function_ser_schema(write_run)
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,50 +48,37 @@ class FeedbackConfig:
         What was measured of its delay, if anything was.
     recorded
         Whether there is a recorder, without which it presents nothing; a preview has none.
+    title
+        What a window of it is called: its name, and the study's.
+    before
+        The displays that come before it in the protocol: windows lie beside theirs.
     streams
         Descriptions of the session's streams by name, when there are any yet.
     """
 
     name: str
     part: Part
-    run: Run
+    run: Annotated[Run, GetPydanticSchema(lambda _, __: _AS_TEXT)]
     source: str
-    study: Path
+    study: Annotated[Path, PlainSerializer(lambda path: str(path.resolve()))]
     always: bool
     cues: Mapping[str, Part] = field(default_factory=dict)
     measured: Measured | None = None
     recorded: bool = True
+    title: str = ""
+    before: tuple[Part, ...] = ()
     streams: Mapping[str, str] = field(default_factory=dict)
 
     def as_json(self) -> str:
         """Return the order as one line."""
-        fields = {
-            "name": self.name,
-            "part": asdict(self.part),
-            "run": write_run(self.run),
-            "source": self.source,
-            "study": str(self.study.resolve()),
-            "always": self.always,
-            "cues": {name: asdict(part) for name, part in self.cues.items()},
-            "measured": asdict(self.measured) if self.measured else None,
-            "recorded": self.recorded,
-            "streams": dict(self.streams),
-        }
-        return json.dumps(fields)
+        return _codec().dump_json(self).decode()
 
     @classmethod
     def from_json(cls, text: str) -> "FeedbackConfig":
         """Return the order that :meth:`as_json` wrote."""
-        found = json.loads(text)
-        return cls(
-            found["name"],
-            Part(**found["part"]),
-            read_run(found["run"]),
-            found["source"],
-            Path(found["study"]),
-            found["always"],
-            {name: Part(**part) for name, part in found["cues"].items()},
-            measured_of(found["measured"]) if found["measured"] else None,
-            found["recorded"],
-            found["streams"],
-        )
+        return _codec().validate_json(text)
+
+
+@cache
+def _codec() -> TypeAdapter[FeedbackConfig]:
+    return TypeAdapter(FeedbackConfig)

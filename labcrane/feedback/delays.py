@@ -2,9 +2,11 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
 
 from labcrane.errors import ProtocolError
 from labcrane.feedback.delay_analysis import Delay, Kind
@@ -55,24 +57,24 @@ def read_delays(protocol: Path) -> dict[str, Measured]:
     if not path.exists():
         return {}
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        return {name: measured_of(each) for name, each in found.items()}
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        return _codec().validate_json(path.read_bytes())
+    except ValidationError as error:
         raise ProtocolError(
-            f"{path} is damaged ({error}); remove it and measure again with labcrane doctor"
+            f"{path} is damaged ({error.errors()[0]['msg']}); remove it and measure again with "
+            "labcrane doctor"
         ) from error
 
 
-def measured_of(found: Mapping[str, Any]) -> Measured:
-    """Return the measurement that JSON holds."""
-    return Measured(**{**found, "delay": Delay(**found["delay"])})
+@cache
+def _codec() -> TypeAdapter[dict[str, Measured]]:
+    return TypeAdapter(dict[str, Measured])
 
 
 def store(protocol: Path, name: str, measured: Measured) -> Path:
     """Put one measurement into the file, instead of an older one; return the file."""
     path = delay_path(protocol)
     all_ = {**read_delays(protocol), name: measured}
-    text = json.dumps({key: asdict(each) for key, each in all_.items()}, indent=2)
+    text = json.dumps(_codec().dump_python(all_, mode="json"), indent=2)
     write_text(path, text + "\n", SHARED_FILE)
     return path
 

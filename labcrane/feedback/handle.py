@@ -67,7 +67,8 @@ class FeedbackHandle:
     @property
     def failure(self) -> str | None:
         """Return why the present process is of no use, in words; None while all is well."""
-        return self._failed or self._process.failure
+        why = self._process.failure
+        return self._failed or why
 
     def offer(self, streams: Mapping[str, str]) -> None:
         """Tell it the session's streams by their descriptions: it need not search for them."""

@@ -20,6 +20,7 @@ from labcrane.feedback.processes import host_orders
 from labcrane.protocol import rig
 from labcrane.protocol.study import Study
 from labcrane.registry.registry import discover
+from labcrane.streams.newest import NewestSample
 
 if TYPE_CHECKING:
     from labcrane.streams.feedback_log import FeedbackLog
@@ -43,21 +44,17 @@ class Sensor:
     """One channel of a stream: a photodiode or a microphone, on our clock."""
 
     def __init__(self, name: str, channel: int) -> None:
-        import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
-
-        found = pylsl.resolve_byprop("name", name, timeout=WAIT_S)
-        if not found:
+        self._stream = NewestSample({"name": name}, buffer_s=60)
+        if not self._stream.wait(WAIT_S) or self._stream.info is None:
+            self._stream.close()
             raise StreamError(
                 f"there is no stream {name!r}; labcrane streams lists those that there are"
             )
-        if not 1 <= channel <= found[0].channel_count():
-            raise StreamError(
-                f"stream {name!r} has no channel {channel}; it has {found[0].channel_count()}"
-            )
+        if not 1 <= channel <= (there := self._stream.info.channel_count()):
+            self._stream.close()
+            raise StreamError(f"stream {name!r} has no channel {channel}; it has {there}")
         self._channel = channel - 1
-        self._inlet = pylsl.StreamInlet(found[0], max_buflen=60, processing_flags=0)
-        self._offsets = [self._inlet.time_correction(timeout=WAIT_S)]
-        self._inlet.open_stream(timeout=WAIT_S)
+        self._offsets = [self._stream.time_correction(WAIT_S)]
         self._times: list[float] = []
         self._values: list[float] = []
 
@@ -68,13 +65,16 @@ class Sensor:
 
     def pull(self, wait_s: float) -> None:
         """Take what has come, waiting for the first of it."""
-        samples, times = self._inlet.pull_chunk(timeout=wait_s, max_samples=4096)
+        deadline = time.monotonic() + wait_s
+        while not (found := self._stream.pull())[1] and time.monotonic() < deadline:
+            time.sleep(PULL_S)
+        samples, times = found
         self._times += times
         self._values += [sample[self._channel] for sample in samples]
 
     def signal(self) -> tuple["np.ndarray", "np.ndarray", float]:
         """Return times in s on our clock, values, and samples per second."""
-        self._offsets.append(self._inlet.time_correction(timeout=WAIT_S))
+        self._offsets.append(self._stream.time_correction(WAIT_S))
         times = np.array(self._times) + float(np.mean(self._offsets))
         rate = (len(times) - 1) / (times[-1] - times[0])
         return times, np.array(self._values), float(rate)

@@ -32,7 +32,7 @@ def play(study: Study, frames: Sequence[Frame], scene: str, say: Callable[[str],
     Parameters
     ----------
     scene
-        What stands around, as of :func:`labcrane.read_placed`.
+        What stands around, as of :func:`labcrane.machines.read_placed`.
     say
         Tells people what is going on.
 

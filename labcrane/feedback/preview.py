@@ -14,12 +14,12 @@ from labcrane.feedback.processes import host_orders
 from labcrane.machines.scene_codec import SCENE_PLACED
 from labcrane.protocol import rig
 from labcrane.protocol.study import Study
+from labcrane.recording.frame_log import LOOP, FrameRow
 from labcrane.recording.participant_file.reader import SessionRecord, open_recording
 from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.session import Visit
 from labcrane.session.session import run as run_session
-from labcrane.streams.frames import HEAD, frame_of
 
 
 def write_preview(
@@ -98,8 +98,9 @@ def movement(record: SessionRecord, trial: int | None = None) -> list[Frame]:
         there = ", ".join(str(int(number)) for number in counted.unique()) or "none"
         raise ProtocolError(f"there is no trial {trial} in the recording; there is {there}")
     arrays = [parts[name].to_numpy() for name in ("input", "command", "state", "task")]
-    table = np.column_stack([loop[list(HEAD)].to_numpy(), *arrays])
-    return [frame_of(row, [array.shape[1] for array in arrays]) for row in table[rows]]
+    head = loop[[label for label, _ in LOOP]].to_numpy()
+    frame = FrameRow(array.shape[1] for array in arrays).frame
+    return [frame(row) for row in np.column_stack([head, *arrays])[rows]]
 
 
 def scene_of(record: SessionRecord, trial: int | None = None) -> str:

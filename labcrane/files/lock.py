@@ -2,8 +2,9 @@
 
 import os
 import sys
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from labcrane.errors import RecordingError
@@ -27,6 +28,82 @@ def exclusive(path: Path) -> Iterator[None]:
         yield
     finally:
         os.close(fd)
+
+
+LOOK_S = 0.05
+"""How often a lock that somebody else holds is tried again."""
+
+
+@contextmanager
+def held(path: Path, refusal: str, patience_s: float = 0.0) -> Iterator[None]:
+    """Hold the lock file ``path``, in a folder that is there; the lock dies with the process.
+
+    Parameters
+    ----------
+    refusal
+        What to say when another process holds it; its number is added.
+    patience_s
+        How long to wait for that process, in seconds.
+
+    Raises
+    ------
+    RecordingError
+        Another process holds it still.
+    """
+    deadline = time.monotonic() + patience_s
+    while (fd := _locked(path)) is None:
+        if time.monotonic() >= deadline:
+            raise RecordingError(f"{refusal} (process {_owner(path)} holds {path})")
+        time.sleep(LOOK_S)
+    try:
+        os.truncate(fd, 0)
+        os.write(fd, f" {os.getpid()}\n".encode())
+        yield
+    finally:
+        if sys.platform != "win32":
+            path.unlink(missing_ok=True)  # while it is held, so that nobody else's is removed
+        os.close(fd)
+        if sys.platform == "win32":
+            with suppress(OSError):  # somebody holds it by now
+                path.unlink()
+
+
+def _locked(path: Path) -> int | None:
+    """Return an open file with the lock on its first byte; None when somebody else has it."""
+    fd = os.open(path, os.O_RDWR | os.O_CREAT, PRIVATE_FILE)
+    try:
+        if sys.platform == "win32":
+            import msvcrt  # noqa: PLC0415 - Windows only
+
+            msvcrt.locking(fd, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl  # noqa: PLC0415 - Unix only
+
+            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if not _is_at(path, fd):  # whoever held it has removed it meanwhile
+                os.close(fd)
+                return _locked(path)
+    except OSError:
+        os.close(fd)
+        return None
+    return fd
+
+
+def _is_at(path: Path, fd: int) -> bool:
+    try:
+        return os.path.samestat(path.stat(), os.fstat(fd))
+    except FileNotFoundError:
+        return False
+
+
+def _owner(path: Path) -> str:
+    """Return the number of the process that holds a lock, as it wrote it."""
+    try:
+        with path.open("rb") as file:
+            file.seek(1)  # Windows lets nobody read the byte that is locked
+            return file.read(20).decode("ascii", "replace").strip() or "unknown"
+    except OSError:
+        return "unknown"
 
 
 @contextmanager

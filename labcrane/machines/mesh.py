@@ -47,13 +47,3 @@ def _written(value: Any) -> Any:
 
 Looks = Annotated[MeshFile, BeforeValidator(_written)]
 """A mesh as it is written: a file, or a mapping with the file and where it is."""
-
-
-def write_mesh(mesh: MeshFile | None) -> Any:
-    """Return a mesh ready for JSON."""
-    return None if mesh is None else mesh.model_dump(mode="json")
-
-
-def read_mesh(found: Any) -> MeshFile | None:
-    """Return the mesh that :func:`write_mesh` wrote."""
-    return None if found is None else MeshFile.model_validate(found)

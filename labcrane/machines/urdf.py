@@ -14,7 +14,7 @@ Vector = tuple[float, float, float]
 ORIGIN: Vector = (0.0, 0.0, 0.0)
 
 
-def urdf(machine: Machine, *, solid: bool = False, beyond: Iterable[str] = ()) -> str:
+def urdf_of(machine: Machine, *, solid: bool = False, beyond: Iterable[str] = ()) -> str:
     """Return the URDF; link ``i`` hangs on joint ``i``, both with the DH joint's name.
 
     Numbers have all their digits.

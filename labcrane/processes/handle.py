@@ -18,6 +18,9 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import IO, Any
 
+LAST_S = 1.0
+"""How long the last words of a process that has ended may take to be read."""
+
 
 @dataclass(frozen=True, slots=True)
 class Patience:
@@ -116,6 +119,7 @@ class ProcessHandle:
     def failure(self) -> str | None:
         """Return why the present process is of no use, in words; None while all is well."""
         if (code := self.exit_code) is not None:
+            self._present.threads[0].join(LAST_S)  # its last words may say why
             return f"its process ended with exit code {code}"
         silent = time.monotonic() - self._present.heard
         patience = self._patience.silent_s if self.ready else self._patience.start_s

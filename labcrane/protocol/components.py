@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
 
-from labcrane.core.roles import Component, Cue, Feedback, Questionnaire, SignalMonitor, Task
+from labcrane.core.roles import Component, Cue, Feedback, Questionnaire, SignalMonitor
 from labcrane.core.settings import Settings
 from labcrane.errors import PluginError, ProtocolError
 from labcrane.files.yaml import Place, YamlFile
@@ -15,6 +15,7 @@ from labcrane.machines.machine import Machine
 from labcrane.protocol.protocol import Protocol, Use
 from labcrane.protocol.referenced_files import plain_settings
 from labcrane.registry.call_monitor import CallMonitor
+from labcrane.registry.hookspecs import ROLES
 from labcrane.registry.offers import Offer
 from labcrane.registry.proxies import watched
 from labcrane.registry.registry import Registry
@@ -31,6 +32,8 @@ class ComponentSpec:
     offer: Offer[Component]
     settings: Settings
     oversight: CallMonitor = field(default_factory=CallMonitor, compare=False)
+    called: str = field(default="", compare=False)
+    """Where it is used, and what it is: ``study.yaml:7: input 'dual_joystick'``."""
 
     def described(self, folder: Path) -> dict[str, Any]:
         """Return it ready for JSON, with the study's files named from its ``folder``."""
@@ -38,7 +41,15 @@ class ComponentSpec:
         return {"use": self.name, "plugin": self.plugin, "settings": settings}
 
     def build(self, machine: Machine) -> Component:
-        """Build, but do not open, the component, under oversight."""
+        """Build, but do not open, the component, under oversight.
+
+        Raises
+        ------
+        PluginError
+            What it needs is not installed, or building fails.
+        """
+        if missing := self.offer.missing:
+            raise PluginError(f"{self.called or repr(self.name)} {missing}")
         build = self.oversight.place(repr(self.name), self.plugin, "build", self.offer.build)
         component = self.oversight.call(build, self.offer.build, self.settings, machine)
         return watched(component, self.name, self.plugin, self.oversight)
@@ -65,28 +76,38 @@ class ComponentResolver:
             return None  # noted by the protocol's own check
         return self._choice(role, use, place, (*place, "use"))
 
-    def choose_tasks(self) -> dict[str, ComponentSpec]:
-        """Return the tasks that can be chosen, by the protocol's names for them."""
-        written = self._at(("tasks",))
+    def choose_several(self, role: type[RoleT], key: str) -> dict[str, ComponentSpec]:
+        """Return the components under a key that can be chosen, by the protocol's names."""
+        written = self._at((key,))
         names = written if isinstance(written, dict) else {}
-        chosen = {name: self.choose(Task, ("tasks", name)) for name in names}
+        chosen = {name: self.choose(role, (key, name)) for name in names}
         return {name: choice for name, choice in chosen.items() if choice}
+
+    def choose_others(self) -> dict[str, ComponentSpec]:
+        """Return what the protocol uses of roles that have no place in a study of their own."""
+        found: dict[str, ComponentSpec] = {}
+        for role, entry in ROLES.items():
+            for key in entry.keys:
+                if key in Protocol.model_fields:
+                    continue
+                if entry.several:
+                    several = self.choose_several(role, key)
+                    found |= {f"{key}.{name}": choice for name, choice in several.items()}
+                elif choice := self.choose(role, (key,)):
+                    found[key] = choice
+        return found
 
     def choose_monitors(self) -> dict[str, ComponentSpec] | None:
         """Return the monitors of signals by the protocol's names; None where it leaves them out."""
         written = self._at(("monitors",))
-        if written is None:
-            return None
-        names = written if isinstance(written, dict) else {}
-        chosen = {name: self.choose(SignalMonitor, ("monitors", name)) for name in names}
-        return {name: choice for name, choice in chosen.items() if choice}
+        return None if written is None else self.choose_several(SignalMonitor, "monitors")
 
     def choose_questionnaires(self, protocol: Protocol) -> dict[str, ComponentSpec]:
         """Return the questionnaires that the protocol asks, noting those that there are not."""
-        chosen = {
-            name: self.choose(Questionnaire, ("questionnaires", name))
-            for name in protocol.questionnaires
-        }
+        chosen: dict[str, ComponentSpec | None]
+        chosen = dict.fromkeys(protocol.questionnaires) | self.choose_several(
+            Questionnaire, "questionnaires"
+        )
         for place, name in self._asked(protocol):
             if name not in chosen:
                 chosen[name] = self._choice(Questionnaire, Use(use=name), place, place)
@@ -114,7 +135,9 @@ class ComponentResolver:
         if settings is None:
             return None
         plugin = self._registry.plugin(role, use.use)
-        return ComponentSpec(use.use, plugin, offer, settings, self.oversight)
+        where = f"{self._source.path}:{self._source.line(named)}"
+        called = f"{where}: {ROLES[role].word} {use.use!r}"
+        return ComponentSpec(use.use, plugin, offer, settings, self.oversight, called)
 
     def choose_feedback(
         self,
@@ -129,12 +152,10 @@ class ComponentResolver:
                 cues[name] = choice
             elif not is_cue and (choice := self.choose(Feedback, place)):
                 sounds[name] = choice
-        written = self._at(("views",))
-        names = written if isinstance(written, dict) else {}
-        views = {name: self.choose(Feedback, ("views", name)) for name in names}
-        for name in set(names) & {*cues, *sounds}:
+        views = self.choose_several(Feedback, "views")
+        for name in views.keys() & {*cues, *sounds}:
             self._source.problem(("views", name), f"{name!r} is the name of a feedback already")
-        return cues, sounds, {name: choice for name, choice in views.items() if choice}
+        return cues, sounds, views
 
     def _is_cue(self, name: object) -> bool:
         """Whether what is named under ``feedback`` is a cue, or is one misspelt."""

@@ -6,63 +6,39 @@ from typing import Any
 
 from pydantic.json_schema import models_json_schema
 
-from labcrane.core.roles import (
-    Component,
-    Controller,
-    Cue,
-    Dynamics,
-    Feedback,
-    InputDevice,
-    Questionnaire,
-    SignalMonitor,
-    Task,
-)
+from labcrane.core.roles import Component
 from labcrane.core.settings import Settings
-from labcrane.protocol.protocol import Protocol
+from labcrane.protocol.protocol import protocol_model
 from labcrane.protocol.steps import Block, Break, Session
+from labcrane.registry.hookspecs import roles_by_key
 from labcrane.registry.offers import Offer
 from labcrane.registry.registry import Registry
 
 Schema = dict[str, Any]
 
-ONE: Mapping[str, tuple[type[Component], ...]] = {
-    "input": (InputDevice,),
-    "operator": (InputDevice,),
-    "scheme": (Controller,),
-    "dynamics": (Dynamics,),
-}
-"""Keys of a protocol that name one component, and of which roles."""
-
-BY_NAME: Mapping[str, tuple[type[Component], ...]] = {
-    "tasks": (Task,),
-    "questionnaires": (Questionnaire,),
-    "monitors": (SignalMonitor,),
-    "feedback": (Cue, Feedback),
-    "views": (Feedback,),
-}
-"""Keys that hold components under names of the study's own."""
-
 
 def protocol_schema(registry: Registry) -> Schema:
     """Return the JSON Schema (2020-12) of what a protocol may say with what is installed."""
-    roles = [*ONE.values(), *BY_NAME.values()]
+    one, by_name = roles_by_key(several=False), roles_by_key(several=True)
+    roles = [*one.values(), *by_name.values()]
     settings = {
         offer.settings: None
         for group in roles
         for role in group
         for offer in registry.offers[role].values()
     }
-    models: list[type[Settings]] = [Protocol, Session, Block, Break, *settings]
-    references, whole = models_json_schema([(model, "validation") for model in models])
+    model = protocol_model()
+    models: list[type[Settings]] = [model, Session, Block, Break, *settings]
+    references, whole = models_json_schema([(each, "validation") for each in models])
     shared: Schema = whole["$defs"]
-    named = {model: shared[ref["$ref"].split("/")[-1]] for (model, _), ref in references.items()}
+    named = {each: shared[ref["$ref"].split("/")[-1]] for (each, _), ref in references.items()}
 
-    protocol = named[Protocol]
-    for key, of in ONE.items():
+    protocol = named[model]
+    for key, of in one.items():
         protocol["properties"][key] = _use(registry, of, named)
-    for key, of in BY_NAME.items():
+    for key, of in by_name.items():
         place = protocol["properties"][key]
-        for part in (place, *place.get("anyOf", ())):
+        for part in (place, *place.get("anyOf", ())):  # null may stand for a default
             if part.get("type") == "object":
                 part |= {"additionalProperties": _use(registry, of, named)}
     named[Session]["properties"]["steps"]["items"] = _step(references[(Block, "validation")])

@@ -1,24 +1,38 @@
 """The study protocol: what its YAML may say."""
 
+import inspect
 import re
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import (
+    AfterValidator,
     ConfigDict,
     Field,
     PositiveFloat,
     PositiveInt,
+    create_model,
     field_validator,
 )
 
 from labcrane.analysis.indicator_settings import IndicatorSettings
+from labcrane.files.names import misfit
 from labcrane.files.yaml import YamlFile
 from labcrane.protocol.design import Design
 from labcrane.protocol.evaluation import StopRule
 from labcrane.protocol.pages import PageSettings
 from labcrane.protocol.steps import Section, Session, read_sessions
 from labcrane.protocol.streams import StreamNeed, TimeLimits
+from labcrane.registry.hookspecs import ROLES
+
+
+def _names_a_folder(name: str) -> str:
+    if why := misfit(name, person=False):
+        raise ValueError(f"{name!r} {why}")
+    return name
+
+
+FolderName = Annotated[str, AfterValidator(_names_a_folder)]
 
 
 class Use(Section):
@@ -82,7 +96,7 @@ class Protocol(Section):
     labcrane: Literal[1]
     """Version of the protocol format."""
 
-    study: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
+    study: Annotated[FolderName, Field(pattern=r"^[a-z][a-z0-9_-]*$")]
     """Short name of the study, in lower case; part of every seed."""
 
     title: str
@@ -131,7 +145,9 @@ class Protocol(Section):
     views: dict[str, Use] = Field(default_factory=dict)
     """Windows and other displays that are always there, by name."""
 
-    streams: dict[str, StreamNeed] = Field(default_factory=dict)
+    streams: dict[Annotated[str, AfterValidator(_names_a_folder)], StreamNeed] = Field(
+        default_factory=dict
+    )
     """Streams of others to be recorded, by the study's names for them."""
 
     monitors: dict[str, Use] | None = None
@@ -151,6 +167,18 @@ class Protocol(Section):
     """What happens when something fails."""
 
 
+def protocol_model() -> type[Protocol]:
+    """Return the model of a protocol, with a key for every role that is on the table."""
+    more: dict[str, Any] = {}
+    for role, entry in ROLES.items():
+        for key in entry.keys:
+            kind, empty = (dict[str, Use], dict) if entry.several else (Use | None, lambda: None)
+            about = inspect.cleandoc(role.__doc__ or entry.about).splitlines()[0]
+            more[key] = (kind, Field(default_factory=empty, description=about))
+    more = {key: field for key, field in more.items() if key not in Protocol.model_fields}
+    return create_model("Protocol", __base__=Protocol, **more) if more else Protocol
+
+
 def read(path: Path) -> tuple[Protocol | None, YamlFile]:
     """Read a protocol file; mistakes are noted in the file that is returned.
 
@@ -164,4 +192,4 @@ def read(path: Path) -> tuple[Protocol | None, YamlFile]:
         source.problem((), "a protocol is a mapping of keys, beginning with 'labcrane: 1'")
         return None, source
     plain = {**source.data, "sessions": read_sessions(source)}
-    return source.check(Protocol, value=plain), source
+    return source.check(protocol_model(), value=plain), source

@@ -1,6 +1,6 @@
 """Streams of others that a protocol asks for, and how right their time must be."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
@@ -46,10 +46,19 @@ class StreamNeed(Settings):
     stamping, in seconds. It cannot be observed. Without it, stamps are taken to scatter evenly
     around the truth."""
 
+    evening: Literal["auto", "forbid", "force"] = "auto"
+    """Whether stamps of a regular stream are made even: only where they are shown to scatter about
+    a steady sample clock, never, or always. The times without evening are kept as well."""
+
     @model_validator(mode="after")
     def _names_a_stream(self) -> "StreamNeed":
         if self.type is None and self.name is None and self.source_id is None:
             raise ValueError("a stream needs a type, a name or a source_id to be found by")
+        if self.evening == "forbid" and self.min_delay_s is not None:
+            raise ValueError(
+                "min_delay_s finds the samples that were delayed least, which is evening; leave it "
+                "out, or do not forbid evening"
+            )
         return self
 
     def request(self, label: str, *, required: bool) -> "StreamRequest":
@@ -84,11 +93,12 @@ class StreamNeed(Settings):
         from labcrane.streams.sync.resync import treatment_of  # noqa: PLC0415
 
         stated = treatment_of(header)
+        ways = {"auto": stated.dejitter, "forbid": Dejitter.NONE, "force": Dejitter.LEAST_SQUARES}
         late = self.min_delay_s is not None
         return Treatment(
             rate_hz=stated.rate_hz,
             can_drop_samples=stated.can_drop_samples,
-            dejitter=Dejitter.ENVELOPE if late else stated.dejitter,
+            dejitter=Dejitter.ENVELOPE if late else ways[self.evening],
             transport_s=self.min_delay_s or 0.0,
             latency_s=stated.latency_s if self.latency_s is None else self.latency_s,
         )
@@ -96,6 +106,12 @@ class StreamNeed(Settings):
 
 class TimeLimits(Settings):
     """How right time stamps must be: beyond the first number a warning, beyond the second not."""
+
+    error_s: Limit = Limits().error_s
+    """Uncertainty of corrected time stamps at 95 %, in seconds."""
+
+    silent_s: Limit = Limits().silent_s
+    """From a required regular stream's last sample to the end of the recording, in seconds."""
 
     rate: Limit = Limits().rate
     """Relative deviation of a stream's effective rate from its nominal rate."""

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from labcrane.core.roles import Controller, Dynamics, InputDevice, Questionnaire, Task
 from labcrane.errors import ProtocolError
+from labcrane.files.names import check_name
 from labcrane.files.yaml import Place, YamlFile
 from labcrane.machines.machine import Machine
 from labcrane.protocol.components import ComponentResolver, ComponentSpec
@@ -40,6 +41,8 @@ class Study:
         on block by block, views are always there.
     monitors
         What looks at the signals of streams; None for all that are installed.
+    others
+        Components of roles that have no place of their own here, by the part they play.
     oversight
         Watches over all components that are built.
     """
@@ -61,6 +64,7 @@ class Study:
     sounds: dict[str, ComponentSpec] = field(default_factory=dict)
     views: dict[str, ComponentSpec] = field(default_factory=dict)
     monitors: dict[str, ComponentSpec] | None = None
+    others: Mapping[str, ComponentSpec] = field(default_factory=dict)
     oversight: CallMonitor = field(default_factory=CallMonitor)
 
     @property
@@ -83,7 +87,32 @@ class Study:
             "scheme": self.scheme,
             "dynamics": self.dynamics,
             **{f"{kind}.{name}": choice for kind in named for name, choice in named[kind].items()},
+            **self.others,
         }
+
+    def warnings(self) -> Iterator[str]:
+        """Yield what is allowed, but should be known before people take part."""
+        for part, choice in self.choices.items():
+            for warning in choice.settings.warnings():
+                yield f"{part}: {warning}"
+
+    def check_installed(self, *, simulated: bool = False, feedback: bool = True) -> None:
+        """Raise :class:`ProtocolError` unless all that a run of the study needs is installed.
+
+        Parameters
+        ----------
+        simulated
+            Whether the simulated operator takes the place of the input.
+        feedback
+            Whether views and sounds are shown.
+        """
+        used = self.choices | ({"input": self.operator} if simulated else {})
+        if not feedback:
+            shown = ("feedback.", "views.")
+            used = {part: each for part, each in used.items() if not part.startswith(shown)}
+        lacks = {each.called: each.offer.missing for each in used.values()}
+        if wrong := [f"{called} {what}" for called, what in lacks.items() if what]:
+            raise ProtocolError("\n".join(wrong))
 
     def check_participant(self, participant: str) -> None:
         """Raise :class:`ProtocolError` unless ``participant`` matches the protocol's pattern."""
@@ -94,6 +123,7 @@ class Study:
                 f"participant {participant!r} does not match the protocol's pattern '{pattern}'; "
                 "give the pseudonym as it was handed out, or correct participants: pattern:"
             )
+        check_name(participant, "participant")
 
     def check_session(self, number: int) -> None:
         """Raise :class:`ProtocolError` unless the protocol has session ``number``."""
@@ -202,14 +232,16 @@ def load(path: Path, registry: Registry) -> Study:
     operator = chooser.choose(InputDevice, ("operator",), DEFAULT_OPERATOR)
     scheme = chooser.choose(Controller, ("scheme",))
     dynamics = chooser.choose(Dynamics, ("dynamics",))
-    choices = chooser.choose_tasks()
+    choices = chooser.choose_several(Task, "tasks")
     tasks = chooser.build(Task, "tasks", choices, machine[0]) if machine else {}
     asked = chooser.choose_questionnaires(protocol) if protocol else {}
-    built = chooser.build(Questionnaire, "questionnaires", asked, machine[0]) if machine else {}
+    questionnaires = (
+        chooser.build(Questionnaire, "questionnaires", asked, machine[0]) if machine else {}
+    )
     cues, sounds, views = chooser.choose_feedback()
-    monitors = chooser.choose_monitors()
     if protocol is not None:
-        Checker(source, protocol).check(tasks, built)
+        Checker(source, protocol).check(tasks, questionnaires)
+    monitors, others = chooser.choose_monitors(), chooser.choose_others()
     source.raise_problems()
     if not (protocol and machine and device and operator and scheme and dynamics):
         raise AssertionError("a missing part is a problem, and problems were raised")
@@ -225,11 +257,12 @@ def load(path: Path, registry: Registry) -> Study:
         dynamics=dynamics,
         tasks=tasks,
         task_choices=choices,
-        questionnaires=built,
+        questionnaires=questionnaires,
         questionnaire_choices=asked,
         cues=cues,
         sounds=sounds,
         views=views,
         monitors=monitors,
+        others=others,
         oversight=chooser.oversight,
     )

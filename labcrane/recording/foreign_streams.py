@@ -8,8 +8,8 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import reduce
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from labcrane.recording.journal_reader import JournalState, SessionLog, state
+from labcrane.recording.journal_reader import JournalState, state
 from labcrane.recording.overlap import Union, sample_keys, union
 from labcrane.recording.xdf.header import Channel, StreamHeader
 from labcrane.recording.xdf.reader import XdfFile, XdfStream, read_xdf
@@ -98,46 +98,6 @@ class RecordedStream:
     notes: tuple[Note, ...]
     offsets: FloatArray
     starts: tuple[int, ...] = (0,)
-
-
-@dataclass(frozen=True, slots=True)
-class Correction:
-    """Stamps on our clock, and how right they are.
-
-    Attributes
-    ----------
-    time
-        In seconds, shape ``(n,)``.
-    quality
-        Figures and texts by name, kept as attributes of the corrected time.
-    """
-
-    time: FloatArray
-    quality: Mapping[str, float | str] = field(default_factory=dict)
-
-
-Correct = Callable[[RecordedStream], Correction]
-
-
-@dataclass(frozen=True, slots=True)
-class Conclusion:
-    """What is worked out of a recording when it is put into the participant file.
-
-    Attributes
-    ----------
-    correct
-        Maps a stream's stamps onto our clock; called once for every stream.
-    report
-        Called last with the session's frames and events; what it returns is kept as the session's
-        sync report. None keeps no report.
-    """
-
-    correct: Correct
-    report: Callable[[SessionLog], Mapping[str, Any]] | None = None
-
-
-Conclude = Callable[[Mapping[str, Any]], Conclusion]
-"""Called with a session's context: the study may say more of a stream than its header."""
 
 
 def companion_headers(header: StreamHeader, number: int) -> dict[str, StreamHeader]:

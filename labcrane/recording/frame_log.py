@@ -2,18 +2,21 @@
 
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
+from itertools import accumulate, pairwise, starmap
 
 import numpy as np
 
+from labcrane.core.clock import Tick
 from labcrane.core.records import Event, Frame, Phase, Run
 from labcrane.errors import RecordingError
 from labcrane.recording.journal import Column, SessionJournal
 from labcrane.types import FloatArray
 
-PHASES: Mapping[Phase, float] = {phase: float(code) for code, phase in enumerate(Phase)}
-"""The number that stands for a phase in ``loop/phase``."""
+PHASES = tuple(Phase)
+"""The phases in the order of the numbers that stand for them in ``loop/phase``."""
+CODES: Mapping[Phase, float] = {phase: float(code) for code, phase in enumerate(PHASES)}
 
 LOOP = (
     ("tick", "1"),
@@ -40,6 +43,11 @@ def columns(run: Run) -> tuple[Column, ...]:
     )
 
 
+def sizes(run: Run) -> tuple[int, int, int, int]:
+    """Return how many axes, numbers of a command, of a state and of a task a frame holds."""
+    return run.axes.size, run.command.size, run.state.size, run.task.size
+
+
 CHUNK_BYTES = 16
 """What the journal adds to a frame, about."""
 
@@ -50,33 +58,50 @@ def frame_bytes(run: Run) -> int:
 
 
 class FrameRow:
-    """Puts frames into rows of numbers, in the order of :func:`columns`."""
+    """Puts frames into rows of numbers, in the order of :func:`columns`, and takes them out again.
 
-    def __init__(self, run: Run) -> None:
-        start = len(LOOP)
-        slices = []
-        for layout in (run.axes, run.command, run.state, run.task):
-            slices.append(slice(start, start + layout.size))
-            start += layout.size
-        self._axes, self._command, self._state, self._task = slices
+    Parameters
+    ----------
+    sizes
+        How many axes, numbers of a command, of a state and of a task a frame holds.
+    wrote
+        Whether rows say how long writing the frame before took; a stream of frames does not.
+    """
 
-    def fill(self, row: FloatArray, frame: Frame, wrote: float) -> None:
+    def __init__(self, sizes: Iterable[int], *, wrote: bool = True) -> None:
+        self._head = len(LOOP) if wrote else len(LOOP) - 1
+        ends = list(accumulate(sizes, initial=self._head))
+        self._axes, self._command, self._state, self._task = starmap(slice, pairwise(ends))
+        self._wrote = wrote
+        self.size = ends[-1]
+
+    def fill(self, row: FloatArray, frame: Frame, wrote: float = 0.0) -> None:
         """Fill ``row``; ``wrote`` is how long writing the frame before took, in seconds."""
-        number, due, woke = frame.tick
-        row[: len(LOOP)] = (
-            number,
-            due,
-            woke,
-            wrote,
-            frame.trial,
-            frame.elapsed,
-            PHASES[frame.phase],
-            frame.paused,
-        )
+        phase = CODES[frame.phase]
+        trial, elapsed, paused = frame.trial, frame.elapsed, frame.paused
+        if self._wrote:
+            row[: self._head] = (*frame.tick, wrote, trial, elapsed, phase, paused)
+        else:
+            row[: self._head] = (*frame.tick, trial, elapsed, phase, paused)
         row[self._axes] = frame.axes
         row[self._command] = frame.command
         row[self._state] = frame.state
         row[self._task] = frame.task
+
+    def frame(self, row: FloatArray) -> Frame:
+        """Return the frame that a row holds, shape ``(n_columns,)``; its arrays are views of it."""
+        number, due, woke, *_, trial, elapsed, phase, paused = row[: self._head].tolist()
+        return Frame(
+            Tick(int(number), due, woke),
+            elapsed,
+            row[self._axes],
+            row[self._command],
+            row[self._state],
+            row[self._task],
+            PHASES[int(phase)],
+            int(trial),
+            bool(paused),
+        )
 
 
 class FrameLog:
@@ -101,7 +126,7 @@ class FrameLog:
         self._journal = journal
         self._reserve = reserve
         self._row = np.empty(len(columns(run)))
-        self._fill = FrameRow(run).fill
+        self._fill = FrameRow(sizes(run)).fill
         self._wrote = 0.0
         self._waiting: deque[Callable[[], None]] = deque()
 

@@ -3,3 +3,7 @@
 In come entry points and the folder ``plugins/`` beside a protocol; out go offers by role and name,
 and proxies that name the plugin when a call fails, is late or is no number.
 """
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

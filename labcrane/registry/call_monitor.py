@@ -118,34 +118,41 @@ class CallMonitor:
             overrun.worst_s = max(overrun.worst_s, took)
         return result
 
-    def brisk(
+    def watched(
         self,
         number: int,
-        function: Callable[..., Any],  # returns an array where there is a layout
-        layout: Layout | None = None,
-    ) -> Callable[..., Any]:
-        """Return ``function`` watched as by :meth:`call`, but for its time and its place.
+        function: Callable[..., T],
+        check: Callable[[T], None] | None = None,
+        *,
+        closely: bool = True,
+    ) -> Callable[..., T]:
+        """Return ``function`` watched as by :meth:`call`, and what it returns by ``check``.
 
-        With ``layout``, what it returns is checked as by :meth:`check`. Most components fill one
-        array anew on every tick: it is looked at whole once, and then only whether its numbers are.
+        Not ``closely``, it is not noted when and where it is called: for simulations, in which
+        nobody waits for a tick, and one that dies is made again.
         """
-        isfinite = math.isfinite
-        known: Any = None
+        if closely:
 
-        def call(*args: object) -> Any:
-            nonlocal known
+            def call(*args: Any) -> T:
+                result = self.call(number, function, *args)
+                if check is not None:
+                    check(result)
+                return result
+
+            return call
+
+        def call_lightly(*args: Any) -> T:
             try:
-                values = function(*args)
+                result = function(*args)
             except LabcraneError:
                 raise
             except (Exception, SystemExit) as error:
                 raise self._failure(number, function, error) from error
-            if layout is not None and not (values is known and isfinite(values.dot(values))):
-                self.check(number, values, layout, finite=True)
-                known = values
-            return values
+            if check is not None:
+                check(result)
+            return result
 
-        return call
+        return call_lightly
 
     def check(self, number: int, values: FloatArray, layout: Layout, *, finite: bool) -> None:
         """Check what a method returned against what the component's signals promise.

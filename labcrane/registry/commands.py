@@ -27,7 +27,7 @@ def plugin_commands(
     for implementation in modules.manager.hook.labcrane_commands.get_hookimpls():
         plugin = implementation.plugin_name
         try:
-            offers = offered(implementation, CommandOffer, "labcrane.CommandOffer(...)")
+            offers = offered(implementation, CommandOffer, "labcrane.registry.CommandOffer(...)")
         except PluginError as error:
             raise PluginError(f"plugin {plugin!r} is broken: {error}") from error
         for offer in offers:

@@ -8,12 +8,12 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from labcrane.analysis.exporter import Exporter
-from labcrane.core.roles import Component, Cue, Feedback, Questionnaire, Task
+from labcrane.core.roles import Component, Questionnaire, Task
 from labcrane.errors import LabcraneError
 from labcrane.machines.machine import Machine
+from labcrane.registry.hookspecs import ROLES
 from labcrane.registry.offers import Offer
-from labcrane.registry.registry import ROLES, Registry
+from labcrane.registry.registry import Registry
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,7 @@ def _sheet(
         plugin,
         about,
         settings,
-        _recorded(offer, machine),
+        _recorded(role, offer, machine),
         _example(role, offer.name, settings),
     )
 
@@ -145,14 +145,14 @@ def possible(schema: Mapping[str, Any], shared: Mapping[str, Any]) -> str:
     return " ".join([kind, " and ".join(bounds)]).strip()
 
 
-def _recorded(offer: Offer[Component], machine: Machine) -> tuple[Recorded, ...] | None:
+def _recorded(
+    role: type[Component], offer: Offer[Component], machine: Machine
+) -> tuple[Recorded, ...] | None:
     try:
         component = offer.build(offer.settings(), machine)
     except (ValidationError, LabcraneError):
         return None
-    found = [("every tick", signal) for signal in component.signals]
-    if isinstance(component, Cue | Feedback):
-        found = [("every frame presented", signal) for signal in component.signals]
+    found = [(ROLES[role].recorded, signal) for signal in component.signals]
     if isinstance(component, Task):
         found += [("every trial", signal) for signal in component.results]
     columns = [
@@ -164,10 +164,11 @@ def _recorded(offer: Offer[Component], machine: Machine) -> tuple[Recorded, ...]
 
 
 def _example(role: type[Component], name: str, settings: tuple[Setting, ...]) -> str:
-    if role is Exporter:
+    entry = ROLES[role]
+    if not entry.keys:
         return f"labcrane export DATA --to {name} --out FOLDER"
-    *outer, last = (part.replace("NAME", name) for part in ROLES[role].place)
-    lines = [f"{'  ' * depth}{key}:" for depth, key in enumerate([*outer, last])]
+    path = (entry.keys[0], name) if entry.several else entry.keys[:1]
+    lines = [f"{'  ' * depth}{key}:" for depth, key in enumerate(path)]
     inner = "  " * len(lines)
     lines.append(f"{inner}use: {name}")
     for setting in settings:

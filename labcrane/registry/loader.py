@@ -8,13 +8,13 @@ from importlib.metadata import EntryPoint
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import CodeType, ModuleType
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import pluggy
 
 from labcrane.errors import PluginError, suggestion
-from labcrane.registry import hookspecs
 from labcrane.registry.entry_points import PROJECT, declared
+from labcrane.registry.hookspecs import ROLES, labcrane_commands
 from labcrane.registry.offers import API
 from labcrane.registry.traceback import told
 
@@ -57,7 +57,7 @@ class PluginModules:
         self, installed: Iterable[EntryPoint] | None = None, study: Path | None = None
     ) -> None:
         self.manager = pluggy.PluginManager(PROJECT)
-        self.manager.add_hookspecs(hookspecs)
+        self.manager.add_hookspecs(type("Hooks", (), _hooks()))
         self.broken: dict[str, str] = {}
         self.local = own_plugins(study) if study else {}
         lines = list(declared()) if installed is None else ()
@@ -163,6 +163,12 @@ class _Source(SourceFileLoader):
         return module
 
 
+def _hooks() -> dict[str, Any]:
+    """Return every hook there is, by its name."""
+    hooks = [*(entry.hook for entry in ROLES.values()), labcrane_commands]
+    return {hook.__name__: hook for hook in hooks}
+
+
 def _check_interface(module: ModuleType) -> None:
     built_for = getattr(module, "labcrane_api", API)
     if built_for != API:
@@ -175,7 +181,6 @@ def _check_interface(module: ModuleType) -> None:
 
 
 def _check_hooks(manager: pluggy.PluginManager, module: ModuleType) -> None:
-    known = [name for name in vars(hookspecs) if name.startswith("labcrane_")]
     for caller in manager.get_hookcallers(module) or ():
         if not caller.has_spec():
-            raise PluginError(f"unknown hook {caller.name!r}; {suggestion(caller.name, known)}")
+            raise PluginError(f"unknown hook {caller.name!r}; {suggestion(caller.name, _hooks())}")

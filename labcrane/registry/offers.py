@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from labcrane.core.roles import Component
@@ -23,6 +25,9 @@ API = 1
 plugin says ``labcrane_api = 1`` in its module; ``docs/compatibility.md`` says when it rises."""
 
 
+LAB = "pip install 'labcrane[lab]'"
+"""How to get everything that a laboratory runs."""
+
 Prompt = Callable[[str], None]
 """Tells the person at the machine what to do next."""
 
@@ -41,12 +46,34 @@ class Offer(Generic[RoleT_co]):
         Makes the component from settings and machine.
     examine
         Looks at the hardware it needs; None where it needs none.
+    needs
+        Modules of other projects without which it cannot be built, and how to get each.
     """
 
     name: str
     settings: type[Settings]
     build: Callable[[Any, Machine], RoleT_co]
     examine: Callable[[Any, Prompt | None], Sequence[Finding]] | None = None
+    needs: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def missing(self) -> str:
+        """What it needs that is not installed, and how to get it; empty when all is there."""
+        return not_installed(self.needs)
+
+
+def not_installed(needs: Mapping[str, str]) -> str:
+    """Return which of these modules are not installed, and how to get each; empty for none."""
+    missing = {module: how for module, how in needs.items() if not _is_there(module)}
+    return "; ".join(
+        f"needs {module}, which is not installed: {how}" for module, how in missing.items()
+    )
+
+
+def _is_there(module: str) -> bool:
+    if module in sys.modules:
+        return sys.modules[module] is not None
+    return find_spec(module) is not None
 
 
 def offer(
@@ -54,6 +81,8 @@ def offer(
     settings: type[SettingsT],
     build: Callable[[SettingsT, Machine], RoleT],
     examine: Callable[[SettingsT, Prompt | None], Sequence[Finding]] | None = None,
+    *,
+    needs: Mapping[str, str] | None = None,
 ) -> Offer[RoleT]:
     """Offer what ``build`` makes as ``name``, the word a protocol writes after ``use:``.
 
@@ -70,13 +99,17 @@ def offer(
         Called by ``labcrane doctor`` with validated settings, in a process of its own, and given
         30 seconds: says how the hardware is that the component needs. With its second argument it
         tells the person at the machine what to do; None when nobody is there.
+    needs
+        Modules that a smaller installation may lack, and how to get each:
+        ``{"pyserial": "pip install 'my-lamp[serial]'"}``. Checking a protocol says so, and nothing
+        is imported for it.
 
     Returns
     -------
     Offer
         To be returned from a hook.
     """
-    return Offer(name, settings, build, examine)
+    return Offer(name, settings, build, examine, needs or {})
 
 
 @dataclass(frozen=True, slots=True)

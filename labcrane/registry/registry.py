@@ -3,60 +3,17 @@
 from collections.abc import Collection, Iterable, Mapping
 from importlib.metadata import EntryPoint
 from pathlib import Path
-from typing import NamedTuple, TypeVar, cast
+from typing import TypeVar, cast
 
 import pluggy
 
-from labcrane.analysis.exporter import Exporter
-from labcrane.core.roles import (
-    Component,
-    Controller,
-    Cue,
-    Dynamics,
-    Feedback,
-    InputDevice,
-    Questionnaire,
-    SignalMonitor,
-    Task,
-)
+from labcrane.core.roles import Component
 from labcrane.errors import PluginError, suggestion
+from labcrane.registry.hookspecs import ROLES
 from labcrane.registry.loader import PluginModules, offered
 from labcrane.registry.offers import Offer
 
 RoleT = TypeVar("RoleT", bound=Component)
-
-
-class RoleEntry(NamedTuple):
-    """How a role is found and spoken of.
-
-    Attributes
-    ----------
-    hook
-        The hook that collects its offers.
-    word
-        What a researcher calls it.
-    place
-        Where a protocol uses it; empty for what no protocol names.
-    """
-
-    hook: str
-    word: str
-    place: tuple[str, ...] = ()
-
-
-ROLES: Mapping[type[Component], RoleEntry] = {
-    InputDevice: RoleEntry("labcrane_inputs", "input", ("input",)),
-    Controller: RoleEntry("labcrane_controllers", "scheme", ("scheme",)),
-    Dynamics: RoleEntry("labcrane_dynamics", "dynamics", ("dynamics",)),
-    Task: RoleEntry("labcrane_tasks", "task", ("tasks", "NAME")),
-    Exporter: RoleEntry("labcrane_exporters", "exporter"),
-    Questionnaire: RoleEntry(
-        "labcrane_questionnaires", "questionnaire", ("questionnaires", "NAME")
-    ),
-    SignalMonitor: RoleEntry("labcrane_monitors", "monitor", ("monitors", "NAME")),
-    Cue: RoleEntry("labcrane_cues", "cue", ("feedback", "NAME")),
-    Feedback: RoleEntry("labcrane_feedback", "feedback", ("feedback", "NAME")),
-}
 
 
 class Registry:
@@ -132,7 +89,7 @@ class Registry:
             self._import({name for offers in self._offers.values() for name in offers})
 
     def _collect(self, role: type[Component], imported: Collection[str]) -> None:
-        hook: pluggy.HookCaller = getattr(self._modules.manager.hook, ROLES[role].hook)
+        hook: pluggy.HookCaller = getattr(self._modules.manager.hook, ROLES[role].hook.__name__)
         found, origins = self._offers[role], self._plugins[role]
         for implementation in hook.get_hookimpls():
             plugin = implementation.plugin_name

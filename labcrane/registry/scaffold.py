@@ -1,35 +1,24 @@
 """A new plugin: a folder that installs, passes its contract tests, and can be changed."""
 
+import inspect
 import keyword
 import re
-from collections.abc import Mapping
 from pathlib import Path
 
+import labcrane
+from labcrane.core.roles import Component
 from labcrane.errors import PluginError, suggestion
 from labcrane.files.atomic import SHARED_FILE, write_text
 from labcrane.registry.commands import plugin_commands
+from labcrane.registry.hookspecs import ROLES, RoleEntry, role_called
 from labcrane.registry.registry import Registry
 
 TEMPLATES = Path(__file__).parent / "templates"
-ANY = "any"
-"""The folder of what every plugin needs, beside one for each role."""
+ANY, BARE = "any", "bare"
+"""The folders of what every plugin needs, beside one for each role, and of a role without one."""
 
-ALIASES = {"scheme": "controller", "input_device": "input", "commands": "command"}
-"""What else a role is called."""
-
-A_ROLE: Mapping[str, str] = {
-    "input": "a device that the operator moves",
-    "controller": "a scheme, from the operator's axes to the machine's commands",
-    "dynamics": "a machine to operate",
-    "task": "a task for the operator",
-    "exporter": "a format for recordings",
-    "questionnaire": "questions for the participant",
-    "monitor": "a monitor of other programs' signals",
-    "cue": "something to be seen in every view",
-    "feedback": "a device that presents the session",
-    "command": "a command of the command line",
-}
-"""What a plugin of each role is, in words."""
+COMMAND = "command"
+"""What else a plugin can be made of: it fills no role."""
 
 GROUP = """
 # And this one names the group of its commands, which `labcrane --help` lists.
@@ -37,30 +26,11 @@ GROUP = """
 my_part = "my_module"
 """
 
-USED: Mapping[str, tuple[str, str]] = {
-    "input": (
-        "operator: {use: simulated_operator}",
-        "operator: {use: my_part}",
-    ),
-    "controller": (
-        "scheme:\n  use: joint_velocity\n"
-        "  map: {slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}\n",
-        "scheme: {use: my_part}\n",
-    ),
-    "dynamics": ("dynamics: {use: kinematic_crane}", "dynamics: {use: my_part}"),
-    "task": (
-        "  work: {use: aiming, distances: [2], movements: 1, limit_s: 10}",
-        "  work: {use: my_part}",
-    ),
-    "questionnaire": (
-        "      - block: {task: work}\n",
-        "      - block: {task: work}\n      - questionnaire: my_part\n",
-    ),
-    "monitor": ("sessions:", "monitors:\n  level: {use: my_part}\nsessions:"),
-    "cue": ("sessions:", "feedback:\n  line: {use: my_part}\nsessions:"),
-    "feedback": ("sessions:", "feedback:\n  lamp: {use: my_part}\nsessions:"),
-}
-"""What is put in place of what in the protocol, so that it uses the plugin."""
+
+def kinds() -> dict[str, str]:
+    """Return what a plugin can be, and that in words: every role, and commands."""
+    roles = {entry.word: entry.about for entry in ROLES.values()}
+    return {**roles, COMMAND: "a command of the command line"}
 
 
 def write_plugin(role: str, name: str, into: Path, registry: Registry) -> Path:
@@ -71,8 +41,8 @@ def write_plugin(role: str, name: str, into: Path, registry: Registry) -> Path:
     PluginError
         There is no such role, the name cannot be used, or the folder exists.
     """
-    role = _role(role)
-    _check_name(role, name, registry)
+    kind = _kind(role)
+    _check_name(kind, name, registry)
     folder = into / f"labcrane-{name.replace('_', '-')}"
     if folder.exists():
         raise PluginError(
@@ -80,50 +50,114 @@ def write_plugin(role: str, name: str, into: Path, registry: Registry) -> Path:
             "place with --into"
         )
     folder.mkdir(parents=True)
-    for template in sorted([*(TEMPLATES / ANY).iterdir(), *(TEMPLATES / role).iterdir()]):
-        if template.is_file():
-            text = template.read_text(encoding="utf-8")
-            if template.name == "protocol.yaml":
-                text = text.replace(*USED.get(role, ("", "")))
-            if template.name == "pyproject.toml" and role == "command":
-                text += GROUP
-            path = folder / _filled(template.name, role, name)
-            write_text(path, _filled(text, role, name), SHARED_FILE)
+    for template, text in _templates(kind).items():
+        path = folder / _filled(template, kind, name)
+        write_text(path, _filled(text, kind, name), SHARED_FILE)
     return folder
 
 
-def _role(role: str) -> str:
-    known = ALIASES.get(role, role)
-    if known in A_ROLE:
-        return known
-    raise PluginError(f"there is no role {role!r}; {suggestion(role, A_ROLE)}")
+def _kind(name: str) -> str:
+    if name in {COMMAND, "commands"}:
+        return COMMAND
+    if role := role_called(name):
+        return ROLES[role].word
+    raise PluginError(f"there is no role {name!r}; {suggestion(name, kinds())}")
 
 
-def _check_name(role: str, name: str, registry: Registry) -> None:
+def _templates(kind: str) -> dict[str, str]:
+    """Return the files of a new plugin, with what is to be filled in, by name."""
+    role = role_called(kind)
+    own = TEMPLATES / kind
+    found = {
+        path.name.removesuffix(".in"): path.read_text(encoding="utf-8")
+        for folder in (TEMPLATES / ANY, own if own.exists() else TEMPLATES / BARE)
+        for path in sorted(folder.iterdir())
+        if path.is_file()
+    }
+    if role is None:
+        found["pyproject.toml"] += GROUP
+    else:
+        found["protocol.yaml"] = _using(ROLES[role], found["protocol.yaml"])
+        if not own.exists():
+            found["my_module.py"] = _bare(role, found["my_module.py"])
+    return found
+
+
+def _using(entry: RoleEntry, protocol: str) -> str:
+    """Return the protocol with the plugin in it, in place of what it uses of its role."""
+    if not entry.keys:
+        return protocol
+    key = entry.keys[0] if entry.several else entry.keys[-1]
+    written = re.search(rf"^{key}:.*\n(?:  .*\n)*", protocol, re.MULTILINE)
+    if entry.several:
+        named = re.search(r"^  (\w+):", written[0], re.MULTILINE) if written else None
+        used = f"{key}:\n  {named[1] if named else 'my_part'}: {{use: my_part}}\n"
+    else:
+        used = f"{key}: {{use: my_part}}\n"
+    protocol = protocol.replace(written[0] if written else "sessions:\n", used, 1) + (
+        f"      - {entry.step}: my_part\n" if entry.step else ""
+    )
+    return protocol if written else protocol.replace(used, f"{used}sessions:\n", 1)
+
+
+def _bare(role: type[Component], module: str) -> str:
+    """Return a module with every method that a component of a role must have, to be written."""
+    methods = []
+    for name in sorted(role.__abstractmethods__):
+        function = getattr(role, name)
+        methods.append(
+            f"    def {name}{inspect.signature(function)}:\n"
+            f'        """{(inspect.getdoc(function) or name).splitlines()[0]}"""\n'
+            f"        raise NotImplementedError\n"
+        )
+    text = "\n".join(methods).replace("'", "") or "    pass\n"
+    words = {role.__name__, *re.findall(r"\w+", text)}
+    public = {"Machine", "Offer", "Settings", "hookimpl", "offer"} | words & set(labcrane.__all__)
+    abstract = ", ".join(sorted(words & {"Iterable", "Mapping", "Sequence"}))
+    standard = f"from collections.abc import {abstract}\n" if abstract else ""
+    standard += "from pathlib import Path\n" if "Path" in words else ""
+    standard += "\n" if standard else ""
+    imports = "".join(f"    {word},\n" for word in sorted(public, key=_as_sorted_by_ruff))
+    for placeholder, filled in (
+        ("a_standard_import\n", standard),
+        ("    a_method", text.rstrip("\n")),
+        ("    an_import,\n", imports),
+        ("ARole", role.__name__),
+        ("a_hook", ROLES[role].hook.__name__),
+    ):
+        module = module.replace(placeholder, filled)
+    return module
+
+
+def _as_sorted_by_ruff(word: str) -> tuple[int, str]:
+    return (0 if word.isupper() else 1 if word[0].isupper() else 2), word
+
+
+def _check_name(kind: str, name: str, registry: Registry) -> None:
     if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", name) or keyword.iskeyword(name):
         raise PluginError(
             f"{name!r} cannot name a plugin; give a lower-case word of letters, digits and single "
             "underscores, such as my_arrow"
         )
-    if role == "command" and not name.isalpha():
+    if kind == COMMAND and not name.isalpha():
         raise PluginError(f"{name!r} cannot name a command; give one word of letters")
     for offers in registry.plugins.values():
         if name in offers:
             raise PluginError(
                 f"plugin {offers[name]!r} offers {name!r} already; choose another name"
             )
-    if role == "command" and name in {group for group, _ in plugin_commands()}:
+    if kind == COMMAND and name in {group for group, _ in plugin_commands()}:
         raise PluginError(f"there are commands {name!r} already; choose another name")
 
 
-def _filled(text: str, role: str, name: str) -> str:
+def _filled(text: str, kind: str, name: str) -> str:
     camel = "".join(word.capitalize() for word in name.split("_"))
     for placeholder, word in (
         ("my_module", f"labcrane_{name}"),
         ("my_part", name),
         ("my-project", f"labcrane-{name.replace('_', '-')}"),
         ("MyPart", camel),
-        ("a_role", A_ROLE[role]),
+        ("a_role", kinds()[kind]),
     ):
         text = text.replace(placeholder, word)
     return text

@@ -23,7 +23,7 @@ from labcrane.protocol import rig
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study, load
 from labcrane.recording.data_folder import DataFolder
-from labcrane.recording.frame_log import FrameLog, FrameRow, columns
+from labcrane.recording.frame_log import FrameLog, FrameRow, columns, sizes
 from labcrane.recording.participant_file.reader import SessionRecord, open_recording
 from labcrane.registry.registry import discover
 from labcrane.replay.restore import differing_parts, restore
@@ -49,7 +49,7 @@ class Difference:
     column
         Which: ``state.joint.angle.slew``; "length" when one of them is longer.
     recorded, replayed
-        The two numbers; ticks for the length.
+        The two numbers, in the signals' units; ticks for the length.
     """
 
     tick: int
@@ -80,7 +80,7 @@ class Replayed:
     frames: Mapping[str, "pd.DataFrame"]
 
 
-def replay(
+def replay_session(
     path: Path,
     session: int,
     *,
@@ -162,7 +162,7 @@ class _Log(FrameLog):
     def __init__(self, run: Run, script: "Script") -> None:
         self._script = script
         self._columns = columns(run)
-        self._fill = FrameRow(run).fill
+        self._fill = FrameRow(sizes(run)).fill
         self._rows = np.full((script.ticks, len(self._columns)), np.nan)
         self.ticks = 0
 

@@ -1,80 +1,118 @@
-"""Postprocessing of a session that has ended: corrected clocks, and the sync report."""
+"""Postprocessing of a session in its participant file: corrected clocks, and the sync report."""
 
-from collections.abc import Mapping
-from typing import Any
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from labcrane.errors import LabcraneError
 from labcrane.protocol.streams import StreamNeed, TimeLimits
-from labcrane.recording.foreign_streams import Conclusion, Correction, RecordedStream
-from labcrane.recording.journal_reader import SessionLog
+from labcrane.recording.foreign_streams import RecordedStream
+from labcrane.recording.participant_file.columns import text_of
+from labcrane.recording.participant_file.recorrect import read_channel, read_stream
+from labcrane.recording.participant_file.stream_group import write_time, write_uncorrected
+from labcrane.recording.participant_file.writer import write_sync_report
+from labcrane.streams.recorder.health import counter_label
 from labcrane.streams.sync.correction import Treatment, correct
-from labcrane.streams.sync.raw import raw_of
-from labcrane.streams.sync.resync import correction_of, treatment_of
+from labcrane.streams.sync.limits import Limits
+from labcrane.streams.sync.pool import pooled
+from labcrane.streams.sync.raw import RawStream, raw_of, unwrapped
+from labcrane.streams.sync.resync import columns_of, quality_of, treatment_of
 from labcrane.streams.sync.stream_report import StreamReport, judge_stream
 from labcrane.streams.sync.sync_report import LoopReport, SyncReport, judge_loop, never_came
 
+if TYPE_CHECKING:
+    import h5py
 
-class SessionConclusion:
-    """Corrects and judges the streams of one session, by what its protocol says of them.
 
-    Attributes
-    ----------
-    sync_report
-        The report, once it has been made.
+@dataclass(frozen=True, slots=True)
+class _Read:
+    """A stream as the file holds it, and what the study says of it."""
+
+    group: "h5py.Group"
+    recorded: RecordedStream
+    raw: RawStream
+    label: str | None
+    need: StreamNeed | None
+
+
+def conclude(group: "h5py.Group") -> SyncReport:
+    """Correct and judge the streams of a session, by its protocol, from its group in the file.
+
+    May be repeated for ever: nothing recorded is altered, and earlier times are kept.
     """
-
-    def __init__(self, context: Mapping[str, Any]) -> None:
-        self._needs = {
-            label: StreamNeed.model_validate(need)
-            for label, need in context.get("streams", {}).items()
-        }
-        self._limits = TimeLimits.model_validate(context.get("sync", {})).limits()
-        self._rate_hz = context.get("rate_hz")
-        self._manual = context.get("clock") == "manual"
-        self._judged: list[StreamReport] = []
-        self._came: set[str] = set()
-        self.sync_report: SyncReport | None = None
-
-    def correct(self, recorded: RecordedStream) -> Correction:
-        """Return a stream's times on our clock."""
-        label, treatment = self._treatment(recorded)
-        if label is not None:
-            self._came.add(label)
-        corrected = correct(raw_of(recorded), treatment)
-        required = label is None or self._needs[label].required
-        self._judged.append(
-            judge_stream(recorded, corrected.quality, self._limits, required=required)
-        )
-        return correction_of(corrected, treatment)
-
-    def report(self, log: SessionLog) -> Mapping[str, Any]:
-        """Return the sync report of the session, ready for JSON."""
-        missing = {
-            label: need.required for label, need in self._needs.items() if label not in self._came
-        }
-        loop = None if self._manual else self._loop(log)
-        self.sync_report = SyncReport(tuple(self._judged), loop, never_came(missing))
-        return self.sync_report.as_json()
-
-    def _treatment(self, recorded: RecordedStream) -> tuple[str | None, Treatment]:
-        header = recorded.header
-        for label, need in self._needs.items():
-            if need.is_for(header):
-                return label, need.treatment(header)
-        return None, treatment_of(header)
-
-    def _loop(self, log: SessionLog) -> LoopReport | None:
-        columns = [log.column("loop", name) for name in ("due", "woke", "tick")]
-        if self._rate_hz is None or any(column is None for column in columns):
-            return None
-        due, woke, tick = (np.asarray(column) for column in columns)
-        same_part = np.diff(log.part) == 0
-        dropped = int(np.sum((np.diff(tick) - 1.0)[same_part]))
-        return judge_loop(due, woke, float(self._rate_hz), self._limits, dropped)
+    context = json.loads(text_of(group["context"]))
+    needs = {
+        label: StreamNeed.model_validate(need) for label, need in context.get("streams", {}).items()
+    }
+    limits = TimeLimits.model_validate(context.get("sync", {})).limits()
+    streams = [_read(one, needs) for one in group.get("streams", {}).values()]
+    raws = pooled([one.raw for one in streams], [one.recorded.header.host for one in streams])
+    end = _end(group, raws)
+    judged = [
+        found
+        for one, raw in zip(streams, raws, strict=True)
+        if (found := _corrected(one, raw, end, limits)) is not None
+    ]
+    came = {one.label for one in streams}
+    missing = {label: need.required for label, need in needs.items() if label not in came}
+    report = SyncReport(tuple(judged), _loop(group, context, limits), never_came(missing))
+    write_sync_report(group, report.as_json())
+    return report
 
 
-def conclude(context: Mapping[str, Any]) -> Conclusion:
-    """Return what consolidation needs to conclude a session with this context."""
-    conclusion = SessionConclusion(context)
-    return Conclusion(conclusion.correct, conclusion.report)
+def _read(group: "h5py.Group", needs: dict[str, StreamNeed]) -> _Read:
+    recorded = read_stream(group)
+    header = recorded.header
+    label, need = next(
+        ((label, need) for label, need in needs.items() if need.is_for(header)), (None, None)
+    )
+    raw = raw_of(recorded)
+    counting = counter_label(header, None if need is None else need.counter)
+    counts = None if counting is None else read_channel(group, counting)
+    if counts is not None and (index := unwrapped(counts)) is not None:
+        raw = RawStream(raw.stamps, raw.probes, raw.arrivals, raw.resets, index)
+    return _Read(group, recorded, raw, label, need)
+
+
+def _end(group: "h5py.Group", raws: Sequence[RawStream]) -> float | None:
+    """Return when the recording ended: the last that anything in it tells of, on our clock."""
+    lasts = [float(group["time"][-1])] if len(group["time"]) else []
+    lasts += [float(raw.arrivals[-1, 1]) for raw in raws if len(raw.arrivals)]
+    lasts += [float(raw.probes[:, 3].max()) for raw in raws if len(raw.probes)]
+    return max(lasts, default=None)
+
+
+def _corrected(
+    one: _Read, raw: RawStream, end: float | None, limits: Limits
+) -> StreamReport | None:
+    """Write a stream's times, and return how right they are; None where they cannot be had."""
+    try:
+        treatment = _treatment(one)
+        corrected = correct(raw, treatment, end)
+    except LabcraneError as error:  # one stream's clock must not keep a session from its file
+        write_uncorrected(one.group, str(error))
+        return None
+    write_time(one.group, columns_of(corrected), quality_of(corrected, treatment))
+    required = one.need is None or one.need.required
+    return judge_stream(one.recorded, corrected.quality, limits, required=required)
+
+
+def _treatment(one: _Read) -> Treatment:
+    header = one.recorded.header
+    return treatment_of(header) if one.need is None else one.need.treatment(header)
+
+
+def _loop(group: "h5py.Group", context: dict[str, Any], limits: Limits) -> LoopReport | None:
+    """Judge the loop; None where there was none, or its clock was moved by hand."""
+    rate_hz = context.get("rate_hz")
+    if context.get("clock") == "manual" or rate_hz is None or "loop" not in group:
+        return None
+    if not all(name in group["loop"] for name in ("due", "woke", "tick")):
+        return None
+    due, woke, tick = (np.asarray(group[f"loop/{name}"][:]) for name in ("due", "woke", "tick"))
+    same_part = np.diff(group["part"][:]) == 0
+    dropped = int(np.sum((np.diff(tick) - 1.0)[same_part]))
+    return judge_loop(due, woke, float(rate_hz), limits, dropped)

@@ -2,7 +2,7 @@
 
 import gc
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,11 +11,11 @@ from labcrane.core.clock import Clock, ManualClock, SystemClock
 from labcrane.core.records import Event, Frame, Phase, Run
 from labcrane.design.plan import SessionPlan, plan_session
 from labcrane.errors import DeviceError, PluginError, ProtocolError
+from labcrane.files.lock import held
 from labcrane.protocol import rig
 from labcrane.protocol.study import Study
 from labcrane.recording.crash_marker import CrashMarker, read_whereabouts, whereabouts_path
 from labcrane.recording.data_folder import DataFolder
-from labcrane.recording.foreign_streams import Conclusion
 from labcrane.recording.frame_log import BatchLog, FrameLog, columns, frame_bytes
 from labcrane.recording.journal import SessionJournal
 from labcrane.recording.participant_file.writer import consolidate
@@ -23,10 +23,10 @@ from labcrane.recording.paths import journal_path, next_part, parts
 from labcrane.registry.proxies import hurried
 from labcrane.session import loop
 from labcrane.session.commands import Console
-from labcrane.session.eligibility import check_eligibility, close_visit
+from labcrane.session.eligibility import Admission, check_eligibility, close_visit
 from labcrane.session.metadata import context
 from labcrane.session.overruns import OverrunReporter
-from labcrane.session.postprocess import SessionConclusion
+from labcrane.session.postprocess import conclude
 from labcrane.session.resume import (
     INCOMPLETE,
     Ledger,
@@ -112,29 +112,79 @@ def run(visit: Visit, console: Console) -> Path:
 
     Whatever ends it, what was recorded until then is in the file.
     """
-    try:
-        record(visit, console)
-    finally:
-        if parts(visit.journal):
-            finish(visit)
+    check_eligibility(visit)
+    with running(visit):
+        try:
+            record(visit, console)
+        finally:
+            if parts(visit.journal):
+                finish(visit)
     return visit.folder.participant_file
 
 
-def finish(visit: Visit) -> SyncReport | None:
+LEAVING_S = 10.0
+"""How long a session process may take to end when its launcher has died."""
+
+
+def running(visit: Visit) -> AbstractContextManager[None]:
+    """Let nobody else run a session of this participant: held from its start to its file.
+
+    Raises
+    ------
+    RecordingError
+        Another process runs one.
+    """
+    return _sole(visit, ".run.lock", 0.0)
+
+
+def check_free(visit: Visit) -> None:
+    """Make sure that nobody else runs a session of this participant now.
+
+    Raises
+    ------
+    RecordingError
+        Another process runs one.
+    """
+    if visit.folder.path.is_dir():
+        with running(visit):
+            pass
+
+
+def recording(visit: Visit) -> AbstractContextManager[None]:
+    """Let nobody else record this participant; a process whose launcher died is waited for.
+
+    Raises
+    ------
+    RecordingError
+        Another process records, and does not end.
+    """
+    return _sole(visit, ".recording.lock", LEAVING_S)
+
+
+def _sole(visit: Visit, name: str, patience_s: float) -> AbstractContextManager[None]:
+    folder = visit.folder
+    visit.study.check_participant(visit.participant)
+    if not visit.resumed:
+        folder.make()
+    elif not folder.path.is_dir():
+        return nullcontext()  # there is nothing to go on with, which is said elsewhere
+    refusal = (
+        f"another labcrane is running a session of {folder.name}; wait until it has ended, or end "
+        "it, and try again"
+    )
+    return held(folder.path / name, refusal, patience_s)
+
+
+def finish(visit: Visit) -> SyncReport:
     """Put what the journals hold into the participant file, with clocks corrected and judged.
 
     Returns the session's sync report.
     """
     journals = [first for first in (visit.journal, visit.streams_journal) if parts(first)]
-    made: list[SessionConclusion] = []
-
-    def conclude(about: Mapping[str, Any]) -> Conclusion:
-        made.append(SessionConclusion(about))
-        return Conclusion(made[-1].correct, made[-1].report)
-
-    consolidate(visit.folder.participant_file, journals, conclude)
+    made: list[SyncReport] = []
+    consolidate(visit.folder.participant_file, journals, lambda group: made.append(conclude(group)))
     close_visit(visit)
-    return made[-1].sync_report
+    return made[-1]
 
 
 def record(
@@ -155,6 +205,18 @@ def record(
     study = visit.study
     admission = check_eligibility(visit)
     whole = plan_session(study, visit.participant, visit.session, admission.slot)
+    with recording(visit):
+        _record(visit, console, admission, whole, offer)
+
+
+def _record(
+    visit: Visit,
+    console: Console,
+    admission: Admission,
+    whole: SessionPlan,
+    offer: Callable[[Mapping[str, str]], None] | None,
+) -> None:
+    study = visit.study
     so_far, plan = go_on(visit, whole) if visit.resumed else (None, whole)
     if so_far is None:
         visit.folder.claim(visit.session)
@@ -255,6 +317,25 @@ def go_on(visit: Visit, whole: SessionPlan) -> tuple[Progress, SessionPlan]:
             "--policy redo_trial"
         )
     return so_far, left  # all is done, and only its end is still to be said
+
+
+def outlook(visit: Visit, admission: Admission) -> str:
+    """Return what people are told before a session goes on: how it stopped, and what follows.
+
+    Raises
+    ------
+    ProtocolError
+        There is nothing to go on with.
+    """
+    whole = plan_session(visit.study, visit.participant, visit.session, admission.slot)
+    so_far, left = go_on(visit, whole)
+    said = resumption(left, so_far, policy_of(visit))
+    lines = [
+        f"session {visit.session} of {visit.folder.name} stopped: {said['after']}",
+        f"left to do: {said['owed'] or 'nothing but its end'}",
+        f"repeated, as new attempts ({said['policy']}): trials {said['repeats'] or 'none'}",
+    ]
+    return "\n".join(lines)
 
 
 def _opening(

@@ -8,11 +8,14 @@ from labcrane.errors import RecordingError
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.streams.probes import ClockProbe, Probe
 from labcrane.streams.request import unstable_id
+from labcrane.streams.search import find
 
 if TYPE_CHECKING:
     import pylsl
 
 ANSWER_S = 2.0
+MOST = 1024
+"""More streams than liblsl tells of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +51,7 @@ class FoundStream:
 
 def discover(wait_s: float = 1.5) -> list[FoundStream]:
     """Return the streams that answer within ``wait_s``, by name and host."""
-    import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
-
-    infos = pylsl.resolve_streams(wait_s)
+    infos = find("", wait_s, minimum=MOST)
     with ThreadPoolExecutor(max_workers=max(len(infos), 1)) as pool:
         found = list(pool.map(_describe, infos))
     return sorted(_with_duplicates(found), key=lambda one: (one.name, one.host, one.uid))

@@ -4,14 +4,14 @@ A sample of ``labcrane.frame`` is everything a frame holds but its events, in fl
 of :func:`frame_columns`, in order. Its time is the time the tick was due.
 """
 
-import itertools
+import time
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane.core.clock import Tick
-from labcrane.core.records import Frame, Phase, Run
-from labcrane.core.signals import Layout
+from labcrane.core.records import Frame, Run
+from labcrane.recording.frame_log import FrameRow, columns, sizes
+from labcrane.recording.journal import Column
 from labcrane.streams.outlets import Samples, channel, stream_info
 from labcrane.types import FloatArray
 
@@ -20,36 +20,25 @@ if TYPE_CHECKING:
 
 FRAME = "labcrane.frame"
 
-HEAD = ("tick", "due", "woke", "elapsed", "trial", "phase", "paused")
-HEAD_UNITS = ("1", "s", "s", "s", "1", "1", "1")
-PHASES = tuple(Phase)
-"""What the numbers in the phase column stand for."""
 
-
-def layouts(run: Run) -> tuple[Layout, Layout, Layout, Layout]:
-    """Return the layouts of a frame's arrays: axes, command, state, task."""
-    return run.axes, run.command, run.state, run.task
-
-
-def frame_columns(run: Run) -> tuple[str, ...]:
-    """Return what a sample holds, in order."""
-    parts = zip(("axes", "command", "state", "task"), layouts(run), strict=True)
-    return (*HEAD, *(f"{part}.{column}" for part, layout in parts for column in layout.columns))
+def frame_columns(run: Run) -> tuple[Column, ...]:
+    """Return what a sample holds, in order: the columns of the journal but for ``wrote``."""
+    return tuple(each for each in columns(run) if (each.group, each.label) != ("loop", "wrote"))
 
 
 class FrameOutlet:
     """Sends every frame whole."""
 
     def __init__(self, run: Run, source: str) -> None:
-        columns = frame_columns(run)
+        held = frame_columns(run)
         info = stream_info(
-            FRAME, "Frame", len(columns), "double64", rate_hz=run.rate_hz, source=source
+            FRAME, "Frame", len(held), "double64", rate_hz=run.rate_hz, source=source
         )
-        units = (*HEAD_UNITS, *(unit for layout in layouts(run) for unit in layout.units))
-        for column, unit in zip(columns, units, strict=True):
-            channel(info, label=column, unit=unit, type="Frame")
-        self._row = np.zeros(len(columns))
-        self._samples = Samples(info, len(columns))
+        for column in held:
+            channel(info, label=_label(column), unit=column.unit, type="Frame")
+        self._row = np.zeros(len(held))
+        self._fill = FrameRow(sizes(run), wrote=False).fill
+        self._samples = Samples(info, len(held))
 
     @property
     def description(self) -> str:
@@ -58,13 +47,8 @@ class FrameOutlet:
 
     def push(self, frame: Frame) -> None:
         """Send a frame. Does not wait for any receiver."""
-        row, start = self._row, len(HEAD)
-        row[:3] = frame.tick
-        row[3:start] = frame.elapsed, frame.trial, PHASES.index(frame.phase), frame.paused
-        for array in (frame.axes, frame.command, frame.state, frame.task):
-            row[start : start + len(array)] = array
-            start += len(array)
-        self._samples.push(row, frame.tick.due)
+        self._fill(self._row, frame)
+        self._samples.push(self._row, frame.tick.due)
 
     def close(self) -> None:
         """End the stream."""
@@ -92,38 +76,36 @@ class FrameInlet:
         import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
 
         self._inlet = pylsl.StreamInlet(
-            info, max_buflen=self.BUFFER_S, recover=True, processing_flags=0, as_numpy=True
+            info, max_buflen=self.BUFFER_S, recover=False, processing_flags=0, as_numpy=True
         )
-        self._sizes = [layout.size for layout in layouts(run)]
+        self._frame = FrameRow(sizes(run), wrote=False).frame
         self.skipped = 0
 
     def newest(self, wait_s: float) -> Frame | None:
         """Return the newest frame, waiting up to ``wait_s`` for one; None when none came."""
+        import pylsl  # noqa: PLC0415
+
+        try:
+            row = self._pulled(wait_s)
+        except pylsl.util.LostError:  # the session has ended, and this process is about to
+            time.sleep(wait_s)
+            return None
+        return None if row is None else self._frame(row)
+
+    def _pulled(self, wait_s: float) -> FloatArray | None:
         row, _ = self._inlet.pull_sample(timeout=wait_s)
         if row is None:
             return None
         while True:
             rows, _ = self._inlet.pull_chunk(timeout=0.0, max_samples=1024)
             if not len(rows):
-                break
+                return np.asarray(row, dtype=np.float64)
             self.skipped += len(rows)
             row = rows[-1]
-        return frame_of(np.asarray(row, dtype=np.float64), self._sizes)
 
 
-def frame_of(row: FloatArray, sizes: list[int]) -> Frame:
-    """Return the frame that a sample holds, shape ``(n_columns,)``."""
-    number, due, woke, elapsed, trial, phase, paused = row[: len(HEAD)].tolist()
-    ends = np.cumsum([len(HEAD), *sizes])
-    axes, command, state, task = (row[a:b] for a, b in itertools.pairwise(ends))
-    return Frame(
-        Tick(int(number), due, woke),
-        elapsed,
-        axes,
-        command,
-        state,
-        task,
-        PHASES[int(phase)],
-        int(trial),
-        bool(paused),
-    )
+def _label(column: Column) -> str:
+    """Return a channel's label: those of the loop stand alone, as ``tick``."""
+    if column.group == "loop":
+        return column.label
+    return f"{'axes' if column.group == 'input' else column.group}.{column.label}"

@@ -11,8 +11,8 @@ import queue
 import struct
 import threading
 import zlib
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +21,7 @@ from labcrane.core.records import CameraImage
 from labcrane.streams.outlets import channel, source_id, stream_info
 
 if TYPE_CHECKING:
-    import pylsl
+    pass
 
 KIND = "CameraImage"
 KEPT_S = 1
@@ -76,22 +76,6 @@ class PictureOutlet:
             for camera, picture in pictures.items():
                 self._outlet.push_sample([_written(camera, picture)], stamp)
             self._free.set()
-
-
-class PictureInlet:
-    """Receives pictures."""
-
-    def __init__(self, info: "pylsl.StreamInfo") -> None:
-        import pylsl  # noqa: PLC0415
-
-        self._inlet = pylsl.StreamInlet(info, max_buflen=KEPT_S, recover=True, processing_flags=0)
-
-    def newest(self, wait_s: float) -> Iterator[tuple[dict[str, Any], float]]:
-        """Yield what has come, waiting up to ``wait_s``: samples, and their times in seconds."""
-        sample, stamp = self._inlet.pull_sample(timeout=wait_s)
-        while sample is not None:
-            yield json.loads(sample[0]), stamp
-            sample, stamp = self._inlet.pull_sample(timeout=0.0)
 
 
 def _written(camera: str, picture: CameraImage) -> str:

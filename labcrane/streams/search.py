@@ -14,11 +14,14 @@ import time
 import weakref
 from typing import TYPE_CHECKING
 
+from labcrane.errors import StreamError
+
 if TYPE_CHECKING:
     import pylsl
 
-LOOK_S = 0.35
-"""How long answers to a wave are waited for: liblsl's next wave would begin 0.4 s after it."""
+LOOK_S = 0.8
+"""How long answers are waited for: known peers are asked 0.5 s after everybody, and the next wave
+begins 1 s or more after the first."""
 
 PAUSE_S = 0.65
 """Between two looks."""
@@ -28,6 +31,9 @@ POLL_S = 0.02
 PORTS = 2
 """How many UDP ports of liblsl's range a look takes at most: one wave to all, one to known peers.
 Twice as many where IPv6 is allowed."""
+
+_looking = threading.Lock()
+"""One look at a time in a process, so that it takes the ports of one."""
 
 _open: "weakref.WeakSet[Search]" = weakref.WeakSet()
 
@@ -89,14 +95,18 @@ class Search:
         import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
 
         while not self._over.is_set():
-            resolver = pylsl.ContinuousResolver(
-                pred=self._predicate or "uid", forget_after=LOOK_S + self._pause_s
-            )
-            ends = time.monotonic() + LOOK_S
-            while time.monotonic() < ends and not self._over.wait(POLL_S):
-                self._take(resolver.results())
-            del resolver
+            if not _looking.acquire(timeout=POLL_S):
+                continue
+            try:
+                self._look(pylsl.ContinuousResolver(pred=self._predicate or "uid"))
+            finally:
+                _looking.release()
             self._over.wait(self._pause_s)
+
+    def _look(self, resolver: "pylsl.ContinuousResolver") -> None:
+        ends = time.monotonic() + LOOK_S
+        while time.monotonic() < ends and not self._over.wait(POLL_S):
+            self._take(resolver.results())
 
     def _take(self, found: "list[pylsl.StreamInfo]") -> None:
         now = time.monotonic()
@@ -128,6 +138,26 @@ def find(predicate: str, wait_s: float, minimum: int = 1) -> "list[pylsl.StreamI
         return search.wait(wait_s, minimum)
     finally:
         search.close()
+
+
+def equal(**properties: str) -> str:
+    """Return the predicate of streams with these properties: ``equal(name="labcrane.frame")``.
+
+    Raises
+    ------
+    StreamError
+        A value holds both kinds of quotes, which XPath 1.0 cannot write.
+    """
+    parts = []
+    for name, value in properties.items():
+        if "'" in value and '"' in value:
+            raise StreamError(
+                f"a stream cannot be searched for by its {name} {value!r}: it holds both kinds of "
+                "quotes; rename it"
+            )
+        quote = '"' if "'" in value else "'"
+        parts.append(f"{name}={quote}{value}{quote}")
+    return " and ".join(parts)
 
 
 def known_stream(description: str) -> "pylsl.StreamInfo | None":

@@ -5,14 +5,17 @@ import threading
 import time
 from collections import deque
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 from labcrane.streams.frames import FRAME
+from labcrane.streams.newest import NewestSample
+
+if TYPE_CHECKING:
+    import pylsl
 
 HISTORY_S = 20.0
 CHART_HZ = 20.0
 PAUSE_S = 0.02
-PATIENCE_S = 5.0
 RECENT_S = 1.0
 """The lateness that is shown is the worst of this time."""
 
@@ -62,35 +65,22 @@ class Live:
     def _pull(self) -> None:
         import pylsl  # noqa: PLC0415
 
-        found: tuple[Any, list[str]] | None = None
+        wanted = {"source_id": f"labcrane/{self._source}/{FRAME}"}
+        frames = NewestSample(wanted, self._described, buffer_s=1)
         while True:
-            found = found or self._open()
-            if found:
-                inlet, columns = found
-                samples, stamps = inlet.pull_chunk(timeout=0.0, max_samples=1024)
-                if stamps:
-                    self._take(columns, samples)
-                    self.age_s = pylsl.local_clock() - stamps[-1]
+            samples, stamps = frames.pull()
+            if stamps:
+                self._take(list(self.units), samples)
+                self.age_s = pylsl.local_clock() - stamps[-1]
             time.sleep(PAUSE_S)
 
-    def _open(self) -> "tuple[Any, list[str]] | None":
-        import pylsl  # noqa: PLC0415
-
-        found = pylsl.resolve_bypred(f"source_id='labcrane/{self._source}/{FRAME}'", 1, 0.5)
-        if not found:
-            return None
-        # One second of buffer, and a connection that comes back by itself.
-        inlet = pylsl.StreamInlet(found[0], max_buflen=1, recover=True)
-        try:
-            channel = inlet.info(PATIENCE_S).desc().child("channels").child("channel")
-        except (TimeoutError, RuntimeError):  # a busy computer, or the session has just ended
-            return None
+    def _described(self, info: "pylsl.StreamInfo") -> None:
         units = {}
+        channel = info.desc().child("channels").child("channel")
         while not channel.empty():
             units[channel.child_value("label")] = channel.child_value("unit")
             channel = channel.next_sibling("channel")
         self.units = units
-        return inlet, list(units)
 
     def _take(self, columns: Sequence[str], samples: Sequence[Sequence[float]]) -> None:
         due, woke = columns.index("due"), columns.index("woke")

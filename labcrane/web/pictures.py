@@ -1,12 +1,14 @@
 """Pictures of cameras, from the LSL streams of the views."""
 
+import json
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from labcrane.streams.pictures import PictureInlet, pictures_source
+from labcrane.streams.newest import NewestSample
+from labcrane.streams.pictures import KEPT_S, pictures_source
 
-WAIT_S = 1.0
+PAUSE_S = 0.05
 STALE_S = 3.0
 """A picture that nobody has renewed for so long is not shown: it could be taken for what is now."""
 
@@ -75,17 +77,14 @@ class Pictures:
         return shot, " · ".join(filter(None, [f"{now - shot.due:.1f} s old", shot.legend]))
 
     def _pull(self, view: str, wanted: str) -> None:
-        import pylsl  # noqa: PLC0415
-
-        while not (found := pylsl.resolve_byprop("source_id", wanted, 1, timeout=WAIT_S)):
-            if self._stop.is_set():
-                return
-        inlet = PictureInlet(found[0])  # it finds a view that is started again by itself
-        while not self._stop.is_set():
-            for sample, stamp in inlet.newest(WAIT_S):
+        pictures = NewestSample({"source_id": wanted}, buffer_s=KEPT_S)
+        while not self._stop.wait(PAUSE_S):
+            for (text,), stamp in zip(*pictures.pull(), strict=True):
+                sample = json.loads(text)
                 self._newest[view, sample["camera"]] = Shot(
                     f"data:image/png;base64,{sample['png']}",
                     sample["legend"],
                     sample["due"],
                     stamp,
                 )
+        pictures.close()

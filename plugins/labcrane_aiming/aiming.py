@@ -16,8 +16,8 @@ from labcrane import (
     Task,
     Trial,
     TrialStatus,
-    reach,
 )
+from labcrane.machines import reach
 from labcrane_aiming.pairs import Pair, Point, index_of_difficulty, pairs
 from labcrane_aiming.settings import AimingSettings
 

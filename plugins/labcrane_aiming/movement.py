@@ -8,7 +8,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from labcrane import FloatArray, Value
+from labcrane import FloatArray
+from labcrane.core import Value
 from labcrane_aiming.pairs import Point
 from labcrane_aiming.settings import AimingSettings
 

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from labcrane import SessionRecord
+from labcrane.recording import SessionRecord
 
 if TYPE_CHECKING:
     import pandas as pd

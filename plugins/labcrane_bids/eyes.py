@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from labcrane import SessionRecord, Stream
+from labcrane.recording import SessionRecord, Stream
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from labcrane import SessionRecord, Stream
+from labcrane.recording import SessionRecord, Stream
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -1,30 +1,26 @@
 """The study's crane: moved by PyBullet, or by its velocity law alone."""
 
-from labcrane import Dynamics, Machine, Offer, PluginError, hookimpl, offer
+from labcrane import Dynamics, Machine, Offer, hookimpl, offer
+from labcrane.registry import LAB
 from labcrane_bullet.settings import BulletSettings, CraneSettings
 
 labcrane_api = 1
+
+ENGINE = f"{LAB} on Python 3.11, where its wheels end; or use 'kinematic_crane', which needs none"
 
 
 @hookimpl
 def labcrane_dynamics() -> list[Offer[Dynamics]]:
     return [
-        offer("bullet_crane", BulletSettings, _bullet_crane),
+        offer("bullet_crane", BulletSettings, _bullet_crane, needs={"pybullet": ENGINE}),
         offer("kinematic_crane", CraneSettings, _kinematic_crane),
     ]
 
 
 def _bullet_crane(settings: BulletSettings, machine: Machine) -> Dynamics:
-    try:
-        from labcrane_bullet.bullet_crane import BulletCrane
-        from labcrane_bullet.loaded_crane import LoadedCrane
-    except ModuleNotFoundError as error:
-        if error.name != "pybullet":
-            raise
-        raise PluginError(
-            "'bullet_crane' needs PyBullet, which is not installed (its wheels end at Python "
-            "3.11); use 'kinematic_crane', which needs no engine, or install pybullet"
-        ) from error
+    from labcrane_bullet.bullet_crane import BulletCrane
+    from labcrane_bullet.loaded_crane import LoadedCrane
+
     return (LoadedCrane if settings.loaded else BulletCrane)(settings, machine)
 
 

@@ -6,7 +6,9 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
-from labcrane import FloatArray, Machine, PluginError, Run, Value, urdf
+from labcrane import FloatArray, Machine, PluginError, Run
+from labcrane.core import Value
+from labcrane.machines import urdf_of
 from labcrane_bullet.crane import Crane
 from labcrane_bullet.engine import pybullet
 from labcrane_bullet.settings import CraneSettings
@@ -65,7 +67,7 @@ class BulletCrane(Crane):
         return {**super().metadata(), "engine": f"pybullet {version('pybullet')}"}
 
     def _urdf(self) -> str:
-        return urdf(self._machine)
+        return urdf_of(self._machine)
 
     def _place(self, angles: Sequence[float]) -> None:
         self._disconnect()

@@ -3,18 +3,9 @@
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 
-from labcrane import (
-    Actuator,
-    Body,
-    Dynamics,
-    FloatArray,
-    Machine,
-    PluginError,
-    ProtocolError,
-    Run,
-    Value,
-    link_boxes,
-)
+from labcrane import Dynamics, FloatArray, Machine, PluginError, ProtocolError, Run
+from labcrane.core import Value
+from labcrane.machines import Actuator, Body, link_boxes
 from labcrane_bullet.crane_state import CraneState, crane_signals
 from labcrane_bullet.pose import check_pose
 from labcrane_bullet.settings import CraneSettings

@@ -4,7 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from labcrane import Body, FloatArray, Machine, Signal, Value
+from labcrane import FloatArray, Machine, Signal
+from labcrane.core import Value
+from labcrane.machines import Body
 from labcrane_bullet.bullet_crane import BulletCrane
 from labcrane_bullet.engine import pybullet
 from labcrane_bullet.hanging import hanging, place, total_kg

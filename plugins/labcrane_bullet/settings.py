@@ -2,7 +2,8 @@
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from labcrane import ACTUATOR_PRESETS, ActuatorSettings, Settings
+from labcrane import Settings
+from labcrane.machines import ACTUATOR_PRESETS, ActuatorSettings
 
 
 class CraneSettings(Settings):

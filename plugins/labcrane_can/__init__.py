@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 
-from labcrane import CommandOffer, Finding, InputDevice, Machine, Offer, Prompt, hookimpl, offer
+from labcrane import InputDevice, Machine, Offer, hookimpl, offer
+from labcrane.core import Finding
+from labcrane.registry import LAB, CommandOffer, Prompt
 from labcrane_can.settings import CanSettings, ReplaySettings
 
 labcrane_api = 1
@@ -25,7 +27,11 @@ def labcrane_inputs() -> list[Offer[InputDevice]]:
 
         return examination.examine(settings, ask)
 
-    return [offer("can", CanSettings, panel, examine), offer("can_replay", ReplaySettings, replay)]
+    needs = {"can": LAB, "cantools": LAB}
+    return [
+        offer("can", CanSettings, panel, examine, needs=needs),
+        offer("can_replay", ReplaySettings, replay, needs=needs),
+    ]
 
 
 @hookimpl

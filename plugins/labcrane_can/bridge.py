@@ -1,22 +1,23 @@
 """From a CAN bus to the open gateway protocol and back (docs/gateway.md)."""
 
 import math
-import threading
 import time
 from collections.abc import Callable
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
+from labcrane import NewestSample
 from labcrane_can.avc import ESTIMATED, encode_flow
 from labcrane_can.command_state import PanelCommands
 from labcrane_can.listener import Listener
 from labcrane_can.settings import CanSettings
 
+if TYPE_CHECKING:
+    import pylsl
+
 RATE_HZ = 50.0
 FULL_PERCENT = 0.4
 FLOW = "gateway.flow"
-LOOK_S = 0.2
-MOST_AT_ONCE = 64
 
 
 class Bridge:
@@ -44,11 +45,8 @@ class Bridge:
             channel.append_child_value("label", joint)
             channel.append_child_value("unit", "0.4 percent")
         self._outlet = pylsl.StreamOutlet(info)
-        self._flow: pylsl.StreamInlet | None = None
         self._valves: list[int | None] = []
-        self._over = threading.Event()
-        self._seeker = threading.Thread(target=self._seek, name="labcrane-flow", daemon=True)
-        self._seeker.start()
+        self._flow = NewestSample({"name": FLOW}, self._accept, buffer_s=1)
         self._listener = Listener(self._settings, self._commands)
         return self
 
@@ -58,8 +56,7 @@ class Bridge:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._over.set()
-        self._seeker.join()
+        self._flow.close()
         self._listener.close()
         del self._outlet
 
@@ -82,35 +79,14 @@ class Bridge:
                 sent_back = now
             time.sleep(1.0 / RATE_HZ)
 
-    def _seek(self) -> None:
-        """Look for the valves' flow: in a thread, because a look waits, and commands must not."""
-        import pylsl  # noqa: PLC0415
-
-        while not self._over.is_set():
-            found = pylsl.resolve_byprop("name", FLOW, timeout=LOOK_S)
-            if not found:
-                continue
-            inlet = pylsl.StreamInlet(found[0], max_buflen=1, recover=True)
-            try:
-                labels = inlet.info(timeout=2.0).get_channel_labels() or []
-            except (pylsl.util.TimeoutError, pylsl.util.LostError):  # gone again: look for the next
-                continue
-            valves = self._settings.valves
-            numbers = [valves.get(str(label)) for label in labels]
-            self._valves = [each if isinstance(each, int) else None for each in numbers]
-            self._flow = inlet
-            return
+    def _accept(self, info: "pylsl.StreamInfo") -> None:
+        """Take which valve each channel of the flow is."""
+        valves = self._settings.valves
+        numbers = [valves.get(str(label)) for label in info.get_channel_labels() or []]
+        self._valves = [each if isinstance(each, int) else None for each in numbers]
 
     def _send_back(self) -> None:
-        if self._flow is None:
-            return
-        sample, stamp = None, None
-        for _ in range(MOST_AT_ONCE):
-            next_ = self._flow.pull_sample(timeout=0.0)
-            if next_[1] is None:
-                break
-            sample, stamp = next_
-        if stamp is None or sample is None:
+        if (sample := self._flow.newest()) is None:
             return
         for flow, valve in zip(sample, self._valves, strict=False):
             if valve is not None and isinstance(flow, float) and math.isfinite(flow):

@@ -3,7 +3,9 @@
 import time
 from collections import Counter
 
-from labcrane import DeviceError, Finding, Prompt, ProtocolError, Verdict
+from labcrane import DeviceError, ProtocolError
+from labcrane.core import Finding, Verdict
+from labcrane.registry import Prompt
 from labcrane_can.command_state import PanelCommands
 from labcrane_can.listener import open_bus
 from labcrane_can.settings import CanSettings

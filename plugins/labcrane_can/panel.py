@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 
-from labcrane import FloatArray, Frame, InputDevice, Machine, Run, Tick, Value
+from labcrane import FloatArray, Frame, InputDevice, Machine, Run, Tick
+from labcrane.core import Value
 from labcrane_can.avc import ESTIMATED, FULL, MEASURED, encode_flow
 from labcrane_can.axes import PanelAxes
 from labcrane_can.command_state import PanelCommands

@@ -5,7 +5,8 @@ from typing import Annotated
 
 from pydantic import Field, PositiveFloat, PositiveInt, field_validator, model_validator
 
-from labcrane import Settings, StudyPath
+from labcrane import Settings
+from labcrane.core import StudyPath
 
 Node = Annotated[int, Field(ge=0, le=253)]
 """Source address on the bus; 254 and 255 are no node."""

@@ -3,16 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from labcrane import (
-    CommandOffer,
-    Controller,
-    Dynamics,
-    Machine,
-    Offer,
-    PluginError,
-    hookimpl,
-    offer,
-)
+from labcrane import Controller, Dynamics, Machine, Offer, hookimpl, offer
+from labcrane.registry import LAB, CommandOffer
 from labcrane_dmd.arm_settings import ArmSettings, ValveSettings
 
 if TYPE_CHECKING:
@@ -20,6 +12,8 @@ if TYPE_CHECKING:
     from labcrane_dmd.settings import Between
 
 labcrane_api = 1
+
+ENGINE = f"{LAB} on Python 3.11, where its wheels end"
 
 
 def load(path: Path | str, between: "Between | None" = None) -> "Model":
@@ -53,15 +47,8 @@ def labcrane_controllers() -> list[Offer[Controller]]:
 @hookimpl
 def labcrane_dynamics() -> list[Offer[Dynamics]]:
     def arm(settings: ArmSettings, machine: Machine) -> Dynamics:
-        try:
-            from labcrane_dmd.arm import DmdArm
-        except ModuleNotFoundError as error:
-            if error.name != "pybullet":
-                raise
-            raise PluginError(
-                "'dmd_arm' needs PyBullet, which is not installed (its wheels end at Python 3.11); "
-                "install pybullet"
-            ) from error
+        from labcrane_dmd.arm import DmdArm
+
         return DmdArm(settings, machine)
 
-    return [offer("dmd_arm", ArmSettings, arm)]
+    return [offer("dmd_arm", ArmSettings, arm, needs={"pybullet": ENGINE})]

@@ -3,20 +3,9 @@
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 
-from labcrane import (
-    Body,
-    Dynamics,
-    FloatArray,
-    Machine,
-    PlacedObject,
-    PluginError,
-    ProtocolError,
-    Run,
-    Trial,
-    Value,
-    load_scene,
-    place_objects,
-)
+from labcrane import Dynamics, FloatArray, Machine, PluginError, ProtocolError, Run, Trial
+from labcrane.core import Value
+from labcrane.machines import Body, PlacedObject, load_scene, place_objects
 from labcrane_dmd.arm_settings import ArmSettings
 from labcrane_dmd.arm_state import ArmState, arm_signals, scene_parts
 from labcrane_dmd.contacts import Window

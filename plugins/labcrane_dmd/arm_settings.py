@@ -4,7 +4,8 @@ from typing import Annotated
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from labcrane import Settings, StudyPath
+from labcrane import Settings
+from labcrane.core import StudyPath
 
 AxisName = Annotated[str, Field(pattern=r"^-?[a-z][a-z0-9_.]*$")]
 """An axis of the input, ``valve.boom``; a leading minus turns it round."""

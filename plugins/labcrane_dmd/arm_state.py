@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane import Arm, FloatArray, Machine, Scene, Signal, place_objects
+from labcrane import FloatArray, Machine, Signal
+from labcrane.machines import Arm, Scene, place_objects
 
 if TYPE_CHECKING:
     from labcrane_dmd.world import World

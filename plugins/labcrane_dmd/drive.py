@@ -4,7 +4,8 @@ import math
 from collections import deque
 from collections.abc import Sequence
 
-from labcrane import Joint, Machine, ProtocolError
+from labcrane import Machine, ProtocolError
+from labcrane.machines import Joint
 from labcrane_dmd.model import Model, Segment
 from labcrane_dmd.recordings import FULL
 

@@ -5,7 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from labcrane import PlacedObject, ProtocolError, ShapeKind
+from labcrane import ProtocolError
+from labcrane.machines import PlacedObject, ShapeKind
 from labcrane_dmd.engine import pybullet
 
 OVERLAP_M = 0.002

@@ -3,15 +3,16 @@
 Nothing of the arm touches anything else of the arm.
 """
 
-from labcrane import Joint, Machine, urdf_joint, urdf_link
-from labcrane import urdf as machine_urdf
+from labcrane import Machine
+from labcrane.machines import Joint, urdf_joint, urdf_link
+from labcrane.machines import urdf_of as machine_urdf
 from labcrane_dmd.arm_settings import JawsSettings
 
 BEYOND = 1.25
 """Length of a jaw, in distances from its hinge to the point between the jaws."""
 
 
-def urdf(machine: Machine, jaws: JawsSettings | None) -> str:
+def urdf_of(machine: Machine, jaws: JawsSettings | None) -> str:
     """Return the URDF; with jaws, their joint becomes ``jaw_upper`` and ``jaw_lower``."""
     if jaws is None:
         return machine_urdf(machine, solid=True)

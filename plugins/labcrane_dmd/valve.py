@@ -3,7 +3,9 @@
 import numpy as np
 import numpy.typing as npt
 
-from labcrane import Arm, Controller, FloatArray, Layout, Machine, ProtocolError, Run, Signal
+from labcrane import Controller, FloatArray, Machine, ProtocolError, Run, Signal
+from labcrane.core import Layout
+from labcrane.machines import Arm
 from labcrane_dmd.arm_settings import ValveSettings
 from labcrane_dmd.model import Model
 from labcrane_dmd.recordings import FULL

@@ -1,6 +1,7 @@
 """Visual shape of the arm: a box for its foot, one along every link, one for each jaw."""
 
-from labcrane import Body, Machine, ProtocolError, link_boxes
+from labcrane import Machine, ProtocolError
+from labcrane.machines import Body, link_boxes
 from labcrane_dmd.arm_settings import JawsSettings
 from labcrane_dmd.urdf import BEYOND
 

@@ -5,13 +5,14 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from labcrane import Machine, PlacedObject, PluginError
+from labcrane import Machine, PluginError
+from labcrane.machines import PlacedObject
 from labcrane_dmd.arm_settings import ArmSettings
 from labcrane_dmd.contacts import Contacts
 from labcrane_dmd.engine import pybullet
 from labcrane_dmd.grip import Grip
 from labcrane_dmd.scene_bodies import add, add_ground, check_apart
-from labcrane_dmd.urdf import urdf
+from labcrane_dmd.urdf import urdf_of
 
 GRAVITY = 9.81
 """In m/s²."""
@@ -168,7 +169,7 @@ def _engine(dt: float) -> int:
 def _load(machine: Machine, settings: ArmSettings, client: int) -> int:
     with tempfile.TemporaryDirectory(prefix="labcrane-") as folder:
         path = Path(folder) / "arm.urdf"
-        path.write_text(urdf(machine, settings.jaws), encoding="utf-8")
+        path.write_text(urdf_of(machine, settings.jaws), encoding="utf-8")
         arm: int = pybullet.loadURDF(
             str(path),
             useFixedBase=True,

@@ -1,6 +1,7 @@
 """The open gateway protocol: any program with LSL can be the control station."""
 
 from labcrane import InputDevice, Machine, Offer, hookimpl, offer
+from labcrane.registry import LAB
 from labcrane_gateway.settings import GatewaySettings
 
 labcrane_api = 1
@@ -13,4 +14,4 @@ def labcrane_inputs() -> list[Offer[InputDevice]]:
 
         return Station(settings, machine)
 
-    return [offer("gateway", GatewaySettings, gateway)]
+    return [offer("gateway", GatewaySettings, gateway, needs={"pylsl": LAB})]

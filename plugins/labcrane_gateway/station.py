@@ -1,13 +1,11 @@
 """A control station that speaks the open gateway protocol (docs/gateway.md)."""
 
 import math
-import threading
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane import FloatArray, Frame, InputDevice, Machine, Run, Signal, Tick
+from labcrane import FloatArray, Frame, InputDevice, Machine, NewestSample, Run, Signal, Tick
 from labcrane_gateway.settings import GatewaySettings
 
 if TYPE_CHECKING:
@@ -15,11 +13,6 @@ if TYPE_CHECKING:
 
 FULL = 250.0
 FLOW_HZ = 50.0
-MOST_A_TICK = 64
-"""Samples taken in one tick; a station that sends more is read on in the next."""
-
-LOOK_S = 0.2
-"""Time between looks for the station's stream, in a thread of their own: they may take long."""
 
 
 class Station(InputDevice):
@@ -36,11 +29,9 @@ class Station(InputDevice):
         self._signals = [0.0] * len(machine.names)
         self._came = -math.inf
         self._complaint = ""
-        self._inlet: pylsl.StreamInlet | None = None
         self._order: list[int] = []
         self._outlet: pylsl.StreamOutlet | None = None
-        self._over = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._station: NewestSample | None = None
 
     def open(self, run: Run) -> None:
         import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
@@ -57,8 +48,7 @@ class Station(InputDevice):
             channel.append_child_value("label", joint)
             channel.append_child_value("unit", "0.4 percent")
         self._outlet = pylsl.StreamOutlet(info)
-        self._thread = threading.Thread(target=self._look, name="labcrane-gateway", daemon=True)
-        self._thread.start()
+        self._station = NewestSample({"name": self._settings.stream}, self._accept)
 
     def read(self, tick: Tick, seen: Frame) -> FloatArray:
         self._pull(tick.woke)
@@ -67,8 +57,7 @@ class Station(InputDevice):
         if age > self._settings.timeout_s:
             self.fault = (
                 f"no command in stream {self._settings.stream!r} for "
-                f"{self._settings.timeout_s:g} s"
-                + (f"; {self._complaint}" if self._complaint else "")
+                f"{self._settings.timeout_s:g} s" + (f"; {why}" if (why := self._trouble()) else "")
             )
             out[:] = 0.0
         else:
@@ -80,22 +69,16 @@ class Station(InputDevice):
         return out
 
     def close(self) -> None:
-        self._over.set()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
-        self._inlet = self._outlet = None
+        if self._station is not None:
+            self._station.close()
+            self._station = None
+        self._outlet = None
+
+    def _trouble(self) -> str:
+        return self._complaint or (self._station.complaint if self._station else "")
 
     def _pull(self, now: float) -> None:
-        inlet = self._inlet
-        if inlet is None:
-            return
-        newest: Sequence[float] | None = None
-        for _ in range(MOST_A_TICK):
-            sample, stamp = inlet.pull_sample(timeout=0.0)
-            if stamp is None:
-                break
-            newest = sample
+        newest = None if self._station is None else self._station.newest()
         if newest is None:
             return
         signals = [newest[place] for place in self._order]
@@ -108,40 +91,20 @@ class Station(InputDevice):
         self._signals = [float(round(signal)) for signal in signals]
         self._came, self._complaint = now, ""
 
-    def _look(self) -> None:
-        import pylsl  # noqa: PLC0415
+    def _accept(self, info: "pylsl.StreamInfo") -> str | None:
+        """Return why a station's stream is of no use; None when it commands all joints."""
+        import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
 
-        while not self._over.is_set():
-            if self._inlet is None:
-                found = pylsl.resolve_byprop("name", self._settings.stream, timeout=LOOK_S)
-                if found:
-                    self._take(pylsl.StreamInlet(found[0], max_buflen=2, recover=True))
-            self._over.wait(LOOK_S)
-
-    def _take(self, inlet: "pylsl.StreamInlet") -> None:
-        import pylsl  # noqa: PLC0415
-
-        try:
-            info = inlet.info(timeout=2.0)
-            labels = info.get_channel_labels() or []
-            inlet.open_stream(timeout=2.0)
-        except (
-            pylsl.util.TimeoutError,
-            pylsl.util.LostError,
-        ) as error:
-            self._complaint = f"it was there and is gone again ({error})"
-            return
+        labels = info.get_channel_labels() or []
         if info.channel_format() == pylsl.cf_string or len(labels) > info.channel_count():
-            self._complaint = (
+            return (
                 f"it has {info.channel_count()} channels of format {info.channel_format()}, and "
                 f"{len(labels)} names; send numbers, and a name for each channel"
             )
-            return
         if missing := [joint for joint in self._joints if joint not in labels]:
-            self._complaint = (
+            return (
                 f"its channels are {', '.join(map(str, labels)) or 'not named'}; the machine also "
                 f"needs {', '.join(missing)}"
             )
-            return
         self._order = [labels.index(joint) for joint in self._joints]
-        self._inlet = inlet
+        return None

@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 
-from labcrane import Finding, InputDevice, Machine, Offer, Prompt, hookimpl, offer
+from labcrane import InputDevice, Machine, Offer, hookimpl, offer
+from labcrane.core import Finding
+from labcrane.registry import LAB, Prompt
 from labcrane_joystick.settings import JoystickSettings
 
 labcrane_api = 1
@@ -10,7 +12,9 @@ labcrane_api = 1
 
 @hookimpl
 def labcrane_inputs() -> list[Offer[InputDevice]]:
-    return [offer("dual_joystick", JoystickSettings, _dual_joystick, _examine)]
+    return [
+        offer("dual_joystick", JoystickSettings, _dual_joystick, _examine, needs={"pygame": LAB})
+    ]
 
 
 def _dual_joystick(settings: JoystickSettings, machine: Machine) -> InputDevice:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane import DeviceError, FloatArray, Frame, InputDevice, Run, Signal, Tick, Value
+from labcrane import DeviceError, FloatArray, Frame, InputDevice, Run, Signal, Tick
+from labcrane.core import Value
 from labcrane_joystick import sdl
 from labcrane_joystick.calibration import (
     RUN_AGAIN,

@@ -5,7 +5,9 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from statistics import median
 
-from labcrane import DeviceError, Finding, Prompt, Verdict
+from labcrane import DeviceError
+from labcrane.core import Finding, Verdict
+from labcrane.registry import Prompt
 from labcrane_joystick import sdl
 from labcrane_joystick.calibration import RUN_AGAIN, Calibration, Calibrations, default_path, load
 from labcrane_joystick.dual_joystick import SIDES, tell_apart

@@ -5,7 +5,7 @@ import struct
 import sys
 from pathlib import Path
 
-from labcrane import Value
+from labcrane.core import Value
 from labcrane_joystick.stick import AXES
 
 NOT_READ = "not read"

@@ -1,6 +1,7 @@
 """The keyboard as an input, through the window of a view."""
 
 from labcrane import InputDevice, Machine, Offer, hookimpl, offer
+from labcrane.registry import LAB
 from labcrane_keyboard.settings import KeyboardSettings
 
 labcrane_api = 1
@@ -14,4 +15,4 @@ def labcrane_inputs() -> list[Offer[InputDevice]]:
         del machine  # axes are named by the protocol
         return Keyboard(settings)
 
-    return [offer("keyboard", KeyboardSettings, keyboard)]
+    return [offer("keyboard", KeyboardSettings, keyboard, needs={"pylsl": LAB})]

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from labcrane import CommandOffer, InputDevice, Machine, Offer, hookimpl, offer
+from labcrane import InputDevice, Machine, Offer, hookimpl, offer
+from labcrane.registry import CommandOffer
 from labcrane_operator.settings import OperatorSettings, RecordedSettings
 
 labcrane_api = 1

@@ -12,10 +12,9 @@ from labcrane import (
     RecordingError,
     Run,
     Tick,
-    Value,
     open_recording,
-    signals_of,
 )
+from labcrane.core import Value, signals_of
 from labcrane_operator.settings import RecordedSettings
 
 

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane import FloatArray, RecordingError, movements, open_recording
+from labcrane import FloatArray, RecordingError, open_recording
+from labcrane.analysis import movements_of
 
 if TYPE_CHECKING:
-    from labcrane import Movement, SessionRecord
+    from labcrane.analysis import Movement
+    from labcrane.recording import SessionRecord
 
 NEEDED = ("command_onset", "width", "target_x", "target_y", "target_z")
 """Columns of the trial table without which there is no stroke."""
@@ -88,7 +90,7 @@ def _check(session: "SessionRecord", where: str) -> None:
 
 
 def _strokes(session: "SessionRecord") -> Iterator[tuple[float, ...]]:
-    for movement in movements(session):
+    for movement in movements_of(session):
         stroke = main_stroke(movement)
         if stroke is not None:
             yield stroke

@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
-from labcrane import Answers, Item, Questionnaire
+from labcrane import Questionnaire
+from labcrane.core import Answers, Item
 from labcrane_questionnaires.settings import RatingSettings
 
 WORDS = {

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from labcrane import Item, ProtocolError, Questionnaire
+from labcrane import ProtocolError, Questionnaire
+from labcrane.core import Item
 from labcrane_questionnaires.settings import LabText
 
 

@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Mapping
 
-from labcrane import Answers, Questionnaire, Score, numeric_answers
+from labcrane import Questionnaire
+from labcrane.core import Answers, Score, numeric_answers
 from labcrane_questionnaires.lab_scale import LabScale
 from labcrane_questionnaires.settings import LabText
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from labcrane import Answers, Score, numeric_answers
+from labcrane.core import Answers, Score, numeric_answers
 from labcrane_questionnaires.lab_scale import LabScale
 
 DEMAND = ("instability", "complexity", "variability")

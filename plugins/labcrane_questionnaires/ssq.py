@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from labcrane import Answers, Score, numeric_answers
+from labcrane.core import Answers, Score, numeric_answers
 from labcrane_questionnaires.lab_scale import LabScale
 
 # Items by their numbers in the publication. Many copies leave item 8, nausea, out of

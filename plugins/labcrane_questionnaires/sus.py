@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
-from labcrane import Answers, Item, Questionnaire, Score, numeric_answers
+from labcrane import Questionnaire
+from labcrane.core import Answers, Item, Score, numeric_answers
 
 STATEMENTS = (
     "I think that I would like to use this system frequently.",

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from labcrane import Answers, Item, Questionnaire, Score, numeric_answers
+from labcrane import Questionnaire
+from labcrane.core import Answers, Item, Score, numeric_answers
 from labcrane_questionnaires.settings import TlxSettings
 
 SCALES = {

@@ -5,7 +5,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from labcrane import Event, FloatArray, Layout, PlacedObject, Run, Scene
+from labcrane import Event, FloatArray, Run
+from labcrane.core import Layout
+from labcrane.machines import PlacedObject, Scene
 
 Point = tuple[float, float, float]
 ANY = -1.0

@@ -3,7 +3,9 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from labcrane import Event, FloatArray, PlacedObject, Run, Value
+from labcrane import Event, FloatArray, Run
+from labcrane.core import Value
+from labcrane.machines import PlacedObject
 from labcrane_scenario.mistakes import Episode, Mistakes
 from labcrane_scenario.settings import ScenarioSettings
 

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from labcrane import (
-    SCENE_PLACED,
     Event,
     FloatArray,
     Frame,
@@ -16,16 +15,13 @@ from labcrane import (
     PlannedTrial,
     ProtocolError,
     Run,
-    Scene,
     Signal,
     Task,
     Trial,
     TrialStatus,
-    Value,
-    load_scene,
-    place_objects,
-    write_placed,
 )
+from labcrane.core import Value
+from labcrane.machines import SCENE_PLACED, Scene, load_scene, place_objects, write_placed
 from labcrane_scenario.goals import Way
 from labcrane_scenario.mistakes import KINDS
 from labcrane_scenario.observation import Observation

@@ -2,7 +2,8 @@
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
-from labcrane import Settings, StudyPath
+from labcrane import Settings
+from labcrane.core import StudyPath
 
 
 class ScenarioSettings(Settings):

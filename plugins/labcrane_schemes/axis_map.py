@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
-from labcrane import Layout, ProtocolError
+from labcrane import ProtocolError
+from labcrane.core import Layout
 
 Axis = tuple[int, float]
 """Place in the input's array, and 1 or -1."""

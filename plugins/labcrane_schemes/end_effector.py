@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from labcrane import Arm, Controller, FloatArray, Machine, ProtocolError, Run
+from labcrane import Controller, FloatArray, Machine, ProtocolError, Run
+from labcrane.machines import Arm
 from labcrane_schemes.axis_map import Axis, find_axes
 from labcrane_schemes.resolved_rate import ResolvedRate
 from labcrane_schemes.settings import DIRECTIONS, EndEffectorSettings

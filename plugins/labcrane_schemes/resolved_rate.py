@@ -9,7 +9,8 @@ import math
 from collections.abc import Sequence
 from typing import Literal
 
-from labcrane import Arm, Machine
+from labcrane import Machine
+from labcrane.machines import Arm
 from labcrane_schemes.soft_stops import SoftStops
 
 Redundancy = Literal["minimum_norm", "hold_pitch"]

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from labcrane import SignalChannel, SignalStream
+from labcrane.core import SignalChannel, SignalStream
 
 MICROVOLTS = {
     "": 1.0,  # the XDF convention for EEG, ECG and EMG

@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from labcrane import FloatArray, SignalFault, SignalMonitor, SignalStream
+from labcrane import FloatArray, SignalMonitor
+from labcrane.core import SignalFault, SignalStream
 from labcrane_signals.channels import electrodes, labels
 from labcrane_signals.rails import Rails
 from labcrane_signals.settings import ElectrodeSettings

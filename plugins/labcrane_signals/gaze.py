@@ -5,7 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labcrane import FloatArray, SignalFault, SignalMonitor, SignalStream
+from labcrane import FloatArray, SignalMonitor
+from labcrane.core import SignalFault, SignalStream
 from labcrane_signals.channels import word
 from labcrane_signals.settings import GazeSettings
 from labcrane_signals.windows import BoolArray, Streak, Windows

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labcrane import FloatArray, SignalFault, SignalMonitor, SignalStream
+from labcrane import FloatArray, SignalMonitor
+from labcrane.core import SignalFault, SignalStream
 from labcrane_signals.channels import is_signal, labels
 from labcrane_signals.rails import Rails
 from labcrane_signals.settings import ForceSettings

@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 
-from labcrane import Feedback, Finding, Machine, Offer, Prompt, hookimpl, offer
+from labcrane import Feedback, Machine, Offer, hookimpl, offer
+from labcrane.core import Finding
+from labcrane.registry import LAB, Prompt
 from labcrane_sonification.settings import SonificationSettings
 
 labcrane_api = 1
@@ -21,4 +23,4 @@ def labcrane_feedback() -> list[Offer[Feedback]]:
 
         return examination.examine(settings, ask)
 
-    return [offer("sonification", SonificationSettings, build, examine)]
+    return [offer("sonification", SonificationSettings, build, examine, needs={"pyo": LAB})]

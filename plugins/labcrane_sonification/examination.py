@@ -2,7 +2,9 @@
 
 import sys
 
-from labcrane import DeviceError, Finding, Prompt, Verdict
+from labcrane import DeviceError
+from labcrane.core import Finding, Verdict
+from labcrane.registry import Prompt
 from labcrane_sonification import real_time
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sonification.synth import server, silent_server

@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel
 
-from labcrane import Feedback, FloatArray, Frame, Run, SessionState, Signal, Value
+from labcrane import Feedback, FloatArray, Frame, Run, Signal
+from labcrane.core import SessionState, Value
 from labcrane_sonification import real_time
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sonification.synth import Synth, offline_server, server

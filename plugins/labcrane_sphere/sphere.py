@@ -5,7 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labcrane import Cue, FloatArray, Frame, Run, Shape, Signal, Sphere
+from labcrane import Cue, FloatArray, Frame, Run, Signal, Sphere
+from labcrane.core import Shape
 from labcrane_sphere.settings import SphereSettings
 
 STEEPNESS = 9.0

@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 
-from labcrane import Feedback, Finding, Machine, Offer, Prompt, hookimpl, offer
+from labcrane import Feedback, Machine, Offer, hookimpl, offer
+from labcrane.core import Finding
+from labcrane.registry import LAB, Prompt
 from labcrane_view.settings import ViewSettings
 
 labcrane_api = 1
@@ -20,4 +22,4 @@ def labcrane_feedback() -> list[Offer[Feedback]]:
 
         return examination.examine(settings, ask)
 
-    return [offer("view", ViewSettings, build, examine)]
+    return [offer("view", ViewSettings, build, examine, needs={"panda3d": LAB})]

@@ -5,7 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labcrane import FloatArray, Frame, PlacedObject, Run, Shape, Sphere, read_placed
+from labcrane import FloatArray, Frame, Run, Sphere
+from labcrane.core import Shape
+from labcrane.machines import PlacedObject, read_placed
 from labcrane_view.outline import of_body, of_thing
 
 TIP = 0.12
@@ -121,7 +123,7 @@ class Areas:
         self._things: list[tuple[PlacedObject, FloatArray]] = []
 
     def update(self, scene: str) -> None:
-        """Take up what stands around, as of :func:`labcrane.read_placed`."""
+        """Take up what stands around, as of :func:`labcrane.machines.read_placed`."""
         if scene != self._scene:
             self._scene = scene
             self._things = [

@@ -3,7 +3,9 @@
 import re
 import subprocess
 
-from labcrane import DeviceError, Finding, Prompt, Verdict
+from labcrane import DeviceError
+from labcrane.core import Finding, Verdict
+from labcrane.registry import Prompt
 from labcrane_view.settings import ViewSettings
 from labcrane_view.window import open_window
 

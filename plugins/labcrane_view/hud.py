@@ -4,7 +4,8 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
-from labcrane import Frame, Run, SessionState, TargetFinder
+from labcrane import Frame, Run
+from labcrane.core import SessionState, TargetFinder
 
 LOAD = "joint.load"
 ITEM = re.compile(r"([-*+•]|\d+[.)])\s")
@@ -89,8 +90,7 @@ class Hud:
             "load": f"{words['load']} {working}" if working else "",
             "lateness": f"{words['lateness']} {1000 * (frame.tick.woke - frame.tick.due):.2f} ms",
         }
-        shown = [lines[name] for name in self._wanted if lines[name]]
-        return [*shown, words["paused"]] if frame.paused and self._wanted else shown
+        return [lines[name] for name in self._wanted if lines[name]]
 
 
 def notice(frame: Frame, situation: SessionState, hint_s: float, language: str) -> list[str]:

@@ -5,7 +5,8 @@ import math
 import numpy as np
 from panda3d import core
 
-from labcrane import DeviceError, FloatArray, MeshFile
+from labcrane import DeviceError, FloatArray
+from labcrane.machines import MeshFile
 from labcrane_view.mesh import Faces, Mesh, flat, joined
 
 ROUGH = 1e-6

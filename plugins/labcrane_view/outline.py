@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from labcrane import Body, FloatArray, PlacedObject
+from labcrane import FloatArray
+from labcrane.machines import Body, PlacedObject
 from labcrane_view.mesh import bevelled_box
 from labcrane_view.mesh_reader import read_mesh
 from labcrane_view.things import pieces

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from labcrane import CameraImage
+from labcrane.core import CameraImage
 from labcrane_view.camera import ROUNDING_S, Camera
 from labcrane_view.settings import ViewSettings
 

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 from panda3d import core
 
-from labcrane import Body, FloatArray, Run, Shape, Sphere, read_placed
+from labcrane import FloatArray, Run, Sphere
+from labcrane.core import Shape
+from labcrane.machines import Body, read_placed
 from labcrane_view import shader
 from labcrane_view.forest import forest
 from labcrane_view.mesh import Mesh, bevelled_box, cone, sphere
@@ -68,7 +70,8 @@ class Stage:
     def place(self, frames: FloatArray, scene: str, state: FloatArray) -> None:
         """Set the machine's bodies and what stands around.
 
-        ``frames`` as of :func:`labcrane.frames`, ``scene`` as of :func:`labcrane.read_placed`.
+        ``frames`` as of :func:`labcrane.machines.link_frames`, ``scene`` as of
+        :func:`labcrane.machines.read_placed`.
         """
         if self._scenery and scene != self._scene:
             self._furnish(scene)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from labcrane import Geom, PlacedObject, ShapeKind
+from labcrane.machines import Geom, PlacedObject, ShapeKind
 from labcrane_view.mesh import Mesh, bevelled_box, cone, joined, sphere
 from labcrane_view.mesh_reader import painted, read_mesh
 

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from labcrane import Channel, Exporter, Participant, SessionRecord, Stream, StreamHeader, XdfWriter
+from labcrane import Exporter
+from labcrane.analysis import Participant
+from labcrane.recording import Channel, SessionRecord, Stream, StreamHeader, XdfWriter
 
 CHUNK = 4096
 """Samples per chunk: a reader that stops early loses little."""

@@ -13,6 +13,8 @@ from pathlib import Path
 import grimp
 import pytest
 
+import labcrane
+
 ROOT = Path(__file__).parents[2]
 PLUGINS = sorted(path for path in (ROOT / "plugins").iterdir() if (path / "__init__.py").exists())
 HEAVY = {"pybullet", "pygame", "pyo", "panda3d", "pandas", "h5py", "nicegui", "pylsl", "matplotlib"}
@@ -35,13 +37,66 @@ def imported_modules(source: str) -> set[str]:
     return names
 
 
+PUBLIC = (
+    "core", "machines", "recording", "analysis", "replay", "registry", "participants", "testing",
+)  # fmt: skip
+"""Packages whose names are public beside those of ``labcrane`` itself."""
+
+
+def private_names(source: str) -> list[str]:
+    """Return what a source imports from labcrane that is in no ``__all__``."""
+    public = {"labcrane": set(labcrane.__all__)}
+    public |= {f"labcrane.{part}": set(getattr(labcrane, part).__all__) for part in PUBLIC}
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "labcrane":
+            known = public.get(node.module or "", set())
+            found += [f"{node.module}.{a.name}" for a in node.names if a.name not in known]
+        elif isinstance(node, ast.Import):
+            ours = (alias.name for alias in node.names if alias.name.split(".")[0] == "labcrane")
+            found += [name for name in ours if name not in public]
+    return found
+
+
 @pytest.mark.parametrize("plugin", PLUGINS, ids=lambda path: path.name)
-def test_plugin_imports_only_labcranes_public_names(plugin: Path) -> None:
+def test_a_plugin_imports_public_names_only(plugin: Path) -> None:
     for module in plugin.rglob("*.py"):
-        names = imported_modules(module.read_text())
-        ours = {name for name in names if name.startswith("labcrane")}
-        foreign = {n for n in ours if n != "labcrane" and n.split(".")[0] != plugin.name}
-        assert not foreign, f"{module.relative_to(ROOT)} imports {foreign}"
+        source = module.read_text()
+        assert not private_names(source), f"{module.relative_to(ROOT)} {private_names(source)}"
+        others = {name for name in imported_modules(source) if name.startswith("labcrane_")}
+        assert {name.split(".")[0] for name in others} <= {plugin.name}, module
+
+
+TEMPLATES = ROOT / "labcrane" / "registry" / "templates"
+
+
+@pytest.mark.parametrize("path", sorted(TEMPLATES.rglob("*.py")), ids=str)
+def test_a_new_plugin_imports_public_names_only(path: Path) -> None:
+    # What an exporter's or a command's own tests export is a recording of labcrane.testing.
+    private = [n for n in private_names(path.read_text()) if "testing.exporters" not in n]
+    assert not private
+
+
+@pytest.mark.parametrize(
+    "page",
+    [ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "own").glob("*.md")],
+    ids=lambda path: path.stem,
+)
+def test_documents_import_public_names_only(page: Path) -> None:
+    blocks = re.findall(r"```python\n(.*?)```", page.read_text(), re.S)
+    private = [n for block in blocks for n in private_names(block)]
+    assert not [n for n in private if "testing.exporters" not in n]
+
+
+def test_there_are_few_names_at_the_top_and_none_twice() -> None:
+    top = set(labcrane.__all__) - set(PUBLIC)
+    assert len(top) <= 33
+    names = [name for part in PUBLIC for name in getattr(labcrane, part).__all__]
+    assert {name for name in names if names.count(name) > 1} <= {"RATE_HZ"}
+    assert top & set(names) <= {"open_recording", "Exporter"}
+    for part in PUBLIC:
+        package = getattr(labcrane, part)
+        assert [name for name in package.__all__ if not hasattr(package, name)] == []
 
 
 def test_core_never_imports_a_plugin() -> None:

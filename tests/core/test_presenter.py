@@ -7,15 +7,8 @@ from pathlib import Path
 import numpy as np
 
 import labcrane
-from labcrane import (
-    Cylinder,
-    Feedback,
-    SessionState,
-    Settings,
-    Signal,
-    Sphere,
-    offer,
-)
+from labcrane import Cylinder, Feedback, Settings, Signal, Sphere, offer
+from labcrane.core import SessionState
 from labcrane.feedback.config import FeedbackConfig, Part
 from labcrane.feedback.presenter import Presenter
 from labcrane.registry.registry import discover

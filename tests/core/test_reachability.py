@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from labcrane import Machine, link_frames, reach
+from labcrane import Machine
+from labcrane.machines import link_frames, reach
 from labcrane.machines.library import load_machine, machine_names
 
 

@@ -9,7 +9,8 @@ import pytest
 import labcrane
 from labcrane import Cue, Dynamics, PluginError, Task
 from labcrane.registry.commands import plugin_commands
-from labcrane.registry.registry import ROLES, discover
+from labcrane.registry.hookspecs import ROLES
+from labcrane.registry.registry import discover
 
 ROOT = Path(__file__).parents[2]
 
@@ -221,7 +222,10 @@ def test_the_line_of_a_plugin_is_told_though_a_library_raised(
     ("offers", "complaint"),
     [
         ("raise ValueError('no lift today')", r"ValueError: no lift today \(.*lifting.py:\d+\)"),
-        ("return 'lift'", r"labcrane_commands must return a list of labcrane.CommandOffer\(...\)"),
+        (
+            "return 'lift'",
+            r"labcrane_commands must return a list of labcrane.registry.CommandOffer\(...\)",
+        ),
     ],
 )
 def test_commands_that_cannot_be_offered_are_told_of_with_their_plugin(

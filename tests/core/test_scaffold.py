@@ -9,10 +9,10 @@ from fresh_environment import environment_with, run
 
 from labcrane import open_recording
 from labcrane.cli.app import main
-from labcrane.registry.registry import ROLES
-from labcrane.registry.scaffold import A_ROLE, TEMPLATES
+from labcrane.registry.hookspecs import ROLES
+from labcrane.registry.scaffold import TEMPLATES, kinds
 
-NAMES = {role: "mycounter" if role == "command" else f"my_{role}" for role in A_ROLE}
+NAMES = {role: "mycounter" if role == "command" else f"my_{role}" for role in kinds()}
 
 
 @pytest.fixture(scope="module")
@@ -29,12 +29,11 @@ def environment(projects: dict[str, Path], tmp_path_factory: pytest.TempPathFact
 
 
 def test_there_is_a_template_for_every_role() -> None:
-    assert {path.name for path in TEMPLATES.iterdir()} - {"any"} == set(A_ROLE)
-    words = {"controller" if entry.word == "scheme" else entry.word for entry in ROLES.values()}
-    assert words | {"command"} == set(A_ROLE)
+    assert {path.name for path in TEMPLATES.iterdir()} - {"any", "bare"} == set(kinds())
+    assert {entry.word for entry in ROLES.values()} | {"command"} == set(kinds())
 
 
-@pytest.mark.parametrize("role", A_ROLE)
+@pytest.mark.parametrize("role", kinds())
 def test_nothing_is_left_to_fill_in(role: str, projects: dict[str, Path]) -> None:
     for path in projects[role].iterdir():
         text = path.read_text()
@@ -61,7 +60,7 @@ def test_all_are_listed_where_they_are_installed(environment: Path, tmp_path: Pa
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("role", A_ROLE)
+@pytest.mark.parametrize("role", kinds())
 def test_its_tests_pass(role: str, environment: Path, projects: dict[str, Path]) -> None:
     done = run(environment, "-m", "pytest", "-q", "-p", "no:cacheprovider", cwd=projects[role])
     assert done.returncode == 0, done.stdout
@@ -69,7 +68,7 @@ def test_its_tests_pass(role: str, environment: Path, projects: dict[str, Path])
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("role", A_ROLE)
+@pytest.mark.parametrize("role", kinds())
 def test_it_does_its_part_in_a_run(
     role: str, environment: Path, projects: dict[str, Path], tmp_path: Path
 ) -> None:
@@ -96,7 +95,7 @@ def test_it_does_its_part_in_a_run(
             done = run(environment, "-m", "labcrane", name, "count", tmp_path / "data")
             assert done.stdout == f"P001-SIMULATED: {len(session.trials)}\n"
         case "feedback":
-            shown = session.streams["labcrane.feedback.lamp"].data
+            shown = session.streams[f"labcrane.feedback.{name}"].data
             assert shown["brightness"].max() > 0.0
         case "task":
             assert set(session.trials["outcome"]) == {"success"}
@@ -110,7 +109,7 @@ def test_names_that_cannot_be_used_are_refused_in_words(
 ) -> None:
     refusals = {
         ("cuee", "my_arrow"): "there is no role 'cuee'; did you mean 'cue'?",
-        ("gizmo", "my_arrow"): "there is no role 'gizmo'; there is input, controller, dynamics",
+        ("gizmo", "my_arrow"): "there is no role 'gizmo'; there is input, scheme, dynamics",
         ("cue", "My-Arrow"): "'My-Arrow' cannot name a plugin; give a lower-case word of letters",
         ("cue", "lambda"): "'lambda' cannot name a plugin",
         ("cue", "sphere"): "plugin 'sphere' offers 'sphere' already; choose another name",

@@ -11,7 +11,8 @@ from ruamel.yaml import YAML
 from labcrane.cli.app import main
 from labcrane.protocol.json_schema import protocol_schema
 from labcrane.protocol.study import load
-from labcrane.registry.registry import ROLES, discover
+from labcrane.registry.hookspecs import ROLES
+from labcrane.registry.registry import discover
 
 ROOT = Path(__file__).parents[2]
 PROTOCOLS = sorted((ROOT / "protocols").glob("*/protocol.yaml"))

@@ -231,12 +231,14 @@ def test_two_sticks_drive_a_trial_are_unplugged_and_plugged_in_again(
     with desk() as table:
         sticks = {"left": table.plug(), "right": table.plug()}
         device = people.input
-        columns = labcrane.Layout("sticks", device.signals).columns
+        columns = labcrane.core.Layout("sticks", device.signals).columns
         read = device.read
 
         def hand_and_read(tick, seen):
             axes = hand.read(tick, seen)
-            wanted = dict(zip(labcrane.Layout("hand", hand.signals).columns, axes, strict=True))
+            wanted = dict(
+                zip(labcrane.core.Layout("hand", hand.signals).columns, axes, strict=True)
+            )
             for side, stick in sticks.items():
                 if stick is not None:
                     for number, axis in enumerate(("x", "y")):

@@ -4,7 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from labcrane import Layout, ProtocolError, Signal, signals_of
+from labcrane import ProtocolError, Signal
+from labcrane.core import Layout, signals_of
 from labcrane.protocol.rig import Rig, describe
 
 SIGNALS = (

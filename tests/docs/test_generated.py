@@ -13,7 +13,8 @@ from docs.page import ROOT
 from labcrane.cli.app import main
 from labcrane.protocol.protocol import Protocol
 from labcrane.protocol.study import load
-from labcrane.registry.registry import ROLES, discover
+from labcrane.registry.hookspecs import ROLES
+from labcrane.registry.registry import discover
 
 
 @pytest.fixture(scope="module")

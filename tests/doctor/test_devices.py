@@ -12,7 +12,8 @@ from needs import needs
 from slcan_adapter import SlcanAdapter
 from windows import an_x_server
 
-from labcrane import Finding, Offer, Settings, Verdict
+from labcrane import Offer, Settings
+from labcrane.core import Finding, Verdict
 from labcrane.testing import ExaminationContract
 from labcrane_can import labcrane_inputs
 from labcrane_can.avc import encode

@@ -24,7 +24,8 @@ AIMING = Path(__file__).parents[2] / "protocols" / "aiming" / "protocol.yaml"
 
 LAMP = '''
 import os, sys, time
-from labcrane import Finding, Settings, Verdict, hookimpl, offer
+from labcrane import Settings, hookimpl, offer
+from labcrane.core import Finding, Verdict
 
 class LampSettings(Settings):
     does: str = "nothing"

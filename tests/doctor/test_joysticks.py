@@ -7,7 +7,8 @@ import pygame
 import pytest
 from virtual_sticks import Desk, VirtualStick, desk
 
-from labcrane import Finding, Offer, Settings, Verdict
+from labcrane import Offer, Settings
+from labcrane.core import Finding, Verdict
 from labcrane.testing import ExaminationContract
 from labcrane_joystick import labcrane_inputs
 from labcrane_joystick.calibration import AxisRange, Calibration, Calibrations, save

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from labcrane import Cue, Feedback, Item, Questionnaire, Settings, Signal, Sphere, hookimpl, offer
+from labcrane import Cue, Feedback, Questionnaire, Settings, Signal, Sphere, hookimpl, offer
+from labcrane.core import Item
 from labcrane_aiming.aiming import Aiming
 from labcrane_aiming.settings import AimingSettings
 from labcrane_bullet.kinematic_crane import KinematicCrane

@@ -5,9 +5,10 @@ from pathlib import Path
 import pytest
 from jack_server import a_jack_server, underruns
 
-from labcrane import SessionRecord, open_recording
+from labcrane import open_recording
 from labcrane.launcher.launcher import Launcher
 from labcrane.launcher.session_process import SessionConfig
+from labcrane.recording import SessionRecord
 from labcrane.session.commands import QueueConsole
 
 

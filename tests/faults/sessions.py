@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +78,19 @@ def recorders(launcher: "subprocess.Popen[str]") -> list[psutil.Process]:
     ]
 
 
+def spares(launcher: "subprocess.Popen[str]") -> list[psutil.Process]:
+    """Return the recorder processes of a launcher that have loaded liblsl, and wait."""
+    found = []
+    writing = {one.pid for one in recorders(launcher)}
+    for child in _children(launcher):
+        with suppress(psutil.NoSuchProcess, psutil.ZombieProcess):
+            waits = "labcrane.streams.recorder.process" in child.cmdline()
+            maps = [each.path for each in child.memory_maps()]
+            if waits and child.pid not in writing and any("liblsl" in path for path in maps):
+                found.append(child)
+    return found
+
+
 def recorder_process(launcher: "subprocess.Popen[str]") -> psutil.Process | None:
     """Return one of the recorder processes of a launcher, while there is one."""
     return next(iter(recorders(launcher)), None)
@@ -103,7 +116,7 @@ def kill_all(launcher: "subprocess.Popen[str]") -> None:
     processes += processes[0].children(recursive=True)
     for process in processes:
         process.kill()
-    psutil.wait_procs(processes, timeout=10)
+    psutil.wait_procs(processes, timeout=240)
     launcher.communicate()
 
 
@@ -138,7 +151,7 @@ def contents(path: Path, group: str) -> dict[str, str]:
     return found
 
 
-def wait_for(condition: object, patience_s: float = 120.0) -> None:
+def wait_for(condition: object, patience_s: float = 240.0) -> None:
     """Wait until something has come about in another process; fail when it does not."""
     deadline = time.monotonic() + patience_s
     while not condition():

@@ -64,13 +64,13 @@ class Changing(Examiner):
 
 
 @pytest.fixture(scope="module")
-def session(tmp_path_factory: pytest.TempPathFactory) -> lab.SessionRecord:
+def session(tmp_path_factory: pytest.TempPathFactory) -> lab.recording.SessionRecord:
     folder = tmp_path_factory.mktemp("settings")
     played, _ = a_jack_session(STUDY.format(study=unique("settings")), folder, Changing())
     return played
 
 
-def distances(session: lab.SessionRecord, tick: np.ndarray) -> np.ndarray:
+def distances(session: lab.recording.SessionRecord, tick: np.ndarray) -> np.ndarray:
     """Return the way from tip to target at recorded ticks, shape ``(n, 3)``."""
     state, task = session.streams["state"].data, session.streams["task"].data
     tip, target = (
@@ -80,14 +80,16 @@ def distances(session: lab.SessionRecord, tick: np.ndarray) -> np.ndarray:
     return target - tip
 
 
-def before_and_after(session: lab.SessionRecord, shown: pd.DataFrame) -> tuple[np.ndarray, ...]:
+def before_and_after(
+    session: lab.recording.SessionRecord, shown: pd.DataFrame
+) -> tuple[np.ndarray, ...]:
     """Return which rows were presented before the settings were changed, and which well after."""
     (changed,) = set(session.events.query("name == 'feedback.setting'")["time"])
     due = shown["frame.due"].to_numpy()
     return due < changed, due > changed + SETTLED_S
 
 
-def test_every_change_of_a_setting_is_an_event(session: lab.SessionRecord) -> None:
+def test_every_change_of_a_setting_is_an_event(session: lab.recording.SessionRecord) -> None:
     events = session.events
     made = [dict(data) for data in events.loc[events["name"] == "feedback.setting", "data"]]
     assert [{key: data[key] for key in ("feedback", "key", "value")} for data in made] == [
@@ -99,7 +101,7 @@ def test_every_change_of_a_setting_is_an_event(session: lab.SessionRecord) -> No
     assert [data["refused"] is None for data in asked] == [True, True, True, False]
 
 
-def test_the_tone_is_rebuilt_from_the_record(session: lab.SessionRecord) -> None:
+def test_the_tone_is_rebuilt_from_the_record(session: lab.recording.SessionRecord) -> None:
     heard = session.streams["labcrane.feedback.tone"].data
     way = distances(session, heard["frame.tick"].to_numpy(int))
     there = np.isfinite(way[:, 0])
@@ -120,7 +122,9 @@ def test_the_tone_is_rebuilt_from_the_record(session: lab.SessionRecord) -> None
             np.testing.assert_allclose(heard[f"tone.{name}"].to_numpy()[chosen], values, rtol=1e-9)
 
 
-def test_the_sphere_follows_a_changed_setting_in_every_view(session: lab.SessionRecord) -> None:
+def test_the_sphere_follows_a_changed_setting_in_every_view(
+    session: lab.recording.SessionRecord,
+) -> None:
     shown = session.streams["labcrane.feedback.window"].data
     way = distances(session, shown["frame.tick"].to_numpy(int))
     radius = shown["cue.ball.radius"].to_numpy()

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from faults.sessions import STUDY, labcrane, recorders, unique, wait_for
+from faults.sessions import STUDY, labcrane, recorders, spares, unique, wait_for
 
 from labcrane import open_recording
+from labcrane.recording.foreign_streams import read_streams
 
 ROOT = Path(__file__).parents[1]
 NEEDS = """\
@@ -20,7 +21,7 @@ streams:
 """
 
 
-RECORDERS = 2
+RECORDERS, SPARES = 2, 2
 RECORDER_KILLS = 4
 
 
@@ -40,6 +41,23 @@ class Sender:
             self._process.kill()
             self._process.wait()
             self._process = None
+
+
+def all_receive(launcher: "subprocess.Popen[str]") -> bool:
+    """Whether two recorders have what the device sent since it was started again."""
+    paths = [
+        Path(file.path)
+        for recorder in recorders(launcher)
+        for file in recorder.open_files()
+        if "_streams" in file.path
+    ]
+    found = [
+        stream
+        for path in paths
+        for stream in read_streams([path])[0]
+        if stream.header.name == "Amplifier" and (stream.data[:, 0] >= 100_000).any()
+    ]
+    return len(found) == RECORDERS
 
 
 class Conversation:
@@ -63,7 +81,7 @@ class Conversation:
         self.process.stdin.flush()
 
     def end(self) -> str:
-        self.process.wait(60)
+        self.process.wait(240)
         self._reader.join()
         self.process.stdout.close()
         self.process.stdin.close()
@@ -116,10 +134,10 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
         sender.start(first=100_000)
         said.until("eeg is back")
         for kill in range(RECORDER_KILLS):
-            wait_for(lambda: len(recorders(process)) == RECORDERS)
+            wait_for(lambda: all_receive(process))
             recorders(process)[kill % 2].kill()
             said.until("a recorder died", times=kill + 1)
-        wait_for(lambda: len(recorders(process)) == RECORDERS)
+        wait_for(lambda: all_receive(process) and len(spares(process)) == SPARES)
         for recorder in recorders(process):
             recorder.kill()
         said.until("STREAM LOST", times=2)

@@ -11,7 +11,8 @@ from governed import edit
 from pages.room import a_room, photograph, press, shown
 from selenium import webdriver
 
-from labcrane import open_recording, read_placed
+from labcrane import open_recording
+from labcrane.machines import read_placed
 
 ROOT = Path(__file__).parents[2]
 SEEN = """

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from cranes import build, cranes, drive, machines, needs_bullet, random_sticks, rates, standing
 
-from labcrane import Arm, Dynamics, jacobian
+from labcrane import Dynamics
+from labcrane.machines import Arm, jacobian
 from labcrane.machines.library import load_machine
 from labcrane.testing import RATE_HZ, DynamicsContract, ch8, crane_state
 

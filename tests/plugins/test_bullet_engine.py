@@ -22,7 +22,8 @@ from cranes import (
 )
 from rehearsal import SHORT, a_study, rehearse
 
-from labcrane import ACTUATOR_PRESETS, Arm, FloatArray, Machine, link_frames
+from labcrane import FloatArray, Machine
+from labcrane.machines import ACTUATOR_PRESETS, Arm, link_frames
 from labcrane.machines.library import load_machine
 from labcrane.testing import RATE_HZ, ch8
 
@@ -37,10 +38,10 @@ class Engine:
     def loaded(self, machine: Machine) -> Iterator["Engine"]:
         import pybullet
 
-        from labcrane import urdf
+        from labcrane.machines import urdf_of
 
         self.bullet = pybullet
-        (self.folder / "crane.urdf").write_text(urdf(machine))
+        (self.folder / "crane.urdf").write_text(urdf_of(machine))
         self.client = pybullet.connect(pybullet.DIRECT)
         try:
             self.body = pybullet.loadURDF(

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from cranes import build, drive, needs_bullet, random_poses, standing
 
-from labcrane import Arm, Dynamics, FloatArray, ProtocolError, link_frames
+from labcrane import Dynamics, FloatArray, ProtocolError
+from labcrane.machines import Arm, link_frames
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
 from labcrane.testing import RATE_HZ, DynamicsContract, ch8

@@ -8,7 +8,8 @@ from cranes import needs_bullet
 from dmd_arms import MAP, MODEL, RETRIEVAL, build, standing, step
 
 import labcrane_dmd
-from labcrane import Arm, Controller, Dynamics, ProtocolError, Signal
+from labcrane import Controller, Dynamics, ProtocolError, Signal
+from labcrane.machines import Arm
 from labcrane.machines.library import load_machine
 from labcrane.testing import (
     RATE_HZ,

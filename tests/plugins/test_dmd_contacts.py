@@ -10,7 +10,8 @@ import pytest
 from cranes import needs_bullet
 from rehearsal import Rehearsal, rehearse
 
-from labcrane import FloatArray, Frame, InputDevice, Phase, Run, Signal, Tick, reach
+from labcrane import FloatArray, Frame, InputDevice, Phase, Run, Signal, Tick
+from labcrane.machines import reach
 from labcrane.machines.library import load_machine
 from labcrane.protocol import rig
 from labcrane.protocol.study import load

@@ -56,7 +56,7 @@ def press_down(arm: Dynamics, state, stop: float) -> None:
 
 
 def over_the_block() -> list[float]:
-    from labcrane import reach
+    from labcrane.machines import reach
 
     found = reach(load_machine("ied_arm.yaml", RETRIEVAL), (1.6, 0.0, 0.45))
     assert found is not None
@@ -85,7 +85,7 @@ goals: [{{position: [0, 0, 0], radius: 1}}]
 
 
 def grasp(arm: Dynamics) -> None:
-    from labcrane import reach
+    from labcrane.machines import reach
 
     found = reach(load_machine("ied_arm.yaml", RETRIEVAL), (1.35, 0.0, 0.15))
     assert found is not None

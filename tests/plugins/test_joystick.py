@@ -7,7 +7,8 @@ import pytest
 from pydantic import ValidationError
 from virtual_sticks import Desk, VirtualStick, desk
 
-from labcrane import DeviceError, InputDevice, Layout
+from labcrane import DeviceError, InputDevice
+from labcrane.core import Layout
 from labcrane.testing import InputContract, ch8, make_frame, make_run, opened
 from labcrane_joystick import labcrane_inputs
 from labcrane_joystick.calibration import (

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from virtual_sticks import Desk, VirtualStick, desk
 
-from labcrane import DeviceError, Layout
+from labcrane import DeviceError
+from labcrane.core import Layout
 from labcrane.testing import ch8, make_frame, make_run, opened
 from labcrane_joystick.__main__ import set_up, wait_and_look
 from labcrane_joystick.calibration import (

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pylsl
 import pytest
+from faults.sessions import wait_for
 from gone_stream import goes_once
 from needs import needs
 from pydantic import ValidationError
@@ -56,7 +57,7 @@ class Desk:
 
     def read_until(self, condition: object) -> np.ndarray:
         """Read in real time until what is read is as wanted."""
-        deadline = time.monotonic() + 20.0
+        deadline = time.monotonic() + 240.0
         while not condition(row := self.read()[0]):
             assert time.monotonic() < deadline, f"last read {row}; {self.keyboard.fault}"
             time.sleep(1 / RATE_HZ)
@@ -78,7 +79,8 @@ def a_view_that_sends(
     outlet = pylsl.StreamOutlet(info)
     desk = Desk(view, **settings)
     try:
-        assert outlet.wait_for_consumers(10.0)
+        keys = desk.keyboard._keys
+        wait_for(lambda: keys.connected or keys.complaint, patience_s=10.0)
         yield desk, outlet
     finally:
         desk.keyboard.close()
@@ -87,10 +89,7 @@ def a_view_that_sends(
 def press(desk: Desk, outlet: pylsl.StreamOutlet, *states: float) -> None:
     """Send the keys' states, and wait until they have come: a ramp begins with the next tick."""
     outlet.push_sample([0.0, *states])
-    deadline = time.monotonic() + 10.0
-    while not desk.keyboard._inlet.samples_available():
-        assert time.monotonic() < deadline
-        time.sleep(0.001)
+    wait_for(desk.keyboard._keys._inlet.samples_available)
 
 
 ORDER = ("a", "arrow_up", "d", "arrow_down")  # not the order in which axes name them

@@ -7,13 +7,8 @@ import pytest
 from ideal_crane import IdealCrane
 from operator_loop import DISTANCES, RADIUS, SCHEMES, Loop, ends
 
-from labcrane import (
-    ACTUATOR_PRESETS,
-    InputDevice,
-    Phase,
-    PlannedTrial,
-    Trial,
-)
+from labcrane import InputDevice, Phase, PlannedTrial, Trial
+from labcrane.machines import ACTUATOR_PRESETS
 from labcrane.machines.library import load_machine
 from labcrane.testing import RATE_HZ, InputContract, ch8
 from labcrane_operator import labcrane_inputs

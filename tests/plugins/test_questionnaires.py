@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 from rehearsal import SHORT, ScriptedConsole, a_study
 
-from labcrane import AnswerError, Item, ProtocolError, Questionnaire
-from labcrane.replay.replay import replay
+from labcrane import ProtocolError, Questionnaire
+from labcrane.core import AnswerError, Item
+from labcrane.replay import replay_session
 from labcrane.session.session import Visit, run
 from labcrane.testing import QuestionnaireContract
 from labcrane_questionnaires.demographics import Demographics
@@ -239,4 +240,4 @@ def test_a_session_is_replayed_without_the_file_of_its_questions(tmp_path: Path)
         Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=True), ScriptedConsole()
     )
     file.unlink()
-    assert replay(path, 1).difference is None
+    assert replay_session(path, 1).difference is None

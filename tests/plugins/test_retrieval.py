@@ -16,7 +16,8 @@ pytestmark = [needs_bullet, pytest.mark.long]
 
 RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"
 SCENES = {
-    path.stem: labcrane.load_scene(path) for path in sorted((RETRIEVAL / "scenes").glob("*.yaml"))
+    path.stem: labcrane.machines.load_scene(path)
+    for path in sorted((RETRIEVAL / "scenes").glob("*.yaml"))
 }
 JOINTS = load_machine("ied_arm.yaml", RETRIEVAL).names
 

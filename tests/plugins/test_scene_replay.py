@@ -10,7 +10,7 @@ from cranes import needs_bullet
 from labcrane import open_recording
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
-from labcrane.replay.replay import replay
+from labcrane.replay import replay_session
 from labcrane.session.commands import QueueConsole
 from labcrane.session.session import Visit, run
 
@@ -48,7 +48,7 @@ def test_a_scenario_is_replayed_bit_for_bit_from_its_record_alone(recorded: Path
     assert context["files"][scene]["text"] == (RETRIEVAL / scene).read_text()
     assert context["components"]["dynamics"]["settings"]["scenes"] == [scene]
     assert "somewhere" not in json.dumps(context)
-    again = replay(recorded, 1)
+    again = replay_session(recorded, 1)
     assert again.difference is None
     assert again.parts == ()
     assert again.ticks > 240

@@ -17,7 +17,8 @@ from scheme_setups import (
     switchable,
 )
 
-from labcrane import Controller, ProtocolError, Settings, jacobian
+from labcrane import Controller, ProtocolError, Settings
+from labcrane.machines import jacobian
 from labcrane.testing import (
     ControllerContract,
     ch8,

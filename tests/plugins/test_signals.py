@@ -9,7 +9,8 @@ import pytest
 import synthetic_signals as synthetic
 
 import labcrane_signals
-from labcrane import FloatArray, SignalChannel, SignalMonitor, SignalStream
+from labcrane import FloatArray, SignalMonitor
+from labcrane.core import SignalChannel, SignalStream
 from labcrane.testing import PluginContract, SignalMonitorContract, ch8
 
 WITHIN_S = 5.0

@@ -23,7 +23,8 @@ from windows import (
     shown,
 )
 
-from labcrane import DeviceError, Feedback, ProtocolError, SessionState, Sphere
+from labcrane import DeviceError, Feedback, ProtocolError, Sphere
+from labcrane.core import SessionState
 from labcrane.machines.kinematics import Arm
 from labcrane.testing import FeedbackContract, crane_at
 from labcrane_view.monitors import parse

@@ -11,18 +11,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 from windows import MACHINE, SIZE, a_scene, make_frame, projected
 
-from labcrane import (
-    Body,
-    Frame,
-    Geom,
-    Layout,
-    MeshFile,
-    PlacedObject,
-    SessionState,
-    ShapeKind,
-    Signal,
-    write_placed,
-)
+from labcrane import Frame, Signal
+from labcrane.core import Layout, SessionState
+from labcrane.machines import Body, Geom, MeshFile, PlacedObject, ShapeKind, write_placed
 from labcrane_view.outline import outermost
 from labcrane_view.settings import CAMERAS, ViewSettings
 from labcrane_view.view import View

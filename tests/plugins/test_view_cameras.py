@@ -5,7 +5,8 @@ import pytest
 from pydantic import ValidationError
 from windows import MACHINE, SIZE, a_view, make_frame, projected, shown
 
-from labcrane import DeviceError, Frame, SessionState, Sphere
+from labcrane import DeviceError, Frame, Sphere
+from labcrane.core import SessionState
 from labcrane_view.hud import notice
 from labcrane_view.settings import CAMERAS, CameraSettings
 
@@ -173,7 +174,8 @@ def test_the_joints_load_is_in_the_corner() -> None:
 
     from windows import a_scene
 
-    from labcrane import Layout, Signal
+    from labcrane import Signal
+    from labcrane.core import Layout
     from labcrane_view.hud import Hud
 
     run = a_scene()

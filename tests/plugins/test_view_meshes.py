@@ -12,21 +12,10 @@ import pytest
 from rehearsal import SHORT, a_study
 from windows import MACHINE, POSE, make_frame, projected
 
-from labcrane import (
-    DeviceError,
-    Frame,
-    Machine,
-    MeshFile,
-    ProtocolError,
-    SessionState,
-    Signal,
-    link_boxes,
-    link_frames,
-    read_placed,
-    urdf,
-    write_placed,
-)
+from labcrane import DeviceError, Frame, Machine, ProtocolError, Signal
 from labcrane.approval.materials import referred
+from labcrane.core import SessionState
+from labcrane.machines import MeshFile, link_boxes, link_frames, read_placed, urdf_of, write_placed
 from labcrane.machines.scene import load_scene, place_objects
 from labcrane.recording.run_codec import read_run, write_run
 from labcrane.testing import TARGETS, crane_state, make_run
@@ -190,7 +179,7 @@ def meshed(folder: Path, **settings: object) -> Machine:
 
 def test_a_mesh_changes_nothing_that_is_touched_and_is_sent_along(tmp_path: Path) -> None:
     machine = meshed(tmp_path)
-    assert urdf(machine) == urdf(MACHINE)
+    assert urdf_of(machine) == urdf_of(MACHINE)
     run = replace(make_run(machine, task=TARGETS), bodies=link_boxes(machine))
     again = read_run(write_run(run))
     assert again.bodies == run.bodies

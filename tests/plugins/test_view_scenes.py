@@ -12,15 +12,12 @@ import pytest
 from cranes import needs_bullet
 from needs import GRAPHICS, needs
 
-from labcrane import (
-    FloatArray,
-    Frame,
+from labcrane import FloatArray, Frame, Run, Tick
+from labcrane.core import SessionState
+from labcrane.machines import (
     Geom,
     PlacedObject,
-    Run,
-    SessionState,
     ShapeKind,
-    Tick,
     load_scene,
     place_objects,
     read_placed,

@@ -3,6 +3,7 @@ import fcntl
 import json
 import os
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -13,14 +14,13 @@ from recording.journals import write
 
 from labcrane import RecordingError
 from labcrane.recording.foreign_streams import (
-    Conclusion,
-    Correction,
     RecordedStream,
     companion_headers,
 )
 from labcrane.recording.participant_file.reader import open_recording
-from labcrane.recording.participant_file.recorrect import recorrect
+from labcrane.recording.participant_file.recorrect import read_stream, recorrect
 from labcrane.recording.participant_file.recover import recover
+from labcrane.recording.participant_file.stream_group import write_time, write_uncorrected
 from labcrane.recording.participant_file.writer import consolidate
 from labcrane.recording.xdf.header import Channel, StreamHeader
 from labcrane.recording.xdf.writer import XdfWriter
@@ -92,12 +92,14 @@ def test_parts_of_a_stream_are_joined_where_its_source_is_the_same(folder: Path)
     record(folder / "ses-01_streams.part2.xdf", 500, first=2000)
     seen: dict[str, RecordedStream] = {}
 
-    def correct(stream: RecordedStream) -> Correction:
-        seen[stream.header.name] = stream
-        return Correction(stream.time_raw + 8.0, {"residual_p95": 1e-5, "verdict": "PASS"})
+    def conclude(group: h5py.Group) -> None:
+        for one in group["streams"].values():
+            stream = seen[str(one.attrs["name"])] = read_stream(one)
+            later = {"time": stream.time_raw + 8.0}
+            write_time(one, later, {"residual_p95": 1e-5, "verdict": "PASS"})
 
     journals = [folder / "ses-01_run.xdf", folder / "ses-01_streams.xdf"]
-    consolidate(folder / "P001.h5", journals, lambda context: Conclusion(correct))
+    consolidate(folder / "P001.h5", journals, conclude)
     eeg = seen["EEG / 1"]
     assert eeg.starts == (0, 1000)
     assert [note.data["samples"] for note in eeg.notes] == [[0, 1000], [1000, 1500]]
@@ -111,11 +113,13 @@ def test_parts_of_a_stream_are_joined_where_its_source_is_the_same(folder: Path)
     assert "Gaze-2" in session.streams  # no source id, so nobody knows that it is the same
 
 
-def test_a_clock_that_cannot_be_corrected_costs_no_session(folder: Path) -> None:
-    def correct(stream: RecordedStream) -> Correction:
-        raise RecordingError(f"no probes for {stream.header.name}")
+def uncorrected(group: h5py.Group) -> None:
+    for stream in group["streams"].values():
+        write_uncorrected(stream, f"no probes for {stream.attrs['name']}")
 
-    (done,) = recover(folder, lambda context: Conclusion(correct))
+
+def test_a_clock_that_cannot_be_corrected_costs_no_session(folder: Path) -> None:
+    (done,) = recover(folder, uncorrected)
     assert done.problem == ""
     eeg = open_recording(folder / "P001.h5").session(1).streams["EEG _ 1"]
     assert eeg.attrs["uncorrected"] == "no probes for EEG / 1"
@@ -139,19 +143,15 @@ def test_pyxdf_reads_the_streams_beside(folder: Path) -> None:
     np.testing.assert_allclose(named["EEG / 1"]["time_stamps"], np.arange(1000) / 500 + 8.0)
 
 
-def as_they_are(stream: RecordedStream) -> Correction:
-    return Correction(stream.time_raw)
+def as_they_are(group: h5py.Group) -> None:
+    for stream in group["streams"].values():
+        write_time(stream, {"time": stream["time_raw"][:]}, {})
 
 
 def test_clocks_that_are_corrected_later_are_no_longer_uncorrected(folder: Path) -> None:
-    def correct(stream: RecordedStream) -> Correction:
-        raise RecordingError("no probes")
-
-    recover(folder, lambda context: Conclusion(correct))
+    recover(folder, uncorrected)
     path = folder / "P001.h5"
-    assert recorrect(path, lambda context: Conclusion(as_they_are)) == {
-        1: ["EEG _ 1", "Gaze", "Keys"]
-    }
+    assert recorrect(path, as_they_are) == {1: ["EEG _ 1", "Gaze", "Keys"]}
     eeg = open_recording(path).session(1).streams["EEG _ 1"]
     assert eeg.attrs["corrected"] is True
     assert "uncorrected" not in eeg.attrs
@@ -162,7 +162,7 @@ def test_a_disk_that_refuses_new_corrections_leaves_the_file_as_it_was(folder: P
     path = folder / "P001.h5"
     before, beside = path.read_bytes(), sorted(folder.iterdir())
 
-    def full(context: object) -> Conclusion:
+    def full(group: h5py.Group) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with pytest.raises(RecordingError, match=r"No space left .* and run labcrane resync .*P001.h5"):
@@ -175,9 +175,8 @@ def test_correcting_again_waits_for_whoever_writes_the_participant_file(folder: 
     recover(folder)
     path, entered = folder / "P001.h5", threading.Event()
 
-    def conclude(context: object) -> Conclusion:
+    def conclude(group: h5py.Group) -> None:
         entered.set()
-        return Conclusion(as_they_are)
 
     held = os.open(folder, os.O_RDONLY)
     fcntl.flock(held, fcntl.LOCK_EX)
@@ -185,10 +184,37 @@ def test_correcting_again_waits_for_whoever_writes_the_participant_file(folder: 
     again.start()
     assert not entered.wait(0.5)
     os.close(held)
-    again.join(60)
+    again.join(240)
     assert entered.is_set()
 
 
 def test_correcting_a_file_that_is_not_there_says_what_makes_one(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"no participant file .*; labcrane recover"):
-        recorrect(tmp_path / "nobody" / "P009.h5", lambda context: Conclusion(as_they_are))
+        recorrect(tmp_path / "nobody" / "P009.h5", as_they_are)
+
+
+def test_times_of_before_stand_beside_better_ones(folder: Path) -> None:
+    def later(seconds: float) -> Callable[[h5py.Group], None]:
+        def conclude(group: h5py.Group) -> None:
+            for stream in group["streams"].values():
+                time = stream["time_raw"][:] + seconds
+                error = np.full(len(time), 2e-4)
+                basis = np.zeros(len(time))
+                columns = {"time": time, "time_error": error, "time_basis": basis}
+                write_time(stream, columns, {"offset": seconds})
+
+        return conclude
+
+    recover(folder, later(8.0))
+    path = folder / "P001.h5"
+    for _ in range(2):  # the second time nothing is better
+        recorrect(path, later(8.1))
+    stream = open_recording(path).session(1).streams["EEG _ 1"]
+    np.testing.assert_allclose(stream.time, stream.time_raw + 8.1)
+    np.testing.assert_allclose(stream.time_error, 0.2)
+    assert set(stream.time_basis) == {"probes"}
+    with h5py.File(path) as file:
+        earlier = file["ses-01/streams/EEG _ 1/earlier"]
+        assert list(earlier) == ["time-1"]
+        np.testing.assert_allclose(earlier["time-1"][:], stream.time_raw + 8.0)
+        assert earlier["time-1"].attrs["offset"] == 8.0

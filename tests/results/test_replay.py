@@ -11,12 +11,12 @@ from labcrane import Frame, ProtocolError, RecordingError
 from labcrane.analysis.measures import measure_session
 from labcrane.cli.app import main
 from labcrane.recording.participant_file.reader import open_recording
-from labcrane.replay.replay import replay
+from labcrane.replay import replay_session
 from labcrane.session.commands import Command, Order, StreamBack, StreamLost
 from results.recorded import STUDY, record, study
 
 ROOT = Path(__file__).parents[2]
-CH8 = Path(labcrane.__file__).parent / "machines" / "ch8.yaml"
+CH8 = Path(labcrane.__file__).parent / "machines" / "data" / "ch8.yaml"
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def test_a_whole_session_on_the_engine_is_bit_identical(tmp_path: Path) -> None:
     path = record(a_study(tmp_path, text), tmp_path / "data", "P001", simulated=True)
     session = open_recording(path).session(1)
     assert len(session.trials) == 32
-    again = replay(path, 1)
+    again = replay_session(path, 1)
     assert again.difference is None
     assert again.parts == ()
     assert again.ticks == len(session.streams["state"].time)
@@ -49,7 +49,7 @@ def test_a_whole_session_on_the_engine_is_bit_identical(tmp_path: Path) -> None:
 def test_a_changed_machine_is_named_with_the_first_tick_that_differs(
     path: Path, tmp_path: Path
 ) -> None:
-    again = replay(path, 1, machine=changed_machine(tmp_path))
+    again = replay_session(path, 1, machine=changed_machine(tmp_path))
     assert again.parts == ("machine.joints.slew.speed_deg_s: recorded 26, now 26.5",)
     first = again.difference
     assert first is not None
@@ -67,7 +67,7 @@ def test_a_changed_machine_is_named_with_the_first_tick_that_differs(
 def test_a_changed_setting_is_named(path: Path, tmp_path: Path) -> None:
     other = tmp_path / "study.yaml"
     other.write_text(STUDY.replace("joint_velocity\n", "joint_velocity\n  dead_zone: 0.2\n"))
-    again = replay(path, 1, protocol=other)
+    again = replay_session(path, 1, protocol=other)
     assert any(part.startswith("scheme.settings.dead_zone: recorded") for part in again.parts)
     assert again.difference is not None
 
@@ -79,7 +79,7 @@ def test_another_version_is_named(path: Path, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(
         replay_parts, "version", lambda name: "0.0.9" if name == "numpy" else real(name)
     )
-    again = replay(path, 1)
+    again = replay_session(path, 1)
     assert again.parts == (f"numpy: recorded with {np.__version__}, now 0.0.9",)
     assert again.difference is None
 
@@ -97,7 +97,7 @@ def test_orders_are_given_again_at_their_ticks(tmp_path: Path) -> None:
     path = record(study(tmp_path), tmp_path / "data", "P001", simulated=True, orders=orders)
     events = open_recording(path).session(1).events["name"].tolist()
     assert {"order.pause", "order.repeat", "stream.lost", "stream.back"} <= set(events)
-    again = replay(path, 1)
+    again = replay_session(path, 1)
     assert again.difference is None
     assert again.ticks == 4001
 
@@ -112,7 +112,7 @@ def test_lost_controls_are_lost_again(tmp_path: Path) -> None:
     second = record(a_study(tmp_path, text), tmp_path / "more", "P001", simulated=True)
     events = open_recording(second).session(1).events["name"].tolist()
     assert "input.lost" in events
-    assert replay(second, 1).difference is None
+    assert replay_session(second, 1).difference is None
 
 
 def test_measures_that_nobody_thought_of_are_taken_from_the_frames(path: Path) -> None:
@@ -121,7 +121,7 @@ def test_measures_that_nobody_thought_of_are_taken_from_the_frames(path: Path) -
     def look(frame: Frame) -> None:
         heights.append(float(frame.state[10]))
 
-    again = replay(path, 1, sinks=[look])
+    again = replay_session(path, 1, sinks=[look])
     assert len(heights) == again.ticks
     session = open_recording(path).session(1)
     np.testing.assert_array_equal(heights, session.streams["state"].data["tip.position.z"])
@@ -146,9 +146,9 @@ def test_the_command_says_what_came_of_it(
 
 def test_what_cannot_be_replayed_is_refused(path: Path) -> None:
     with pytest.raises(RecordingError, match="has no session 2; it has 1"):
-        replay(path, 2)
+        replay_session(path, 2)
     with pytest.raises(ProtocolError, match="a speed of 0 shows nothing; give one above 0"):
-        replay(path, 1, speed=0.0)
+        replay_session(path, 1, speed=0.0)
 
 
 def test_a_replay_is_shown_on_the_streams_at_a_speed(path: Path) -> None:
@@ -171,7 +171,7 @@ def test_a_replay_is_shown_on_the_streams_at_a_speed(path: Path) -> None:
     watcher = threading.Thread(target=watch)
     watcher.start()
     began = time.perf_counter()
-    again = replay(path, 1, speed=10.0)
+    again = replay_session(path, 1, speed=10.0)
     took = time.perf_counter() - began
     watcher.join()
     assert len(got) == 3

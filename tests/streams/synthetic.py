@@ -40,7 +40,7 @@ def probe(clock: Callable, start: float, stop: float, random, *, every=1.0, way_
 
 def arrivals(times, *, every=0.03, travel_s=200e-6):
     """Return what a recorder notes that pulls at steady intervals."""
-    pulled = np.ceil((times + travel_s) / every) * every
+    pulled = np.ceil((np.maximum.accumulate(times) + travel_s) / every) * every
     last = np.flatnonzero(np.r_[np.diff(pulled) > 0, True])
     return np.column_stack([last + 1.0, pulled[last]])
 

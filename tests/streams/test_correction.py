@@ -172,7 +172,9 @@ def test_stamps_of_a_clock_that_lsl_does_not_know_are_told(random, foreign):
     raw = RawStream.of(honest.stamps + foreign, honest.probes, honest.arrivals)
     corrected = correct(raw, REGULAR)
     assert corrected.quality.lag_s == pytest.approx(-foreign, rel=1e-5)
-    assert corrected.quality.unprobed == 0
+    assert corrected.quality.whose == "foreign"
+    assert corrected.quality.unprobed == len(times)
+    assert (np.abs(corrected.time - times) < corrected.error).all()
 
 
 def test_delay_of_probes_on_one_way_is_found_by_their_round_trips(random):

@@ -9,8 +9,9 @@ import h5py
 import numpy as np
 import pytest
 
-from labcrane import FloatArray, SignalChannel, SignalFault, SignalMonitor, SignalStream
+from labcrane import FloatArray, SignalMonitor
 from labcrane.cli.streams import watched_lines
+from labcrane.core import SignalChannel, SignalFault, SignalStream
 from labcrane.monitoring.monitored_stream import MonitoredStream
 from labcrane.monitoring.stream_meter import StreamMeter, StreamReading
 from labcrane.monitoring.watch import StreamView
@@ -26,7 +27,8 @@ CALM = np.zeros((10, 2))
 
 PLUGIN = """
 import os, time
-from labcrane import Settings, SignalFault, SignalMonitor, hookimpl, offer
+from labcrane import Settings, SignalMonitor, hookimpl, offer
+from labcrane.core import SignalFault
 
 labcrane_api = 1
 

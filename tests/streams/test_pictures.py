@@ -11,7 +11,7 @@ import pylsl
 import pytest
 from faults.sessions import unique, wait_for
 
-from labcrane import CameraImage
+from labcrane.core import CameraImage
 from labcrane.streams.pictures import PictureOutlet
 from labcrane.web.pictures import Pictures
 

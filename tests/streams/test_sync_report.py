@@ -14,7 +14,7 @@ from labcrane.recording.foreign_streams import Note, RecordedStream
 from labcrane.recording.xdf.header import Channel, StreamHeader
 from labcrane.streams.sync.limits import Limit, Limits
 from labcrane.streams.sync.quality import Quality
-from labcrane.streams.sync.resync import correction_of, resync, treatment_of
+from labcrane.streams.sync.resync import columns_of, quality_of, resync, treatment_of
 from labcrane.streams.sync.stream_report import judge_stream
 from labcrane.streams.sync.sync_report import COLUMNS, SyncReport, judge_loop, never_came
 
@@ -77,7 +77,7 @@ def test_samples_that_a_sources_counter_left_out_are_judged():
     report = judged(recorded(clock=SourceClock(ppm=40.0), notes=notes))
     (finding,) = report.findings
     assert (finding.verdict, report.quality.dropped) == (Verdict.FAIL, 402)
-    assert finding.text == "402 samples are missing by the source's counter"
+    assert finding.text == "402 samples are missing, by its counter or between its stamps"
 
 
 def test_what_is_not_known_fails():
@@ -123,13 +123,16 @@ def test_resets_in_a_later_part_count_from_its_first_sample():
     assert np.abs(corrected.time - np.r_[times, later]).max() < 1e-5
 
 
-def test_consolidation_gets_times_and_flat_figures():
+def test_the_file_gets_a_row_per_sample_and_flat_figures():
     stream = recorded()
-    correction = correction_of(resync(stream), treatment_of(stream.header))
-    assert len(correction.time) == 30_000
-    assert correction.quality["drift_ppm"] == pytest.approx(100.0, abs=0.5)
-    assert correction.quality["dejitter"] == "least_squares"
-    assert all(isinstance(value, float | str) for value in correction.quality.values())
+    corrected = resync(stream)
+    columns = columns_of(corrected)
+    assert list(columns) == ["time", "time_error", "time_uneven", "time_basis"]
+    assert {len(column) for column in columns.values()} == {30_000}
+    quality = quality_of(corrected, treatment_of(stream.header))
+    assert quality["drift_ppm"] == pytest.approx(100.0, abs=0.5)
+    assert quality["dejitter"] == "auto"
+    assert all(isinstance(value, float | str) for value in quality.values())
 
 
 def test_a_streams_own_header_says_how_it_is_read():

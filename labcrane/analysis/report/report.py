@@ -16,6 +16,8 @@ from labcrane.analysis.statistics.anova import repeated_measures
 from labcrane.analysis.statistics.fitts import throughput
 from labcrane.analysis.statistics.learning import learning_curves
 from labcrane.analysis.statistics.trends import holm, linear_trend, mixed_model
+from labcrane.errors import LabcraneError
+from labcrane.recording.participant_file.writer import DAMAGED
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,6 +33,7 @@ def write_report(
     folder: Path,
     settings: MeasureSettings = DEFAULTS,
     progress: Callable[[int, int], None] | None = None,
+    leave_out: Callable[[str, str], None] | None = None,
     workers: int = 1,
     scheduler: str | None = None,
 ) -> Path:
@@ -43,6 +46,8 @@ def write_report(
     ----------
     progress
         Told how many participants are done, of how many.
+    leave_out
+        Told whose data cannot be used, and why; the report is of the others, and says so.
     workers, scheduler
         Who does it; see :func:`labcrane.analysis.parallel.work`.
     """
@@ -52,8 +57,13 @@ def write_report(
     (folder / "participants").mkdir(exist_ok=True)
     one = partial(_one, settings=settings, folder=folder.resolve())
     found = {}
-    for name, *tables in work(one, cohort.included, workers, scheduler):
-        found[name] = tables
+    for name, why, *tables in work(one, cohort.included, workers, scheduler):
+        if why:
+            cohort = cohort.without(name, why)
+            if leave_out is not None:
+                leave_out(name, why)
+        else:
+            found[name] = tables
         if progress is not None:
             progress(len(found), len(cohort.included))
     in_order = [found[participant.name] for participant in cohort.included]
@@ -79,12 +89,25 @@ def write_report(
 
 def _one(
     participant: Participant, settings: MeasureSettings, folder: Path
-) -> "tuple[str, pd.DataFrame, pd.DataFrame, pd.DataFrame]":
-    """Write one participant's page; return name, movements, and quality of loop and clocks."""
-    own = measures_of(participant, settings)
-    loop, sync = loop_quality(participant), sync_quality(participant)
-    _participant_page(participant, own, loop, sync, folder)
-    return participant.name, own, loop, sync
+) -> "tuple[str, str, pd.DataFrame, pd.DataFrame, pd.DataFrame]":
+    """Write one participant's page; return name, movements, and quality of loop and clocks.
+
+    The second is why the data cannot be used, and then the tables are empty.
+    """
+    import pandas as pd
+
+    try:
+        own = measures_of(participant, settings)
+        loop, sync = loop_quality(participant), sync_quality(participant)
+        _participant_page(participant, own, loop, sync, folder)
+    except (LabcraneError, *DAMAGED) as error:  # one recording never stops a cohort
+        nothing = pd.DataFrame()
+        return participant.name, _words(error), nothing, nothing, nothing
+    return participant.name, "", own, loop, sync
+
+
+def _words(error: Exception) -> str:
+    return str(error) if isinstance(error, LabcraneError) else f"cannot be measured: {error!r}"
 
 
 def _title(participant: Participant) -> str:

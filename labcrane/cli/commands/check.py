@@ -15,20 +15,38 @@ if TYPE_CHECKING:
     from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan
 
 
-def check(protocol: ProtocolPath, as_json: AsJson = False) -> None:
+def check(
+    protocol: ProtocolPath,
+    as_json: AsJson = False,
+    simulated: Annotated[
+        bool, typer.Option("--simulated", help="what a simulation needs must be installed, no more")
+    ] = False,
+) -> None:
     """Check a protocol and everything it refers to, without running it."""
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
 
     try:
         study = load(protocol, discover(study=protocol))
+        study.check_installed(simulated=simulated, feedback=not simulated)
     except ProtocolError as error:
         if as_json:
             typer.echo(json.dumps({"fine": False, "problems": str(error).splitlines()}))
         raise
     if as_json:
-        typer.echo(json.dumps({"fine": True, "problems": [], "study": study.protocol.study}))
+        typer.echo(
+            json.dumps(
+                {
+                    "fine": True,
+                    "problems": [],
+                    "warnings": list(study.warnings()),
+                    "study": study.protocol.study,
+                }
+            )
+        )
         return
+    for warning in study.warnings():
+        typer.echo(f"{protocol}: warning: {warning}", err=True)
     sessions = len(study.protocol.sessions)
     # One plain line, for which rich is not worth loading.
     typer.echo(

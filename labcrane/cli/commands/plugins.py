@@ -26,7 +26,8 @@ def plugins(context: typer.Context, study: OfStudy = None, as_json: AsJson = Fal
     """List what installed plugins offer; ``show NAME`` tells everything about one."""
     if context.invoked_subcommand is not None:
         return
-    from labcrane.registry.registry import ROLES, discover
+    from labcrane.registry.hookspecs import ROLES
+    from labcrane.registry.registry import discover
 
     registry = discover(study=study)
     if as_json:
@@ -101,7 +102,7 @@ def new_plugin(
 
 
 def _listed(registry: "Registry") -> dict[str, object]:
-    from labcrane.registry.registry import ROLES
+    from labcrane.registry.hookspecs import ROLES
 
     offers = [
         {

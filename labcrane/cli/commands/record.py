@@ -210,11 +210,28 @@ def _recover(folder: Path) -> None:
 
 
 def resync(
-    file: Annotated[Path, typer.Argument(help="a participant file")],
+    file: Annotated[Path, typer.Argument(help="a participant file, or anybody's XDF file")],
 ) -> None:
-    """Correct the clocks of a participant file's streams again, from what it holds."""
+    """Correct the clocks of a participant file's streams again, or those of any XDF file."""
+    if file.suffix == ".xdf":
+        _resync_xdf(file)
+        return
     from labcrane.recording.participant_file.recorrect import recorrect
     from labcrane.session.postprocess import conclude
 
     for session, names in recorrect(file, conclude).items():
         out.print(f"session {session}: {', '.join(names) or 'no streams'}", markup=False)
+
+
+def _resync_xdf(file: Path) -> None:
+    from labcrane.cli.sync import print_report
+    from labcrane.session.resync_xdf import resync_xdf
+
+    done = resync_xdf(file)
+    print_report(done.report)
+    for name, (usual, most) in done.against_pyxdf.items():
+        out.print(
+            f"{name}: pyxdf's times are {1e3 * usual:.3f} ms away, {1e3 * most:.3f} ms at most",
+            markup=False,
+        )
+    out.print(f"corrected times and their errors are in {done.path}", markup=False)

@@ -1,7 +1,7 @@
 """Commands that work on recordings: export, report, replay."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,11 +10,12 @@ import typer
 from labcrane.cli.commands.approval import today
 from labcrane.cli.options import stay_on_this_computer
 from labcrane.cli.output import out
-from labcrane.errors import ProtocolError, RecordingError
+from labcrane.errors import LabcraneError, ProtocolError, RecordingError
 
 if TYPE_CHECKING:
     from labcrane.analysis.cohort import Cohort, Participant, Struck
     from labcrane.analysis.movements import Groups
+    from labcrane.participants.products import Product
 
 DataFolder = Annotated[Path, typer.Argument(metavar="DATA", help="the study's data folder")]
 Include = Annotated[
@@ -25,7 +26,13 @@ Workers = Annotated[int, typer.Option(help="processes on this computer", min=1)]
 Scheduler = Annotated[
     str | None, typer.Option(help="a Dask scheduler whose workers do it: tcp://host:8786")
 ]
-MANIFEST = "labcrane_export.json"
+AcceptUnprobed = Annotated[
+    bool,
+    typer.Option("--accept-unprobed", help="use streams whose clock was never probed as well"),
+]
+
+LEFT_OUT = 3
+"""Exit status of what was done, but without recordings that cannot be used."""
 
 
 def export(
@@ -40,10 +47,12 @@ def export(
     ] = None,
     workers: Workers = 1,
     scheduler: Scheduler = None,
+    accept_unprobed: AcceptUnprobed = False,
 ) -> None:
     """Export recordings for R, MATLAB, BIDS, Psych-DS or EEG programs."""
     from labcrane.analysis.exporter import Exporter
     from labcrane.analysis.movements import machine_of
+    from labcrane.analysis.quality import check_probed
     from labcrane.registry.call_monitor import CallMonitor
     from labcrane.registry.registry import discover
 
@@ -56,28 +65,91 @@ def export(
     if folder.exists() and any(folder.iterdir()):
         raise ProtocolError(f"{folder} is not empty, and nothing is overwritten; give a new folder")
     cohort = cohort_of(data.resolve() if scheduler else data, include)
+    unknown = check_probed(cohort.included, accept=accept_unprobed)
     _, first = next(cohort.included[0].sessions())
     exporter = oversight.call(place, offer.build, chosen, machine_of(first))
-    folder.mkdir(parents=True, exist_ok=True)
-    people = _measured(cohort, workers, scheduler)
-    with progress_bar(f"export to {to}", len(cohort.included)) as advance:
-        oversight.call(place, exporter.export, _counted(people, advance), folder)
-    _write_manifest(folder, to, chosen.model_dump(mode="json"), cohort)
-    _keep_track(data, to, folder, cohort)
+
+    def attempt(cohort: "Cohort") -> None:
+        people = _Read(_measured(cohort, workers, scheduler))
+        with (
+            _product(data, to, folder, cohort, shared=exporter.shared) as made,
+            progress_bar(f"export to {to}", len(cohort.included)) as advance,
+        ):
+            handed = made.handing_out((person.name, person) for person in people.counted(advance))
+            try:
+                oversight.call(place, exporter.export, handed, made.folder)
+            except LabcraneError as error:
+                if people.now is None:  # nobody's data were being read
+                    raise
+                raise _Unusable(people.now, str(error)) from error
+            _write_manifest(made.folder, to, chosen.model_dump(mode="json"), cohort, unknown)
+
+    cohort = _without_bad(attempt, cohort)
     out.print(f"{to}: {folder}", markup=False)
+    _tell_left_out(cohort)
+
+
+class _Unusable(Exception):  # noqa: N818 - no error: the rest is done without
+    """Somebody's data stopped what was made of everybody's."""
+
+    def __init__(self, name: str, why: str) -> None:
+        super().__init__(name, why)
+        self.name, self.why = name, why
+
+
+class _Read:
+    """Participants as they are handed out, and whose data are being read now."""
+
+    def __init__(self, people: "Sequence[Participant]") -> None:
+        self._people = people
+        self.now: str | None = None
+
+    def counted(self, advance: Any) -> "Iterator[Participant]":
+        for person in self._people:
+            self.now = person.name
+            yield person
+            advance()
+        self.now = None
+
+
+def _without_bad(attempt: "Callable[[Cohort], None]", cohort: "Cohort") -> "Cohort":
+    """Do something with a cohort; without whoever's data cannot be used, who is named."""
+    while True:
+        try:
+            attempt(cohort)
+        except _Unusable as bad:
+            cohort = _leave_out(cohort, bad.name, bad.why)
+        else:
+            return cohort
+
+
+def _leave_out(cohort: "Cohort", name: str, why: str) -> "Cohort":
+    out.print(f"left out: {name}, unreadable: {why}", markup=False)
+    return cohort.without(name, why)
+
+
+def _tell_left_out(cohort: "Cohort") -> None:
+    """Say how many recordings cannot be used, and end with their exit code."""
+    if not cohort.unreadable:
+        return
+    names = ", ".join(person.name for person in cohort.unreadable)
+    out.print(f"{len(cohort.unreadable)} recordings cannot be used: {names}", markup=False)
+    raise typer.Exit(LEFT_OUT)
 
 
 def _measured(cohort: "Cohort", workers: int, scheduler: str | None) -> "Sequence[Participant]":
     """Return the participants; with many workers their measures, most of the work, are done."""
     if workers == 1 and scheduler is None:
         return cohort.included
-    from labcrane.analysis.measures import measure_ahead
+    from labcrane.analysis.measures import measure_or_say_why
     from labcrane.analysis.parallel import work
 
     with progress_bar("measure", len(cohort.included)) as advance:
         done = {}
-        for person in work(measure_ahead, cohort.included, workers, scheduler):
-            done[person.name] = person
+        for name, why, person in work(measure_or_say_why, cohort.included, workers, scheduler):
+            if person is None:
+                raise _Unusable(name, why)
+            done[name] = person
             advance()
     return [done[person.name] for person in cohort.included]
 
@@ -90,20 +162,33 @@ def report(
     include: Include = None,
     workers: Workers = 1,
     scheduler: Scheduler = None,
+    accept_unprobed: AcceptUnprobed = False,
 ) -> None:
     """Write an HTML report of a study: figures, measures, statistics, quality."""
+    from labcrane.analysis.quality import check_probed
     from labcrane.analysis.report.report import write_report
 
     cohort = cohort_of(data.resolve() if scheduler else data, include)
-    with progress_bar("report", len(cohort.included)) as advance:
+    check_probed(cohort.included, accept=accept_unprobed)
+
+    def leave_out(name: str, why: str) -> None:
+        nonlocal cohort
+        cohort = _leave_out(cohort, name, why)
+
+    with (
+        _product(data, "report", folder, cohort, whole=True) as made,
+        progress_bar("report", len(cohort.included)) as advance,
+    ):
         page = write_report(
             cohort,
-            folder,
+            made.folder,
+            leave_out=leave_out,
             progress=lambda done, of: advance(),
             workers=workers,
             scheduler=scheduler,
         )
-    out.print(f"report: {page}", markup=False)
+    out.print(f"report: {folder / page.name}", markup=False)
+    _tell_left_out(cohort)
 
 
 def replay(
@@ -123,7 +208,7 @@ def replay(
     ] = None,
 ) -> None:
     """Run a recorded session again from its input, and compare every number."""
-    from labcrane.replay.replay import replay as run_again
+    from labcrane.replay.replay import replay_session as run_again
 
     if speed is not None:
         stay_on_this_computer()
@@ -146,10 +231,12 @@ def replay(
 def _write_measures(recording: Path, session: int, frames: "Groups", path: Path) -> None:
     """Write the measures of a session's movements in the ``frames`` of its replay."""
     from labcrane.analysis.measures import measure_session
+    from labcrane.participants.products import written_about
     from labcrane.recording.participant_file.reader import open_recording
 
     record = open_recording(recording).session(session)
-    measure_session(record, frames=frames).to_csv(path, index=False)
+    with written_about(recording, "replay", path) as beside:
+        measure_session(record, frames=frames).to_csv(beside, index=False)
     out.print(f"measures: {path}", markup=False)
 
 
@@ -183,21 +270,25 @@ def _struck(data: Path) -> "dict[str, Struck]":
     return struck
 
 
-def _keep_track(data: Path, to: str, folder: Path, cohort: "Cohort") -> None:
-    """Note in the register where data of its participants went, for erasing and relabelling."""
-    from labcrane.participants.copies import record_export
-    from labcrane.participants.folders import Places
+def _product(
+    data: Path,
+    writer: str,
+    folder: Path,
+    cohort: "Cohort",
+    *,
+    shared: Sequence[str] = (),
+    whole: bool = False,
+) -> "AbstractContextManager[Product]":
+    """Return a folder to write into that the register knows; see :mod:`~.participants.products`.
 
-    if not Places(data).register.exists():
-        return  # pilots and simulations only: nobody's data have gone anywhere
-    names = [person.name for person in cohort.included]
-    files = {}
-    for path in (path for path in folder.rglob("*") if path.is_file()):
-        inside = path.relative_to(folder)
-        # A file that is named after somebody holds nobody else; a table may hold everybody.
-        named = [name for name in names if name in str(inside)]
-        files[inside] = named or names
-    record_export(Places(data), to, folder, files, today())
+    Those who were left out are listed in it, with the reason.
+    """
+    from labcrane.analysis.cohort import Status
+    from labcrane.participants.products import product
+
+    people = [*cohort.included, *cohort.left_out]
+    names = [person.name for person in people if person.status is not Status.ERASED]
+    return product(data, writer, folder, names, today(), shared=shared, whole=whole)
 
 
 @contextmanager
@@ -219,12 +310,6 @@ def progress_bar(what: str, total: int) -> Iterator[Any]:
     with Progress(*parts, console=out.console) as progress:
         task = progress.add_task(what, total=total)
         yield lambda: progress.advance(task)
-
-
-def _counted(participants: "Sequence[Participant]", advance: Any) -> "Iterator[Participant]":
-    for participant in participants:
-        yield participant
-        advance()
 
 
 def _settings(model: Any, words: list[str], name: str) -> Any:
@@ -249,17 +334,18 @@ def _settings(model: Any, words: list[str], name: str) -> Any:
         raise ProtocolError(f"exporter {name!r} can set {known}; {problems}") from None
 
 
-def _write_manifest(folder: Path, to: str, settings: Any, cohort: "Cohort") -> None:
+def _write_manifest(
+    folder: Path, to: str, settings: Any, cohort: "Cohort", unprobed: list[str]
+) -> None:
     """Write what was exported and who was left out beside the export, for erasure and for readers.
 
     BIDS and Psych-DS allow no further files, so it is hidden from them under ``.labcrane``.
     """
-    import json
     from datetime import UTC, datetime
 
     from labcrane import __version__
+    from labcrane.participants.copies import write_manifest
 
-    (folder / ".labcrane").mkdir()
     content = {
         "labcrane": __version__,
         "format": to,
@@ -267,6 +353,6 @@ def _write_manifest(folder: Path, to: str, settings: Any, cohort: "Cohort") -> N
         "made": datetime.now(UTC).isoformat(timespec="seconds"),
         "data": cohort.folder.name,
         "participants": cohort.listing().to_dict("records"),
+        "unprobed": unprobed,
     }
-    path = folder / ".labcrane" / MANIFEST
-    path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_manifest(folder, content)

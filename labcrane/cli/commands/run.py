@@ -9,7 +9,7 @@ import typer
 
 from labcrane.cli.options import DataBeside, Local, ProtocolPath, data_folder, stay_on_this_computer
 from labcrane.cli.output import out
-from labcrane.errors import LabcraneError, ProtocolError
+from labcrane.errors import LabcraneError, PluginError, ProtocolError
 
 if TYPE_CHECKING:
     from labcrane.launcher.session_process import SessionConfig
@@ -129,6 +129,7 @@ def _run_fast(order: "SessionConfig") -> Path:
     from labcrane.session.session import run as run_session
 
     visit = replace(order.visit(), fast=True)
+    visit.study.check_installed(simulated=True, feedback=False)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
     with Terminal(console, out.console, len(plan.trials), keys=False):
@@ -142,11 +143,18 @@ def _launch(order: "SessionConfig", *, page: bool) -> None:
     from labcrane.design.plan import plan_session
     from labcrane.launcher.launcher import Launcher
     from labcrane.launcher.pages import pages
+    from labcrane.registry.offers import LAB, not_installed
     from labcrane.session.commands import QueueConsole
+    from labcrane.session.session import check_free
 
     visit = order.visit()
+    check_free(visit)  # before anything is shown
     if not order.resumed:
-        visit.folder.check_new(order.session)  # before anything is shown
+        visit.folder.check_new(order.session)
+    visit.study.check_installed(simulated=visit.simulated, feedback=visit.feedback)
+    needs = {"pylsl": LAB, **({"nicegui": LAB} if page else {})}
+    if missing := not_installed(needs):
+        raise PluginError(f"a session {missing}")
     ask_for_consent(visit, page=page)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
@@ -166,10 +174,15 @@ def _launch(order: "SessionConfig", *, page: bool) -> None:
         print_report(outcome.sync_report)
     if visit.folder.participant_file.exists():
         out.print(f"participant file: {visit.folder.participant_file}", markup=False)
+    again = (
+        f"go on with: labcrane resume {order.protocol} --participant {order.participant} "
+        f"--session {order.session}"
+    )
+    if outcome.owed:
+        out.print(f"the session is not complete: {outcome.owed}; {again}", markup=False)
     if outcome.died is not None:
         raise LabcraneError(
             f"the session process died with exit code {outcome.died}"
             f"{f' in {outcome.where}' if outcome.where else ''}; what it recorded is in the "
-            f"participant file; go on with: labcrane resume {order.protocol} --participant "
-            f"{order.participant} --session {order.session}"
+            f"participant file; {again}"
         )

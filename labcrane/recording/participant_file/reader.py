@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from labcrane.errors import RecordingError
 from labcrane.recording.journal import GROUPS
 from labcrane.recording.participant_file.columns import holds_texts, text_of, texts_of
-from labcrane.recording.participant_file.writer import SYNC_REPORT, group_name, opened
+from labcrane.recording.participant_file.stream_group import BASES
+from labcrane.recording.participant_file.writer import SYNC_REPORT, group_name, reading
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -53,11 +55,43 @@ class Stream:
         return self._column(raw) if "rate_hz" in self.attrs else self.time
 
     @cached_property
+    def time_error(self) -> FloatArray:
+        """How far each time may be off at 95 %, in milliseconds, shape ``(n,)``.
+
+        Zero for the session's own signals, whose clock it is; NaN where it is not known, as in
+        files of before it was worked out: ``labcrane resync`` does.
+        """
+        if "rate_hz" not in self.attrs:
+            return np.zeros(len(self.time))
+        error = self._beside("time_error")
+        return np.full(len(self.time), np.nan) if error is None else 1e3 * error
+
+    @cached_property
+    def time_basis(self) -> npt.NDArray[np.str_]:
+        """What each time rests on, shape ``(n,)``.
+
+        ``own`` for the session's own clock, ``probes`` of another one, ``arrivals`` where it was
+        never probed, ``nothing`` where neither is known, ``unknown`` in files of before.
+        """
+        if "rate_hz" not in self.attrs:
+            return np.full(len(self.time), "own")
+        basis = self._beside("time_basis")
+        if basis is None:
+            return np.full(len(self.time), "unknown" if self.attrs["corrected"] else "nothing")
+        return np.asarray(np.array(BASES)[basis.astype(int)])
+
+    @cached_property
+    def time_uneven(self) -> FloatArray:
+        """The times without evening, in seconds, shape ``(n,)``; the same where nothing was."""
+        uneven = self._beside("time_uneven") if "rate_hz" in self.attrs else None
+        return self.time if uneven is None else uneven
+
+    @cached_property
     def data(self) -> "pd.DataFrame":
         """One column per number, named by its dotted path; one row per time."""
         import pandas as pd  # noqa: PLC0415 - loads for a second
 
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             return pd.DataFrame(
                 {name: _values(dataset) for name, dataset in _columns(file[self._group])}
             )
@@ -65,12 +99,18 @@ class Stream:
     @cached_property
     def units(self) -> dict[str, str]:
         """The unit of each column."""
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             columns = _columns(file[self._group])
             return {name: str(dataset.attrs.get("unit", "")) for name, dataset in columns}
 
+    def _beside(self, name: str) -> FloatArray | None:
+        """Return a column beside the corrected time; None where there is none."""
+        path = f"{self._time.rpartition('/')[0]}/{name}"
+        with reading(self._path) as file:
+            return np.asarray(file[path][:], np.float64) if path in file else None
+
     def _column(self, path: str) -> FloatArray:
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             return np.asarray(file[path][:], np.float64)
 
 
@@ -91,7 +131,7 @@ class SessionRecord:
     @cached_property
     def streams(self) -> dict[str, Stream]:
         """Frames as loop, input, command, state and task; streams of others by their names."""
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             group = file[self._group]
             own = {
                 name: Stream(name, {}, self._path, f"{self._group}/{name}", f"{self._group}/time")
@@ -121,7 +161,7 @@ class SessionRecord:
         """Return a group of columns of one length; empty where the session has none."""
         import pandas as pd  # noqa: PLC0415
 
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             group = file[self._group].get(name, {})
             return pd.DataFrame({column: _values(group[column]) for column in group})
 
@@ -130,19 +170,19 @@ class SessionRecord:
         """One row per event: time, tick, part, trial, name and data, a dict."""
         import pandas as pd  # noqa: PLC0415
 
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             group = file[f"{self._group}/events"]
             columns = ("time", "tick", "part", "trial", "name", "data")
             table = {name: _values(group[name]) for name in columns}
-        table["data"] = [json.loads(text) for text in table["data"]]
-        return pd.DataFrame(table)
+            table["data"] = [_mapping(text) for text in table["data"]]
+            return pd.DataFrame(table)
 
     @cached_property
     def trials(self) -> "pd.DataFrame":
         """One row per counted trial: its condition and its results."""
         import pandas as pd  # noqa: PLC0415
 
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             columns = _columns(file[f"{self._group}/trials"])
             return pd.DataFrame({name: _values(dataset) for name, dataset in columns})
 
@@ -154,7 +194,7 @@ class SessionRecord:
         """
         import pandas as pd  # noqa: PLC0415
 
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             group = file[self._group]  # sessions of older files have none
             columns = _columns(group["questionnaires"]) if "questionnaires" in group else []
             return pd.DataFrame({name: _values(dataset) for name, dataset in columns})
@@ -167,20 +207,22 @@ class SessionRecord:
     @cached_property
     def context(self) -> dict[str, Any]:
         """Everything that was known when the session started."""
-        content: dict[str, Any] = json.loads(self._text("context"))
-        return content
+        return self._json("context")
 
     @cached_property
     def sync_report(self) -> dict[str, Any]:
         """How right the time stamps are, and what to do where they are not; empty if unknown."""
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             if SYNC_REPORT not in file[self._group]:
                 return {}
-        content: dict[str, Any] = json.loads(self._text(SYNC_REPORT))
-        return content
+        return self._json(SYNC_REPORT)
+
+    def _json(self, name: str) -> dict[str, Any]:
+        with reading(self._path) as file:
+            return _mapping(text_of(file[f"{self._group}/{name}"]))
 
     def _text(self, name: str) -> str:
-        with opened(self._path) as file:
+        with reading(self._path) as file:
             return text_of(file[f"{self._group}/{name}"])
 
 
@@ -201,11 +243,11 @@ class Recording:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        with opened(path) as file:
+        with reading(path) as file:
             self.attrs: Mapping[str, Any] = _attributes(file)
             found = (_SESSION.fullmatch(name) for name in file)
             self.sessions: list[int] = sorted(int(match[1]) for match in found if match)
-        self.participant: str = self.attrs["participant"]
+            self.participant: str = self.attrs["participant"]
 
     def session(self, number: int) -> SessionRecord:
         """Return a session by its number."""
@@ -213,7 +255,7 @@ class Recording:
             known = ", ".join(map(str, self.sessions)) or "none"
             raise RecordingError(f"{self.path} has no session {number}; it has {known}")
         name = group_name(number)
-        with opened(self.path) as file:
+        with reading(self.path) as file:
             return SessionRecord(_attributes(file[name]), self.path, name)
 
     def __iter__(self) -> Iterator[SessionRecord]:
@@ -235,6 +277,13 @@ def open_recording(path: Path | str) -> Recording:
             "journals, if there are any"
         )
     return Recording(path)
+
+
+def _mapping(text: str) -> dict[str, Any]:
+    content = json.loads(text)
+    if not isinstance(content, dict):
+        raise TypeError(f"{text[:40]!r} is no mapping of names")
+    return content
 
 
 def _attributes(node: "h5py.HLObject") -> dict[str, Any]:

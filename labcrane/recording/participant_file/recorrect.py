@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane.recording.foreign_streams import Conclude, Note, RecordedStream
+from labcrane.recording.foreign_streams import Note, RecordedStream
 from labcrane.recording.participant_file.columns import text_of, texts_of
 from labcrane.recording.participant_file.reader import open_recording
-from labcrane.recording.participant_file.stream_group import write_time
-from labcrane.recording.participant_file.writer import opened, renewed
+from labcrane.recording.participant_file.writer import Conclude, opened, renewed
 from labcrane.recording.xdf.header import StreamHeader
+from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import h5py
@@ -44,26 +44,17 @@ def recorrect(path: Path, conclude: Conclude) -> dict[int, list[str]]:
             new.attrs[name] = value
         for name in new:
             if match := re.fullmatch(r"ses-(\d+)", name):
-                done[int(match[1])] = _session(new[name], conclude)
+                group = new[name]
+                conclude(group)
+                done[int(match[1])] = list(group.get("streams", {}))
     return done
-
-
-def _session(group: "h5py.Group", conclude: Conclude) -> list[str]:
-    conclusion = conclude(json.loads(text_of(group["context"])))
-    names = list(group.get("streams", {}))
-    for name in names:
-        stream = group["streams"][name]
-        if "time" in stream:
-            del stream["time"]
-        stream.attrs.pop("uncorrected", None)
-        write_time(stream, read_stream(stream), conclusion.correct)
-    return names
 
 
 def read_stream(group: "h5py.Group") -> RecordedStream:
     """Return what a participant file holds of a stream, as far as its clock needs it.
 
-    The samples' values are left out: texts are empty, and data have no channels.
+    The samples' values are left out: texts are empty, and data have no channels;
+    :func:`read_channel` reads one.
     """
     count = len(group["time_raw"])
     probes = [group[f"clock/{name}"][:] for name in ("remote_time", "offset", "rtt", "local")]
@@ -86,3 +77,11 @@ def read_stream(group: "h5py.Group") -> RecordedStream:
         offsets=offsets,
         starts=tuple(int(start) for start in group["starts"][:]),
     )
+
+
+def read_channel(group: "h5py.Group", label: str) -> FloatArray | None:
+    """Return one channel of numbers of a stream, by its label, shape ``(n,)``; None without it."""
+    for dataset in group["data"].values():
+        if str(dataset.attrs.get("name", "")) == label and dataset.dtype.kind == "f":
+            return np.asarray(dataset[:], np.float64)
+    return None

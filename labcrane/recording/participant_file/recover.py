@@ -5,9 +5,14 @@ from pathlib import Path
 
 from labcrane.errors import RecordingError
 from labcrane.recording.crash_marker import read_whereabouts, whereabouts_path
-from labcrane.recording.foreign_streams import Conclude
 from labcrane.recording.participant_file.columns import texts_of
-from labcrane.recording.participant_file.writer import Consolidated, consolidate, group_name, opened
+from labcrane.recording.participant_file.writer import (
+    Conclude,
+    Consolidated,
+    consolidate,
+    group_name,
+    reading,
+)
 from labcrane.recording.paths import journal_path, participant_path, parts, session_of
 
 
@@ -79,7 +84,7 @@ def is_recovered(folder: Path, session: int) -> bool:
         return False
     firsts = _journals_of(folder, session)
     on_disk = {part.name: part.stat().st_size for first in firsts for part in parts(first)}
-    with opened(path) as file:
+    with reading(path) as file:
         if group_name(session) not in file:
             return False
         made_of = file[f"{group_name(session)}/journals"]

@@ -1,13 +1,13 @@
 """Writes the streams of others into a session of a participant file."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane.errors import LabcraneError, RecordingError
-from labcrane.recording.foreign_streams import PROBE_CHANNELS, Correct, RecordedStream
+from labcrane.errors import RecordingError
+from labcrane.recording.foreign_streams import PROBE_CHANNELS, RecordedStream
 from labcrane.recording.participant_file.columns import (
     node_names,
     write_attributes,
@@ -15,24 +15,30 @@ from labcrane.recording.participant_file.columns import (
     write_text,
     write_texts,
 )
+from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import h5py
 
+TIME_COLUMNS = {"time": "s", "time_error": "s", "time_uneven": "s", "time_basis": "1"}
+"""What stands beside a stream's raw stamps once it is corrected, with units: when a sample was, on
+our clock; how far that may be off at 95 %; the same without evening; and what it rests on, a place
+in :data:`BASES`."""
 
-def write_streams(
-    group: "h5py.Group", streams: Sequence[RecordedStream], correct: Correct | None
-) -> None:
+BASES = ("probes", "arrivals", "nothing")
+
+
+def write_streams(group: "h5py.Group", streams: Sequence[RecordedStream]) -> None:
     """Write all streams; those without a sample as well, so that nobody misses them silently."""
     if not streams:
         return
     all_streams = group.create_group("streams")
     names = node_names([stream.header.name for stream in streams])
     for (_, safe), stream in zip(names, streams, strict=True):
-        _write_stream(all_streams.create_group(safe), stream, correct)
+        _write_stream(all_streams.create_group(safe), stream)
 
 
-def _write_stream(group: "h5py.Group", stream: RecordedStream, correct: Correct | None) -> None:
+def _write_stream(group: "h5py.Group", stream: RecordedStream) -> None:
     header = stream.header
     write_attributes(
         group,
@@ -47,26 +53,56 @@ def _write_stream(group: "h5py.Group", stream: RecordedStream, correct: Correct 
     write_text(group, "header", header.xml)
     write_numbers(group, "time_raw", stream.time_raw, "s")
     write_numbers(group, "starts", np.array(stream.starts, np.float64), "1")
-    if correct is not None:
-        write_time(group, stream, correct)
     _write_beside(group, stream)
     _write_data(group.create_group("data"), stream)
 
 
-def write_time(group: "h5py.Group", stream: RecordedStream, correct: Correct) -> None:
-    """Write a stream's corrected times and how right they are, or why there are none."""
-    try:
-        correction = correct(stream)
-    except LabcraneError as error:  # one stream's clock must not keep a session from its file
-        write_attributes(group, {"uncorrected": str(error)})
+def write_time(
+    group: "h5py.Group", columns: Mapping[str, FloatArray], quality: Mapping[str, float | str]
+) -> None:
+    """Write a stream's corrected times, and beside them how right they are.
+
+    Times that were there before are kept below ``earlier``, oldest first, unless they are the same.
+
+    Parameters
+    ----------
+    group
+        The stream's.
+    columns
+        Of :data:`TIME_COLUMNS`, one number per sample.
+    quality
+        Figures and texts by name, kept as attributes of the time.
+    """
+    count = len(group["time_raw"])
+    for name, values in columns.items():
+        if values.shape != (count,):
+            raise RecordingError(
+                f"{name} of stream {group.attrs['name']!r} has {len(values)} numbers for {count} "
+                "samples"
+            )
+    _put_aside(group, columns["time"])
+    group.attrs.pop("uncorrected", None)
+    for name, values in columns.items():
+        write_numbers(group, name, values, TIME_COLUMNS[name])
+    write_attributes(group["time"], quality)
+
+
+def write_uncorrected(group: "h5py.Group", reason: str) -> None:
+    """Write why a stream has no corrected times; it has no earlier ones then either."""
+    _put_aside(group, None)
+    write_attributes(group, {"uncorrected": reason})
+
+
+def _put_aside(group: "h5py.Group", time: FloatArray | None) -> None:
+    """Make room for new times, and keep the old ones if they were others."""
+    if "time" not in group:
         return
-    if correction.time.shape != stream.time_raw.shape:
-        raise RecordingError(
-            f"the correction of stream {stream.header.name!r} returned {len(correction.time)} "
-            f"times for {len(stream.time_raw)} samples"
-        )
-    write_numbers(group, "time", correction.time, "s")
-    write_attributes(group["time"], correction.quality)
+    if time is None or not np.array_equal(group["time"][:], time, equal_nan=True):
+        earlier = group.require_group("earlier")
+        group.move("time", f"earlier/time-{len(earlier) + 1}")
+    for name in TIME_COLUMNS:
+        if name in group:
+            del group[name]
 
 
 def _write_beside(group: "h5py.Group", stream: RecordedStream) -> None:

@@ -6,20 +6,21 @@ the old one, which is brought to the disk, read again, and only then takes the o
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from labcrane.errors import RecordingError
 from labcrane.files.atomic import replacing
 from labcrane.files.lock import alone_in
-from labcrane.recording.foreign_streams import Conclude, RecordedStream, read_streams
+from labcrane.recording.foreign_streams import RecordedStream, read_streams
 from labcrane.recording.journal_reader import JournalState, SessionLog, read_journal
 from labcrane.recording.participant_file.columns import node_names, write_attributes, write_text
+from labcrane.recording.participant_file.containment import check_containment, check_heaps
 from labcrane.recording.participant_file.session_group import write_session
 from labcrane.recording.participant_file.signal_faults import write_signal_faults
 from labcrane.recording.participant_file.stream_group import write_streams
@@ -31,6 +32,14 @@ if TYPE_CHECKING:
 FORMAT = "labcrane participant file"
 VERSION = "1"
 SYNC_REPORT = "sync_report"
+
+Conclude = Callable[["h5py.Group"], object]
+"""Works something out of a session's group in a participant file, and writes it there."""
+
+DAMAGED = (
+    OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError,
+)  # fmt: skip
+"""What reading a damaged file raises somewhere below."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +80,13 @@ class _Session:
         return group_name(self.number)
 
 
+def write_sync_report(group: "h5py.Group", report: Mapping[str, Any]) -> None:
+    """Write a session's sync report into its group, in place of an earlier one."""
+    if SYNC_REPORT in group:
+        del group[SYNC_REPORT]
+    write_text(group, SYNC_REPORT, json.dumps(report, ensure_ascii=False, allow_nan=False))
+
+
 def group_name(session: int) -> str:
     """Return the name of a session's group."""
     return f"ses-{session:02d}"
@@ -91,8 +107,8 @@ def consolidate(
     journals
         First parts of the session's journals; further parts beside them are found.
     conclude
-        Gives what corrects the stamps of other clocks and makes the sync report; without it,
-        streams hold raw stamps only.
+        Corrects the stamps of other clocks and makes the sync report, from what the session's group
+        holds; without it, streams hold raw stamps only.
 
     Raises
     ------
@@ -133,7 +149,7 @@ def renewed(path: Path, again: str) -> Iterator[Path]:
     with alone_in(path.parent), replacing(path) as beside:
         try:
             yield beside
-        except (OSError, RuntimeError, ValueError) as error:  # all of them h5py's
+        except DAMAGED as error:  # h5py's, and of an old file that is damaged
             raise RecordingError(
                 f"cannot write {path}: {_reason(error)}; it is as it was, and so are the journals: "
                 f"remove the cause and run {again}"
@@ -191,12 +207,10 @@ def _write(beside: Path, path: Path, session: _Session, conclude: Conclude | Non
         group = new.create_group(session.group)
         write_attributes(group, {"session": session.number, "participant": path.stem})
         write_session(group, session.log, session.journals)
-        conclusion = conclude(context) if conclude else None
-        write_streams(group, session.streams, conclusion.correct if conclusion else None)
+        write_streams(group, session.streams)
         write_signal_faults(group, session.log, session.streams)
-        if conclusion and conclusion.report:
-            report = conclusion.report(session.log)
-            write_text(group, SYNC_REPORT, json.dumps(report, ensure_ascii=False, allow_nan=False))
+        if conclude is not None:
+            conclude(group)
 
 
 @contextmanager
@@ -211,8 +225,9 @@ def opened(path: Path) -> Iterator["h5py.File"]:
     import h5py  # noqa: PLC0415
 
     try:
+        check_heaps(path)
         file = h5py.File(path, "r")
-    except OSError as error:
+    except (OSError, RuntimeError, ValueError) as error:  # ValueError: no name of a file
         raise RecordingError(f"cannot read {path}: {error}") from error
     with file:
         if file.attrs.get("format") != FORMAT:
@@ -225,7 +240,28 @@ def opened(path: Path) -> Iterator["h5py.File"]:
                 f"{path} has format version {file.attrs['format_version']!r}, this labcrane reads "
                 f"{VERSION!r}; install a newer labcrane"
             )
+        check_containment(file, path)
         yield file
+
+
+@contextmanager
+def reading(path: Path) -> Iterator["h5py.File"]:
+    """Open a participant file for reading alone: whatever is wrong with it is told in words.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be read, is none, or is damaged where it was read.
+    """
+    try:
+        with opened(path) as file:
+            yield file
+    # h5py, numpy, pandas and json raise what they like of damaged files.
+    except (*DAMAGED, MemoryError) as error:
+        raise RecordingError(
+            f"{path} is damaged: {error!r}; labcrane recover {path.parent} makes it "
+            "anew of the journals, if they are there"
+        ) from error
 
 
 def _refuse_less(path: Path, old: "h5py.File", session: _Session) -> None:

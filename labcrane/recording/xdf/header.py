@@ -1,5 +1,7 @@
 """Stream header: what a stream holds, as XDF and LSL describe it."""
 
+import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Union
@@ -8,6 +10,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from labcrane.errors import RecordingError
+from labcrane.limits import LIMITS, LimitError, check_size
 
 Description = Union[str, Mapping[str, "Description"]]  # noqa: UP007 - refers to itself
 
@@ -21,6 +24,10 @@ FORMATS: Mapping[str, np.dtype[np.generic] | None] = {
     "string": None,
 }
 """The number formats of XDF by name; None for text."""
+
+
+_TAG = re.compile(r"</|<(?=[^?!/])|/>")
+"""Where an element ends, begins, or has ended at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +97,12 @@ class StreamHeader:
         return tuple(channel.label for channel in self.channels)
 
     @property
+    def host(self) -> str:
+        """The computer that sent it, as LSL knows it; empty where it is not told."""
+        found = re.search(r"<hostname>([^<]*)</hostname>", self.text or "")
+        return found[1].strip() if found else ""
+
+    @property
     def xml(self) -> str:
         """The header as it is written."""
         return self.text if self.text is not None else _compose(self)
@@ -98,9 +111,12 @@ class StreamHeader:
     def from_xml(cls, text: str) -> "StreamHeader":
         """Read a header that came from LSL or from an XDF file, and keep its text."""
         try:
-            info = ET.fromstring(text.strip().rstrip("\0"))  # noqa: S314 - see the import
+            _check_text(text)
+            info = ET.fromstring(text.strip().rstrip("\0"))  # noqa: S314 - checked, no entities
             count = int(info.findtext("channel_count") or 0)
             rate_hz = float(info.findtext("nominal_srate") or 0.0)
+            check_size(count, "stream channels", f"stream {info.findtext('name')!r}")
+            _check_rate(rate_hz)
         except (ET.ParseError, ValueError) as error:
             raise RecordingError(f"a stream header cannot be read: {error}") from error
         desc = info.find("desc")
@@ -114,6 +130,23 @@ class StreamHeader:
             desc={} if desc is None else _description(desc, leave="channels"),
             text=text,
         )
+
+
+def _check_text(text: str) -> None:
+    """Refuse what takes long to read: entities, which can stand for gigabytes, and stairs."""
+    check_size(len(text), "stream header", "it")
+    if "<!" in text.replace("<!--", ""):
+        raise LimitError("it holds a document type or entities, which LSL and XDF do not write")
+    depth = 0
+    for mark in _TAG.findall(text):
+        depth += -1 if mark == "</" else 1 if mark == "<" else -1
+        if depth > LIMITS["stream header"].depth:
+            raise LimitError("its elements are nested too deep")
+
+
+def _check_rate(rate_hz: float) -> None:
+    if not (math.isfinite(rate_hz) and rate_hz >= 0.0):
+        raise LimitError(f"its rate is {rate_hz} Hz")
 
 
 def _compose(header: StreamHeader) -> str:

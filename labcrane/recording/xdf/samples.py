@@ -67,12 +67,19 @@ def _count(data: bytes, chunk: Chunk) -> tuple[int, int]:
     return found
 
 
+def _check_count(count: int, least: int, size: int) -> None:
+    """Refuse more samples than fit, before they are looked for behind the chunk."""
+    if count * least > size:
+        raise ValueError(f"{count} samples do not fit into {size} bytes")
+
+
 def _numbers(
     data: bytes, chunk: Chunk, header: StreamHeader, dtype: np.dtype[np.generic], last: float
 ) -> tuple[FloatArray, npt.NDArray[np.generic]]:
     count, start = _count(data, chunk)
     sample = sample_dtype(dtype, len(header.channels))
     size = chunk.stop - chunk.start
+    _check_count(count, 1 + dtype.itemsize * len(header.channels), chunk.stop - start)
     if start + count * sample.itemsize == chunk.stop:
         samples = np.ndarray(
             (chunk.count, count), sample, data, start, strides=(size, sample.itemsize)
@@ -111,6 +118,7 @@ def _texts(
 ) -> tuple[FloatArray, Texts]:
     count, start = _count(data, chunk)
     size = chunk.stop - chunk.start
+    _check_count(count, 1 + len(header.channels), chunk.stop - start)
     times: list[float] = []
     rows: Texts = []
     for repeat in range(chunk.count):

@@ -58,7 +58,7 @@ class RecorderHandle:
         self._recorders: list[_Recorder] = []
         self._part = max((part_number(part) for part in parts(journal)), default=0)
         self._known: tuple[str, ...] = ()
-        self._spares = [_Recorder() for _ in range(RECORDERS + SPARES)]
+        self._spares = [_Recorder() for _ in range(RECORDERS)]
         for _ in range(RECORDERS):
             self._recorders.append(self._began())
 
@@ -128,7 +128,7 @@ class RecorderHandle:
         """Replace recorders that have died; whether one had."""
         for spare in [one for one in self._spares if one.exit_code is not None]:
             spare.kill()
-            self._spares[self._spares.index(spare)] = _Recorder()
+            self._spares.remove(spare)
         dead = [one for one in self._recorders if one.exit_code is not None]
         for recorder in dead:
             recorder.kill()
@@ -136,6 +136,8 @@ class RecorderHandle:
             self._known = tuple(recorder.status.get("known", self._known))
             self._recorders.remove(recorder)
             self._recorders.append(self._began())
+        if self.status and len(self._spares) < SPARES:  # not while everything else is started
+            self._spares.append(_Recorder())
         return bool(dead)
 
     def stop(self) -> None:
@@ -147,8 +149,8 @@ class RecorderHandle:
             recorder.stop(max(deadline - time.monotonic(), 1.0))
 
     def _began(self) -> "_Recorder":
-        """Give a recorder that waits its orders, and have another one ready."""
-        recorder = self._spares.pop(0)
+        """Give a recorder that waits its orders."""
+        recorder = self._spares.pop(0) if self._spares else _Recorder()
         self._part += 1
         monitors = None
         if self._monitors is not None and self._monitoring not in self._recorders:
@@ -162,8 +164,6 @@ class RecorderHandle:
                 monitors=monitors,
             )
         )
-        if len(self._spares) < SPARES:
-            self._spares.append(_Recorder())
         return recorder
 
 

@@ -155,13 +155,8 @@ class Counter:
     @classmethod
     def of(cls, header: StreamHeader, label: str | None) -> "Counter | None":
         """Return the counter of a stream of numbers, by its label or its usual names."""
-        if header.dtype is None:
-            return None
-        for column, channel in enumerate(header.channels):
-            usual = {_word(channel.label), _word(channel.type)} & COUNTERS
-            if channel.label == label or (label is None and usual):
-                return cls(column)
-        return None
+        counting = counter_label(header, label)
+        return None if counting is None else cls(header.labels.index(counting))
 
     def forget(self) -> None:
         """Begin anew: the source is another process."""
@@ -175,6 +170,17 @@ class Counter:
         self._last = float(counts[-1])
         steps = np.diff(counts)
         return int(np.sum(steps[steps > 1.0] - 1.0))
+
+
+def counter_label(header: StreamHeader, label: str | None) -> str | None:
+    """Return the label of the channel that counts samples, by its name or the usual ones."""
+    if header.dtype is None:
+        return None
+    for channel in header.channels:
+        usual = {_word(channel.label), _word(channel.type)} & COUNTERS
+        if channel.label == label or (label is None and usual):
+            return channel.label
+    return None
 
 
 def _word(text: str) -> str:

@@ -56,6 +56,7 @@ class Recorder:
         self._requests = tuple(requests)
         self._writer = XdfWriter(next_part(journal) if part is None else part_path(journal, part))
         self._streams: dict[tuple[str, str, str], _Recorded] = {}
+        self._latest: dict[tuple[str, str, str], pylsl.StreamInfo] = {}
         self._since: dict[str, float] = {}
         self._fault: str | None = None
         self._feed = None if monitors is None else SignalFeed(monitors)
@@ -75,6 +76,7 @@ class Recorder:
         now = time.monotonic()
         self._since = {info.uid(): self._since.get(info.uid(), now) for info in found}
         for info in found:
+            self._latest[_key(info)] = info  # a program that was started again has other ports
             self._start(info)
         self._find_duplicates(found, now)
         if self._feed is not None:
@@ -89,7 +91,7 @@ class Recorder:
 
     def status(self) -> dict[str, Any]:
         """Return how the recording is, ready for JSON."""
-        streams = self.health()
+        streams, recorded = self.health(), self._streams.items()
         faults = {self._fault, *(one.inlet.flow.fault for one in self._streams.values())} - {None}
         return {
             "journal": str(self.path),
@@ -98,7 +100,7 @@ class Recorder:
             "ready": all(one.sane for one in streams if one.required) and not faults,
             "faults": sorted(str(fault) for fault in faults),
             "streams": [one.as_json() for one in streams],
-            "known": [one.inlet.info.as_xml() for one in self._streams.values()],
+            "known": [self._latest.get(key, one.inlet.info).as_xml() for key, one in recorded],
             "monitors": self._feed.fault if self._feed else None,
         }
 
@@ -119,7 +121,7 @@ class Recorder:
 
     def _start(self, info: "pylsl.StreamInfo") -> None:
         """Record a stream, unless it is recorded already or nobody asked for it."""
-        key = (info.source_id() or info.uid(), info.name(), info.type())
+        key = _key(info)
         request = self._wanted(info)
         if request is None or key in self._streams:
             return
@@ -145,6 +147,11 @@ class Recorder:
                 if warning not in recorded.warnings:
                     recorded.warnings.append(warning)
                     recorded.inlet.note("warning", text=warning)
+
+
+def _key(info: "pylsl.StreamInfo") -> tuple[str, str, str]:
+    """Return what a stream is known again by when its program is started again."""
+    return info.source_id() or info.uid(), info.name(), info.type()
 
 
 def _health(recorded: _Recorded, now: float) -> Health:

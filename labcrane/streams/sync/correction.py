@@ -5,32 +5,39 @@ recording, and is wrong by drift times age, by whatever a clock wanders, and by 
 in this order:
 
 1. split where the clock changed (``epochs``),
-2. for each clock, leave out probes with long round trips, and follow the rest by local lines in
-   the source's own time (``offset``),
-3. for sources that sample evenly and drop nothing, even the stamps (``dejitter``),
+2. for each clock, follow its probes in the source's own time, each trusted by its round trip
+   (``offset``, ``smoother``), and place its samples (``placement``),
+3. see how it sampled and stamped (``sampling``), and even the stamps only where that is shown to
+   help (``dejitter``),
 4. subtract the stated transport delay and device latency.
+
+Each step adds what it leaves open to the uncertainty of every sample.
 
 Nothing recorded is altered, and nothing here depends on when it runs: it can be repeated for ever.
 """
 
 import itertools
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from labcrane.errors import RecordingError
-from labcrane.streams.sync.dejitter import Dejitter, even
-from labcrane.streams.sync.epochs import REMOTE, Epoch, epochs
-from labcrane.streams.sync.offset import OffsetCurve, fit
-from labcrane.streams.sync.quality import Basis, Quality, Segment, assess, usual_lag
+from labcrane.streams.sync.dejitter import Dejitter, even, follow_sample_clock
+from labcrane.streams.sync.epochs import REMOTE, RTT, epochs
+from labcrane.streams.sync.placement import Placement, place
+from labcrane.streams.sync.quality import (
+    Basis,
+    Quality,
+    Segment,
+    clock_changes,
+    probe_age,
+    worst_second,
+)
 from labcrane.streams.sync.raw import RawStream
+from labcrane.streams.sync.sampling import Sampling, examine
 from labcrane.types import FloatArray
-
-WRONG_CLOCK_S = 0.25
-"""Samples that seem to travel this much longer than the others were stamped by another clock."""
-
-LONGEST_S = 30.0
-"""The first samples cannot be so much older than others: LSL keeps nothing from before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,21 +51,18 @@ class Treatment:
     can_drop_samples
         Whether the source may leave out samples, as cameras do.
     dejitter
-        For regular streams that drop nothing; markers are never evened.
+        Whether stamps are made even; markers never are, nor streams that may drop samples.
     transport_s
         Least time from sampling to stamping, for sources stamped when sent. It cannot be observed.
     latency_s
         Stated fixed latency of the device.
-    bandwidth_s
-        Reach of the smoother of clock offsets.
     """
 
     rate_hz: float = 0.0
     can_drop_samples: bool = False
-    dejitter: Dejitter = Dejitter.LEAST_SQUARES
+    dejitter: Dejitter = Dejitter.AUTO
     transport_s: float = 0.0
     latency_s: float = 0.0
-    bandwidth_s: float = 15.0
 
     @property
     def way(self) -> Dejitter:
@@ -68,156 +72,197 @@ class Treatment:
         return self.dejitter
 
 
-_Piece = tuple[int, int, Epoch, OffsetCurve | None]
+PAUSE_S = 0.5
+
+_Sampled = tuple[Segment, Sampling]
 
 
 @dataclass(frozen=True, slots=True)
 class Corrected:
-    """Times on our clock, shape ``(n,)`` in seconds, and how right they are."""
+    """Times on our clock, and how right they are.
+
+    Attributes
+    ----------
+    time
+        In seconds, shape ``(n,)``; NaN where nothing is known.
+    error
+        How far each may be off at 95 %, in seconds, shape ``(n,)``.
+    uneven
+        The times as they are without evening, in seconds, shape ``(n,)``.
+    segments
+        Stretches of one clock, and what each rests on.
+    quality
+        The same summed up.
+    """
 
     time: FloatArray
+    error: FloatArray
+    uneven: FloatArray
     segments: tuple[Segment, ...] = field(default_factory=tuple)
     quality: Quality = field(default_factory=Quality)
 
+    @property
+    def basis(self) -> npt.NDArray[np.uint8]:
+        """What each sample's time rests on, shape ``(n,)``: place in :class:`Basis`."""
+        order = list(Basis)
+        found = np.full(len(self.time), order.index(Basis.NOTHING), dtype=np.uint8)
+        for segment in self.segments:
+            found[segment.start : segment.stop] = order.index(segment.basis)
+        return found
 
-def correct(raw: RawStream, treatment: Treatment) -> Corrected:
-    """Map a stream's stamps onto our clock."""
+
+def correct(raw: RawStream, treatment: Treatment, end: float | None = None) -> Corrected:
+    """Map a stream's stamps onto our clock.
+
+    Parameters
+    ----------
+    end
+        When the recording ended, on our clock, if that is known: a source may have died before.
+    """
     if treatment.transport_s and treatment.way is not Dejitter.ENVELOPE:
         raise RecordingError(
             f"a least transport delay of {treatment.transport_s} s needs dejitter 'envelope', "
             "which finds the least delayed samples; give the mean delay as latency otherwise"
         )
-    regular = treatment.rate_hz > 0.0
     if not len(raw.stamps):
-        return Corrected(np.empty(0), quality=assess(raw, raw.stamps, [], [], regular=regular))
-    stretches = epochs(raw, regular=regular)
-    curves = _curves(raw, stretches, treatment.bandwidth_s)
-    time, segments = _map(raw, stretches, curves, regular=regular)
-    index = np.arange(len(time), dtype=np.float64) if raw.index is None else raw.index
-    for segment in segments:
+        nothing = np.empty(0)
+        return Corrected(nothing, nothing, nothing, quality=Quality(**_trips(raw)))
+    regular = treatment.rate_hz > 0.0
+    placed = place(raw, epochs(raw, regular=regular), regular=regular)
+    sampled = _examined(raw, placed) if regular else []
+    time, error = _evened(raw, placed, sampled, treatment)
+    shift = treatment.transport_s + treatment.latency_s
+    quality = _summed(raw, placed, sampled, (time, error), end)
+    return Corrected(time - shift, error, placed.time - shift, placed.segments, quality)
+
+
+def _examined(raw: RawStream, placed: Placement) -> list[_Sampled]:
+    """Return how each clock's samples were sampled."""
+    arrival = raw.arrival()
+    found = []
+    for segment in placed.segments:
         part = slice(segment.start, segment.stop)
         if segment.basis is not Basis.NOTHING:
-            time[part] = even(time[part], index[part], treatment.way)
-    known = [curve for curve in curves if curve is not None]
-    quality = assess(raw, time, segments, known, regular=regular)
-    return Corrected(time - treatment.transport_s - treatment.latency_s, tuple(segments), quality)
+            sampling = examine(
+                raw.stamps[part],
+                placed.time[part],
+                None if arrival is None else arrival[part],
+                None if raw.index is None else raw.index[part],
+            )
+            found.append((segment, sampling))
+    return found
 
 
-def _curves(raw: RawStream, stretches: list[Epoch], bandwidth_s: float) -> list[OffsetCurve | None]:
-    """Return each clock's curve, the longest known first: it lends its slope to brief ones."""
-    curves: list[OffsetCurve | None] = [None] * len(stretches)
-    slope = 0.0
-    lengths = [
-        np.ptp(epoch.probes[:, REMOTE]) if len(epoch.probes) else -1.0 for epoch in stretches
-    ]
-    for k in sorted(range(len(stretches)), key=lambda k: -lengths[k]):
-        epoch = stretches[k]
-        if len(epoch.probes):
-            stamps = raw.stamps[epoch.start : epoch.stop]
-            span = float(stamps.min()), float(stamps.max())
-            curve = curves[k] = fit(epoch.probes, bandwidth_s, span, slope)
-            slope = slope or curve.slope
-    return curves
-
-
-def _map(
-    raw: RawStream, stretches: list[Epoch], curves: list[OffsetCurve | None], *, regular: bool
-) -> tuple[FloatArray, list[Segment]]:
-    """Return corrected times, and what each stretch of them rests on."""
-    arrival = raw.arrival()
-    time = np.full(len(raw.stamps), np.nan)
-    for epoch, curve in zip(stretches, curves, strict=True):
-        if curve is not None:
-            part = slice(epoch.start, epoch.stop)
-            time[part] = raw.stamps[part] + curve(raw.stamps[part])
-    usual = usual_lag(arrival, time)
-    found: list[_Piece] = []
-    for k, epoch in enumerate(stretches):
-        for start, stop in _pieces(raw.stamps, arrival, epoch, regular=regular):
-            part = slice(start, stop)
-            stamps = raw.stamps[part]
-            chosen = curves[k]
-            if arrival is not None and (chosen is None or regular):
-                after = float(time[start - 1]) if start else float(arrival[0]) - usual - LONGEST_S
-                chosen = _whose(stamps, arrival[part], (usual, after), _candidates(curves, k))
-            if chosen is None:
-                time[part] = _by_arrival(stamps, arrival, part, usual)
-            else:
-                time[part] = stamps + chosen(stamps)
-            found.append((start, stop, epoch, chosen))
-    known = arrival is not None
-    return time, [_segment(*piece, known=known) for piece in _joined(found)]
-
-
-def _joined(pieces: list[_Piece]) -> list[_Piece]:
-    """Return the pieces with those of one clock put together: what came late is evened alike."""
-    joined: list[_Piece] = []
-    for start, stop, epoch, curve in pieces:
-        if joined and curve is not None and joined[-1][3] is curve:
-            first, _, whose, _ = joined.pop()
-            joined.append((first, stop, whose, curve))
+def _evened(
+    raw: RawStream, placed: Placement, sampled: list[_Sampled], treatment: Treatment
+) -> tuple[FloatArray, FloatArray]:
+    """Return times made even where that helps or is asked for, and errors with what remains."""
+    time, error = placed.time.copy(), placed.error.copy()
+    way = treatment.way
+    declared = treatment.transport_s != 0.0 or treatment.latency_s != 0.0
+    for segment, sampling in sampled:
+        part = slice(segment.start, segment.stop)
+        if way is Dejitter.AUTO and sampling.steady and segment.basis is Basis.PROBES:
+            time[part], doubt = follow_sample_clock(placed.time[part], sampling.index)
+            error[part] += doubt
+            if sampling.uncounted:
+                error[part] += sampling.noise_s / 2.0
+            if sampling.late_stamps and not declared:
+                error[part] += sampling.noise_s
+        elif way in {Dejitter.LEAST_SQUARES, Dejitter.ENVELOPE}:
+            index = sampling.index if raw.index is None else raw.index[part]
+            time[part] = even(placed.time[part], index, way)
+            error[part] += sampling.noise_s / 4.0  # asked for: how right it is was not tested
         else:
-            joined.append((start, stop, epoch, curve))
-    return joined
+            error[part] += sampling.noise_s
+    return time, error
 
 
-def _candidates(curves: list[OffsetCurve | None], k: int) -> list[OffsetCurve]:
-    """Return the clocks a piece may be of: its own, the next, the one before."""
-    near = (curves[k], *curves[k + 1 : k + 2], *curves[max(k - 1, 0) : k])
-    return [curve for curve in near if curve is not None]
+def _trips(raw: RawStream) -> dict[str, Any]:
+    trips = raw.probes[:, RTT]
+    p50, p95 = np.quantile(trips, (0.5, 0.95)) if len(trips) else (np.nan, np.nan)
+    return {"rtt_p50_s": float(p50), "rtt_p95_s": float(p95)}
 
 
-def _whose(
-    stamps: FloatArray,
-    arrival: FloatArray,
-    lag_and_order: tuple[float, float],
-    candidates: list[OffsetCurve],
-) -> OffsetCurve | None:
-    """Return the first clock by which samples arrive when they can.
-
-    Not before their time, and in their order. Samples that the network held up come late together.
-    """
-    usual, after = lag_and_order
-    for curve in candidates:
-        time = stamps + curve(stamps)
-        early = float((arrival - time).min()) < usual - WRONG_CLOCK_S
-        if not early and not float(time.min()) < after - WRONG_CLOCK_S:  # after may be NaN
-            return curve
-    return None
-
-
-def _pieces(
-    stamps: FloatArray, arrival: FloatArray | None, epoch: Epoch, *, regular: bool
-) -> list[tuple[int, int]]:
-    """Return the ranges between leaps of the stamps that arrival does not share.
-
-    A source that is replaced before its first probe leaves no other trace. Irregular sources may
-    stamp what happened long ago, so that a leap says nothing there.
-    """
-    bounds = [epoch.start, epoch.stop]
-    if arrival is not None and regular:
-        part = slice(epoch.start, epoch.stop)
-        leaps = np.abs(np.diff(stamps[part]) - np.diff(arrival[part])) > 2 * WRONG_CLOCK_S
-        bounds[1:1] = [epoch.start + int(k) + 1 for k in np.flatnonzero(leaps)]
-    return list(itertools.pairwise(bounds))
-
-
-def _by_arrival(
-    stamps: FloatArray, arrival: FloatArray | None, part: slice, usual: float
-) -> FloatArray:
-    """Return times with the offset that makes the samples arrive as late as others do."""
-    if arrival is None:
-        return np.full(len(stamps), np.nan)
-    lag = float(np.median(arrival[part] - stamps))
-    return stamps + lag - (0.0 if np.isnan(usual) else usual)
+def _summed(
+    raw: RawStream,
+    placed: Placement,
+    sampled: list[_Sampled],
+    result: tuple[FloatArray, FloatArray],
+    end: float | None,
+) -> Quality:
+    """Sum up how right the corrected times are."""
+    time, error = result
+    segments, curves = placed.segments, placed.curves
+    longest = max(segments, key=lambda part: part.stop - part.start)
+    probed = longest.basis is Basis.PROBES
+    steps, restarts, sleeps = clock_changes(segments, placed.time)
+    known = [curve.probes[:, REMOTE] for curve in curves]
+    finite = placed.time[np.isfinite(placed.time)]
+    last = float(finite.max()) if len(finite) else np.nan
+    return Quality(
+        hidden_s=max((curve.least_rtt / 2.0 for curve in curves), default=np.nan),
+        drift_ppm=longest.drift_ppm if probed else np.nan,
+        residual_s=longest.residual_s if probed else np.nan,
+        probe_age_s=probe_age(raw.stamps, segments, np.concatenate([*known, np.empty(0)])),
+        lag_s=placed.least_lag,
+        steps=steps,
+        restarts=restarts,
+        sleeps=sleeps,
+        slews=sum(len(curve.slews()) for curve in curves),
+        congested_s=sum(curve.congested_s() for curve in curves),
+        silent_s=0.0 if end is None or np.isnan(last) else max(float(end - last), 0.0),
+        unsure=sum(segment.unsure for segment in segments),
+        unprobed=sum(s.stop - s.start for s in segments if s.basis is not Basis.PROBES),
+        whose=placed.whose,
+        **_trips(raw),
+        **_errors(time, error, placed.time),
+        **_flow(placed, sampled),
+    )
 
 
-def _segment(
-    start: int, stop: int, epoch: Epoch, curve: OffsetCurve | None, *, known: bool
-) -> Segment:
-    unsure = epoch.unsure if start == epoch.start else 0
-    if curve is None:
-        return Segment(start, stop, Basis.ARRIVALS if known else Basis.NOTHING, unsure=unsure)
-    drift = -curve.slope / (1.0 + curve.slope) * 1e6
-    residual = 1.4826 * float(np.median(np.abs(curve.residuals)))
-    return Segment(start, stop, Basis.PROBES, len(curve.trusted), unsure, drift, residual)
+def _errors(time: FloatArray, error: FloatArray, uneven: FloatArray) -> dict[str, Any]:
+    """Return how far the times may be off, and how far evening moved them."""
+    known = np.isfinite(time) & np.isfinite(error)
+    if not known.any():
+        return {}
+    p50, p95 = np.quantile(error[known], (0.5, 0.95))
+    moved, furthest = np.quantile(np.abs(time - uneven)[known], (0.95, 1.0))
+    worst, worst_at = worst_second(time, error)
+    return {
+        "error_p50_s": float(p50),
+        "error_p95_s": float(p95),
+        "worst_s": worst,
+        "worst_at_s": worst_at,
+        "moved_p95_s": float(moved),
+        "moved_max_s": float(furthest),
+    }
+
+
+def _flow(placed: Placement, sampled: list[_Sampled]) -> dict[str, Any]:
+    """Return what the segments' sampling says together."""
+    if not sampled:
+        known = placed.time[np.isfinite(placed.time)]
+        span = float(np.ptp(known)) if len(known) else 0.0
+        return {"rate_hz": (len(known) - 1) / span if span > 0.0 else np.nan}
+    each = [sampling for _, sampling in sampled]
+    _, most = max(sampled, key=lambda pair: pair[0].stop - pair[0].start)
+    first, last = most.rates_hz or (np.nan, np.nan)
+    pauses = [
+        float(placed.time[after.start] - placed.time[before.stop - 1])
+        for before, after in itertools.pairwise(placed.segments)
+    ]
+    pauses = [pause for pause in pauses if pause > PAUSE_S]
+    return {
+        "rate_hz": 1.0 / most.period,
+        "first_rate_hz": first,
+        "last_rate_hz": last,
+        "gaps": sum(one.gaps for one in each) + len(pauses),
+        "longest_gap_s": max([*(one.longest_gap_s for one in each), *pauses]),
+        "dropped": sum(one.missing for one in each),
+        "disordered": sum(one.disordered for one in each),
+        "stalls": sum(one.stalls for one in each),
+        "longest_stall_s": max(one.longest_stall_s for one in each),
+        "noise_s": most.noise_s,
+        "late_stamps": int(most.late_stamps),
+    }

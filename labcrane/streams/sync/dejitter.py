@@ -1,8 +1,9 @@
 """Even time stamps for sources that sample evenly but stamp unevenly.
 
-Only for regular streams whose every sample arrives. Lines are fitted to stretches of two minutes
-that overlap by half and fade into each other: a crystal wanders by a part in a million with the
-room's temperature, which is milliseconds in an hour.
+Only where that is shown to help, or asked for: what scatters in a stream may be its samples. Where
+it is shown, the sample clock is followed by the smoother that follows clocks, as a phase-locked
+loop would, but from both sides. Where it is asked for, lines are fitted to stretches of two minutes
+that overlap by half and fade into each other.
 """
 
 import itertools
@@ -11,7 +12,15 @@ from enum import StrEnum
 
 import numpy as np
 
+from labcrane.streams.sync.offset import SURE
+from labcrane.streams.sync.smoother import smooth
 from labcrane.types import FloatArray
+
+CRYSTAL_WALK = 1e-6
+"""Variance by which a sampler's rate usually walks in a second, in ppm squared."""
+
+FEWEST = 50
+MOST_BLOCKS = 400
 
 STRETCH_S = 120.0
 BLOCK_S = 0.05
@@ -22,6 +31,7 @@ Line = Callable[[FloatArray], FloatArray]
 class Dejitter(StrEnum):
     """How uneven stamps are made even."""
 
+    AUTO = "auto"  # only where it is shown to help
     NONE = "none"
     LEAST_SQUARES = "least_squares"  # stamps scatter evenly around the truth
     ENVELOPE = "envelope"  # stamps are late by a transport delay that has a known minimum
@@ -39,13 +49,40 @@ def even(times: FloatArray, index: FloatArray, way: Dejitter) -> FloatArray:
     way
         With ``ENVELOPE``, the line lies below all times: at the truth plus the least delay.
     """
-    if way is Dejitter.NONE:
+    if way in {Dejitter.NONE, Dejitter.AUTO}:
         return times
     result = times.copy()
     for start, stop in runs(times, index):
         if stop - start > 2:  # noqa: PLR2004
             result[start:stop] = _follow(times[start:stop], index[start:stop], way)
     return result
+
+
+def follow_sample_clock(times: FloatArray, index: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the times of a steady sample clock whose stamps scatter, and their error at 95 %.
+
+    Parameters
+    ----------
+    times
+        In seconds, shape ``(n,)``, of one clock, in the order of ``index``.
+    index
+        Which sample each one is, shape ``(n,)``.
+    """
+    away = index - index.mean()
+    due = float(away @ (times - times.mean())) / float(away @ away) * (index - index[0])
+    blocks = np.array_split(np.arange(len(times)), min(max(len(times) // FEWEST, 3), MOST_BLOCKS))
+    middle = np.array([float(due[block].mean()) for block in blocks])
+    rest = np.array([float((times[block] - due[block]).mean()) for block in blocks])
+    scatter = 1.4826 * float(np.median(np.abs(np.diff(rest)))) / np.sqrt(2.0) + 1e-6
+    followed = smooth(
+        middle,
+        rest,
+        np.zeros(len(rest)),
+        scatter_s=(0.5 * scatter, scatter, 2.0 * scatter),
+        usual_walk=CRYSTAL_WALK,
+    )
+    offset, deviation = followed.at(due)
+    return due + offset, SURE * deviation
 
 
 def runs(times: FloatArray, index: FloatArray) -> list[tuple[int, int]]:

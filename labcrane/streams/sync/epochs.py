@@ -8,6 +8,7 @@ import itertools
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from labcrane.streams.sync.raw import RawStream
 from labcrane.types import FloatArray
@@ -17,6 +18,9 @@ JUMP_S = 0.002
 
 FASTEST_DRIFT = 500e-6
 """No crystal in a computer drifts faster, in seconds per second."""
+
+FASTEST_SLEW = 0.02
+"""No system turns its clock by more to set it right."""
 
 CERTAIN_S = 0.1
 """Jumps beyond this show in the times of arrival, whatever the network did."""
@@ -36,12 +40,18 @@ class Epoch:
         Shape ``(n, 4)``, in the order of :class:`~labcrane.streams.probes.Probe`; may be empty.
     unsure
         How many samples at its start may belong to the clock before.
+    step_s
+        By how much the offset differs from the clock before; 0 where either was not probed.
+    told
+        Whether liblsl told that the source is another process.
     """
 
     start: int
     stop: int
     probes: FloatArray
     unsure: int = 0
+    step_s: float = 0.0
+    told: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +61,7 @@ class _Change:
     probe: int
     sample: int
     unsure: int = 0
+    told: bool = False
 
 
 def epochs(raw: RawStream, *, regular: bool) -> list[Epoch]:
@@ -68,8 +79,13 @@ def epochs(raw: RawStream, *, regular: bool) -> list[Epoch]:
     for this, following in itertools.pairwise(bounds):
         mine = probes[this.probe : following.probe]
         if following.sample > this.sample:
-            found.append(Epoch(this.sample, following.sample, mine, this.unsure))
+            step = _change_of_offset(probes, this.probe) if len(mine) else 0.0
+            found.append(Epoch(this.sample, following.sample, mine, this.unsure, step, this.told))
     return found
+
+
+def _change_of_offset(probes: FloatArray, k: int) -> float:
+    return float(probes[k, OFFSET] - probes[k - 1, OFFSET]) if k else 0.0
 
 
 def in_order(probes: FloatArray) -> FloatArray:
@@ -91,8 +107,25 @@ def _jumps(probes: FloatArray) -> list[int]:
     measured = probes[:, REMOTE] + probes[:, OFFSET]
     drift = FASTEST_DRIFT * np.abs(np.diff(measured))
     doubt = (probes[1:, RTT] + probes[:-1, RTT]) / 2
-    far = np.abs(np.diff(probes[:, OFFSET])) > JUMP_S + drift + doubt
+    change = np.diff(probes[:, OFFSET])
+    far = np.abs(change) > JUMP_S + drift + doubt
+    far &= ~_slewed(change, np.abs(np.diff(measured)), doubt)
     return [int(k) + 1 for k in np.flatnonzero(far)]
+
+
+def _slewed(change: FloatArray, step: FloatArray, doubt: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return which changes belong to a slew: their neighbours change the same way, if less.
+
+    A clock that is set right by turning it faster does so for seconds. One that steps goes on
+    before and after as it did.
+    """
+    usual = float(np.median(change / np.maximum(step, 1e-3)))
+    beyond = change - usual * step
+    slow = np.abs(beyond) < FASTEST_SLEW * np.maximum(step, 1e-3)
+    clear = np.sign(beyond) * (np.abs(beyond) > 5e-5 + 1e-4 * step + 2.0 * doubt)
+    before, after = np.r_[0.0, clear[:-1]], np.r_[clear[1:], 0.0]
+    alike = (clear != 0.0) & ((before == clear) | (after == clear))
+    return np.asarray(slow & alike, dtype=np.bool_)
 
 
 def _without_strays(probes: FloatArray, jumps: list[int]) -> tuple[FloatArray, list[int]]:
@@ -119,7 +152,7 @@ def _changes(
         near = [k for k in left if probes[k - 1, LOCAL] - 1.0 <= told <= probes[k, LOCAL]]
         probe = near[0] if near else int(np.searchsorted(probes[:, LOCAL], told))
         left -= set(near)
-        changes.append(_Change(probe, _within(raw, int(low), int(high))))
+        changes.append(_Change(probe, _within(raw, int(low), int(high)), told=True))
     for k in sorted(left):
         sample, unsure = _step(raw, probes[k - 1], probes[k], regular=regular)
         changes.append(_Change(k, sample, unsure))

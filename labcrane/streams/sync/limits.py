@@ -19,8 +19,10 @@ class Limit(NamedTuple):
         return Verdict.WARN if value > self.warn else Verdict.PASS
 
 
-RATE = Limit(0.005, 0.05)
-LAG_S = Limit(0.5, 5.0)
+ERROR_S = Limit(0.001, 0.05)
+RATE = Limit(0.002, 0.05)
+LAG_S = Limit(0.05, 5.0)
+SILENT_S = Limit(5.0, 5.0)
 GAP_S = Limit(0.0, 1.0)
 DRIFT_PPM = Limit(100.0, 500.0)
 RESIDUAL_S = Limit(0.0002, 0.002)
@@ -36,10 +38,14 @@ class Limits:
 
     Attributes
     ----------
+    error_s
+        Uncertainty, at 95 %, of nearly all corrected stamps, and of those of any second.
+    silent_s
+        From a required regular stream's last sample to the end of the recording.
     rate
         Relative deviation of the effective from the nominal rate.
     lag_s
-        Usual time, either way, from a regular stream's stamps to their arrival.
+        Shortest time, either way, from a regular stream's stamps to their arrival.
     gap_s
         Longest interruption of a regular stream.
     drift_ppm
@@ -56,6 +62,8 @@ class Limits:
         Fraction of the loop's ticks that woke more than a period after they were due.
     """
 
+    error_s: Limit = ERROR_S
+    silent_s: Limit = SILENT_S
     rate: Limit = RATE
     lag_s: Limit = LAG_S
     gap_s: Limit = GAP_S

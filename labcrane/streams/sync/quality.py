@@ -6,11 +6,12 @@ from enum import StrEnum
 
 import numpy as np
 
-from labcrane.streams.sync.dejitter import runs
-from labcrane.streams.sync.epochs import REMOTE, RTT
-from labcrane.streams.sync.offset import OffsetCurve
-from labcrane.streams.sync.raw import RawStream
 from labcrane.types import FloatArray
+
+ASLEEP_S = 1.0
+"""Shorter than this no computer sleeps."""
+
+LONG_PAUSE = 8.0
 
 
 class Basis(StrEnum):
@@ -27,6 +28,7 @@ class Segment:
 
     ``unsure`` counts samples that may belong to the clock before. ``drift_ppm`` is positive for a
     source whose clock is fast. Residuals are the median deviation of probes from the curve.
+    ``step_s`` is by how much the offset changed at its start, ``told`` whether liblsl said why.
     """
 
     start: int
@@ -36,104 +38,139 @@ class Segment:
     unsure: int = 0
     drift_ppm: float = 0.0
     residual_s: float = 0.0
+    step_s: float = 0.0
+    told: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """How right a stream's corrected times are. NaN where it is not known.
+    """How right a stream's corrected times are. NaN where it is not known. Times are seconds.
 
     Attributes
     ----------
+    error_p50_s, error_p95_s
+        The stated uncertainty, at 95 %, of half of the samples and of nearly all.
+    worst_s, worst_at_s
+        The largest uncertainty over a second, and when that second begins, on our clock.
+    hidden_s
+        Half of the shortest round trip, which a lasting asymmetry of the path may hide.
     drift_ppm
         Of the clock that stamped most samples; positive when it is fast.
     residual_s
         Median absolute deviation of its probes from the curve, as a standard deviation.
     probe_age_s
-        Longest time from a sample to the nearest trusted probe.
+        Longest time from a sample to the nearest probe of its clock.
     rtt_p50_s, rtt_p95_s
         Round trips of all probes.
     rate_hz
         Samples per second while they flowed.
+    first_rate_hz, last_rate_hz
+        The rates before and after it changed; NaN where it did not.
     lag_s
-        Usual time from a stamp to the sample's arrival: far off when the stamps are of a clock
+        Shortest time from a stamp to its sample's arrival: far off when the stamps are of a clock
         that LSL knows nothing of.
     gaps, longest_gap_s
         Interruptions of regular streams.
     dropped
-        Samples that the source's own counter says are missing.
+        Samples that are missing, by the source's own counter or by whole periods between stamps.
+    disordered
+        Samples that came after one stamped later.
+    stalls, longest_stall_s
+        How often samples came in a burst after a pause, and how late.
+    noise_s
+        By how much stamps scatter that were not taken with the samples, at 95 %.
+    late_stamps
+        1 where chunks are stamped when they are sent.
+    moved_p95_s, moved_max_s
+        By how much evening moved samples.
+    steps, restarts, sleeps, slews
+        How often its clock jumped, its program began anew, its computer slept, its clock was turned
+        faster or slower.
+    congested_s
+        How long probes took far longer than usual, one after the other.
+    silent_s
+        From its last sample to the end of the recording.
     unsure, unprobed
         Samples near a step that may be of the other clock; samples of clocks never probed.
+    whose
+        Whose clock the stamps are of, where it is not the probed one: "receiver" or "foreign".
     """
 
+    error_p50_s: float = np.nan
+    error_p95_s: float = np.nan
+    worst_s: float = np.nan
+    worst_at_s: float = np.nan
+    hidden_s: float = np.nan
     drift_ppm: float = np.nan
     residual_s: float = np.nan
     probe_age_s: float = np.nan
     rtt_p50_s: float = np.nan
     rtt_p95_s: float = np.nan
     rate_hz: float = np.nan
+    first_rate_hz: float = np.nan
+    last_rate_hz: float = np.nan
     lag_s: float = np.nan
     gaps: int = 0
     longest_gap_s: float = 0.0
     dropped: int = 0
+    disordered: int = 0
+    stalls: int = 0
+    longest_stall_s: float = 0.0
+    noise_s: float = 0.0
+    late_stamps: int = 0
+    moved_p95_s: float = 0.0
+    moved_max_s: float = 0.0
+    steps: int = 0
+    restarts: int = 0
+    sleeps: int = 0
+    slews: int = 0
+    congested_s: float = 0.0
+    silent_s: float = 0.0
     unsure: int = 0
     unprobed: int = 0
+    whose: str = ""
 
 
-def assess(
-    raw: RawStream,
-    time: FloatArray,
-    segments: Sequence[Segment],
-    curves: Sequence[OffsetCurve],
-    *,
-    regular: bool,
-) -> Quality:
-    """Sum up how right corrected times are."""
-    longest = max(segments, key=lambda part: part.stop - part.start, default=None)
-    probed = longest is not None and longest.basis is Basis.PROBES
-    trips = raw.probes[:, RTT]
-    p50, p95 = np.quantile(trips, (0.5, 0.95)) if len(trips) else (np.nan, np.nan)
-    rate, gaps = _flow(time[np.isfinite(time)], regular=regular)
-    return Quality(
-        drift_ppm=longest.drift_ppm if longest is not None and probed else np.nan,
-        residual_s=longest.residual_s if longest is not None and probed else np.nan,
-        probe_age_s=_probe_age(raw.stamps, curves),
-        rtt_p50_s=float(p50),
-        rtt_p95_s=float(p95),
-        rate_hz=rate,
-        lag_s=usual_lag(raw.arrival(), time),
-        gaps=len(gaps),
-        longest_gap_s=float(gaps.max(initial=0.0)),
-        dropped=0 if raw.index is None else int(np.sum(np.maximum(np.diff(raw.index) - 1, 0))),
-        unsure=sum(segment.unsure for segment in segments),
-        unprobed=sum(s.stop - s.start for s in segments if s.basis is not Basis.PROBES),
-    )
+def worst_second(time: FloatArray, error: FloatArray) -> tuple[float, float]:
+    """Return the largest error over a second, and when that second begins; NaN if unknown."""
+    known = np.isfinite(time) & np.isfinite(error)
+    if not known.any():
+        return np.nan, np.nan
+    k = int(np.argmax(np.where(known, error, -np.inf)))
+    return float(error[k]), float(np.floor(time[k]))
 
 
-def usual_lag(arrival: FloatArray | None, time: FloatArray) -> float:
-    """Return the usual time from a stamp to its sample's arrival; NaN when it is not known."""
-    if arrival is None or not np.isfinite(time).any():
+def probe_age(stamps: FloatArray, segments: Sequence[Segment], known: FloatArray) -> float:
+    """Return the longest time from a sample to a probe of its clock; NaN without probes."""
+    probed = [segment for segment in segments if segment.basis is Basis.PROBES]
+    if not len(known) or not probed:
         return np.nan
-    return float(np.nanmedian(arrival - time))
+    known = np.sort(known)
+    ages = []
+    for segment in probed:
+        part = stamps[segment.start : segment.stop]
+        k = np.clip(np.searchsorted(known, part), 1, max(len(known) - 1, 1))
+        after = known[np.minimum(k, len(known) - 1)]
+        ages.append(np.minimum(np.abs(part - known[k - 1]), np.abs(part - after)).max())
+    return float(max(ages))
 
 
-def _flow(time: FloatArray, *, regular: bool) -> tuple[float, FloatArray]:
-    """Return samples per second while they flowed, and how long each gap was."""
-    steps = np.diff(time)
-    if not len(steps) or time[-1] <= time[0]:
-        return np.nan, np.empty(0)
-    if not regular:
-        return len(steps) / float(time[-1] - time[0]), np.empty(0)
-    stops = [stop for _, stop in runs(time, np.arange(len(time), dtype=np.float64))[:-1]]
-    gaps = steps[np.array(stops, dtype=int) - 1]
-    flowing = float(steps.sum() - gaps.sum())
-    return ((len(steps) - len(gaps)) / flowing if flowing > 0 else np.nan), gaps
+def clock_changes(segments: Sequence[Segment], time: FloatArray) -> tuple[int, int, int]:
+    """Return how often the clock stepped, its program began anew, its computer slept.
 
-
-def _probe_age(stamps: FloatArray, curves: Sequence[OffsetCurve]) -> float:
-    """Return the longest time from a sample to a probe of its clock."""
-    if not curves:
-        return np.nan
-    known = np.sort(np.concatenate([curve.trusted[:, REMOTE] for curve in curves]))
-    k = np.clip(np.searchsorted(known, stamps), 1, max(len(known) - 1, 1))
-    after = known[np.minimum(k, len(known) - 1)]
-    return float(np.minimum(np.abs(stamps - known[k - 1]), np.abs(stamps - after)).max())
+    While a computer sleeps its clock stands still: it falls behind by as long as nothing comes.
+    """
+    steps = restarts = sleeps = 0
+    steps_s = np.diff(time)
+    steps_s = steps_s[np.isfinite(steps_s)]
+    usual = float(np.median(steps_s)) if len(steps_s) else np.nan
+    for segment in segments:
+        if segment.told:
+            restarts += 1
+        elif segment.step_s and segment.start:
+            pause = float(time[segment.start] - time[segment.start - 1])
+            if segment.step_s > ASLEEP_S and pause > max(segment.step_s - 0.5, LONG_PAUSE * usual):
+                sleeps += 1
+            else:
+                steps += 1
+    return steps, restarts, sleeps

@@ -8,6 +8,13 @@ from labcrane.errors import RecordingError
 from labcrane.recording.foreign_streams import RESET, RecordedStream
 from labcrane.types import FloatArray
 
+POLL_AGE_S = 1.2
+"""LabRecorder pairs an offset with the time when it asks for it; liblsl measured it 0.2 to 2.2 s
+before."""
+
+ASSUMED_RTT_S = 1e-3
+"""Round trip of a probe that was recorded without: few cables need longer."""
+
 
 def _nothing(columns: int) -> FloatArray:
     return np.empty((0, columns))
@@ -72,6 +79,23 @@ class RawStream:
         return np.asarray(times[np.minimum(chunk, len(times) - 1)])
 
 
+def unwrapped(counts: FloatArray) -> FloatArray | None:
+    """Return a source's counter without its wraps, shape ``(n,)``; None when it does not count.
+
+    A counter goes on by one nearly always. A step back is a wrap, to the power of two that the
+    highest number falls just short of, else to that number itself.
+    """
+    steps = np.diff(counts)
+    if len(steps) == 0 or float(np.median(steps)) != 1.0 or not np.isfinite(counts).all():
+        return None
+    back = steps < 0.0
+    if back.any():
+        highest = float(counts.max()) + 1.0
+        power = 2.0 ** np.ceil(np.log2(highest))
+        steps = np.where(back, steps + (power if highest > 0.98 * power else highest), steps)
+    return np.asarray(np.r_[0.0, np.cumsum(np.maximum(steps, 0.0))])
+
+
 def raw_of(recorded: RecordedStream) -> RawStream:
     """Return the times of a recorded stream, for correction.
 
@@ -79,12 +103,13 @@ def raw_of(recorded: RecordedStream) -> RawStream:
     ----------
     recorded
         As read from journals of labcrane or of another recorder, whose clock offsets count as
-        probes with an unknown round trip.
+        probes of :data:`POLL_AGE_S` before, with round trips that nobody wrote down.
     """
     probes = recorded.probes
     if not len(probes) and len(recorded.offsets):
         when, offset = recorded.offsets.T
-        probes = np.column_stack([when, offset, np.zeros(len(when)), when + offset])
+        trips = np.full(len(when), ASSUMED_RTT_S)
+        probes = np.column_stack([when - POLL_AGE_S, offset, trips, when + offset])
     return RawStream.of(
         recorded.time_raw,
         probes=probes,

@@ -3,11 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import asdict
 
+import numpy as np
+
 from labcrane.errors import RecordingError
-from labcrane.recording.foreign_streams import Correction, RecordedStream
+from labcrane.recording.foreign_streams import RecordedStream
 from labcrane.recording.xdf.header import Description, StreamHeader
 from labcrane.streams.sync.correction import Corrected, Treatment, correct
 from labcrane.streams.sync.raw import raw_of
+from labcrane.types import FloatArray
 
 
 def treatment_of(header: StreamHeader) -> Treatment:
@@ -29,24 +32,33 @@ def resync(recorded: RecordedStream) -> Corrected:
     return correct(raw_of(recorded), treatment_of(recorded.header))
 
 
-def correction_of(corrected: Corrected, treatment: Treatment) -> Correction:
-    """Return corrected times with everything that the participant file keeps of how they came."""
+def columns_of(corrected: Corrected) -> dict[str, FloatArray]:
+    """Return what the participant file keeps per sample, by name."""
+    return {
+        "time": corrected.time,
+        "time_error": corrected.error,
+        "time_uneven": corrected.uneven,
+        "time_basis": corrected.basis.astype(np.float64),
+    }
+
+
+def quality_of(corrected: Corrected, treatment: Treatment) -> dict[str, float | str]:
+    """Return everything that the participant file keeps of how corrected times came."""
     segments = "; ".join(
         f"{part.start} to {part.stop} by {part.basis}, {part.probes} probes, "
         f"{part.drift_ppm:+.3f} ppm"
         for part in corrected.segments
     )
     quality: dict[str, float | str] = {
-        name: float(value) for name, value in asdict(corrected.quality).items()
+        name: value if isinstance(value, str) else float(value)
+        for name, value in asdict(corrected.quality).items()
     }
-    quality |= {
+    return quality | {
         "segments": segments,
         "dejitter": treatment.way.value,
         "transport_s": treatment.transport_s,
         "latency_s": treatment.latency_s,
-        "bandwidth_s": treatment.bandwidth_s,
     }
-    return Correction(corrected.time, quality)
 
 
 def _text(timing: Description, name: str) -> str:

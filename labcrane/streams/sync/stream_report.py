@@ -8,13 +8,26 @@ import numpy as np
 
 from labcrane.core.findings import Finding, Verdict, worst
 from labcrane.recording.foreign_streams import COUNTER_GAP, RESET, RecordedStream
+from labcrane.streams.sync.certificate import CONGESTED_S, carries, corrections, faults, unknowable
 from labcrane.streams.sync.limits import Limits
 from labcrane.streams.sync.quality import Quality
 
 
 @dataclass(frozen=True, slots=True)
 class StreamReport:
-    """One stream. Times are seconds; NaN where it is not known."""
+    """One stream. Times are seconds; NaN where it is not known.
+
+    Attributes
+    ----------
+    faults
+        What is wrong with its samples or clocks, by name, whether corrected or not.
+    corrected
+        What was done to its stamps, one sentence each.
+    unknown
+        What no software can know of them.
+    carries
+        Which analyses its stamps carry.
+    """
 
     name: str
     type: str
@@ -24,6 +37,10 @@ class StreamReport:
     nominal_hz: float
     quality: Quality
     findings: tuple[Finding, ...] = ()
+    faults: tuple[str, ...] = ()
+    corrected: tuple[str, ...] = ()
+    unknown: str = ""
+    carries: str = ""
 
 
 def judge_stream(
@@ -36,20 +53,35 @@ def judge_stream(
     if samples == 0:
         findings = [_empty(required=required)]
     else:
-        findings = _flow(header.rate_hz, samples, quality, limits)
-        findings += _clock(quality, limits) + _certainty(quality)
+        findings = judge_quality(quality, header.rate_hz, samples, limits, required=required)
     findings += _noted(recorded)
-    verdict = worst(finding.verdict for finding in findings)
     return StreamReport(
         header.name,
         header.type,
         header.source_id,
-        verdict,
+        worst(finding.verdict for finding in findings),
         samples,
         header.rate_hz,
         quality,
         tuple(findings),
+        tuple(sorted(faults(quality, header.rate_hz))) if samples else (),
+        tuple(corrections(quality)),
+        unknowable(quality),
+        carries(quality),
     )
+
+
+def judge_quality(
+    quality: Quality, nominal: float, samples: int, limits: Limits, *, required: bool = True
+) -> list[Finding]:
+    """Judge corrected times by themselves."""
+    findings = _flow(nominal, samples, quality, limits)
+    if nominal > 0:
+        findings += _stamping(quality, limits)
+        if limits.silent_s.judge(quality.silent_s) is not Verdict.PASS:
+            findings.append(_died(quality, required=required))
+    findings += _clock(quality, limits) + _changes(quality) + _certainty(quality, limits)
+    return findings
 
 
 def _missing(recorded: RecordedStream) -> int:
@@ -77,12 +109,13 @@ def _flow(nominal: float, samples: int, quality: Quality, limits: Limits) -> lis
             f"{quality.rate_hz:.2f} Hz instead of {nominal:g} Hz",
             "check the rate set in the device's program, and whether it drops samples",
         )
-        if not np.isnan(quality.lag_s):
+        if not np.isnan(quality.first_rate_hz):
             _add(
                 found,
-                limits.lag_s.judge(abs(quality.lag_s)),
-                f"its stamps lie {quality.lag_s:.3f} s before their arrival",
-                "its program may stamp with a clock of its own: let it use LSL's",
+                Verdict.WARN,
+                f"its rate changed from {quality.first_rate_hz:.3f} to {quality.last_rate_hz:.3f} "
+                "Hz",
+                "its stamps were not made even; let the device warm up before you record",
             )
         _add(
             found,
@@ -93,9 +126,69 @@ def _flow(nominal: float, samples: int, quality: Quality, limits: Limits) -> lis
     _add(
         found,
         limits.missing.judge(quality.dropped / (samples + quality.dropped)),
-        f"{quality.dropped} samples are missing by the source's counter",
+        f"{quality.dropped} samples are missing, by its counter or between its stamps",
         "check the link between device and its program",
     )
+    return found
+
+
+def _stamping(quality: Quality, limits: Limits) -> list[Finding]:
+    """Judge how samples were stamped and sent."""
+    found: list[Finding] = []
+    if quality.whose == "receiver":
+        text = "its stamps are of this computer's clock already, while its own was probed"
+        _add(found, Verdict.FAIL, text, "let its program push LSL's stamps as they are")
+    elif quality.whose == "foreign":
+        text = f"its stamps are of a clock that LSL does not know ({quality.lag_s:.3f} s off)"
+        _add(found, Verdict.FAIL, text, "its program must stamp with LSL's clock, not its own")
+    elif not np.isnan(quality.lag_s):
+        _add(
+            found,
+            limits.lag_s.judge(abs(quality.lag_s)),
+            f"its stamps lie {quality.lag_s:.3f} s before their arrival",
+            "its program may stamp with a clock of its own: let it use LSL's",
+        )
+    if quality.disordered:
+        text = f"{quality.disordered} samples came out of order"
+        _add(found, Verdict.WARN, text, "sort by time before you use them; look why they overtake")
+    if quality.stalls:
+        _add(
+            found,
+            Verdict.WARN,
+            f"{quality.stalls} times it stalled and sent late, by {quality.longest_stall_s:.1f} s "
+            "at most",
+            "its times are right; feedback that used it was late: look what kept its program",
+        )
+    if quality.late_stamps:
+        text = f"chunks are stamped when they are sent ({1e3 * quality.noise_s:.1f} ms of scatter)"
+        _add(found, Verdict.WARN, text, "measure the delay and give it as latency_s or min_delay_s")
+    elif quality.noise_s:
+        text = f"its stamps scatter by {1e3 * quality.noise_s:.2f} ms about its samples"
+        _add(found, Verdict.WARN, text, "let its program stamp with LSL's clock at full resolution")
+    return found
+
+
+def _died(quality: Quality, *, required: bool) -> Finding:
+    return Finding(
+        Verdict.FAIL if required else Verdict.WARN,
+        f"it died: no sample came in the last {quality.silent_s:.0f} s",
+        "leave out the trials after its last sample; look at its program and its battery",
+    )
+
+
+def _changes(quality: Quality) -> list[Finding]:
+    """Name what happened to its clock and on the way to it."""
+    found: list[Finding] = []
+    for count, what, advice in (
+        (quality.steps, "its clock jumped {} times", "look what sets its computer's clock"),
+        (quality.sleeps, "its computer slept {} times", "switch off its power saving"),
+        (quality.slews, "a clock was slewed {} times", "switch off NTP while you record"),
+    ):
+        if count:
+            _add(found, Verdict.WARN, what.format(count), f"corrected; {advice}")
+    if quality.congested_s > CONGESTED_S:
+        text = f"probes were held up for {quality.congested_s:.0f} s"
+        _add(found, Verdict.WARN, text, "trusted less by as much; keep the network for the study")
     return found
 
 
@@ -134,10 +227,22 @@ def _clock(quality: Quality, limits: Limits) -> list[Finding]:
     return found
 
 
-def _certainty(quality: Quality) -> list[Finding]:
-    """Judge whether every sample is known to be of one clock."""
+def _certainty(quality: Quality, limits: Limits) -> list[Finding]:
+    """Judge how well every sample's time is known."""
     found: list[Finding] = []
-    if quality.unprobed:
+    _add(
+        found,
+        limits.error_s.judge(quality.error_p95_s),
+        f"its times may be off by {1e3 * quality.error_p95_s:.2f} ms",
+        f"they carry {carries(quality)}",
+    )
+    if not quality.error_p95_s > limits.error_s.warn and quality.worst_s > limits.error_s.warn:
+        text = (
+            f"its times may be off by {1e3 * quality.worst_s:.2f} ms in the second from "
+            f"{quality.worst_at_s:.0f} s"
+        )
+        _add(found, Verdict.WARN, text, "leave out the trial it is in where milliseconds matter")
+    if quality.unprobed and not quality.whose:
         _add(
             found,
             Verdict.FAIL,

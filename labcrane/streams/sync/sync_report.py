@@ -22,8 +22,9 @@ COLUMNS = (
     "rate Hz",
     "gaps",
     "drift ppm",
-    "residual ms",
-    "round trip ms",
+    "±95 % ms",
+    "worst ms",
+    "carries",
 )
 
 
@@ -76,6 +77,14 @@ class SyncReport:
         found.sort(key=lambda pair: -order.index(pair[1].verdict))
         return [f"{f.verdict} {whose}{f.text}; {f.advice}" for whose, f in found]
 
+    def details(self) -> list[str]:
+        """Return what was done to each stream's stamps and what stays unknown, one line each."""
+        return [
+            f"{one.name}: {'; '.join((*one.corrected, one.unknown))}"
+            for one in self.streams
+            if one.samples
+        ]
+
 
 def judge_loop(
     due: FloatArray, woke: FloatArray, rate_hz: float, limits: Limits, dropped: int = 0
@@ -121,8 +130,9 @@ def _row(one: StreamReport) -> tuple[str, ...]:
         _number(quality.rate_hz, ".2f"),
         f"{quality.gaps}" + (f" ({quality.longest_gap_s:.2f} s)" if quality.gaps else ""),
         _number(quality.drift_ppm, "+.1f"),
-        _number(1e3 * quality.residual_s, ".3f"),
-        _number(1e3 * quality.rtt_p95_s, ".2f"),
+        _number(1e3 * quality.error_p95_s, ".3f"),
+        _number(1e3 * quality.worst_s, ".2f"),
+        one.carries,
     )
 
 

@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from labcrane import CommandOffer, hookimpl
+from labcrane import hookimpl
+from labcrane.registry import CommandOffer
 
 labcrane_api = 1
 

@@ -7,7 +7,7 @@ import my_module
 import pytest
 from my_module import count, labcrane_commands
 
-from labcrane import CommandOffer
+from labcrane.registry import CommandOffer
 from labcrane.testing import CommandContract, PluginContract
 from labcrane.testing.exporters import TRIALS, a_participant
 

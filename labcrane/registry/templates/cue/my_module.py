@@ -15,11 +15,11 @@ from labcrane import (
     Offer,
     Run,
     Settings,
-    Shape,
     Signal,
     hookimpl,
     offer,
 )
+from labcrane.core import Shape
 
 labcrane_api = 1
 

@@ -5,20 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from pydantic import PositiveFloat
 
-from labcrane import (
-    Arm,
-    Body,
-    Dynamics,
-    FloatArray,
-    Machine,
-    Offer,
-    Run,
-    Settings,
-    Signal,
-    hookimpl,
-    jacobian,
-    offer,
-)
+from labcrane import Dynamics, FloatArray, Machine, Offer, Run, Settings, Signal, hookimpl, offer
+from labcrane.machines import Arm, Body, jacobian
 
 labcrane_api = 1
 

@@ -3,7 +3,8 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from labcrane import Exporter, Machine, Offer, Participant, Settings, hookimpl, offer
+from labcrane import Exporter, Machine, Offer, Settings, hookimpl, offer
+from labcrane.analysis import Participant
 
 labcrane_api = 1
 

@@ -5,17 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from pydantic import PositiveFloat
 
-from labcrane import (
-    FloatArray,
-    Machine,
-    Offer,
-    Settings,
-    SignalFault,
-    SignalMonitor,
-    SignalStream,
-    hookimpl,
-    offer,
-)
+from labcrane import FloatArray, Machine, Offer, Settings, SignalMonitor, hookimpl, offer
+from labcrane.core import SignalFault, SignalStream
 
 labcrane_api = 1
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from my_module import MyPart, MyPartSettings
 
-from labcrane import FloatArray, SignalChannel, SignalMonitor, SignalStream
+from labcrane import FloatArray, SignalMonitor
+from labcrane.core import SignalChannel, SignalStream
 from labcrane.testing import PluginContract, SignalMonitorContract
 
 STREAM = SignalStream("Oil", "Temperature", 10.0, (SignalChannel("tank", "°C"),))

@@ -4,18 +4,8 @@ from collections.abc import Mapping, Sequence
 
 from pydantic import Field
 
-from labcrane import (
-    Answers,
-    Item,
-    Machine,
-    Offer,
-    Questionnaire,
-    Score,
-    Settings,
-    hookimpl,
-    numeric_answers,
-    offer,
-)
+from labcrane import Machine, Offer, Questionnaire, Settings, hookimpl, offer
+from labcrane.core import Answers, Item, Score, numeric_answers
 
 labcrane_api = 1
 

@@ -3,18 +3,8 @@
 import numpy as np
 from pydantic import Field
 
-from labcrane import (
-    Controller,
-    FloatArray,
-    Machine,
-    Offer,
-    Run,
-    Settings,
-    Signal,
-    hookimpl,
-    jacobian,
-    offer,
-)
+from labcrane import Controller, FloatArray, Machine, Offer, Run, Settings, Signal, hookimpl, offer
+from labcrane.machines import jacobian
 
 labcrane_api = 1
 

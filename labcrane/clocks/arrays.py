@@ -1,0 +1,124 @@
+"""Correction of other clocks' time stamps on plain arrays, for any recording."""
+
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from labcrane.errors import RecordingError
+from labcrane.streams.sync.correction import Corrected, Treatment
+from labcrane.streams.sync.correction import correct as correct_raw
+from labcrane.streams.sync.dejitter import Dejitter
+from labcrane.streams.sync.raw import RawStream
+
+__all__ = ["Corrected", "correct"]
+
+PROBE = ("remote time", "offset", "round trip")
+EVENING = {"auto": Dejitter.AUTO, "forbid": Dejitter.NONE, "force": Dejitter.LEAST_SQUARES}
+
+
+def correct(
+    stamps: npt.ArrayLike,
+    *,
+    probes: npt.ArrayLike | None = None,
+    arrivals: npt.ArrayLike | None = None,
+    counter: npt.ArrayLike | None = None,
+    rate_hz: float = 0.0,
+    latency_s: float = 0.0,
+    evening: Literal["auto", "forbid", "force"] = "auto",
+    end: float | None = None,
+) -> Corrected:
+    """Map time stamps of another clock onto the receiver's, and say how far each may be off.
+
+    The offset ``o(t)`` of the receiver's clock from the source's is followed in the source's time
+    ``t`` by a Kalman smoother with the state (offset, skew, share). Skew does a random walk, so
+    that offset is its integral (Kalman 1960; Rauch, Tung and Striebel 1965; in the backward form of
+    Bryson and Frazier). A probe measures ``o + share * excess + e``: *excess* is by how much its
+    round trip is longer than the shortest of all, and *share* which part of that lies on one way,
+    between -1/2 and 1/2 (the bound of NTP's clock filter, RFC 5905 section 10, and of its
+    huff-n'-puff filter). How fast skew walks and how large ``e`` is are not assumed: a grid of
+    models is weighed by likelihood, and averaged by it.
+
+    Where probes leap by more than round trips allow, the clock is another one from there on.
+    Samples without probes are placed by their arrival, and say so.
+
+    Parameters
+    ----------
+    stamps
+        As the source gave them, in the order of arrival, in seconds, shape ``(n,)``.
+    probes
+        Clock probes: source's time, what must be added to it to have the receiver's, round trip,
+        in seconds, shape ``(n_probes, 3)``; in LSL, what ``lsl_time_correction_ex`` tells.
+    arrivals
+        When each sample came, on the receiver's clock, in seconds, shape ``(n,)``.
+    counter
+        The source's own number of each sample, without wraps, shape ``(n,)``: tells what is lost.
+    rate_hz
+        Nominal rate; 0 for irregular streams, such as markers.
+    latency_s
+        Stated delay of the device from sampling to stamping; subtracted.
+    evening
+        Whether stamps of a regular stream are made even: only where they are shown to scatter about
+        a steady sample clock (``"auto"``), never, or always.
+    end
+        When the recording ended, on the receiver's clock: tells of a source that died before.
+
+    Returns
+    -------
+    Corrected
+        ``time`` and ``error`` (half width of a 95 % interval) of each sample in seconds,
+        ``uneven``, ``basis`` and a ``quality`` that sums it up.
+
+    Raises
+    ------
+    RecordingError
+        An array has another shape, or holds what is no number.
+
+    Notes
+    -----
+    Assumed, and not seen in the data: that the shortest round trip is split evenly. Half of it is
+    part of ``error``. What passes in the device before it stamps is not.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labcrane.clocks import correct
+    >>> clock = np.arange(0.0, 60.0, 0.01) * (1 + 50e-6) + 1000.0
+    >>> at = np.arange(0.0, 60.0, 2.0)
+    >>> there = at * (1 + 50e-6) + 1000.0
+    >>> probes = np.column_stack([there, at - there, np.full(len(at), 2e-4)])
+    >>> corrected = correct(clock, probes=probes, rate_hz=100.0)
+    >>> bool(np.abs(corrected.time - np.arange(0.0, 60.0, 0.01)).max() < 1e-5)
+    True
+    """
+    if evening not in EVENING:
+        raise RecordingError(f"evening is {evening!r}; it may be {', '.join(EVENING)}")
+    taken = _column("stamps", stamps)
+    count = len(taken)
+    shown = np.empty((0, 4))
+    if probes is not None:
+        table = np.asarray(probes, dtype=np.float64)
+        if table.ndim != 2 or table.shape[1] != len(PROBE) or not np.isfinite(table).all():  # noqa: PLR2004
+            raise RecordingError(
+                f"probes must be finite numbers of the shape (n, 3), {', '.join(PROBE)}; they have "
+                f"the shape {table.shape}"
+            )
+        table = table[np.argsort(table[:, 0] + table[:, 1], kind="stable")]
+        shown = np.column_stack([table, table[:, 0] + table[:, 1]])
+    came = np.empty((0, 2))
+    if arrivals is not None:
+        when = _column("arrivals", arrivals, count)
+        came = np.column_stack([np.arange(1.0, count + 1.0), when])
+    index = None if counter is None else _column("counter", counter, count)
+    treatment = Treatment(rate_hz=rate_hz, latency_s=latency_s, dejitter=EVENING[evening])
+    return correct_raw(RawStream.of(taken, shown, came, index=index), treatment, end)
+
+
+def _column(name: str, values: npt.ArrayLike, count: int | None = None) -> npt.NDArray[np.float64]:
+    column = np.asarray(values, dtype=np.float64)
+    if column.ndim != 1 or (count is not None and len(column) != count):
+        wanted = "(n,)" if count is None else f"({count},), one per stamp"
+        raise RecordingError(f"{name} must have the shape {wanted}, but have {column.shape}")
+    if not np.isfinite(column).all():
+        raise RecordingError(f"{name} hold what is no number; leave those samples out")
+    return column

@@ -1,0 +1,29 @@
+"""The public names of this package, and the modules from which they are imported."""
+
+from .findings import Finding, Verdict
+from .items import AnswerError, Answers, Item, Score, numeric_answers
+from .primitives import Shape, TargetFinder
+from .records import CameraImage, SessionState, Value
+from .settings import StudyPath
+from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
+
+__all__ = [
+    "AnswerError",
+    "Answers",
+    "CameraImage",
+    "Finding",
+    "Item",
+    "Layout",
+    "Score",
+    "SessionState",
+    "Shape",
+    "SignalChannel",
+    "SignalFault",
+    "SignalStream",
+    "StudyPath",
+    "TargetFinder",
+    "Value",
+    "Verdict",
+    "numeric_answers",
+    "signals_of",
+]

@@ -1,0 +1,39 @@
+"""The public names of this package, and the modules from which they are imported."""
+
+from .actuator import ACTUATOR_PRESETS, Actuator, ActuatorSettings
+from .inverse_kinematics import reach
+from .kinematics import Arm, jacobian, link_frames
+from .library import load_machine
+from .links import link_boxes
+from .machine import Body, Joint
+from .mesh import MeshFile
+from .scene import Geom, PlacedObject, Scene, ShapeKind, load_scene, place_objects
+from .scene_codec import SCENE_PLACED, read_placed, write_placed
+from .urdf import urdf_joint, urdf_link, urdf_of
+
+__all__ = [
+    "ACTUATOR_PRESETS",
+    "SCENE_PLACED",
+    "Actuator",
+    "ActuatorSettings",
+    "Arm",
+    "Body",
+    "Geom",
+    "Joint",
+    "MeshFile",
+    "PlacedObject",
+    "Scene",
+    "ShapeKind",
+    "jacobian",
+    "link_boxes",
+    "link_frames",
+    "load_machine",
+    "load_scene",
+    "place_objects",
+    "reach",
+    "read_placed",
+    "urdf_joint",
+    "urdf_link",
+    "urdf_of",
+    "write_placed",
+]

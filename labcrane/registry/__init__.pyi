@@ -1,0 +1,11 @@
+"""The public names of this package, and the modules from which they are imported."""
+
+from .offers import LAB, CommandOffer, Prompt
+from .quiet_import import quietly_imported
+
+__all__ = [
+    "LAB",
+    "CommandOffer",
+    "Prompt",
+    "quietly_imported",
+]

@@ -1,0 +1,135 @@
+"""Certificate of a stream's stamps in words.
+
+What is wrong with them by name, what they carry, what was done, and what stays hidden.
+"""
+
+from collections.abc import Callable
+from enum import StrEnum
+
+import numpy as np
+
+from labcrane.streams.sync.quality import Quality
+
+LONG_S = 1.0
+SILENT_S = 5.0
+RATE_OFF = 2e-3
+LATE_S = 0.05
+UNPROBED_S = 30.0
+CONGESTED_S = 10.0
+
+
+class Fault(StrEnum):
+    """What may be wrong with a stream, in the words of its report."""
+
+    LOST = "lost samples"
+    INTERRUPTED = "interrupted"
+    DISORDERED = "out of order"
+    STALLED = "stalled and sent late"
+    WRONG_RATE = "wrong nominal rate"
+    CHANGED_RATE = "changing rate"
+    RECEIVER = "stamps of the receiver's clock"
+    FOREIGN = "stamps of an unknown clock"
+    SLOW = "stamps long before arrival"
+    LATE_STAMPS = "stamped when sent"
+    NOISY = "noisy stamps"
+    STEPPED = "clock stepped"
+    RESTARTED = "restarted"
+    SLEPT = "computer slept"
+    SLEWED = "clock slewed"
+    CONGESTED = "network congested"
+    DIED = "died"
+    UNPROBED = "never probed"
+    PROBES_MISSING = "probes interrupted"
+
+
+_FAULTS: dict[Fault, Callable[[Quality, float], bool]] = {
+    Fault.LOST: lambda q, _: q.dropped > 0,
+    Fault.INTERRUPTED: lambda q, _: q.longest_gap_s > LONG_S,
+    Fault.DISORDERED: lambda q, _: q.disordered > 0,
+    Fault.STALLED: lambda q, _: q.stalls > 0,
+    Fault.WRONG_RATE: lambda q, hz: (
+        np.isnan(q.first_rate_hz) and abs(q.rate_hz / hz - 1.0) > RATE_OFF
+    ),
+    Fault.CHANGED_RATE: lambda q, _: bool(np.isfinite(q.first_rate_hz)),
+    Fault.RECEIVER: lambda q, _: q.whose == "receiver",
+    Fault.FOREIGN: lambda q, _: q.whose == "foreign",
+    Fault.SLOW: lambda q, _: not q.whose and q.lag_s > LATE_S,
+    Fault.LATE_STAMPS: lambda q, _: q.late_stamps > 0,
+    Fault.NOISY: lambda q, _: q.noise_s > 0.0 and not q.late_stamps,
+    Fault.DIED: lambda q, _: q.silent_s > SILENT_S,
+}
+"""Of regular streams only."""
+
+_CLOCK_FAULTS: dict[Fault, Callable[[Quality], bool]] = {
+    Fault.STEPPED: lambda q: q.steps > 0,
+    Fault.RESTARTED: lambda q: q.restarts > 0,
+    Fault.SLEPT: lambda q: q.sleeps > 0,
+    Fault.SLEWED: lambda q: q.slews > 0,
+    Fault.CONGESTED: lambda q: q.congested_s > CONGESTED_S,
+    Fault.UNPROBED: lambda q: not q.whose and q.unprobed > 0,
+    Fault.PROBES_MISSING: lambda q: q.probe_age_s > UNPROBED_S,
+}
+
+
+def faults(quality: Quality, rate_hz: float) -> frozenset[Fault]:
+    """Return the faults of a stream with this nominal rate; 0 is irregular."""
+    found = {fault for fault, is_there in _CLOCK_FAULTS.items() if is_there(quality)}
+    if rate_hz > 0.0:
+        found |= {fault for fault, is_there in _FAULTS.items() if is_there(quality, rate_hz)}
+    return frozenset(found)
+
+
+CARRIES = (
+    (0.001, "single-trial ERP, averaged ERP, gaze, movement"),
+    (0.004, "averaged ERP, gaze, movement; not single-trial ERP"),
+    (0.010, "gaze, movement; no ERP"),
+    (0.050, "movement; neither ERP nor gaze"),
+)
+"""Uncertainty at 95 % up to which stamps carry an analysis, in seconds: a quarter of the finest
+feature, which for a single-trial latency is 4 ms and for a fixation 40 ms."""
+
+
+def carries(quality: Quality) -> str:
+    """Return which analyses the stamps carry, in words."""
+    for limit, words in CARRIES:
+        if quality.error_p95_s <= limit:
+            return words
+    return "the order of events at most: no ERP, no gaze, no movement"
+
+
+def corrections(quality: Quality) -> list[str]:
+    """Return what was done to the stamps, one sentence each."""
+    done = []
+    if np.isfinite(quality.drift_ppm):
+        done.append(f"mapped from a clock that runs {quality.drift_ppm:+.1f} ppm off")
+    for count, what in (
+        (quality.steps, "steps of its clock"),
+        (quality.restarts, "restarts of its program"),
+        (quality.sleeps, "sleeps of its computer"),
+        (quality.slews, "slews of a clock"),
+    ):
+        if count:
+            done.append(f"{count} {what} followed")
+    if quality.stalls:
+        done.append(
+            f"{quality.stalls} times samples came up to {quality.longest_stall_s:.1f} s late and "
+            "kept their own times"
+        )
+    if quality.disordered:
+        done.append(f"{quality.disordered} samples came out of order and kept their own times")
+    if quality.moved_max_s > 0.0:
+        done.append(
+            f"evening moved 95 % of the samples by less than {1e3 * quality.moved_p95_s:.3f} ms, "
+            f"the furthest by {1e3 * quality.moved_max_s:.3f} ms"
+        )
+    return done
+
+
+def unknowable(quality: Quality) -> str:
+    """Return what no software can know of the stamps."""
+    if np.isnan(quality.hidden_s):
+        return "without probes nothing bounds how far its clock is off"
+    return (
+        f"a lasting asymmetry of the network may hide {1e3 * quality.hidden_s:.3f} ms, half of the "
+        "shortest round trip; what happens in the device before it stamps is its maker's to say"
+    )

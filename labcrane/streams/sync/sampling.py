@@ -1,0 +1,287 @@
+"""Sampling of a regular stream, as its stamps, arrivals and counter show it together.
+
+Lost samples, disorder, a changing rate, and whether stamps scatter because samples were taken so,
+or because they were stamped so.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from labcrane.types import FloatArray
+
+FEW = 20
+BLOCKS = 200
+EXACT = 0.1
+"""Stamps that scatter by less than this part of a period leave no doubt which are missing."""
+
+WHOLE = 0.25
+"""A step this close to whole periods has lost whole samples."""
+
+EQUAL_S = 3e-6
+SAME = 0.5
+"""Where this part of all steps is the same, stamps are computed and not taken."""
+
+DELAYS = 0.25
+RATE_CHANGE = 1e-3
+STEADY = 1.5e-4
+"""No crystal is further off the rate that stamps are computed by: what is, was lost."""
+
+LEAST_NOISE_S = 5e-5
+LATTICES = (1e-2, 1e-3, 1e-4)
+UNLIKE = 0.3
+STALL_S = 0.75
+
+
+@dataclass(frozen=True, slots=True)
+class Sampling:
+    """How a regular stream was sampled and stamped. Times are seconds.
+
+    Attributes
+    ----------
+    period
+        Between two samples, while they flowed.
+    missing
+        Samples that were lost on the way: by the counter, else by steps of whole periods.
+    gaps, longest_gap_s
+        Interruptions, and the longest.
+    disordered
+        Samples stamped before one that came earlier.
+    rates_hz
+        The rate at first and at last, where it changed; else empty.
+    noise_s
+        By how much stamps scatter about a steady sample clock, at 95 %; 0 where they were taken
+        so.
+    late_stamps
+        Whether whole chunks are stamped when they are sent: an unknown delay lies in all of them.
+    steady
+        Whether evening helps: the scatter is the stamps', and the sample clock is steady.
+    uncounted
+        Whether samples are missing, and nothing tells where.
+    stalls, longest_stall_s
+        How often samples came in a burst after a pause, and the longest delay.
+    index
+        Which sample each one is, shape ``(n,)``; counts on over those that are missing.
+    """
+
+    period: float = np.nan
+    missing: int = 0
+    gaps: int = 0
+    longest_gap_s: float = 0.0
+    disordered: int = 0
+    rates_hz: tuple[float, ...] = ()
+    noise_s: float = 0.0
+    late_stamps: bool = False
+    steady: bool = False
+    uncounted: bool = False
+    stalls: int = 0
+    longest_stall_s: float = 0.0
+    index: FloatArray = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples per second, while they flowed."""
+        return 1.0 / self.period
+
+
+def examine(
+    stamps: FloatArray,
+    time: FloatArray,
+    arrival: FloatArray | None,
+    counter: FloatArray | None,
+) -> Sampling:
+    """Examine one clock's samples of a regular stream.
+
+    Parameters
+    ----------
+    stamps
+        On the source's clock, shape ``(n,)``.
+    time
+        The same on ours, shape ``(n,)``.
+    arrival
+        When each sample came, on ours; None when it is not known.
+    counter
+        The source's own, unwrapped; None when it has none.
+    """
+    index = np.arange(len(time), dtype=np.float64) if counter is None else counter
+    stalls, longest = _stalls(time, arrival)
+    if len(time) < FEW:
+        return Sampling(index=index, stalls=stalls, longest_stall_s=longest)
+    order = np.argsort(time, kind="stable")
+    behind = int(np.count_nonzero(np.diff(np.maximum.accumulate(time)) == 0.0))
+    sorted_steps = np.diff(time[order])
+    disordered = behind if _is_shuffled(np.diff(time), sorted_steps) else 0
+    lattice = _lattice(stamps)
+    if disordered:
+        found = _steps(time[order], index[order], lattice, counted=counter is not None)
+    else:
+        found = _steps(time, index, lattice, counted=counter is not None)
+    noise, late = _noise(time, arrival, found, lattice)
+    rates = _rates(found)
+    steady = noise > LEAST_NOISE_S and not disordered and not rates
+    uncounted = late and found.missing > 0 and counter is None
+    return Sampling(
+        found.period, found.missing, found.gaps, found.longest, disordered, rates, noise, late,
+        steady, uncounted, stalls, longest, found.index if not disordered else index,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class _Steps:
+    """What the steps between neighbouring stamps show."""
+
+    time: FloatArray
+    period: float
+    local: FloatArray
+    index: FloatArray
+    missing: int
+    gaps: int
+    longest: float
+    exact: bool
+    computed: bool
+    balance: float
+
+
+def _steps(time: FloatArray, index: FloatArray, lattice: float, *, counted: bool) -> _Steps:
+    steps, counts = np.diff(time), np.maximum(np.diff(index), 1.0)
+    local = _local(steps / counts)
+    whole = counts if counted else np.maximum(np.round(steps / local), 1.0)
+    rest = steps - whole * local
+    scatter = 1.4826 * float(np.median(np.abs(rest)))
+    odd = np.abs(rest) > WHOLE * local
+    exact = scatter < EXACT * float(np.median(local)) and float(odd.mean()) < 0.01  # noqa: PLR2004
+    same = np.abs(steps - counts * local) < EQUAL_S
+    boundary = steps[~same] - (counts * local)[~same]
+    moved = float(np.abs(boundary).sum())
+    balance = abs(float(boundary.sum())) / moved if moved > 0.0 else 0.0
+    # Steps of chunks stamped when sent differ by their delays, which do not add up.
+    between = boundary / local[~same]
+    fraction = np.abs(between - np.round(between)) > 0.05 if len(between) else np.zeros(0, bool)  # noqa: PLR2004
+    computed = not lattice and bool(
+        same.mean() > SAME and len(boundary) >= 5 and fraction.mean() > 0.5  # noqa: PLR2004
+    )
+    exact = exact and not computed
+    if not counted and not exact:
+        whole = np.where(steps > np.maximum(20.0 * local, 1.0), np.round(steps / local), 1.0)
+    gaps = whole > 1.5 if exact or counted else whole > 1.0  # noqa: PLR2004
+    missing = int((whole - 1.0)[gaps].sum())
+    position = index if counted else index[0] + np.r_[0.0, np.cumsum(whole)]
+    span = float(position[-1] - position[0])
+    mean, usual = _slope(position, time), float(np.median(local))
+    if computed and not counted and mean > usual * (1.0 + STEADY):
+        missing += max(round(span * (mean / usual - 1.0)), 1)
+        mean = usual
+    longest = float(steps[gaps].max(initial=0.0))
+    return _Steps(
+        time, mean, local, position, missing, int(gaps.sum()), longest, exact, computed, balance
+    )  # fmt: skip
+
+
+def _slope(x: FloatArray, y: FloatArray) -> float:
+    away = x - x.mean()
+    return float(away @ (y - y.mean())) / float(away @ away)
+
+
+def _local(steps: FloatArray) -> FloatArray:
+    """Return the usual step around each, shape of ``steps``: a rate may change."""
+    size = max(len(steps) // BLOCKS, 50)
+    count = max(len(steps) // size, 1)
+    blocks = np.array_split(steps, count)
+    middle = np.cumsum([len(block) for block in blocks]) - len(blocks[0]) / 2
+    return np.interp(np.arange(len(steps)), middle, [float(np.median(block)) for block in blocks])
+
+
+def _is_shuffled(steps: FloatArray, in_order: FloatArray) -> bool:
+    """Whether samples fall in place when they are put in the order of their stamps."""
+    if not (steps < 0.0).any():
+        return False
+    usual = float(np.median(in_order))
+    odd, left = (
+        int(np.count_nonzero(np.abs(each - usual) > WHOLE * usual)) for each in (steps, in_order)
+    )
+    return left < 0.5 * odd
+
+
+def _rates(found: _Steps) -> tuple[float, ...]:
+    """Return the rates at first and at last where they differ by more than stamps scatter."""
+    count = 40
+    edges = np.linspace(0, len(found.time) - 1, count + 1).astype(int)
+    span = np.diff(found.index[edges])
+    if (span <= 0).any() or (found.computed and found.balance >= DELAYS):
+        return ()
+    rate = np.diff(found.time[edges]) / span
+    scatter = 1.4826 * float(np.median(np.abs(np.diff(rate)))) / np.sqrt(2.0)
+    ends = [float(np.median(part)) for part in (rate[:4], rate[-4:])]
+    mean = float(np.median(rate))
+    low, high = np.quantile(rate, (0.05, 0.95))
+    if high - low < max(RATE_CHANGE * mean, 8.0 * scatter):
+        return ()
+    if found.exact or abs(ends[1] - ends[0]) > RATE_CHANGE * mean:
+        return 1.0 / ends[0], 1.0 / ends[1]
+    return ()
+
+
+def _noise(
+    time: FloatArray, arrival: FloatArray | None, found: _Steps, lattice: float
+) -> tuple[float, bool]:
+    """Return by how much the stamps scatter that were not taken so, and whether they are late.
+
+    Stamps that are computed, of a coarse clock, or unlike the arrivals of their samples were not
+    taken when the samples were.
+    """
+    rest = found.time - found.period * (found.index - found.index[0])
+    size = max(len(rest) // BLOCKS, 50)
+    if found.computed:
+        size = max(size, 20 * max(len(rest) // max(_boundaries(found), 1), 1))
+    count = max(len(rest) // size, 1)
+    blocks = np.array_split(rest, count)
+    middle = np.cumsum([len(block) for block in blocks]) - len(blocks[0]) / 2
+    level = np.interp(np.arange(len(rest)), middle, [float(np.median(block)) for block in blocks])
+    apart = np.abs(rest - level)
+    spread = float(np.quantile(apart, 0.95))
+    if found.computed:
+        return float(np.quantile(apart, 0.975)) + abs(float(np.mean(rest - level))), True
+    if lattice > LEAST_NOISE_S and not _on_grid(found, lattice):
+        return spread, False
+    if spread < max(LEAST_NOISE_S, 0.005 * found.period):
+        return 0.0, False
+    if arrival is not None and len(arrival) == len(rest) and found.time is time:
+        late = arrival - time + (rest - level)  # what arrival does on top of a steady clock
+        own = rest - level
+        near = apart < 4.0 * spread
+        slope = float(own[near] @ (late - late.mean())[near]) / float(own[near] @ own[near])
+        doubt = float(late.std()) / (float(own[near].std()) * np.sqrt(near.sum()))
+        if slope + 3.0 * doubt < 1.0 - UNLIKE and slope < UNLIKE:
+            return spread, False
+    return 0.0, False
+
+
+def _boundaries(found: _Steps) -> int:
+    steps = np.diff(found.time)
+    return int(np.count_nonzero(np.abs(steps - found.local) > EQUAL_S))
+
+
+def _lattice(stamps: FloatArray) -> float:
+    """Return the unit of a coarse clock whose whole multiples the stamps are; 0 if of none."""
+    for lattice in LATTICES:
+        some = stamps[:2000] / lattice
+        if (np.abs(some - np.round(some)) < 1e-3).all():  # noqa: PLR2004
+            return lattice
+    return 0.0
+
+
+def _on_grid(found: _Steps, lattice: float) -> bool:
+    """Whether whole periods are whole steps of the lattice, so that nothing was rounded."""
+    part = found.period / lattice
+    return abs(part - round(part)) < 1e-4  # noqa: PLR2004
+
+
+def _stalls(time: FloatArray, arrival: FloatArray | None) -> tuple[int, float]:
+    """Return how often samples came in a burst after a pause, and the longest delay."""
+    if arrival is None or len(time) < 2:  # noqa: PLR2004
+        return 0, 0.0
+    lag = arrival - time
+    usual = float(np.median(lag))
+    late = lag > min(usual, float(np.quantile(lag, 0.1)) + 0.5) + STALL_S
+    begins = np.flatnonzero(np.diff(np.r_[0, late.astype(int)]) == 1)
+    return len(begins), float(lag.max()) if len(begins) else 0.0

@@ -1,0 +1,183 @@
+"""Recordings of before: a session recorded by commit 721f9c3 is read, recorded and run as it was.
+
+``before/`` holds its protocol, its journal and its participant file, compressed. The numbers are
+those of a simulation, so that today's code must make them again, bit for bit.
+"""
+
+import gzip
+import json
+import subprocess
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import pyxdf
+
+import labcrane
+
+BEFORE = Path(__file__).parent / "before"
+NAME = "P001-SIMULATED"
+OF_THE_COMPUTER = {"versions"}
+"""What the start of a session says of where it was recorded, and not of what."""
+ADDED = {"done"}
+"""What events say since, beside all that they said before: whether a step's work was done."""
+OF_THE_JOURNAL = {"ses-01/journals/size", "ses-01/context"}
+"""How long versions' names are; the context is compared by its content."""
+
+
+def labcrane_command(*arguments: str | Path) -> str:
+    done = subprocess.run(
+        [sys.executable, "-m", "labcrane", *map(str, arguments)],
+        check=False,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def before(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of the participant as it was then."""
+    folder = tmp_path_factory.mktemp("before")
+    for packed in BEFORE.glob("*.gz"):
+        (folder / packed.stem).write_bytes(gzip.decompress(packed.read_bytes()))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def now(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a participant who does the same today."""
+    data = tmp_path_factory.mktemp("now")
+    protocol = BEFORE / "protocol.yaml"
+    labcrane_command(
+        "run", protocol, "--participant", "P001", "--simulate", "--fast", "--data", data
+    )
+    return data / NAME
+
+
+def journal(folder: Path) -> dict[str, Mapping[str, Any]]:
+    """Return the streams of a journal, read by pyxdf."""
+    streams, _ = pyxdf.load_xdf(
+        folder / "ses-01_run.xdf", synchronize_clocks=False, dejitter_timestamps=False
+    )
+    return {stream["info"]["name"][0]: stream for stream in streams}
+
+
+def events(folder: Path) -> list[dict[str, Any]]:
+    return [json.loads(row[0]) for row in journal(folder)["labcrane.events"]["time_series"]]
+
+
+def unlike(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what an event says otherwise than before; what is :data:`ADDED` may be there."""
+    kept = {name: value for name, value in new.items() if name in old or name not in ADDED}
+    return {} if kept == dict(old) else {"was": old, "is": new}
+
+
+def datasets(folder: Path) -> dict[str, tuple[Any, dict[str, Any]]]:
+    """Return what is in a participant file, read by h5py: values and attributes, by path."""
+    found: dict[str, tuple[Any, dict[str, Any]]] = {}
+
+    def note(path: str, node: h5py.HLObject) -> None:
+        if isinstance(node, h5py.Dataset):
+            attributes = {
+                name: value
+                for name, value in node.attrs.items()
+                if name not in {"REFERENCE_LIST", "DIMENSION_LIST"}
+            }
+            found[path] = (node[()], attributes)
+
+    with h5py.File(folder / f"{NAME}.h5") as file:
+        file.visititems(note)
+    return found
+
+
+def test_the_same_seed_writes_the_same_frames_bit_for_bit(before: Path, now: Path) -> None:
+    old, new = (journal(folder)["labcrane.frames"] for folder in (before, now))
+    assert len(old["time_stamps"]) > 400
+    assert old["time_stamps"].tobytes() == new["time_stamps"].tobytes()
+    assert old["time_series"].tobytes() == new["time_series"].tobytes()
+    assert old["info"]["desc"] == new["info"]["desc"]
+
+
+def test_the_same_seed_writes_the_same_events(before: Path, now: Path) -> None:
+    old, new = events(before), events(now)
+    start, again = old.pop(0), new.pop(0)
+    kept = start.keys() - OF_THE_COMPUTER
+    assert len(kept) > 25
+    assert {name: again[name] for name in kept} == {name: start[name] for name in kept}
+    assert len(new) == len(old)
+    assert not [unlike(*pair) for pair in zip(old, new, strict=True) if unlike(*pair)]
+    stamps = [journal(folder)["labcrane.events"]["time_stamps"] for folder in (before, now)]
+    assert stamps[0].tobytes() == stamps[1].tobytes()
+
+
+def test_the_same_seed_makes_the_same_datasets(before: Path, now: Path) -> None:
+    old, new = datasets(before), datasets(now)
+    assert new.keys() == old.keys()
+    for path in sorted(old.keys() - OF_THE_JOURNAL):
+        (was, attributes), (values, described) = old[path], new[path]
+        assert described == attributes, path
+        if path == "ses-01/events/data":  # the first is the start, compared above
+            was, values = was[1:], values[1:]
+            was, values = ([json.loads(text) for text in texts] for texts in (was, values))
+            assert len(values) == len(was)
+            assert not any(unlike(*pair) for pair in zip(was, values, strict=True))
+            continue
+        assert np.asarray(values).dtype == np.asarray(was).dtype, path
+        assert np.asarray(values).tobytes() == np.asarray(was).tobytes(), path
+
+
+def test_every_dataset_of_before_reads_as_it_stands(before: Path) -> None:
+    recording = labcrane.open_recording(before / f"{NAME}.h5")
+    assert (recording.participant, recording.sessions) == (NAME, [1])
+    session = recording.session(1)
+    stored = datasets(before)
+    read = set()
+    for group, stream in session.streams.items():
+        np.testing.assert_array_equal(stream.time, stored["ses-01/time"][0])
+        for column in stream.data:
+            path = f"ses-01/{group}/{column.replace('.', '/')}"
+            np.testing.assert_array_equal(stream.data[column], stored[path][0])
+            assert stream.units[column] == stored[path][1]["unit"]
+            read.add(path)
+    tables = ("trials", "questionnaires", "events")
+    for table in tables:
+        frame = getattr(session, table)
+        for column in frame:
+            path = f"ses-01/{table}/{column}"
+            values = stored[path][0]
+            if values.dtype.kind == "S":
+                texts = [text.decode() for text in values]
+                assert list(frame[column]) == (
+                    [json.loads(text) for text in texts] if column == "data" else texts
+                )
+            else:
+                np.testing.assert_array_equal(frame[column], values)
+            read.add(path)
+    groups = {*session.streams, *tables}
+    assert read == {path for path in stored if path.split("/")[1] in groups}
+    assert session.protocol == (BEFORE / "protocol.yaml").read_text()
+
+
+def test_a_replay_of_before_gives_every_number(before: Path) -> None:
+    said = labcrane_command("replay", before / f"{NAME}.h5")
+    assert said.strip() == "454 ticks replayed, every number the same bit for bit"
+
+
+def test_the_journal_of_before_makes_the_participant_file_of_before(
+    before: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / NAME
+    folder.mkdir()
+    (folder / "ses-01_run.xdf").write_bytes((before / "ses-01_run.xdf").read_bytes())
+    labcrane_command("recover", tmp_path)
+    old, new = datasets(before), datasets(folder)
+    assert new.keys() == old.keys()
+    assert all(
+        np.asarray(new[path][0]).tobytes() == np.asarray(old[path][0]).tobytes() for path in old
+    )

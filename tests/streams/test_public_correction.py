@@ -1,0 +1,132 @@
+"""The correction as others use it: on plain arrays, and on anybody's XDF file."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from streams.synthetic import SourceClock, probe, source
+from streams.unkind import Clock, probes, regular
+
+from labcrane.cli.app import main
+from labcrane.clocks import correct
+from labcrane.errors import RecordingError
+from labcrane.recording.xdf.header import Channel, StreamHeader
+from labcrane.recording.xdf.writer import XdfWriter
+from labcrane.streams.sync.correction import Treatment
+from labcrane.streams.sync.correction import correct as correct_raw
+from labcrane.streams.sync.pool import pooled
+from labcrane.streams.sync.raw import RawStream, unwrapped
+
+
+@pytest.fixture
+def random() -> np.random.Generator:
+    return np.random.default_rng(3)
+
+
+def test_plain_arrays_are_corrected_within_what_is_said(random: np.random.Generator) -> None:
+    times = regular(random, 250.0)
+    clock = Clock(random)
+    shown = probes(clock, times[0], times[-1], random)[:, :3]
+    corrected = correct(clock(times), probes=shown[::-1], arrivals=times + 0.01, rate_hz=250.0)
+    error = np.abs(corrected.time - times)
+    assert (error <= corrected.error).all()
+    assert np.quantile(error, 0.95) < 1e-4
+    assert np.median(corrected.error) < 3e-4
+    assert set(corrected.basis) == {0}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"stamps": np.zeros((3, 2))}, r"stamps must have the shape \(n,\), but have \(3, 2\)"),
+        ({"arrivals": np.zeros(4)}, r"arrivals must have the shape \(3,\), one per stamp"),
+        ({"counter": [0.0, np.nan, 2.0]}, "counter hold what is no number"),
+        ({"probes": np.zeros((5, 4))}, "remote time, offset, round trip; they have the shape"),
+        ({"evening": "maybe"}, "evening is 'maybe'; it may be auto, forbid, force"),
+    ],
+)
+def test_arrays_that_do_not_fit_are_refused(wrong: dict, said: str) -> None:
+    given = {"stamps": np.arange(3.0), **wrong}
+    with pytest.raises(RecordingError, match=said):
+        correct(given.pop("stamps"), **given)
+
+
+@pytest.mark.parametrize("highest", [255, 65535, 99])
+def test_a_counter_is_unwrapped_and_keeps_its_gaps(highest: int) -> None:
+    truth = np.delete(np.arange(200_000.0), [500, 501, 90_000])
+    np.testing.assert_array_equal(unwrapped(truth % (highest + 1)), truth)
+
+
+def test_what_does_not_count_is_no_counter(random: np.random.Generator) -> None:
+    assert unwrapped(np.zeros(100)) is None
+    assert unwrapped(random.normal(size=100)) is None
+    assert unwrapped(np.empty(0)) is None
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_two_devices_of_one_computer_agree(seed: int) -> None:
+    """Each is probed on its own, over a way that delays one of them more."""
+    random = np.random.default_rng(seed)
+    times = regular(random, 100.0, 100, 200)
+    clock = Clock(random)
+    raws = [
+        RawStream.of(clock(times), probes(clock, times[0], times[-1], random, way=way, reply=reply))
+        for way, reply in ((5e-5, 0.0), (1.5e-4, 0.002))
+    ]
+    apart = [
+        correct_raw(pair[0], Treatment(100.0)).time - correct_raw(pair[1], Treatment(100.0)).time
+        for pair in (raws, pooled(raws, ["lab", "lab"]))
+    ]
+    assert np.abs(apart[1]).max() < 5e-5
+    assert np.abs(apart[1]).max() < np.abs(apart[0]).max()
+
+
+def test_clocks_that_differ_are_not_pooled_whatever_their_host_is_called(
+    random: np.random.Generator,
+) -> None:
+    times = 100.0 + np.arange(3000) / 100.0
+    raws = [source(SourceClock(offset=offset), times, random) for offset in (1000.0, 1000.3)]
+    for raw, alone in zip(pooled(raws, ["lab", "lab"]), raws, strict=True):
+        assert raw.probes is alone.probes
+    alike = [source(SourceClock(), times, random) for _ in range(2)]
+    for raw, alone in zip(pooled(alike, ["", ""]), alike, strict=True):
+        assert raw.probes is alone.probes
+
+
+def as_labrecorder_writes(path: Path, random: np.random.Generator) -> np.ndarray:
+    """Write a stream with the offsets that LabRecorder notes; return its true times."""
+    times = 100.0 + np.arange(30_000) / 250.0
+    clock = SourceClock(ppm=100.0)
+    header = StreamHeader("EEG", "EEG", (Channel("Cz"),), rate_hz=250.0, source_id="amp")
+    shown = probe(clock, 100.3, 221.0, random, every=2.0)
+    with XdfWriter(path) as writer:
+        stream = writer.add_stream(header)
+        writer.write_samples(stream, clock(times), np.zeros((len(times), 1)))
+        for now in np.arange(102.0, 220.0, 5.0):
+            offset = shown[np.searchsorted(shown[:, 3], now) - 1, 1]
+            writer.write_offset(stream, now - offset, offset)
+    return times
+
+
+def test_an_xdf_file_of_labrecorder_is_corrected_and_certified(
+    tmp_path: Path, random: np.random.Generator, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "others.xdf"
+    times = as_labrecorder_writes(path, random)
+    before = path.read_bytes()
+    assert main(["resync", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "EEG: pyxdf's times are" in said
+    assert path.read_bytes() == before
+    with h5py.File(tmp_path / "others_resync.h5") as file:
+        error = np.abs(file["EEG/time"][:] - times)
+        assert (error <= file["EEG/time_error"][:]).all()
+        assert np.quantile(error, 0.95) < 1.5e-4
+
+
+def test_an_xdf_file_that_is_not_there_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["resync", str(tmp_path / "no.xdf")]) == 1
+    assert "there is no XDF file" in capsys.readouterr().err

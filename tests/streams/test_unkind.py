@@ -1,0 +1,57 @@
+"""Corrections of unkind devices and clocks, drawn at random, against what really was."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from streams.unkind import ROWS
+from streams.unkind_score import Score, coverage, misnamed, score, shortcomings
+
+QUICK = (
+    "60 Hz, single samples lost",
+    "markers, wander and step",
+    "rate changes at once",
+    "stamps of the receiver's clock",
+    "stalls and bursts",
+)
+
+
+def scores(row: str, draws: int) -> list[Score]:
+    return [score(row, seed, usual=True) for seed in range(draws)]
+
+
+@pytest.mark.parametrize("row", QUICK)
+def test_an_unkind_device_is_as_right_as_it_is_said_to_be(row: str) -> None:
+    (one,) = scores(row, 1)
+    assert shortcomings(one) == []
+    assert one.named == one.present
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("row", ROWS)
+def test_every_unkind_device_is_as_right_as_it_is_said_to_be(row: str) -> None:
+    for one in scores(row, 2):
+        assert shortcomings(one) == [], one
+        assert one.named == one.present
+
+
+@pytest.mark.soak
+def test_fifty_draws_of_each_hold_what_the_report_promises() -> None:
+    found = {row: scores(row, 50) for row in ROWS}
+    beyond = Counter(
+        (row, what) for row, each in found.items() for one in each for what in shortcomings(one)
+    )
+    assert not beyond
+    every = [one for each in found.values() for one in each]
+    assert coverage(every) >= 0.99
+    assert all(
+        precision >= 0.95 and recall >= 0.95 for precision, recall in misnamed(every).values()
+    )
+
+
+def test_the_drawn_truth_is_none_of_what_is_received() -> None:
+    """The emulation would be no test if truth could be read from it."""
+    drawn = ROWS["steady, up to 400 ppm"](np.random.default_rng(3))
+    assert np.abs(drawn.raw.stamps - drawn.truth).min() > 1.0
+    lag = drawn.raw.arrival() - drawn.truth
+    assert lag.min() > 0.0
