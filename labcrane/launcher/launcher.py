@@ -20,6 +20,7 @@ from labcrane.core.records import Event
 from labcrane.feedback.processes import FeedbackProcesses, log_requests
 from labcrane.launcher.hang_detector import HangDetector
 from labcrane.launcher.session_process import Ended, Offered, serve
+from labcrane.launcher.signal_reporter import SignalReporter, monitor_config
 from labcrane.recording.crash_marker import read_whereabouts
 from labcrane.recording.paths import parts
 from labcrane.session.commands import (
@@ -169,7 +170,8 @@ class Launcher:
         self._recorder: RecorderHandle | None = None
         self._crew: FeedbackProcesses | None = None
         self._lost: set[str] = set()
-        self._kept: list[Command] = []
+        self._signals = SignalReporter(say)
+        self._kept: list[Message] = []
         self._owed = ""
         self.sync_report: SyncReport | None = None
 
@@ -200,7 +202,7 @@ class Launcher:
         if visit.feedback:
             requests += log_requests(visit)
         if requests:
-            self._recorder = RecorderHandle(visit.streams_journal, requests)
+            self._recorder = RecorderHandle(visit.streams_journal, requests, monitor_config(visit))
         report = None
         try:
             if visit.feedback:
@@ -229,6 +231,7 @@ class Launcher:
         told: list[str] = []
         while recorder is not None and not recorder.ready:
             recorder.watch()
+            self._kept += self._signals.news(recorder)
             if recorder.status and recorder.complaints() != told:
                 told = recorder.complaints()
                 self._say("waiting for streams:\n" + "\n".join(f"  {line}" for line in told))
@@ -315,6 +318,8 @@ class Launcher:
             return
         if recorder.watch():
             self._say("a recorder died: the other one has all streams, and a new one was started")
+        for news in self._signals.news(recorder):
+            send(news)
         lost = recorder.lost() if recorder.status else {RECORDER}
         for what in sorted(lost - self._lost):
             send(StreamLost(what))

@@ -36,6 +36,12 @@ class LateRecorder:
     def complaints(self) -> list[str]:
         return []
 
+    def signals(self) -> dict[tuple[str, str, str], str]:
+        return {}
+
+    def unwatched(self) -> list[str]:
+        return []
+
     def stop(self) -> None:
         pass
 
