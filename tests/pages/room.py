@@ -62,7 +62,7 @@ class Room:
             self.said.append(line)
 
     def links(self) -> dict[str, str]:
-        found = re.findall(r"(\w+) page: (http://\S+)", "".join(self.said))
+        found = re.findall(r"(\w+) page: (https?://\S+)", "".join(self.said))
         return dict(found)
 
     def process(self, word: str) -> psutil.Process | None:

@@ -124,7 +124,9 @@ def test_a_refusal_says_why_and_gives_nothing_away(visited) -> None:
     answers, *_ = visited
     text = answers["no token"][2]
     assert text == "labcrane: no token; use the link that labcrane run has printed"
-    assert answers["participant's order"][2] == "the participant page has no right to order end"
+    assert answers["participant's order"][2] == (
+        "the participant page asked for end: no right to order it"
+    )
 
 
 def test_every_refusal_is_in_the_record(visited) -> None:
