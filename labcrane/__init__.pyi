@@ -16,7 +16,6 @@ from .errors import (
     RecordingError,
     StreamError,
 )
-from .files.yaml import read_yaml
 from .machines.machine import Machine
 from .recording.participant_file.reader import open_recording
 from .registry.hookspecs import hookimpl
@@ -24,7 +23,6 @@ from .registry.offers import Offer, offer
 from .types import FloatArray
 
 __version__: str
-from .streams.newest import NewestSample
 
 __all__ = [
     "Controller",
@@ -40,7 +38,6 @@ __all__ = [
     "InputDevice",
     "LabcraneError",
     "Machine",
-    "NewestSample",
     "Offer",
     "Phase",
     "PlannedTrial",
@@ -64,7 +61,6 @@ __all__ = [
     "offer",
     "open_recording",
     "participants",
-    "read_yaml",
     "recording",
     "registry",
     "replay",

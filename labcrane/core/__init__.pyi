@@ -4,7 +4,7 @@ from .findings import Finding, Verdict
 from .items import AnswerError, Answers, Item, Score, numeric_answers
 from .primitives import Shape, TargetFinder
 from .records import CameraImage, SessionState, Value
-from .settings import StudyPath
+from .settings import StudyPath, read_yaml
 from .signals import Layout, signals_of
 
 __all__ = [
@@ -22,5 +22,6 @@ __all__ = [
     "Value",
     "Verdict",
     "numeric_answers",
+    "read_yaml",
     "signals_of",
 ]

@@ -6,6 +6,7 @@ the participant file, to be gone on with by ``labcrane resume``.
 """
 
 import multiprocessing
+import pickle
 import queue
 import threading
 import time
@@ -18,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from labcrane.core.records import Event
 from labcrane.feedback.processes import FeedbackProcesses, log_requests
 from labcrane.launcher.hang_detector import HangDetector
-from labcrane.launcher.session_process import Ended, Offered, SessionConfig, serve
+from labcrane.launcher.session_process import Ended, Offered, serve
 from labcrane.recording.crash_marker import read_whereabouts
 from labcrane.recording.paths import parts
 from labcrane.session.commands import (
@@ -33,7 +34,8 @@ from labcrane.session.commands import (
     encode,
 )
 from labcrane.session.eligibility import check_eligibility
-from labcrane.session.session import Visit, finish, outlook, recording, running
+from labcrane.session.session import finish, outlook, recording, running
+from labcrane.session.visit import Visit
 from labcrane.streams.recorder.handle import RecorderHandle
 from labcrane.streams.sync.sync_report import SyncReport
 
@@ -160,11 +162,8 @@ class Launcher:
         Tells people what the launcher itself has to say.
     """
 
-    def __init__(
-        self, order: SessionConfig, console: QueueConsole, say: Callable[[str], None]
-    ) -> None:
-        self._order = order
-        self._visit: Visit = order.visit()
+    def __init__(self, visit: Visit, console: QueueConsole, say: Callable[[str], None]) -> None:
+        self._visit = visit
         self._console = console
         self._say = say
         self._recorder: RecorderHandle | None = None
@@ -198,13 +197,13 @@ class Launcher:
             need.request(label, required=not visit.simulated)
             for label, need in visit.study.protocol.streams.items()
         ]
-        if self._order.feedback:
+        if visit.feedback:
             requests += log_requests(visit)
         if requests:
             self._recorder = RecorderHandle(visit.streams_journal, requests)
         report = None
         try:
-            if self._order.feedback:
+            if visit.feedback:
                 self._crew = FeedbackProcesses(visit)
             died = self._run() if self._gate() else None
         finally:
@@ -253,7 +252,9 @@ class Launcher:
     def _run(self) -> int | None:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        process = context.Process(target=serve, args=(self._order, theirs), name="session")
+        process = context.Process(
+            target=serve, args=(pickle.dumps(self._visit), theirs), name="session"
+        )
         process.start()
         theirs.close()
         sender = MessageSender(ours, self._say)

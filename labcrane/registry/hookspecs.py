@@ -27,8 +27,10 @@ from labcrane.core.roles import (
     Questionnaire,
     Task,
 )
-from labcrane.registry.entry_points import PROJECT
 from labcrane.registry.offers import CommandOffer, Offer
+
+PROJECT = "labcrane"
+"""The entry-point group of plugins; groups below it say more of them: ``labcrane.commands``."""
 
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
