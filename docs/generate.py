@@ -1,7 +1,8 @@
 """Makes the pages that are read off the program itself: every key, every plugin, all decisions.
 
-mkdocs calls :func:`on_files` while it builds the site, so these pages are never out of date and
-never in the repository. ``python docs/generate.py FOLDER`` writes them for reading.
+mkdocs calls :func:`on_files` while it builds the site, so these pages are never out of date. In the
+repository there is a page for each that says so, to which links lead. ``python docs/generate.py
+FOLDER`` writes them for reading.
 """
 
 import re
@@ -268,6 +269,8 @@ def on_files(files: Any, config: Any) -> Any:
     from mkdocs.structure.files import File  # noqa: PLC0415 - a hook of mkdocs, and nothing else
 
     for path, text in pages().items():
+        if (stand_in := files.get_file_from_path(path)) is not None:
+            files.remove(stand_in)
         files.append(File.generated(config, path, content=text))
     return files
 

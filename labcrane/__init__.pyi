@@ -1,6 +1,6 @@
 """The public names, and the modules from which they are imported."""
 
-from . import analysis, core, machines, recording, registry, replay, testing
+from . import analysis, core, machines, participants, recording, registry, replay, testing
 from .analysis.exporter import Exporter
 from .core.clock import Tick
 from .core.primitives import Cylinder, Sphere
@@ -63,6 +63,7 @@ __all__ = [
     "machines",
     "offer",
     "open_recording",
+    "participants",
     "read_yaml",
     "recording",
     "registry",

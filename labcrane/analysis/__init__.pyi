@@ -5,13 +5,17 @@ from .cohort import Participant, find_cohort
 from .exporter import Exporter
 from .measures import measures_of
 from .movements import Movement, movements_of
+from .questionnaires import answers_of, asked_in, scores_of
 
 __all__ = [
     "Exporter",
     "Movement",
     "Participant",
+    "answers_of",
+    "asked_in",
     "codebook_of",
     "find_cohort",
     "measures_of",
     "movements_of",
+    "scores_of",
 ]

@@ -1,10 +1,12 @@
 """Every column of a participant's tables, with its unit and where it comes from."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from labcrane.analysis.cohort import Participant
 from labcrane.analysis.gaze import gaze_units
 from labcrane.analysis.measures import MEASURES
+from labcrane.analysis.questionnaires import ANSWERS, MEANING, SCORES, asked_in
 from labcrane.recording.participant_file.reader import SessionRecord
 
 if TYPE_CHECKING:
@@ -24,7 +26,11 @@ def codebook_of(participant: Participant, measures: "pd.DataFrame") -> "pd.DataF
     import pandas as pd
 
     sessions = [session for _, session in participant.sessions()]
-    tables = [trial_codebook(measures, sessions[0]), *map(stream_codebook, sessions)]
+    tables = [
+        trial_codebook(measures, sessions[0]),
+        questionnaire_codebook(sessions),
+        *map(stream_codebook, sessions),
+    ]
     return pd.concat(tables).drop_duplicates(["table", "column"], ignore_index=True)
 
 
@@ -46,6 +52,34 @@ def trial_codebook(measures: "pd.DataFrame", session: SessionRecord) -> "pd.Data
         else:
             row = (str(units.get(column, "")), column.replace("_", " "), WRITTEN)
         rows.append(("trials", column, *row))
+    return pd.DataFrame(rows, columns=["table", "column", "unit", "description", "source"])
+
+
+def questionnaire_codebook(sessions: Sequence[SessionRecord]) -> "pd.DataFrame":
+    """Return the same of the tables of answers and scores, and of every question and score."""
+    import pandas as pd
+
+    rows = [
+        (table, column, *(MEANING.get(column) or ("", IDENTITY[column])), WRITTEN)
+        for table, columns in (("questionnaires", ANSWERS), ("scores", SCORES))
+        for column in columns
+    ]
+    for session in sessions:
+        for name, about in asked_in(session).items():
+            rows += [
+                ("questionnaires.item", f"{name}.{item['name']}", "", item["text"], WRITTEN)
+                for item in about["items"]
+            ]
+            rows += [
+                (
+                    "scores.score",
+                    f"{name}.{score['name']}",
+                    "",
+                    f"{score['lowest']:g} to {score['highest']:g}",
+                    WRITTEN,
+                )
+                for score in about["scores"]
+            ]
     return pd.DataFrame(rows, columns=["table", "column", "unit", "description", "source"])
 
 

@@ -28,7 +28,7 @@ MODULES = {
     "simulate": ("simulate", "power"),
     "approval": ("approve", "amend", "methods"),
     "participants": ("participants", "consent", "exclude", "note", "waive", "deviations"),
-    "data": ("erase", "relabel", "transfer"),
+    "data": ("where", "erase", "relabel", "transfer"),
 }
 """Where commands are: a module, and its functions."""
 

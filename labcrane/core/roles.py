@@ -206,6 +206,13 @@ class Feedback(Component):
     cameras: tuple[str, ...] = ()
     """Names of the cameras whose pictures the supervisor's page shows; see ``pictures``."""
 
+    title: str = ""
+    """What a window of it is called; set before it is opened."""
+
+    before: Sequence[BaseModel] = ()
+    """Settings of others of the same kind that the protocol names before it, which may have windows
+    already; set before it is opened."""
+
     def update(self, situation: SessionState) -> None:
         """Be told what the session is about, before the first frame and whenever it changes."""
 

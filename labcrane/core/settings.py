@@ -1,5 +1,6 @@
 """Settings of components: the model of what a protocol writes beside ``use``."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,10 @@ from labcrane.files.model import StrictModel
 
 class Settings(StrictModel):
     """Base of every plugin's settings: unknown keys are errors, values never change."""
+
+    def warnings(self) -> Sequence[str]:
+        """Return what is allowed but should be known beforehand; ``labcrane check`` says it."""
+        return ()
 
 
 def _beside(path: Path, info: ValidationInfo) -> Path:

@@ -16,13 +16,14 @@ def pseudonyms(pattern: str, count: int) -> list[str]:
     ProtocolError
         The pattern is not of that kind.
     """
-    prefix = re.match(r"[A-Za-z_-]*", pattern)
-    letters = prefix[0] if prefix else ""
-    for digits in range(1, 7):
-        candidates = (f"{letters}{number:0{digits}}" for number in range(1, min(MOST, 10**digits)))
-        names = (name for name in candidates if re.fullmatch(pattern, name))
-        if len(found := list(itertools.islice(names, count))) == count:
-            return found
+    written = re.sub(r"\\[A-Za-z]|\[[^]]*\]|\{[^}]*\}", " ", pattern)
+    for letters in dict.fromkeys([*re.findall(r"[A-Za-z][A-Za-z_-]*", written), ""]):
+        for digits in range(1, 7):
+            numbers = range(1, min(MOST, 10**digits))
+            candidates = (f"{letters}{number:0{digits}}" for number in numbers)
+            names = (name for name in candidates if re.fullmatch(pattern, name))
+            if len(found := list(itertools.islice(names, count))) == count:
+                return found
     raise ProtocolError(
         f"no {count} names of letters and a number match the pattern {pattern!r}; "
         "name participants with --participant"

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 from labcrane.core.findings import Finding, Verdict
 from labcrane.streams.discovery import FoundStream, discover
-from labcrane.streams.network import describe
+from labcrane.streams.network import describe, free_ports, port_range
 from labcrane.streams.request import StreamRequest
 
 if TYPE_CHECKING:
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 FIRST_PORT, PORTS = 16571, 34
 """liblsl's default: 16571 for discovery, and 16572 to 16604 for streams."""
+
+ENOUGH_PORTS, FEWEST_PORTS = 20, 8
+"""Ports that a run with page, recorders and three views takes; and the session alone."""
 
 LOOK_S = 2.0
 ANSWER_S = 1.5
@@ -33,6 +36,7 @@ def examine(requests: Sequence[StreamRequest] = ()) -> list[Finding]:
     """Look for a stream of our own, those that a study needs, and trouble with any other."""
     import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
 
+    room = ports_finding(free_ports(), len(port_range()))
     source_id = f"{OURS}-{os.getpid()}"
     outlet = pylsl.StreamOutlet(pylsl.StreamInfo(OURS, "Test", 1, 0.0, "float32", source_id))
     try:
@@ -41,8 +45,21 @@ def examine(requests: Sequence[StreamRequest] = ()) -> list[Finding]:
         del outlet
     own = [one for one in there if one.source_id == source_id]
     others = [one for one in there if one.name != OURS]
-    found = [_self_test(own), *_needs(requests, others)]
+    found = [_self_test(own), room, *_needs(requests, others)]
     return [*found, *(finding for one in others for finding in _trouble(one))]
+
+
+def ports_finding(free: int, of: int) -> Finding:
+    """Say whether a run finds enough free ports of liblsl's range."""
+    text = f"{free} of LSL's {of} ports are free"
+    if free >= ENOUGH_PORTS:
+        return Finding(Verdict.PASS, text)
+    fix = (
+        f"a run takes up to {ENOUGH_PORTS}: end programs that search for streams all the time, or "
+        "set PortRange = 128 under [ports] in the lsl_api.cfg of every computer, and in firewalls"
+    )
+    verdict = Verdict.WARN if free >= FEWEST_PORTS else Verdict.FAIL
+    return Finding(verdict, text, fix)
 
 
 def _self_test(own: Sequence[FoundStream]) -> Finding:

@@ -48,6 +48,10 @@ class FeedbackConfig:
         What was measured of its delay, if anything was.
     recorded
         Whether there is a recorder, without which it presents nothing; a preview has none.
+    title
+        What a window of it is called: its name, and the study's.
+    before
+        The displays that come before it in the protocol: windows lie beside theirs.
     streams
         Descriptions of the session's streams by name, when there are any yet.
     """
@@ -61,6 +65,8 @@ class FeedbackConfig:
     cues: Mapping[str, Part] = field(default_factory=dict)
     measured: Measured | None = None
     recorded: bool = True
+    title: str = ""
+    before: tuple[Part, ...] = ()
     streams: Mapping[str, str] = field(default_factory=dict)
 
     def as_json(self) -> str:

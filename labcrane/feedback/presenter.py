@@ -30,7 +30,7 @@ class Presenter:
         self._registry = registry
         self._situation = SessionState()
         self._resting = True
-        self.feedback = self._built(Feedback, order.name, order.part)
+        self.feedback = self._presenting()
         self.cues = {name: self._built(Cue, name, part) for name, part in order.cues.items()}
 
     @property
@@ -100,8 +100,21 @@ class Presenter:
             if self.feedback.adjust(self._settings(offer, name, self._order.part)):
                 return
             self.feedback.close()
-            self.feedback = self._built(Feedback, name, self._order.part)
+            self.feedback = self._presenting()
             self.feedback.open(self._order.run)
+
+    def _presenting(self) -> Feedback:
+        """Return the component, which knows what its window is called and which come before it."""
+        order = self._order
+        feedback = self._built(Feedback, order.name, order.part)
+        settings = self._registry.find(Feedback, order.part.use).settings
+        feedback.title = order.title
+        feedback.before = [
+            settings.model_validate(part.settings)
+            for part in order.before
+            if part.use == order.part.use
+        ]
+        return feedback
 
     def _built(self, role: type[RoleT], name: str, part: Part) -> RoleT:
         offer = self._registry.find(role, part.use)

@@ -77,10 +77,22 @@ class FeedbackProcesses:
 def host_orders(study: Study, run: Run, source: str) -> list[FeedbackConfig]:
     """Return what the feedback processes of a study are to be told; ``source`` is whose streams."""
     cues = {name: _part(choice) for name, choice in study.cues.items()}
+    views = {name: _part(choice) for name, choice in study.views.items()}
+    parts = list(views.values())
     return [
         *(
-            FeedbackConfig(name, _part(choice), run, source, study.path, always=True, cues=cues)
-            for name, choice in study.views.items()
+            FeedbackConfig(
+                name,
+                part,
+                run,
+                source,
+                study.path,
+                always=True,
+                cues=cues,
+                title=f"{name} - {study.protocol.study}",
+                before=tuple(parts[:number]),
+            )
+            for number, (name, part) in enumerate(views.items())
         ),
         *(
             FeedbackConfig(name, _part(choice), run, source, study.path, always=False)

@@ -9,12 +9,13 @@ import multiprocessing
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 
+from labcrane.core.records import Event
 from labcrane.feedback.processes import FeedbackProcesses, log_requests
 from labcrane.launcher.hang_detector import HangDetector
 from labcrane.launcher.session_process import Ended, Offered, SessionConfig, serve
@@ -22,6 +23,7 @@ from labcrane.recording.crash_marker import read_whereabouts
 from labcrane.recording.paths import parts
 from labcrane.session.commands import (
     Command,
+    LauncherGone,
     Message,
     MessageError,
     Order,
@@ -107,6 +109,44 @@ class MessageSender:
                 self._pipe.send_bytes(line)
             except OSError:
                 return  # the session has ended this very moment
+
+
+class MessageReceiver:
+    """Receives what the session says, in a thread of its own.
+
+    A session that hangs may do so in the middle of a message, and whoever reads its pipe waits.
+
+    Attributes
+    ----------
+    over
+        Whether it will say no more, and all it said has been taken: it has ended or died.
+    """
+
+    def __init__(self, pipe: Connection) -> None:
+        self.over = False
+        self._pipe = pipe
+        self._said: queue.SimpleQueue[Event | Offered | Ended | None] = queue.SimpleQueue()
+        threading.Thread(target=self._receive, name="from-session", daemon=True).start()
+
+    def wait(self, seconds: float) -> list[Event | Offered | Ended]:
+        """Return what was said, and wait so long for it."""
+        said: list[Event | Offered | Ended] = []
+        with suppress(queue.Empty):
+            message = self._said.get(timeout=seconds)
+            while message is not None:
+                said.append(message)
+                message = self._said.get_nowait()
+            self.over = True
+        return said
+
+    def _receive(self) -> None:
+        try:
+            while True:
+                self._said.put(self._pipe.recv())
+        except (EOFError, OSError):
+            pass  # it may have died in the middle of a message
+        finally:
+            self._said.put(None)
 
 
 class Launcher:
@@ -217,15 +257,17 @@ class Launcher:
         process.start()
         theirs.close()
         sender = MessageSender(ours, self._say)
+        said = MessageReceiver(ours)
         try:
-            return self._watch(process, ours, sender.send)
+            return self._watch(process, said, sender.send)
         finally:
+            sender.send(LauncherGone())  # if it still runs, nobody looks after it any more
             sender.close()
-            ours.close()
             process.join()
+            ours.close()
 
     def _watch(
-        self, process: "SpawnProcess", pipe: Connection, send: Callable[[Message], None]
+        self, process: "SpawnProcess", said: "MessageReceiver", send: Callable[[Message], None]
     ) -> int | None:
         """Return the exit code of a session that died, None of one that ended in order."""
         stillness = HangDetector(self._visit.whereabouts, self._say)
@@ -234,17 +276,16 @@ class Launcher:
                 for command in (*self._kept, *self._console.commands()):
                     send(command)
                 self._kept.clear()
-                ready = wait([pipe, process.sentinel], LOOK_S)
+                messages = said.wait(LOOK_S)
             except KeyboardInterrupt:
                 send(Command(Order.END))
                 continue
-            # Also when it has died: what it said before is in the pipe.
-            ended = self._pass_events(pipe) if ready else None
+            ended = self._pass_events(messages)
             if ended is not None:
                 if ended.error is not None:
                     raise ended.error
                 return None
-            if process.sentinel in ready:
+            if said.over:  # it has died, and what it said before has been heard
                 process.join()
                 return process.exitcode
             if stillness.hangs():
@@ -254,21 +295,17 @@ class Launcher:
                 for news in self._crew.watch(self._say):
                     send(news)
 
-    def _pass_events(self, pipe: Connection) -> Ended | None:
-        try:
-            while pipe.poll():
-                message = pipe.recv()
-                if isinstance(message, Ended):
-                    return message
-                if isinstance(message, Offered):
-                    if self._crew:
-                        self._crew.offer(message.streams)
-                    continue
-                if message.name == "session.end":
-                    self._owed = str(message.data["owed"])
-                self._console.report(message)
-        except (EOFError, OSError):
-            pass  # it died in the middle of a message; its exit code says how
+    def _pass_events(self, messages: Iterable[Event | Offered | Ended]) -> Ended | None:
+        for message in messages:
+            if isinstance(message, Ended):
+                return message
+            if isinstance(message, Offered):
+                if self._crew:
+                    self._crew.offer(message.streams)
+                continue
+            if message.name == "session.end":
+                self._owed = str(message.data["owed"])
+            self._console.report(message)
         return None
 
     def _watch_streams(self, send: Callable[[Message], None]) -> None:

@@ -1,12 +1,15 @@
 """Into the register: slot, consent, exclusion, notes."""
 
+import re
 from datetime import date
 from typing import Literal
 
 from labcrane.design.seeds import derive
 from labcrane.design.slots import group_of, next_slot
 from labcrane.errors import ProtocolError
+from labcrane.files.names import check_name, twin_key
 from labcrane.participants.folders import Places
+from labcrane.participants.mentions import Mentions
 from labcrane.participants.personal_data import personal
 from labcrane.participants.register import Consent, Deviation, Entry, Exclusion, Register, changed
 from labcrane.protocol.study import Study
@@ -21,6 +24,7 @@ def _entry(register: Register, study: Study, participant: str, today: date) -> E
         return register.participants[participant]
     if any(stone.participant == participant for stone in register.tombstones):
         raise ProtocolError(f"{participant} was erased; give the next participant a new pseudonym")
+    check_apart(register, participant)
     groups = tuple(study.protocol.design.groups)
     slot = next_slot(name, groups, register.slots())
     entry = Entry(
@@ -31,6 +35,32 @@ def _entry(register: Register, study: Study, participant: str, today: date) -> E
     )
     register.participants[participant] = entry
     return entry
+
+
+def check_apart(register: Register, participant: str, instead_of: str = "") -> None:
+    """Refuse a new pseudonym that could be taken for another one, in a text or by a disk.
+
+    Parameters
+    ----------
+    instead_of
+        Somebody whose pseudonym it replaces.
+    """
+    check_name(participant, "participant")
+    if not re.search("[A-Za-z]", participant):
+        raise ProtocolError(
+            f"participant {participant!r} cannot be told from a number in a text, and so could not "
+            f"be erased from one; put a letter before it: P{participant}"
+        )
+    for known in register.names():
+        if known == instead_of:
+            continue
+        same = twin_key(known) == twin_key(participant)
+        if same or Mentions([known]).of(participant) or Mentions([participant]).of(known):
+            raise ProtocolError(
+                f"participant {participant} could be taken for {known}, who is in the register: "
+                "they differ only in capitals, hyphens, or a part of their own; give another "
+                "pseudonym"
+            )
 
 
 def confirm_consent(

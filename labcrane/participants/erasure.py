@@ -1,15 +1,31 @@
 """Erase a participant."""
 
-import re
 import shutil
 from dataclasses import dataclass
 from datetime import date
+from pathlib import Path
 
-from labcrane.errors import ProtocolError
-from labcrane.participants.copies import Reach, edit_exports, forget_export, remove_from_stores
+from labcrane.files.names import OURS, check_name
+from labcrane.participants.copies import (
+    Reach,
+    edit_exports,
+    forget_export,
+    reached_now,
+    remove_from_stores,
+)
 from labcrane.participants.enrolment import check_words
 from labcrane.participants.folders import Places
-from labcrane.participants.register import Register, Tombstone, Work, begun, changed, read
+from labcrane.participants.mentions import Mentions
+from labcrane.participants.proof import mentioned
+from labcrane.participants.register import (
+    Owed,
+    Register,
+    Tombstone,
+    Work,
+    begun,
+    changed,
+    read,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +37,7 @@ class Erased:
     reach
         Files that were removed or changed, and folders that could not be reached.
     mentions
-        Files of the data folder that still hold the pseudonym: written by people, not by labcrane.
+        Files that still hold the pseudonym: written by people, not by labcrane.
     """
 
     reach: Reach
@@ -43,13 +59,15 @@ def begin(places: Places, participant: str, reason: str, today: date) -> None:
         Nothing is known of the participant.
     """
     check_words(reason, "reason")
-    if not re.fullmatch(r"[A-Za-z0-9_]+", participant):
-        raise ProtocolError(
-            f"{participant!r} is no pseudonym; give it without stamps: P007, not P007-PILOT"
-        )
 
     def check(register: Register) -> None:
-        if participant not in register.participants and not places.all_raw(participant):
+        if participant in register.participants:
+            # A name that could not be given today, but was: it is one folder's all the same.
+            if Path(participant).name != participant or participant.lower() in OURS:
+                check_name(participant, "participant")
+            return
+        check_name(participant, "participant")
+        if not (places.all_raw(participant) or places.links(participant)):
             register.entry(participant)  # says who there is
 
     work = Work(kind="erase", participant=participant, reason=reason, date=today.isoformat())
@@ -58,7 +76,12 @@ def begin(places: Places, participant: str, reason: str, today: date) -> None:
 
 def carry_out(places: Places, work: Work) -> Erased:
     """Erase; may be killed and repeated at any moment."""
-    participant, register, reach = work.participant, read(places), Reach()
+    participant, reach = work.participant, Reach()
+    register = reaching(places, participant)
+    reach.owed += [
+        Owed(participant=participant, folder=str(link), link=True)
+        for link in places.links(participant)
+    ]
     for folder in places.all_raw(participant):
         shutil.rmtree(folder)
         reach.removed.append(str(folder))
@@ -66,7 +89,7 @@ def carry_out(places: Places, work: Work) -> Erased:
     remove_from_stores(register, participant, reach)
     with changed(places) as now:
         now.participants.pop(participant, None)
-        forget_export(now, participant, None)
+        forget_export(places, now, participant, None)
         forget_store(now, participant)
         now.owed += reach.owed
         now.tombstones.append(
@@ -74,6 +97,19 @@ def carry_out(places: Places, work: Work) -> Erased:
         )
         now.work = None
     return Erased(reach, mentions(places, participant))
+
+
+def reaching(places: Places, participant: str) -> Register:
+    """Return the register, after noting in it which folders elsewhere are there.
+
+    Noted first: of a folder that a kill leaves empty of the participant's files, the next call
+    must know that it was there.
+    """
+    with changed(places) as register:
+        assert register.work is not None  # noqa: S101 - begun before
+        there = reached_now(places, register, participant)
+        register.work.reached = sorted({*register.work.reached, *there})
+    return read(places)
 
 
 def forget_store(register: Register, participant: str) -> None:
@@ -85,10 +121,20 @@ def forget_store(register: Register, participant: str) -> None:
 
 
 def mentions(places: Places, participant: str) -> list[str]:
-    """Return the files of the data folder, but the register, with the pseudonym in them."""
-    word = participant.encode()
-    return [
-        str(path)
-        for path in places.files()
-        if path != places.register and (word in path.name.encode() or word in path.read_bytes())
+    """Return files with the pseudonym in name or content: of the data folder, and of all exports.
+
+    What is packed is opened. The register is left out: it keeps the tombstone.
+    """
+    register = read(places)
+    names = Mentions({*register.names(), participant})
+    written = [
+        places.root / export.folder / name for export in register.exports for name in export.files
     ]
+    found = []
+    for path in dict.fromkeys([*places.files(), *written]):
+        if path == places.register or path.is_symlink() or not path.is_file():
+            continue
+        under = path.relative_to(places.root) if path.is_relative_to(places.root) else path.name
+        if participant in names.of(str(under)) | mentioned(path, names):
+            found.append(str(path))
+    return found

@@ -11,6 +11,7 @@
 All of it is for the user only.
 """
 
+import os
 import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -52,21 +53,41 @@ class Places:
 
     def all_raw(self, participant: str) -> list[Path]:
         """Return the folders of a participant's recordings, pilots and simulations as well."""
-        folders = [
+        folders = self._with_stamps(participant)
+        return [folder for folder in folders if folder.is_dir() and not folder.is_symlink()]
+
+    def links(self, participant: str) -> list[Path]:
+        """Return links in the places of such folders; they are never followed."""
+        return [folder for folder in self._with_stamps(participant) if folder.is_symlink()]
+
+    def _with_stamps(self, participant: str) -> list[Path]:
+        return [
             DataFolder(self.root, participant, pilot, simulated).path
             for pilot in (False, True)
             for simulated in (False, True)
         ]
-        return [folder for folder in folders if folder.is_dir()]
 
     def files(self) -> Iterator[Path]:
-        """Yield every file below the data folder."""
-        return (path for path in sorted(self.root.rglob("*")) if path.is_file())
+        """Yield every file below the data folder; links are left out."""
+        return (path for path in entries(self.root) if path.is_file())
+
+
+def entries(folder: Path) -> Iterator[Path]:
+    """Yield every file and folder below a folder; links, and what is behind them, are left out."""
+    for place, folders, files in os.walk(folder, followlinks=False):
+        folders.sort()
+        for name in sorted([*folders, *files]):
+            path = Path(place) / name
+            if not path.is_symlink():
+                yield path
 
 
 def keep_private(folder: Path) -> None:
-    """Take all permissions on ``folder`` and what is in it from everybody but the user."""
-    for path in (folder, *folder.rglob("*")):
+    """Take all permissions on ``folder`` and what is in it from everybody but the user.
+
+    Links, and what is behind them, are left as they are.
+    """
+    for path in (folder, *entries(folder)):
         wanted = PRIVATE_FOLDER if path.is_dir() else PRIVATE_FILE
         if stat.S_IMODE(path.stat().st_mode) & ~wanted:
             path.chmod(wanted)

@@ -92,13 +92,20 @@ class Entry(Record):
 
 
 class Export(Record):
-    """Where data of participants have gone."""
+    """Where data of participants have gone: an export, a report, a workbook."""
 
     date: str
     exporter: str
+    """What wrote it: an exporter, or a command."""
     folder: str
     files: dict[str, list[str]]
-    """The participants in each file, by its path in the folder."""
+    """The participants in each file, by its path in the folder; nobody in one that all share."""
+    people: list[str] = Field(default_factory=list)
+    """Everybody whose data went in, while it is being written as well."""
+    whole: bool = False
+    """Whether every part of it was worked out of everybody's data: it cannot be edited."""
+    staging: str = ""
+    """Folder in which it is being written; gone once everything has its place."""
 
 
 class Tombstone(Record):
@@ -118,6 +125,14 @@ class Owed(Record):
     folder: str
     files: dict[str, list[str]] = Field(default_factory=dict)
     """The participants in each file of an export; empty for a store."""
+    whole: bool = False
+    """Whether the export cannot be edited, and goes as a whole."""
+    staging: str = ""
+    """Folder in which it was being written when its writer was killed."""
+    reached: bool = False
+    """Whether the folder was found again: what is missing there now was removed by us."""
+    link: bool = False
+    """Whether the folder is a link, which is never followed: due until it is gone."""
 
 
 class Work(Record):
@@ -128,6 +143,8 @@ class Work(Record):
     to: str = ""
     reason: str = ""
     date: str
+    reached: list[str] = Field(default_factory=list)
+    """Folders outside of the data folder that were there when it began."""
 
 
 class Register(Record):
@@ -174,6 +191,12 @@ class Register(Record):
                 )
         known = ", ".join(sorted(self.participants)) or "nobody"
         raise ProtocolError(f"participant {participant} is not in the register; it has {known}")
+
+    def names(self) -> list[str]:
+        """Return every pseudonym that was ever in the register, those of the erased too."""
+        erased = [stone.participant for stone in self.tombstones]
+        pending = [self.work.participant] if self.work else []
+        return sorted({*self.participants, *erased, *pending})
 
     def slots(self) -> dict[int, str]:
         """Return who holds which slot."""

@@ -1,5 +1,6 @@
 """Repair a wrong participant number."""
 
+import os
 import re
 import shutil
 from datetime import date
@@ -7,9 +8,16 @@ from pathlib import Path
 
 from labcrane.errors import ProtocolError
 from labcrane.files.atomic import copy, make_folder, replacing, sync_folder
-from labcrane.participants.copies import Reach, edit_exports, forget_export, remove_from_stores
-from labcrane.participants.enrolment import check_words
-from labcrane.participants.erasure import forget_store
+from labcrane.files.names import check_name
+from labcrane.participants.copies import (
+    Reach,
+    edit_exports,
+    forget_export,
+    remove_from_stores,
+    store_reachable,
+)
+from labcrane.participants.enrolment import check_apart, check_words
+from labcrane.participants.erasure import forget_store, reaching
 from labcrane.participants.folders import Places
 from labcrane.participants.register import (
     Deviation,
@@ -40,6 +48,7 @@ def begin(places: Places, old: str, new: str, reason: str, today: date) -> None:
 
     def check(register: Register) -> None:
         register.entry(old)
+        check_name(new, "participant")
         if old == new or not re.fullmatch(register.pattern, new):
             raise ProtocolError(
                 f"{old} cannot become {new!r}: it takes another pseudonym that matches "
@@ -48,7 +57,14 @@ def begin(places: Places, old: str, new: str, reason: str, today: date) -> None:
         if any(stone.participant == new for stone in register.tombstones):
             raise ProtocolError(f"{new} was erased; nobody can have that pseudonym again")
         known = register.participants.get(new)
-        if places.raw(new).exists() or (known and known.sessions):
+        if known is None:
+            check_apart(register, new, instead_of=old)
+        if links := places.links(old):
+            raise ProtocolError(
+                f"{links[0]} is a link, and links are never followed; put the folder itself there, "
+                f"then relabel {old}"
+            )
+        if _is_taken(places, old, new) or (known and known.sessions):
             raise ProtocolError(
                 f"{new} has recordings of its own; relabel {new} first, to where they belong"
             )
@@ -57,53 +73,68 @@ def begin(places: Places, old: str, new: str, reason: str, today: date) -> None:
     begun(places, work, check)
 
 
+def _is_taken(places: Places, old: str, new: str) -> bool:
+    """Say whether a folder that the recordings of ``old`` are to have is there already."""
+    return any(
+        os.path.lexists(_renamed(folder, old, new))
+        for folder in {places.raw(old), *places.all_raw(old)}
+    )
+
+
+def _renamed(folder: Path, old: str, new: str) -> Path:
+    """Return what a participant's folder will be called; its stamps stay."""
+    return folder.with_name(new + folder.name.removeprefix(old))
+
+
 def carry_out(places: Places, work: Work) -> Reach:
     """Relabel; may be killed and repeated at any moment."""
     old, new, reach = work.participant, work.to, Reach()
-    _relabel_folder(places, old, new, reach)
-    register = read(places)
+    register = reaching(places, old)
+    for folder in places.all_raw(old):
+        _relabel_folder(folder, _renamed(folder, old, new), old, new)
+    reach.changed += [
+        str(path) for folder in places.all_raw(new) for path in sorted(folder.glob("*"))
+    ]
     edit_exports(places, register, old, new, reach)
     remove_from_stores(register, old, reach)
     with changed(places) as now:
         if old in now.participants:
             now.participants[new] = _merged(now, work)
             del now.participants[old]
-        forget_export(now, old, new)
+        forget_export(places, now, old, new)
         forget_store(now, old)
         now.owed += reach.owed
-    for store in (Path(name) for name in read(places).stores):
-        if store.is_dir():
-            transfer(places, store)
+    now = read(places)
+    for name, files in now.stores.items():
+        if store_reachable(name, now.study, files, work.reached) and Path(name).is_dir():
+            transfer(places, Path(name))
     with changed(places) as now:
         now.work = None
     return reach
 
 
-def _relabel_folder(places: Places, old: str, new: str, reach: Reach) -> None:
+def _relabel_folder(source: Path, target: Path, old: str, new: str) -> None:
     """Make the new folder beside the old one, give it its name at last, remove the old one."""
-    source, target = places.raw(old), places.raw(new)
-    beside = target.with_name(f".{new}.relabelled")
-    if source.is_dir() and not target.exists():
+    beside = target.with_name(f".{target.name}.relabelled")
+    if not target.exists():
         make_folder(beside)
         _relabel_files(source, beside, old, new)
         sync_folder(beside)
         beside.rename(target)
         sync_folder(target.parent)
-    if source.is_dir():
-        shutil.rmtree(source)
-    reach.changed += [str(path) for path in sorted(target.glob("*"))]
+    shutil.rmtree(source)
 
 
 def _relabel_files(source: Path, target: Path, old: str, new: str) -> None:
     rename = renaming(old, new)
     sizes: dict[str, int] = {}
-    for path in sorted(source.glob("*.xdf")):
+    for path in sorted(path for path in source.glob("*.xdf") if not path.is_symlink()):
         journal = target / rename(path.name)
         relabel_journal(path, journal, old, new)
         sizes[journal.name] = journal.stat().st_size
     for path in sorted(source.rglob("*")):
         place = target / rename(path.relative_to(source).as_posix())
-        if not path.is_file() or path.suffix == ".xdf":
+        if not path.is_file() or path.is_symlink() or path.suffix == ".xdf":
             continue
         if path.suffix == ".h5":
             with replacing(place) as beside:

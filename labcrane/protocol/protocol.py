@@ -3,9 +3,10 @@
 import inspect
 import re
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import (
+    AfterValidator,
     ConfigDict,
     Field,
     PositiveFloat,
@@ -15,6 +16,7 @@ from pydantic import (
 )
 
 from labcrane.analysis.indicator_settings import IndicatorSettings
+from labcrane.files.names import misfit
 from labcrane.files.yaml import YamlFile
 from labcrane.protocol.design import Design
 from labcrane.protocol.evaluation import StopRule
@@ -22,6 +24,15 @@ from labcrane.protocol.pages import PageSettings
 from labcrane.protocol.steps import Section, Session, read_sessions
 from labcrane.protocol.streams import StreamNeed, TimeLimits
 from labcrane.registry.hookspecs import ROLES
+
+
+def _names_a_folder(name: str) -> str:
+    if why := misfit(name, person=False):
+        raise ValueError(f"{name!r} {why}")
+    return name
+
+
+FolderName = Annotated[str, AfterValidator(_names_a_folder)]
 
 
 class Use(Section):
@@ -85,7 +96,7 @@ class Protocol(Section):
     labcrane: Literal[1]
     """Version of the protocol format."""
 
-    study: str = Field(pattern=r"^[a-z][a-z0-9_-]*$")
+    study: Annotated[FolderName, Field(pattern=r"^[a-z][a-z0-9_-]*$")]
     """Short name of the study, in lower case; part of every seed."""
 
     title: str
@@ -134,7 +145,9 @@ class Protocol(Section):
     views: dict[str, Use] = Field(default_factory=dict)
     """Windows and other displays that are always there, by name."""
 
-    streams: dict[str, StreamNeed] = Field(default_factory=dict)
+    streams: dict[Annotated[str, AfterValidator(_names_a_folder)], StreamNeed] = Field(
+        default_factory=dict
+    )
     """Streams of others to be recorded, by the study's names for them."""
 
     sync: TimeLimits = TimeLimits()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from labcrane.core.roles import Controller, Dynamics, InputDevice, Questionnaire, Task
 from labcrane.errors import ProtocolError
+from labcrane.files.names import check_name
 from labcrane.files.yaml import Place, YamlFile
 from labcrane.machines.machine import Machine
 from labcrane.protocol.components import ComponentResolver, ComponentSpec
@@ -85,6 +86,12 @@ class Study:
             **self.others,
         }
 
+    def warnings(self) -> Iterator[str]:
+        """Yield what is allowed, but should be known before people take part."""
+        for part, choice in self.choices.items():
+            for warning in choice.settings.warnings():
+                yield f"{part}: {warning}"
+
     def check_installed(self, *, simulated: bool = False, feedback: bool = True) -> None:
         """Raise :class:`ProtocolError` unless all that a run of the study needs is installed.
 
@@ -112,6 +119,7 @@ class Study:
                 f"participant {participant!r} does not match the protocol's pattern '{pattern}'; "
                 "give the pseudonym as it was handed out, or correct participants: pattern:"
             )
+        check_name(participant, "participant")
 
     def check_session(self, number: int) -> None:
         """Raise :class:`ProtocolError` unless the protocol has session ``number``."""

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from labcrane.errors import ProtocolError, RecordingError
 from labcrane.files.atomic import make_folder
+from labcrane.files.names import check_name, twin_key
 from labcrane.recording.paths import participant_path
 
 
@@ -49,6 +50,11 @@ class DataFolder:
         """Return the pseudonym in a ``name`` with stamps."""
         return name.removesuffix("-SIMULATED").removesuffix("-PILOT")
 
+    @staticmethod
+    def is_simulated(name: str) -> bool:
+        """Say whether a ``name`` with stamps is of data that a program made."""
+        return name.endswith("-SIMULATED")
+
     @property
     def path(self) -> Path:
         """The participant's folder."""
@@ -85,6 +91,13 @@ class DataFolder:
         RecordingError
             It cannot be written.
         """
+        check_name(self.participant, "participant")
+        self._refuse_twin()
+        if self.path.is_symlink():
+            raise RecordingError(
+                f"{self.path} is a link, and links are never followed: what is behind it could "
+                "not be erased; move the folder itself here, or give another with --data"
+            )
         try:
             make_folder(self.path)
         except OSError as error:
@@ -107,6 +120,17 @@ class DataFolder:
                 f"participant {self.name} has already run session {session} (recorded in "
                 f"{self.path}: {done}); check the number, or give the next session{pilot}"
             )
+
+    def _refuse_twin(self) -> None:
+        """Refuse a name that some disk or format would take for that of another folder here."""
+        key = twin_key(self.name)
+        there = self.root.iterdir() if self.root.is_dir() else ()
+        for folder in there:
+            if folder.name != self.name and folder.is_dir() and twin_key(folder.name) == key:
+                raise ProtocolError(
+                    f"participant {self.name} and {folder.name}, who is here already, would be "
+                    "the same on some disks and in some formats; check the pseudonym"
+                )
 
     def check_space(self, expected_s: float, bytes_per_s: float, reserve_s: float) -> None:
         """Make sure that a session of twice the expected length fits, and its reserve.

@@ -2,14 +2,17 @@
 
 import hashlib
 import platform
+from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import entry_points, version
 from importlib.util import find_spec
 from typing import Any, Protocol
 
 from labcrane.core.records import Run
+from labcrane.core.roles import Questionnaire
 from labcrane.design.plan import SessionPlan
 from labcrane.doctor.checks import at_start
+from labcrane.protocol.components import ComponentSpec
 from labcrane.protocol.referenced_files import named_files
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
@@ -105,6 +108,10 @@ def _of_study(study: Study, *, simulated: bool) -> dict[str, Any]:
             for label, need in study.protocol.streams.items()
         },
         "rights": {name: each.rights for name, each in study.questionnaires.items()},
+        "questionnaires": {
+            name: _asked(each, study.questionnaire_choices.get(name))
+            for name, each in study.questionnaires.items()
+        },
         "indicator": study.protocol.indicator.model_dump(mode="json"),
         "sync": study.protocol.sync.model_dump(mode="json"),
         "trial_units": {
@@ -112,6 +119,16 @@ def _of_study(study: Study, *, simulated: bool) -> dict[str, Any]:
             for task in study.tasks.values()
             for column, unit in trial_units(task).items()
         },
+    }
+
+
+def _asked(questionnaire: Questionnaire, choice: ComponentSpec | None) -> dict[str, Any]:
+    """Return what a questionnaire asks, in which words, and what it is worth."""
+    return {
+        "title": questionnaire.title,
+        "language": str(getattr(choice.settings, "language", "")) if choice else "",
+        "items": [asdict(item) for item in questionnaire.items()],
+        "scores": [asdict(score) for score in questionnaire.scores],
     }
 
 

@@ -7,6 +7,7 @@ starts late, or again, draws from one sample alone.
 """
 
 import json
+import time
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from functools import cache
@@ -119,17 +120,21 @@ class ContextInlet:
     def __init__(self, info: "pylsl.StreamInfo") -> None:
         import pylsl  # noqa: PLC0415
 
-        self._inlet = pylsl.StreamInlet(info, max_buflen=60, recover=True, processing_flags=0)
+        self._inlet = pylsl.StreamInlet(info, max_buflen=60, recover=False, processing_flags=0)
+        self._lost = pylsl.util.LostError
         self.text = ""
         self.situation = SessionState()
 
     def changed(self, wait_s: float = 0.0) -> bool:
         """Take what has come; whether the situation is another one now."""
         newest = None
-        sample, _ = self._inlet.pull_sample(timeout=wait_s)
-        while sample is not None:
-            newest = sample[0]
-            sample, _ = self._inlet.pull_sample(timeout=0.0)
+        try:
+            sample, _ = self._inlet.pull_sample(timeout=wait_s)
+            while sample is not None:
+                newest = sample[0]
+                sample, _ = self._inlet.pull_sample(timeout=0.0)
+        except self._lost:  # the session has ended, and this process is about to
+            time.sleep(wait_s)
         if newest is None:
             return False
         self.text = newest

@@ -4,6 +4,7 @@ A sample of ``labcrane.frame`` is everything a frame holds but its events, in fl
 of :func:`frame_columns`, in order. Its time is the time the tick was due.
 """
 
+import time
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ from labcrane.core.records import Frame, Run
 from labcrane.recording.frame_log import FrameRow, columns, sizes
 from labcrane.recording.journal import Column
 from labcrane.streams.outlets import Samples, channel, stream_info
+from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pylsl
@@ -74,23 +76,32 @@ class FrameInlet:
         import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
 
         self._inlet = pylsl.StreamInlet(
-            info, max_buflen=self.BUFFER_S, recover=True, processing_flags=0, as_numpy=True
+            info, max_buflen=self.BUFFER_S, recover=False, processing_flags=0, as_numpy=True
         )
         self._frame = FrameRow(sizes(run), wrote=False).frame
         self.skipped = 0
 
     def newest(self, wait_s: float) -> Frame | None:
         """Return the newest frame, waiting up to ``wait_s`` for one; None when none came."""
+        import pylsl  # noqa: PLC0415
+
+        try:
+            row = self._pulled(wait_s)
+        except pylsl.util.LostError:  # the session has ended, and this process is about to
+            time.sleep(wait_s)
+            return None
+        return None if row is None else self._frame(row)
+
+    def _pulled(self, wait_s: float) -> FloatArray | None:
         row, _ = self._inlet.pull_sample(timeout=wait_s)
         if row is None:
             return None
         while True:
             rows, _ = self._inlet.pull_chunk(timeout=0.0, max_samples=1024)
             if not len(rows):
-                break
+                return np.asarray(row, dtype=np.float64)
             self.skipped += len(rows)
             row = rows[-1]
-        return self._frame(np.asarray(row, dtype=np.float64))
 
 
 def _label(column: Column) -> str:

@@ -7,6 +7,7 @@ anything imports pylsl, and child processes inherit it with the environment.
 import atexit
 import configparser
 import os
+import socket
 import sys
 import tempfile
 from dataclasses import dataclass
@@ -15,6 +16,9 @@ from pathlib import Path
 from labcrane.errors import StreamError
 
 VARIABLE = "LSLAPICFG"
+
+FIRST_PORT, PORTS = 16572, 32
+"""liblsl's defaults."""
 
 # KnownPeers makes streams of other processes visible to liblsl before 1.18, which sees only one of
 # them by multicast on loopback. PortRange 32, the default, hides outlets beyond the 32nd. Clock
@@ -40,7 +44,7 @@ MulticastMinRTT = 0.05
 UnicastMinRTT = 0.1
 MulticastMaxRTT = 1
 UnicastMaxRTT = 1
-ContinuousResolveInterval = 0.25
+ContinuousResolveInterval = 0.75
 TimeUpdateInterval = 1
 [log]
 level = -3
@@ -105,6 +109,36 @@ def describe() -> Network:
             f"{VARIABLE} names {name}, which cannot be read ({error}); correct it or unset it"
         ) from error
     return Network(Path(name), loopback=_stays_here(parser))
+
+
+def port_range() -> range:
+    """Return the ports that liblsl takes for streams and searches, on this computer.
+
+    Raises
+    ------
+    StreamError
+        The configuration cannot be read.
+    """
+    parser = configparser.ConfigParser(strict=False, interpolation=None)
+    if config := describe().config:
+        parser.read_string(config.read_text())
+    first = parser.getint("ports", "BasePort", fallback=FIRST_PORT)
+    return range(first, first + parser.getint("ports", "PortRange", fallback=PORTS))
+
+
+def free_ports() -> int:
+    """Return how many ports of liblsl's range are free for UDP and for TCP, the fewer of both."""
+    kinds = (socket.SOCK_DGRAM, socket.SOCK_STREAM)
+    return min(sum(_is_free(port, kind) for port in port_range()) for kind in kinds)
+
+
+def _is_free(port: int, kind: socket.SocketKind) -> bool:
+    with socket.socket(socket.AF_INET, kind) as probe:
+        try:
+            probe.bind(("", port))
+        except OSError:
+            return False
+    return True
 
 
 def _stays_here(parser: configparser.ConfigParser) -> bool:

@@ -19,8 +19,9 @@ from labcrane.errors import StreamError
 if TYPE_CHECKING:
     import pylsl
 
-LOOK_S = 0.35
-"""How long answers to a wave are waited for: liblsl's next wave would begin 0.4 s after it."""
+LOOK_S = 0.8
+"""How long answers are waited for: known peers are asked 0.5 s after everybody, and the next wave
+begins 1 s or more after the first."""
 
 PAUSE_S = 0.65
 """Between two looks."""

@@ -20,14 +20,20 @@ TICK_S = 1.0 / 240.0
 
 
 def check_soon(method: Callable[[], object], calls: int = 50) -> None:
-    """Check that a method leaves time for the others of a tick; the first call may be slow."""
+    """Check that a method leaves time for the others of a tick; the first call may be slow.
+
+    The fastest call counts: what else runs on the computer makes calls slower, and none faster.
+    """
     took = []
     for _ in range(calls):
         began = time.perf_counter()
         method()
         took.append(time.perf_counter() - began)
-    median = float(np.median(took))
-    assert median < TICK_S / 2, f"a call takes {1000 * median:.1f} ms, and must return at once"
+    least = min(took)
+    assert least < TICK_S / 2, (
+        f"a call takes {1000 * least:.1f} ms at least, and must return at once: a tick at 240 Hz "
+        f"has {1000 * TICK_S:.1f} ms for everything"
+    )
 
 
 def check_closes_after_failed_open(component: Component) -> None:
@@ -55,16 +61,25 @@ class PluginContract:
         offers = _offers(plugin)
         assert offers or _commands(plugin), "no hook of labcrane offers anything"
         for offer in offers:
-            assert offer.name.isidentifier(), offer.name
-            assert offer.name.islower(), offer.name
+            assert offer.name.isidentifier(), (
+                f"{offer.name!r} cannot be written in a protocol; use letters, digits and _"
+            )
+            assert offer.name.islower(), f"write {offer.name.lower()!r} instead of {offer.name!r}"
 
     def test_every_setting_says_what_it_means(self, plugin: ModuleType) -> None:
         for offer in _offers(plugin):
-            assert offer.settings.__doc__, offer.settings
+            name = offer.settings.__name__
+            assert offer.settings.__doc__, (
+                f"{name} needs a docstring: write what {offer.name!r} is, in a sentence, below "
+                f"'class {name}(Settings):'"
+            )
             schema = offer.settings.model_json_schema()
             for name, setting in schema.get("properties", {}).items():
                 said = setting.get("description")
-                assert said, f"{offer.settings.__name__}.{name} needs a docstring, with its unit"
+                assert said, (
+                    f"{offer.settings.__name__}.{name} needs a docstring: write what it is, with "
+                    "its unit, on the line below it"
+                )
 
     def test_settings_refuse_keys_that_they_do_not_have(self, plugin: ModuleType) -> None:
         for offer in _offers(plugin):

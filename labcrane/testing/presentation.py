@@ -37,6 +37,13 @@ def make_target(run: Run, number: int = 0) -> Frame:
     return frame
 
 
+def make_movement(run: Run, number: int = 0) -> Frame:
+    """Return a frame with a target in which the tip moves at 0.4 m/s."""
+    frame = make_target(run, number)
+    frame.state[run.state.find("tip.velocity")] = (0.3, 0.2, -0.17)
+    return frame
+
+
 class CueContract:
     """What every cue must do. Provide the fixture ``cue``."""
 
@@ -52,18 +59,29 @@ class CueContract:
     def test_cue_draws_shapes_with_names_of_their_own(self, cue: Cue) -> None:
         run = make_run(ch8(), task=TARGETS)
         with opened(cue, run):
-            shapes = cue.draw(make_target(run))
-            assert shapes, "with a target there is something to be seen"
-            assert len({shape.name for shape in shapes}) == len(shapes)
-            for shape in shapes:
-                _check_shape(shape)
+            # Each drawing is looked at before the next: a cue may use its shapes again.
+            seen = 0
+            for frame in (make_target(run), make_movement(run)):
+                shapes = cue.draw(frame)
+                names = [shape.name for shape in shapes]
+                assert len(set(names)) == len(names), f"two shapes have one name: {names}"
+                for shape in shapes:
+                    _check_shape(shape)
+                seen += len(shapes)
+            assert seen, (
+                "draw() returned no shape for a frame with a target, neither with the tip at rest "
+                "nor moving at 0.4 m/s"
+            )
 
     def test_cue_has_the_numbers_its_signals_promise(self, cue: Cue) -> None:
         run = make_run(ch8(), task=TARGETS)
         with opened(cue, run):
             values = cue.values(make_target(run))
-            assert values.shape == (Layout("cue", cue.signals).size,)
-            assert np.isfinite(values).all()
+            size = Layout("cue", cue.signals).size
+            assert values.shape == (size,), (
+                f"values() has shape {values.shape}; signals of {size} numbers are promised"
+            )
+            assert np.isfinite(values).all(), f"values() must be finite with a target: {values}"
 
     def test_cue_draws_at_once(self, cue: Cue) -> None:
         run = make_run(ch8(), task=TARGETS)
@@ -78,14 +96,16 @@ class CueContract:
     def test_cue_draws_nothing_between_trials(self, cue: Cue) -> None:
         run = make_run(ch8(), task=TARGETS)
         with opened(cue, run):
-            assert not cue.draw(make_frame(run))
+            shapes = cue.draw(make_frame(run))
+            assert not shapes, f"draw() returned {shapes} between trials, when no target is there"
 
 
 def _check_shape(shape: Shape) -> None:
     points = [shape.centre] if isinstance(shape, Sphere) else [shape.start, shape.end]
-    assert np.isfinite(points).all(), shape
-    assert shape.radius > 0.0, shape
-    assert all(0.0 <= part <= 1.0 for part in shape.colour), shape
+    assert np.isfinite(points).all(), f"a shape must be somewhere: {shape}"
+    assert shape.radius > 0.0, f"a radius must be over 0 m: {shape}"
+    fine = all(0.0 <= part <= 1.0 for part in shape.colour)
+    assert fine, f"red, green, blue and alpha must be 0 to 1: {shape}"
 
 
 class Foreign(BaseModel):
@@ -104,9 +124,11 @@ class FeedbackContract:
             for number in range(3):
                 values = feedback.present(make_target(run, number))
                 assert values.shape == (size,), f"promised ({size},), got {values.shape}"
-                assert values.dtype == np.float64
+                assert values.dtype == np.float64, f"present() gave {values.dtype}, not float64"
                 samples = feedback.samples()
-                assert set(samples) == set(feedback.streams)
+                assert set(samples) == set(feedback.streams), (
+                    f"samples() has {sorted(samples)}; streams are {sorted(feedback.streams)}"
+                )
                 for name, signals in feedback.streams.items():
                     rows = np.atleast_2d(samples[name])
                     assert rows.shape[1:] == (Layout(name, signals).size,), name
@@ -116,7 +138,9 @@ class FeedbackContract:
         with opened(feedback, run):
             feedback.present(make_target(run))
             pictures = feedback.pictures()
-            assert set(pictures) <= set(feedback.cameras)
+            assert set(pictures) <= set(feedback.cameras), (
+                f"pictures() has {sorted(pictures)}; cameras are {sorted(feedback.cameras)}"
+            )
             for name, picture in pictures.items():
                 assert picture.pixels.dtype == np.uint8, name
                 assert picture.pixels.shape[2:] in {(), (3,)}, name
@@ -133,8 +157,9 @@ class FeedbackContract:
         run = make_run(ch8(), task=TARGETS)
         with opened(feedback, run):
             before = feedback.present(make_target(run)).shape
-            assert feedback.adjust(Foreign()) is False
-            assert feedback.present(make_target(run)).shape == before
+            assert feedback.adjust(Foreign()) is False, "adjust() must refuse foreign settings"
+            after = feedback.present(make_target(run)).shape
+            assert after == before, f"present() gave shape {before}, then {after}"
 
     def test_feedback_closes_without_having_been_opened(self, feedback: Feedback) -> None:
         feedback.close()

@@ -217,8 +217,9 @@ class ControllerContract:
         with opened(controller, run):
             state = crane_at(machine, machine.rest)
             command = controller.command(np.zeros(run.axes.size), state)
-            assert not command[drive].any()
-            assert not controller.idle()[drive].any()
+            assert not command[drive].any(), f"axes at 0 must ask for no motion, not {command}"
+            idle = controller.idle()
+            assert not idle[drive].any(), f"idle() must ask for no motion, not {idle}"
 
     def test_no_command_exceeds_the_joint_speeds(self, controller: Controller) -> None:
         machine = ch8()
@@ -231,7 +232,8 @@ class ControllerContract:
                 state = crane_at(machine, random.uniform(lowest, highest).tolist())
                 axes = random.uniform(-1, 1, run.axes.size)
                 command = controller.command(axes, state)[drive]
-                assert (np.abs(command) <= np.array(machine.speeds) * (1 + 1e-12)).all()
+                fine = np.abs(command) <= np.array(machine.speeds) * (1 + 1e-12)
+                assert fine.all(), f"{command} rad/s is beyond the joints' {machine.speeds} rad/s"
 
     def test_steering_stays_within_the_axes(self, controller: Controller) -> None:
         machine = ch8()
@@ -240,8 +242,8 @@ class ControllerContract:
             state = crane_at(machine, machine.rest)
             for velocity in np.vstack([np.eye(3), -5.0 * np.eye(3)]):
                 axes = controller.inverse(velocity, state)
-                assert axes.shape == (run.axes.size,)
-                assert np.abs(axes).max() <= 1.0
+                assert axes.shape == (run.axes.size,), f"inverse() gave shape {axes.shape}"
+                assert np.abs(axes).max() <= 1.0, f"inverse() must stay within -1 to 1: {axes}"
 
 
 def _push(run: Run, push: float) -> FloatArray:
@@ -258,7 +260,7 @@ class DynamicsContract:
         with opened(dynamics, run):
             check_array(dynamics, dynamics.state())
             check_array(dynamics, dynamics.step(0.5 * np.array(machine.speeds), 1 / RATE_HZ))
-            assert dynamics.bodies()
+            assert dynamics.bodies(), "bodies() must return what is drawn of the machine"
 
     def test_reset_forgets_everything(self, dynamics: Dynamics) -> None:
         machine = ch8()

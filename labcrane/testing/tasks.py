@@ -43,10 +43,13 @@ class TaskContract:
         factors = task.factors()
         forward = task.plan(factors)
         backward = task.plan({name: list(levels)[::-1] for name, levels in factors.items()})
-        assert [p.condition for p in forward] == [p.condition for p in task.plan(factors)]
-        assert len(forward) == len(backward)
-        assert any(planned.counted for planned in forward)
-        assert all(planned.expected_s > 0 for planned in forward)
+        again = task.plan(factors)
+        assert [p.condition for p in forward] == [p.condition for p in again], (
+            "plan() must return the same for the same levels"
+        )
+        assert len(forward) == len(backward), "the order of levels changes how many there are"
+        assert any(planned.counted for planned in forward), "one planned trial at least must count"
+        assert all(planned.expected_s > 0 for planned in forward), "expected_s must be over 0"
 
     def test_task_judges_what_its_signals_promise(self, task: Task) -> None:
         check_signals(task)
@@ -56,7 +59,7 @@ class TaskContract:
                 task.begin_trial(make_trial(planned))
                 judgement = task.evaluate(self._frame(run))
                 check_array(task, judgement.values)
-                assert judgement.phase is not Phase.IDLE
+                assert judgement.phase is not Phase.IDLE, "a trial that has begun is not IDLE"
 
     def test_the_same_frames_are_judged_alike_after_every_beginning(self, task: Task) -> None:
         run = self._run(task)
@@ -86,7 +89,8 @@ class TaskContract:
                 task.begin_trial(make_trial(planned))
                 task.lift_limits()
                 late = self._frame(run, number=int(3600 * RATE_HZ))
-                assert not task.evaluate(late).phase.over
+                over = task.evaluate(late).phase.over
+                assert not over, "after lift_limits() a trial must not end by itself"
 
     def test_results_are_declared(self, task: Task) -> None:
         run = self._run(task)

@@ -58,7 +58,10 @@ class Gate:
         keys: Keys,
         used: Callable[[str], None],
         denied: Callable[[str], None],
+        *,
+        secure: bool = False,
     ) -> None:
+        self._secure = "; Secure" if secure else ""
         self._inner = inner
         self._keys = keys
         self._used = used
@@ -104,11 +107,11 @@ class Gate:
             return
         del self._keys.tokens[page]
         self._used(page)
-        await _redirect(send, page, self._keys.cookies[page])
+        await _redirect(send, page, self._keys.cookies[page] + self._secure)
 
     async def _refuse(self, scope: Mapping[str, Any], send: Any, why: str) -> None:
         host = (scope.get("client") or ("unknown",))[0]
-        self._denied(f"{host} asked for {scope['path']}: {why}")
+        self._denied(f"{host} asked for {str(scope['path'])[:80]}: {why}")
         if scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
             return
@@ -130,7 +133,7 @@ async def _redirect(send: Any, page: str, cookie: str | None) -> None:
         (b"cache-control", b"no-store"),
     ]
     if cookie is not None:
-        value = f"{_name(page)}={cookie}; HttpOnly; SameSite=Strict; Path=/"
+        value = f"{_name(page)}={cookie}; HttpOnly; SameSite=Strict; Path=/"  # Secure by TLS
         headers.append((b"set-cookie", value.encode()))
     await send({"type": "http.response.start", "status": 303, "headers": headers})
     await send({"type": "http.response.body", "body": b""})

@@ -60,8 +60,9 @@ class PageHandle:
     def links(self) -> dict[str, str]:
         """Return the one-time link to each page."""
         order = self._order
+        scheme = "http" if order.certificate is None else "https"
         return {
-            page: f"http://{order.host}:{order.port}/{page}?token={token}"
+            page: f"{scheme}://{order.host}:{order.port}/{page}?token={token}"
             for page, token in order.keys.tokens.items()
         }
 

@@ -1,16 +1,20 @@
 """Page context: what every page knows, and how it asks."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from labcrane.design.plan import SessionPlan
+from labcrane.limits import LIMITS
 from labcrane.protocol.study import Study
-from labcrane.session.commands import Command, Order
+from labcrane.session.commands import Command, Order, beyond_limits
 from labcrane.web.access import PARTICIPANT, RIGHTS
+from labcrane.web.denials import Bucket
 from labcrane.web.live import Live
 from labcrane.web.pictures import Pictures
 from labcrane.web.state import SessionView
 from labcrane.web.translations import WORDS, Words
+
+MOST_ORDERS_S = LIMITS["orders of one page"].most
 
 PRIMARY = "#0d47a1"
 """The pages' colour for what has the focus, 8.6 to 1 on white; the usual one is too faint."""
@@ -24,6 +28,10 @@ class PageContext:
     ----------
     send
         Passes a command on to the launcher.
+    denied
+        Told of what was refused.
+    buckets
+        How many orders each page may give now.
     participant
         Name of the participant's folder: a pseudonym with its stamps.
     """
@@ -35,16 +43,38 @@ class PageContext:
     live: Live
     pictures: Pictures
     send: Callable[[Command], None]
+    denied: Callable[[str], None]
+    buckets: dict[str, Bucket] = field(
+        default_factory=lambda: {page: Bucket(MOST_ORDERS_S, 2 * MOST_ORDERS_S) for page in RIGHTS}
+    )
 
     def words(self, page: str) -> Words:
         """Return the words of a page; the supervisor's is English."""
         return WORDS[self.study.protocol.page.language if page == PARTICIPANT else "en"]
 
-    def give(self, page: str, order: Order, text: str = "") -> bool:
-        """Pass on what a page asks; refuse and log what it has no right to. Whether it went."""
+    def give(self, page: str, order: Order, text: str = "", at: str | None = None) -> str:
+        """Pass on what a page asks, or refuse and log it; return why, or nothing when it went.
+
+        ``at`` is the address from which it was asked, that of the browser by default.
+        """
+        at = _address() if at is None else at
+        command = Command(order, text, page, at)
         if order not in RIGHTS[page]:
-            why = f"the {page} page asked for {order.value}: no right to order it"
-            self.send(Command(Order.DENIED, why, page))
-            return False
-        self.send(Command(order, text, page))
-        return True
+            why: str | None = "no right to order it"
+        elif not self.buckets[page].take():
+            why = f"more than {MOST_ORDERS_S} orders a second"
+        else:
+            why = beyond_limits(command)
+        if why is None:
+            self.send(command)
+            return ""
+        why = f"the {page} page asked for {order.value}: {why}"
+        self.denied(why)
+        return why
+
+
+def _address() -> str:
+    """Return the address of the browser whose event is handled now."""
+    from nicegui import context  # noqa: PLC0415 - loads for a second
+
+    return str(context.client.ip)

@@ -4,6 +4,7 @@ import mimetypes
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -14,18 +15,24 @@ from typing import Any
 from labcrane.approval.lock import read_lock
 from labcrane.core.records import Event
 from labcrane.design.plan import plan_session
+from labcrane.limits import LIMITS
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
 from labcrane.web.access import SCOPE, SUPERVISOR, Gate, Keys
+from labcrane.web.denials import Denials
 from labcrane.web.live import Live
 from labcrane.web.page import PageContext
 from labcrane.web.pictures import Pictures
 from labcrane.web.state import SessionView
 
 FORBIDDEN, NOT_FOUND = 403, 404
-NICENESS = 15
-"""The loop's process comes first when the computer is busy, whatever browsers ask for."""
+NICENESS = 5
+"""The loop's process comes first when the computer is busy, whatever browsers ask for; but the
+pages get a third of what it gets, and answer within a second. At 15 it was a thirtieth."""
+
+MOST_HEAD = 16_384
+"""Bytes of a request's line and headers."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +47,8 @@ class PageConfig:
         Which session's LSL streams are shown: ``"aiming/P001/ses-01"``.
     cameras
         Names of the cameras whose pictures are shown, by the view that sends them.
+    certificate, key
+        Of the lab, in PEM; without them the pages are served without TLS.
     """
 
     protocol: Path
@@ -50,6 +59,8 @@ class PageConfig:
     host: str
     port: int
     cameras: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    certificate: Path | None = None
+    key: Path | None = None
     keys: Keys = field(default_factory=Keys)
 
 
@@ -83,6 +94,8 @@ def serve(order: PageConfig, pipe: Connection) -> None:
     from fastapi import FastAPI  # noqa: PLC0415
     from nicegui import ui  # noqa: PLC0415 - loads for a second
 
+    from labcrane.web.guard import BoundedProtocol, Guard  # noqa: PLC0415
+
     study = load(order.protocol, discover(study=order.protocol))
     plan = plan_session(study, order.participant, order.session)
     lock = threading.Lock()
@@ -94,25 +107,40 @@ def serve(order: PageConfig, pipe: Connection) -> None:
             except OSError:
                 return  # the launcher is gone, and this process is about to end
 
+    denials = Denials(lambda why: send(Command(Order.DENIED, why, "page")))
     live, pictures = Live(order.source), Pictures(order.source, order.cameras)
-    desk = PageContext(study, plan, order.folder_name, SessionView(), live, pictures, send)
+    desk = PageContext(study, plan, order.folder_name, SessionView(), live, pictures, send, denials)
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     _routes(app, desk)
     ui.run_with(app, title="labcrane", show_welcome_message=False)
-    gate = Gate(
-        app,
-        order.keys,
-        lambda page: send(Used(page)),
-        lambda why: send(Command(Order.DENIED, why, "page")),
-    )
+    secure = order.certificate is not None
+    gate = Gate(app, order.keys, lambda page: send(Used(page)), denials, secure=secure)
     config = uvicorn.Config(
-        gate, host=order.host, port=order.port, log_level="error", server_header=False
+        Guard(gate, order.host, order.port, denials, secure=secure),
+        host=order.host,
+        port=order.port,
+        log_level="error",
+        server_header=False,
+        http=BoundedProtocol,
+        h11_max_incomplete_event_size=MOST_HEAD,
+        ws_max_size=LIMITS["message of a page"].most,
+        ws_per_message_deflate=False,  # a few bytes of it can stand for megabytes
+        ssl_certfile=order.certificate,
+        ssl_keyfile=order.key,
     )
     server = uvicorn.Server(config)
+    threading.Thread(target=_count, args=(denials,), daemon=True).start()
     end = partial(setattr, server, "should_exit", True)  # noqa: FBT003 - the attribute's value
     threading.Thread(target=_listen, args=(pipe, desk.board, end), daemon=True).start()
     server.run()
     pictures.close()
+
+
+def _count(denials: Denials) -> None:
+    """Tell once a second what else was refused."""
+    while True:
+        time.sleep(1.0)
+        denials.flush()
 
 
 def _listen(pipe: Connection, board: SessionView, end: Callable[[], None]) -> None:
@@ -162,6 +190,6 @@ def _routes(app: Any, desk: PageContext) -> None:
         if word not in set(Order):
             return Response(f"{word!r} is not an order", FORBIDDEN)
         text = (await request.body()).decode(errors="replace")
-        if not desk.give(page, Order(word), text):
-            return Response(f"the {page} page has no right to order {word}", FORBIDDEN)
+        if why := desk.give(page, Order(word), text, request.client.host if request.client else ""):
+            return Response(why, FORBIDDEN)
         return Response(status_code=202)

@@ -18,6 +18,7 @@ from labcrane_bids.events import event_description, event_table
 from labcrane_bids.eyes import eye_recordings
 from labcrane_bids.files import label, write_bare_tsv, write_json, write_tsv
 from labcrane_bids.motion import TrackingSystem, tracking_systems
+from labcrane_bids.phenotype import Phenotype
 from labcrane_bids.settings import BidsSettings
 
 FIRST_DAY = datetime(1925, 1, 1, tzinfo=UTC)
@@ -31,6 +32,8 @@ class Bids(Exporter):
     export.
     """
 
+    shared = ("dataset_description.json", "README", "participants.json", "phenotype/*.json")
+
     def __init__(self, settings: BidsSettings, machine: Machine) -> None:
         self._settings = settings
         self._machine = machine
@@ -38,10 +41,12 @@ class Bids(Exporter):
     def export(self, participants: Iterable[Participant], folder: Path) -> None:
         rows, contexts = [], []
         known = people_table(self._settings.people)
+        phenotype = Phenotype()
         for participant in participants:
             context = participant.context
             contexts.append(context)
             subject = f"sub-{label(participant.name)}"
+            phenotype.add(subject, participant)
             rows.append(
                 {"participant_id": subject}
                 | {name: known.get(participant.name, {}).get(name) for name in PERSON}
@@ -58,7 +63,7 @@ class Bids(Exporter):
                 self._session(at, stem, session, moved)
         describe_dataset(folder, self._settings, contexts)
         describe_participants(folder, rows)
-        copy_phenotype(self._settings.phenotype, folder)
+        copy_phenotype(self._settings.phenotype, folder, phenotype.write(folder))
 
     def _session(self, at: Path, stem: str, session: SessionRecord, started: datetime) -> None:
         import pandas as pd

@@ -105,8 +105,14 @@ def people_table(path: Path | None) -> dict[str, dict[str, str]]:
         return {row["participant"]: {k: v for k, v in row.items() if v} for row in reader}
 
 
-def copy_phenotype(source: Path | None, folder: Path) -> None:
-    """Write each questionnaire as ``phenotype/NAME.tsv`` with its description."""
+def copy_phenotype(source: Path | None, folder: Path, recorded: Sequence[str] = ()) -> None:
+    """Write each questionnaire of a folder as ``phenotype/NAME.tsv`` with its description.
+
+    Parameters
+    ----------
+    recorded
+        What the recordings have filled already.
+    """
     if source is None:
         return
     import pandas as pd
@@ -117,8 +123,13 @@ def copy_phenotype(source: Path | None, folder: Path) -> None:
             f"there is no CSV file in {source}; put one there for each questionnaire, or leave "
             "phenotype out"
         )
-    (folder / "phenotype").mkdir()
+    (folder / "phenotype").mkdir(exist_ok=True)
     for path in tables:
+        if path.stem in recorded:
+            raise ProtocolError(
+                f"questionnaire {path.stem!r} is in the recordings and in {path}; give the file "
+                "another name, or leave it out"
+            )
         described = path.with_suffix(".json")
         if not described.is_file():
             raise ProtocolError(f"{path} has no description; write {described} beside it")

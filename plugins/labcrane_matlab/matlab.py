@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from labcrane import Exporter, RecordingError
-from labcrane.analysis import Participant, codebook_of, measures_of
+from labcrane.analysis import Participant, answers_of, codebook_of, measures_of, scores_of
 from labcrane.recording import SessionRecord
 from labcrane_matlab.settings import MatlabSettings
 
@@ -31,6 +31,8 @@ class Matlab(Exporter):
     are double columns, texts are cells.
     """
 
+    shared = (READER,)
+
     def __init__(self, settings: MatlabSettings) -> None:
         self._settings = settings
 
@@ -46,6 +48,8 @@ class Matlab(Exporter):
                 "status": str(participant.status),
                 "why": participant.why,
                 "trials": columns(measures),
+                "questionnaires": columns(answers_of(participant)),
+                "scores": columns(scores_of(participant)),
                 "units": _units(dict(zip(trials["column"], trials["unit"], strict=True))),
                 "sessions": np.array(
                     [self._session(number, record) for number, record in participant.sessions()],

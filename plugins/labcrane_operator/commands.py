@@ -7,6 +7,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from labcrane.participants import written_about
+
 out = Console(soft_wrap=True, highlight=False)
 
 
@@ -37,5 +39,6 @@ def fit(
     for name, why in not_identified(fitted).items():
         out.print(f"  {name}: {why}", markup=False)
     if to is not None:
-        save(protocol_part(fitted, source), to)
+        with written_about(recording, "operator fit", to) as beside:
+            save(protocol_part(fitted, source), beside)
         out.print(f"operator: {to}", markup=False)

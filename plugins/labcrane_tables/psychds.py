@@ -5,17 +5,22 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from labcrane import Exporter
-from labcrane.analysis import Participant, codebook_of, measures_of
+from labcrane.analysis import Participant, answers_of, codebook_of, measures_of, scores_of
 from labcrane_tables.frames import snake
 from labcrane_tables.settings import PsychDsSettings
 from labcrane_tables.tables import write_csv
 
+OTHERS = ("questionnaires", "scores")
+"""Tables beside that of movements."""
+
 
 class PsychDs(Exporter):
-    """One CSV file of movements per participant and session.
+    """One CSV file per participant and session of movements, of answers, and of scores.
 
     Streams stay in the participant files: Psych-DS is for tables that people read.
     """
+
+    shared = ("dataset_description.json", "README.md")
 
     def __init__(self, settings: PsychDsSettings) -> None:
         self._settings = settings
@@ -38,6 +43,15 @@ class PsychDs(Exporter):
                 subject = _key(participant.name)
                 name = f"study-{_key(study)}_subject-{subject}_session-{number}_data.csv"
                 write_csv(own, folder / "data" / name)
+            others = book[book["table"].isin(OTHERS)]
+            for row in others.itertuples(index=False):
+                name = str(row.column)
+                variables.setdefault(name, _variable(name, *map(str, row[2:])))
+            for what, answers in zip(OTHERS, (answers_of, scores_of), strict=True):
+                for number, own in answers(participant).groupby("session"):
+                    subject = _key(participant.name)
+                    name = f"study-{_key(study)}_subject-{subject}_session-{number}_desc-{what}"
+                    write_csv(own, folder / "data" / f"{name}_data.csv")
         description = {
             "@context": "https://schema.org/",
             "@type": "Dataset",

@@ -2,7 +2,7 @@
 #
 #   source("read.R"); study <- read_labcrane(".")
 #   study$trials                          one row per movement
-#   study$streams[["P001_ses-01_frames"]] one row per tick
+#   study$streams[["NAME_ses-01_frames"]] one row per tick
 #   study$codebook                        unit, meaning and source of every column
 #
 # Needs no package. Streams that were written as Parquet only are read with arrow or nanoparquet.

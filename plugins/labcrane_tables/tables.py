@@ -2,13 +2,13 @@
 
 import gzip
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from shutil import copyfile
 from typing import TYPE_CHECKING, Any
 
 from labcrane import Exporter
-from labcrane.analysis import Participant, codebook_of, measures_of
+from labcrane.analysis import Participant, answers_of, codebook_of, measures_of, scores_of
 from labcrane.recording import SessionRecord
 from labcrane_tables.frames import snake, stream_tables
 from labcrane_tables.settings import TableSettings
@@ -27,10 +27,14 @@ class Tables(Exporter):
     ``participants``     one row per participant
     ``trials``           one row per movement: condition, results, measures
     ``events``           one row per event
+    ``questionnaires``   one row per answer
+    ``scores``           one row per score of a questionnaire
     ``streams/``         one file per participant, session and stream, one row per tick
     ``codebook.csv``     unit, meaning and source of every column
     ===================  ==============================================================
     """
+
+    shared = (READER, "codebook.csv")
 
     def __init__(self, settings: TableSettings) -> None:
         self._settings = settings
@@ -39,20 +43,23 @@ class Tables(Exporter):
         import pandas as pd
 
         (folder / "streams").mkdir()
-        people, trials, codebooks = [], [], []
+        people, trials, codebooks, answers, scores = [], [], [], [], []
         events = _Growing(folder / "events")
         for participant in participants:
             people.append(_person(participant))
             measures = measures_of(participant)
             trials.append(snake(measures))
             codebooks.append(codebook_of(participant, measures))
+            answers.append(answers_of(participant))
+            scores.append(scores_of(participant))
             for number, session in participant.sessions():
                 events.add(_events(participant, number, session))
                 self._streams(participant, number, session, folder / "streams")
         events.close()
-        everything = pd.concat(trials, ignore_index=True)
-        write_csv(everything, folder / "trials.csv")
-        everything.to_parquet(folder / "trials.parquet", index=False)
+        for name, tables in (("trials", trials), ("questionnaires", answers), ("scores", scores)):
+            everything = joined(tables)
+            write_csv(everything, folder / f"{name}.csv")
+            everything.to_parquet(folder / f"{name}.parquet", index=False)
         write_csv(pd.DataFrame(people), folder / "participants.csv")
         write_csv(_codebook(codebooks), folder / "codebook.csv")
         copyfile(Path(__file__).with_name(READER), folder / READER)
@@ -69,6 +76,14 @@ class Tables(Exporter):
                 table.to_parquet(path.with_name(f"{path.name}.parquet"), index=False)
             if forms in {"both", "csv"}:
                 write_csv(table, path.with_name(f"{path.name}.csv.gz"))
+
+
+def joined(tables: "Sequence[pd.DataFrame]") -> "pd.DataFrame":
+    """Return tables of the same columns below one another; those without rows say nothing."""
+    import pandas as pd
+
+    filled = [table for table in tables if len(table)]
+    return pd.concat(filled or tables[:1], ignore_index=True)
 
 
 class _Growing:
@@ -101,7 +116,11 @@ def write_csv(table: "pd.DataFrame", path: Path) -> None:
 
     rows = pa.Table.from_pandas(table, preserve_index=False)  # NaN becomes null, which is empty
     if path.suffix == ".gz":
-        with gzip.open(path, "wb", compresslevel=GZIP_LEVEL) as out:
+        # Its head says nothing: neither what the file was called, nor when it was made.
+        with (
+            path.open("wb") as file,
+            gzip.GzipFile("", "wb", GZIP_LEVEL, file, mtime=0) as out,
+        ):
             csv.write_csv(rows, out)
     else:
         csv.write_csv(rows, path)

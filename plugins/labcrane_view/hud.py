@@ -90,8 +90,7 @@ class Hud:
             "load": f"{words['load']} {working}" if working else "",
             "lateness": f"{words['lateness']} {1000 * (frame.tick.woke - frame.tick.due):.2f} ms",
         }
-        shown = [lines[name] for name in self._wanted if lines[name]]
-        return [*shown, words["paused"]] if frame.paused and self._wanted else shown
+        return [lines[name] for name in self._wanted if lines[name]]
 
 
 def notice(frame: Frame, situation: SessionState, hint_s: float, language: str) -> list[str]:

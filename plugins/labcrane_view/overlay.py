@@ -16,6 +16,12 @@ NOTICE = 0.05
 WIDE, TALL = 0.8, 0.9
 """Longest line of it, and most that all lines take, as shares of the window's width and height."""
 
+CURTAIN = (0.05, 0.06, 0.07, 0.6)
+"""Colour and opacity of what dims the picture while the session stands still."""
+
+SPREAD, HIGH = 0.8, 0.25
+"""Most that its words take, as shares of the window's width and, for a line, of its height."""
+
 SMALLER = 0.95
 """Each time that text does not fit."""
 
@@ -54,6 +60,10 @@ class Overlay:
     def notice(self, font: Any) -> "Text":
         """Return a new block of text in the lower middle, for what is to be read now."""
         return Text(self, self._size, font, notice=True)
+
+    def curtain(self, font: Any) -> "Curtain":
+        """Return a new state that covers the whole picture while it holds."""
+        return Curtain(self, self._size, font)
 
     def picture(self, part: tuple[int, int], texture: Any) -> None:
         """Fill the window from one x to another with a picture."""
@@ -117,3 +127,44 @@ class Text:
             self._node.set_wordwrap(WIDE * width / line)
         self._place.set_scale(line)
         self._place.set_pos(0.5 * width, 0.0, line * (1.5 - self._node.get_bottom()))
+
+
+class Curtain:
+    """One word over the whole picture, which is dimmed behind it: nobody goes on by mistake."""
+
+    def __init__(self, overlay: Overlay, size: tuple[int, int], font: Any) -> None:
+        width, height = size
+        self._root = overlay.root.attach_new_node("curtain")
+        self._root.set_transparency(core.TransparencyAttrib.M_alpha)
+        maker = core.CardMaker("curtain")
+        maker.set_frame(0, width, 0, height)
+        card = self._root.attach_new_node(maker.generate())
+        card.set_color(*CURTAIN)
+        card.set_bin("fixed", 30)
+        self._node = core.TextNode("state")
+        self._node.set_font(font)
+        self._node.set_text_color(1.0, 1.0, 1.0, 1.0)
+        self._node.set_align(core.TextNode.A_center)
+        self._node.set_bin("fixed")
+        self._node.set_draw_order(40)
+        self._place = self._root.attach_new_node(self._node)
+        self._size = size
+        self._shown = ""
+        self._root.hide()
+
+    def show(self, words: Sequence[str]) -> None:
+        """Show words in the middle, as large as they fit; none takes the curtain away."""
+        text = "\n".join(words)
+        if text == self._shown:
+            return
+        self._shown = text
+        if not text:
+            self._root.hide()
+            return
+        width, height = self._size
+        self._node.set_text(text)
+        scale = min(SPREAD * width / self._node.get_width(), HIGH * height)
+        middle = 0.5 * (self._node.get_top() + self._node.get_bottom())
+        self._place.set_scale(scale)
+        self._place.set_pos(0.5 * width, 0.0, 0.5 * height - scale * middle)
+        self._root.show()

@@ -1,6 +1,6 @@
 """Settings of a view."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -108,6 +108,10 @@ class SupervisorSettings(Settings):
     sent."""
 
 
+HudLine = Literal["block", "trial", "distance", "time", "speed", "load", "lateness"]
+"""What a line of text can say."""
+
+
 class ViewSettings(Settings):
     """A window, what is seen in it, and from where."""
 
@@ -130,12 +134,12 @@ class ViewSettings(Settings):
     content: Literal["scene", "feedback"] = "scene"
     """``feedback`` shows targets and cues on black: for a semi-transparent mirror on a table."""
 
-    hud: tuple[Literal["block", "trial", "distance", "time", "speed", "load", "lateness"], ...] = (
-        "block",
-        "trial",
-        "distance",
-    )
-    """Lines of text in the corner; ``load`` is how hard each joint works, if the machine says."""
+    seen_by: Literal["operator", "examiner"] = "operator"
+    """Who looks at it. What tells the operator how far the task's goal is belongs to the design."""
+
+    hud: tuple[HudLine, ...] | None = None
+    """Lines of text in the corner; block and trial by default, and for the examiner the distance to
+    the target as well. ``load`` is how hard each joint works, if the machine says."""
 
     notices: bool = True
     """Whether the operator is shown what is to be read: instructions, questions, hints."""
@@ -180,6 +184,22 @@ class ViewSettings(Settings):
 
     renderer: Literal["auto", "software"] = "auto"
     """``software`` draws without any graphics driver, and without shadows."""
+
+    @property
+    def hud_lines(self) -> tuple[HudLine, ...]:
+        """The lines of text that are shown."""
+        if self.hud is not None:
+            return self.hud
+        return ("block", "trial", "distance") if self.seen_by == "examiner" else ("block", "trial")
+
+    def warnings(self) -> Sequence[str]:
+        if self.seen_by == "operator" and "distance" in self.hud_lines:
+            return (
+                "hud: distance tells the operator the task's error in every group, also in one "
+                "without feedback; leave it out, make it feedback of a group, or write seen_by: "
+                "examiner if the operator does not see this view",
+            )
+        return ()
 
     @model_validator(mode="after")
     def _sends_what_it_has(self) -> "ViewSettings":

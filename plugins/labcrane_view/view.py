@@ -25,7 +25,7 @@ from labcrane.core import CameraImage, SessionState, Shape, TargetFinder, Value
 from labcrane.machines import link_frames
 from labcrane_view.areas import Areas
 from labcrane_view.camera import Camera, Delay, Part
-from labcrane_view.hud import Hud, notice
+from labcrane_view.hud import WORDS, Hud, notice
 from labcrane_view.keys import Keys
 from labcrane_view.overlay import Overlay
 from labcrane_view.settings import ViewSettings
@@ -78,14 +78,18 @@ class View(Feedback):
         settings = self._settings
         self._angles = run.state.find("joint.angle")
         self._targets = TargetFinder(run.task)
-        window = self._window = open_window(settings, "labcrane")
+        window = self._window = open_window(
+            settings,
+            self.title or "labcrane",
+            [view for view in self.before if isinstance(view, ViewSettings)],
+        )
         if not window.shaders:
             self._check_simple()
         output = window.output
         self._size = (output.get_x_size(), output.get_y_size())
         scenery = settings.content == "scene"
         self.stage = Stage(run, shaders=window.shaders, shadow=settings.shadow, scenery=scenery)
-        self._hud = Hud(settings.hud, settings.language, run)
+        self._hud = Hud(settings.hud_lines, settings.language, run)
         self._areas = Areas(settings.areas, run, self._size, settings.flip)
         back = HAZE if scenery else (0.0, 0.0, 0.0)
         target: Any = output
@@ -98,8 +102,10 @@ class View(Feedback):
             picture = camera.open(window, self.stage, target, part, back)
             if picture is not None:
                 overlay.picture((part.left, part.left + part.width), picture)
-        self._text = overlay.text(font(settings.font)) if settings.hud else None
+        self._text = overlay.text(font(settings.font)) if settings.hud_lines else None
         self._notice = overlay.notice(font(settings.font)) if settings.notices else None
+        told = settings.notices or settings.hud_lines
+        self._paused = overlay.curtain(font(settings.font)) if told else None
         self._patch = overlay.patch(settings.patch) if settings.patch else None
         if self._keys:
             self._keys.open(output)
@@ -248,6 +254,8 @@ class View(Feedback):
             self._notice.show(
                 notice(frame, self._situation, self._settings.hint_s, self._settings.language)
             )
+        if self._paused is not None:
+            self._paused.show([WORDS[self._settings.language]["paused"]] if frame.paused else [])
         if self._patch is None or self._settings.patch is None:
             return math.nan
         counts = self._situation.counts

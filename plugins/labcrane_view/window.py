@@ -1,7 +1,9 @@
 """Opens a window, or a picture without one, with whatever renderer there is."""
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,10 @@ framebuffer-multisample 0
 textures-power-2 none
 """
 
+
+Pixels = tuple[int, int]
+Place = tuple[Pixels, Pixels]
+"""Upper left corner and size, in pixels."""
 
 SEEN, TURNED = -7, -5
 """When cameras' pictures and the whole window turned over are drawn: after the shadows (Panda3D's
@@ -62,8 +68,14 @@ class Window:
         self.engine.remove_all_windows()
 
 
-def open_window(settings: ViewSettings, title: str) -> Window:
+def open_window(settings: ViewSettings, title: str, before: Sequence[ViewSettings] = ()) -> Window:
     """Open what the settings ask for.
+
+    Parameters
+    ----------
+    before
+        Views whose windows may be on the desktop already: this one lies beside them, where there is
+        room. A window manager may put it elsewhere.
 
     Raises
     ------
@@ -81,7 +93,7 @@ def open_window(settings: ViewSettings, title: str) -> Window:
     tried = [("p3headlessgl" if hidden else "pandagl", True)] * (settings.renderer == "auto")
     for module, shaders in [*tried, ("p3tinydisplay", False)]:
         engine = core.GraphicsEngine()
-        output = _output(engine, module, settings, title, monitor)
+        output = _output(engine, module, settings, title, monitor, before)
         if output is None:
             continue
         gsg = output.get_gsg()
@@ -103,7 +115,12 @@ def hidden_picture(output: Any, name: str, size: tuple[int, int], turn: int) -> 
 
 
 def _output(
-    engine: Any, module: str, settings: ViewSettings, title: str, monitor: Monitor | None
+    engine: Any,
+    module: str,
+    settings: ViewSettings,
+    title: str,
+    monitor: Monitor | None,
+    before: Sequence[ViewSettings],
 ) -> Any:
     selection = core.GraphicsPipeSelection.get_global_ptr()
     hidden = settings.display == "hidden"
@@ -119,10 +136,17 @@ def _output(
     if monitor is not None:
         window.origin = core.LPoint2i(*monitor.origin)
         window.undecorated = True
+    elif not hidden:
+        desktop = (pipe.get_display_width(), pipe.get_display_height())
+        place = free_place((width, height), _taken(before, desktop), desktop)
+        window.origin = core.LPoint2i(*place)
     form = core.FrameBufferProperties()
     form.rgb_color = True
     form.set_rgba_bits(8, 8, 8, 0)
     form.depth_bits = 24
+    # A picture is drawn where nobody sees it, and shown whole. Without this the X server shows what
+    # is drawn so far.
+    form.back_buffers = 0 if hidden else 1
     kind = core.GraphicsPipe.BF_refuse_window if hidden else core.GraphicsPipe.BF_require_window
     output = engine.make_output(
         pipe, title, 0, form, window, kind | core.GraphicsPipe.BF_fb_props_optional
@@ -132,6 +156,45 @@ def _output(
     engine.open_windows()
     engine.render_frame()
     return output if output.is_valid() else None
+
+
+def _taken(before: Sequence[ViewSettings], desktop: Pixels) -> list[Place]:
+    """Return the places of windows, in the order in which they were given them."""
+    places: list[Place] = []
+    for view in before:
+        if view.display == "hidden":
+            continue
+        if view.screen is not None:
+            monitor = _monitor(view.screen)
+            places.append((monitor.origin, monitor.size))
+        else:
+            places.append((free_place(view.size, places, desktop), view.size))
+    return places
+
+
+def free_place(size: Pixels, taken: Sequence[Place], desktop: Pixels) -> Pixels:
+    """Return where a window covers none of those that are there.
+
+    The upper left corner, right of one, or below one; where there is no room for the whole window,
+    where the least of others is covered.
+    """
+    corners = [(0, 0)]
+    for (left, top), (width, height) in taken:
+        corners += [(left + width, top), (left, top + height)]
+    width, height = size
+    inside = [
+        (max(0, min(left, desktop[0] - width)), max(0, min(top, desktop[1] - height)))
+        for left, top in corners
+    ]
+    return min(inside, key=lambda corner: sum(_common((corner, size), each) for each in taken))
+
+
+def _common(one: Place, other: Place) -> int:
+    """Return how many pixels two places have in common."""
+    sides = [
+        min(a + wide, b + broad) - max(a, b) for a, wide, b, broad in zip(*one, *other, strict=True)
+    ]
+    return max(0, sides[0]) * max(0, sides[1])
 
 
 def _monitor(wanted: int | str) -> Monitor:
@@ -144,7 +207,7 @@ def _monitor(wanted: int | str) -> Monitor:
 
 
 def font(path: str | None) -> Any:
-    """Return the font in a file, or the renderer's own.
+    """Return the font in a file, or a plain one.
 
     Raises
     ------
@@ -152,10 +215,29 @@ def font(path: str | None) -> Any:
         There is no such font.
     """
     if path is None:
-        return core.TextNode.get_default_font()
+        return _plain_font()
     if not Path(path).is_file():
         raise DeviceError(f"there is no font file {path!r}; correct font: or leave it out")
-    loaded = core.FontPool.load_font(core.Filename.from_os_specific(path))
+    loaded = core.FontPool.load_font(core.Filename.from_os_specific(path).get_fullpath())
     if loaded is None or not loaded.is_valid():
         raise DeviceError(f"{path!r} cannot be read as a font; TrueType and OpenType can")
     return loaded
+
+
+def _plain_font() -> Any:
+    """Return a font whose digits are all as high as capitals, with the letters of our languages.
+
+    The renderer's own has old-style digits, in which 0.00 reads as three small letters. Matplotlib,
+    which labcrane needs in any case, comes with this one; it is found without being imported.
+    """
+    found = find_spec("matplotlib")
+    folders = found.submodule_search_locations if found else None
+    for folder in folders or ():
+        path = Path(folder) / "mpl-data" / "fonts" / "ttf" / "DejaVuSans.ttf"
+        if path.is_file():
+            loaded = core.FontPool.load_font(
+                core.Filename.from_os_specific(str(path)).get_fullpath()
+            )
+            if loaded is not None and loaded.is_valid():
+                return loaded
+    return core.TextNode.get_default_font()

@@ -213,7 +213,7 @@ def converted(book: Path, sheet: int) -> list[list[str]]:
         ],
         check=True,
         capture_output=True,
-        timeout=120,
+        timeout=240,
     )
     [text] = book.parent.glob(f"{book.stem}-*.csv")
     rows = list(csv.reader(text.read_text().splitlines()))

@@ -11,15 +11,14 @@ from labcrane import (
     Controller,
     Dynamics,
     InputDevice,
-    Item,
     Phase,
     PlannedTrial,
     Questionnaire,
-    Score,
     Signal,
     Task,
     TrialStatus,
 )
+from labcrane.core import Item, Score
 from labcrane.protocol.design import Criterion
 from labcrane.protocol.evaluation import StopRule
 from labcrane.protocol.protocol import OnFault

@@ -141,17 +141,17 @@ def test_nothing_is_shown_before_it_is_known_what_to_show(joined: Joined) -> Non
         joined.session.frames.push(joined.session.frame())
         return len(joined.said) > before + 3
 
-    wait_for(it_has_looked_around, patience_s=60)
+    wait_for(it_has_looked_around, patience_s=240)
     assert not joined.notes.exists()
     begun = Event("trial.start", 1.0, {"trial": 1, "feedback": "ball"})
     joined.session.context.push(joined.session.frame(begun))
-    wait_for(joined.shown, patience_s=60)
+    wait_for(joined.shown, patience_s=240)
     assert set(joined.shown()) == {"1"}, "a picture was shown without its cue"
 
 
 def test_pictures_for_the_supervisor_are_made_only_while_somebody_watches(joined: Joined) -> None:
     joined.record()
-    wait_for(lambda: len(joined.shown()) > 5, patience_s=60)
+    wait_for(lambda: len(joined.shown()) > 5, patience_s=240)
     assert not joined.notes.with_suffix(".pictures").exists()
     with closing(Pictures(joined.source, {"notes": ("eye",)})) as page:
 
@@ -159,4 +159,4 @@ def test_pictures_for_the_supervisor_are_made_only_while_somebody_watches(joined
             joined.shown()
             return page.of("notes", "eye")[1] != "no picture yet"
 
-        wait_for(a_picture_has_come, patience_s=60)
+        wait_for(a_picture_has_come, patience_s=240)

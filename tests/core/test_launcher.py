@@ -88,6 +88,8 @@ def test_a_spare_recorder_that_hangs_keeps_no_recorder_from_closing_its_journal(
     monkeypatch.setattr(recorder_handle, "MODULE", "hanging_spare")
     keeper = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
     wait_for(lambda: keeper.ready, 60.0)
+    for _ in range(recorder_handle.SPARES):
+        assert not keeper.watch()
     monkeypatch.setattr(recorder_handle, "PATIENCE_S", 3.0)
     keeper.stop()
     assert [(tmp_path / f"heard-{part}").read_text() for part in (1, 2)] == ["stop", "stop"]

@@ -162,7 +162,7 @@ def test_processes_of_a_session_find_it_and_its_source_is_recorded(protocol: Pat
     data = protocol.parent / "data"
     arguments = ("--participant", "P001", "--simulate", "--feedback", "--data", data)
     done = command("run", protocol, *arguments)
-    said, _ = done.communicate(timeout=60)
+    said, _ = done.communicate(timeout=240)
     assert done.returncode == 0, said
     session = open_recording(data / "P001-SIMULATED" / "P001-SIMULATED.h5").session(1)
     assert session.context["components"]["feedback.ball"]["plugin"] == "plugins/arrow.py"

@@ -39,7 +39,7 @@ class TerminalUser:
                 return
 
     def until(self, words: str) -> None:
-        deadline = time.monotonic() + 40.0
+        deadline = time.monotonic() + 240.0
         while words.encode() not in self._seen:
             assert time.monotonic() < deadline, f"{words!r} was not printed"
             time.sleep(0.01)
@@ -48,7 +48,7 @@ class TerminalUser:
         os.write(self._keys, keys.encode())
 
     def leave(self) -> int:
-        status = self.process.wait(60)
+        status = self.process.wait(240)
         self._reader.join()
         os.close(self._keys)
         return status
@@ -137,3 +137,15 @@ def test_a_refused_order_is_called_as_it_is_given() -> None:
     with Terminal(console, Console(file=printed), total=1, keys=False):
         console.report(Event("order.repeat", 1.0, refused))
     assert "repeat: no trial is running" in map(str.strip, printed.getvalue().splitlines())
+
+
+def test_a_line_is_short_and_says_nothing_of_what_is_not_known() -> None:
+    from labcrane.cli.terminal import _event_line, _trial_line
+
+    ended = {"trial": 3, "outcome": "timeout", "movement_time": float("nan"), "error": 0.25}
+    assert _trial_line(ended) == "trial 3: timeout, error 0.25 m"
+    place = "dynamics 'slow' of plugin 'p', in step (/home/someone/a/b/slow.py:12), took 9 ms"
+    slow = Event("plugin.slow", 0.0, {"why": place})
+    assert _event_line(slow) == (
+        "PLUGIN SLOW: dynamics 'slow' of plugin 'p', in step (slow.py:12), took 9 ms"
+    )

@@ -6,7 +6,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from xml.etree import ElementTree
 
 import pylsl
@@ -15,6 +15,7 @@ from recording.test_full_disk import needs_mounts
 
 from labcrane.core.findings import Finding, Verdict
 from labcrane.doctor import lsl
+from labcrane.streams.network import free_ports, port_range
 from labcrane.streams.request import StreamRequest
 
 HOST = "127.0.0.1"
@@ -51,6 +52,29 @@ def test_streams_that_are_there_missing_or_wrong_are_told_apart(
     assert "labcrane doctor --peer" in missing.advice
     assert about(found, "maybe").verdict is Verdict.WARN
     assert "has 4 channels, 32 are expected" in about(found, "wrong").text
+
+
+def test_ports_that_others_have_taken_are_counted() -> None:
+    before = free_ports()
+    with ExitStack() as held:
+        for port in port_range():
+            for kind in (socket.SOCK_DGRAM, socket.SOCK_STREAM):
+                each = held.enter_context(socket.socket(socket.AF_INET, kind))
+                with suppress(OSError):  # another program has it
+                    each.bind(("", port))
+        assert free_ports() == 0 < before
+
+
+def test_too_few_free_ports_are_a_finding_that_says_what_to_do() -> None:
+    enough, few, none = (lsl.ports_finding(free, 32) for free in (32, 12, 0))
+    assert (enough.verdict, few.verdict, none.verdict) == (
+        Verdict.PASS,
+        Verdict.WARN,
+        Verdict.FAIL,
+    )
+    assert few.text == "12 of LSL's 32 ports are free"
+    assert "end programs that search for streams all the time" in few.advice
+    assert "PortRange = 128 under [ports]" in few.advice
 
 
 @needs_mounts

@@ -116,7 +116,7 @@ def kill_all(launcher: "subprocess.Popen[str]") -> None:
     processes += processes[0].children(recursive=True)
     for process in processes:
         process.kill()
-    psutil.wait_procs(processes, timeout=10)
+    psutil.wait_procs(processes, timeout=240)
     launcher.communicate()
 
 
@@ -151,7 +151,7 @@ def contents(path: Path, group: str) -> dict[str, str]:
     return found
 
 
-def wait_for(condition: object, patience_s: float = 120.0) -> None:
+def wait_for(condition: object, patience_s: float = 240.0) -> None:
     """Wait until something has come about in another process; fail when it does not."""
     deadline = time.monotonic() + patience_s
     while not condition():

@@ -135,12 +135,12 @@ def test_killed_hanging_and_raising_feedback_leave_the_session_as_it_is(
     with ThreadPoolExecutor(1) as elsewhere:
         outcome = elsewhere.submit(Launcher(order, console, said.append).run)
         try:
-            wait_for(lambda: told.count("block.end") == 1, patience_s=120)
+            wait_for(lambda: told.count("block.end") == 1, patience_s=240)
             first, second = hosts()[:2]
             first.send_signal(signal.SIGKILL)
             second.send_signal(signal.SIGSTOP)
-            wait_for(lambda: told.back() == {"killed", "hanging", "raising"}, patience_s=120)
-            wait_for(lambda: told.count("break.start") == 2, patience_s=60)
+            wait_for(lambda: told.back() == {"killed", "hanging", "raising"}, patience_s=240)
+            wait_for(lambda: told.count("break.start") == 2, patience_s=240)
             console.give(Command(Order.SKIP))
         except BaseException:
             console.give(Command(Order.END))

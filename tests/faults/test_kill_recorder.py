@@ -14,9 +14,10 @@ import psutil
 import pytest
 from faults.sessions import unique, wait_for
 
+from labcrane.processes.handle import ProcessHandle
 from labcrane.recording.foreign_streams import RecordedStream, read_streams
 from labcrane.recording.paths import parts
-from labcrane.streams.recorder.handle import RecorderHandle
+from labcrane.streams.recorder.handle import SPARES, RecorderHandle
 from labcrane.streams.request import StreamRequest
 
 HERE = Path(__file__).parent
@@ -60,6 +61,11 @@ def recording(process: psutil.Process) -> bool:
     )  # fmt: skip
 
 
+def loaded(spare: ProcessHandle) -> bool:
+    """Whether a recorder that waits has loaded all it needs: liblsl comes last."""
+    return any("liblsl" in each.path for each in psutil.Process(spare.pid).memory_maps())
+
+
 def kill_at_random(folder: Path, kills: int, seed: int) -> tuple[list[float], list[str]]:
     """Kill recorders, every third time both; return what each double kill cost, in seconds."""
     source = unique("device")
@@ -77,7 +83,7 @@ def kill_at_random(folder: Path, kills: int, seed: int) -> tuple[list[float], li
         try:
 
             def look(until) -> None:
-                deadline = time.monotonic() + 60.0
+                deadline = time.monotonic() + 240.0
                 while not until():
                     assert time.monotonic() < deadline, keeper.status
                     keeper.watch()
@@ -86,6 +92,7 @@ def kill_at_random(folder: Path, kills: int, seed: int) -> tuple[list[float], li
             for kill in range(kills):
                 victims = [psutil.Process(one.pid) for one in keeper._recorders]
                 look(lambda: all(recording(one) for one in victims))  # noqa: B023
+                look(lambda: sum(map(loaded, keeper._spares)) == SPARES)
                 ends = time.monotonic() + draw.uniform(0.0, 0.7)
                 look(lambda: time.monotonic() > ends)  # noqa: B023
                 both = kill % 3 == 2

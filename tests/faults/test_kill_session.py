@@ -80,7 +80,7 @@ def _kill(stage: str, launcher, data: Path, whole: int, chance: random.Random) -
     victim = session_process(launcher)
     if victim is not None:
         victim.kill()
-        launcher.communicate(timeout=60)  # it concludes what was recorded
+        launcher.communicate(timeout=240)  # it concludes what was recorded
         return "session"
     if launcher.poll() is None:
         kill_all(launcher)
@@ -97,7 +97,7 @@ def _whole_journal(protocol: Path, prepared: Path, data: Path) -> int:
     """Return the size of a session's journal when nobody kills it."""
     shutil.copytree(prepared, data)
     launcher = run_second(protocol, data)
-    said, _ = launcher.communicate(timeout=60)
+    said, _ = launcher.communicate(timeout=240)
     assert launcher.returncode == 0, said
     return _size(data / "P001-SIMULATED" / "ses-02_run.xdf")
 
@@ -167,7 +167,7 @@ def test_a_killed_session_is_gone_on_with(killed) -> None:
     protocol = data.parent / "study.yaml"
     arguments = ("--participant", "P001", "--session", 2, "--simulate", "--data", data)
     resumed = labcrane("resume", protocol, *arguments)
-    said, _ = resumed.communicate(timeout=60)
+    said, _ = resumed.communicate(timeout=240)
     assert resumed.returncode == 0, said
     session = open_recording(data / "P001-SIMULATED" / "P001-SIMULATED.h5").session(2)
     assert session.events["name"].tolist().count("session.start") == 2

@@ -116,7 +116,7 @@ def find(launcher: psutil.Process, folder: Path) -> dict[str, psutil.Process]:
             found["session"] = child
         elif "labcrane.feedback" in said:
             found["feedback"] = child
-        elif "spawn_main" in said and child.net_connections("tcp"):
+        elif "spawn_main" in said or "labcrane.web" in said:
             found["page"] = child
     return found
 
@@ -130,7 +130,7 @@ def kill(lab: Lab, data: Path, victims: tuple[str, ...], chance: random.Random) 
     assert run.poll() is None, run.communicate()
     launcher = psutil.Process(run.pid)
     everybody = [launcher, *launcher.children(recursive=True)]
-    time.sleep(chance.uniform(0.0, 4.0))
+    time.sleep(chance.uniform(0.0, 3.0))
     found = find(launcher, data) if run.poll() is None else {}
     killed = [name for name in victims if name in found]
     for name in killed:
@@ -188,7 +188,7 @@ def kill_and_go_on(lab: Lab, data: Path, victims: tuple[str, ...], seed: int) ->
 def test_a_session_whose_processes_were_killed_comes_to_its_planned_end(
     lab: Lab, tmp_path: Path, number: int, victims: tuple[str, ...]
 ) -> None:
-    assert kill_and_go_on(lab, tmp_path, victims, number) <= set(victims)
+    assert kill_and_go_on(lab, tmp_path, victims, number) == set(victims)
 
 
 @pytest.mark.soak

@@ -81,7 +81,7 @@ def test_a_laboratory_is_recorded_whole_and_nothing_of_it_stays_in_memory(
         devices.stdin.write("go\n")
         devices.stdin.flush()
         memory = _memory(recorder, launcher)
-        said, _ = launcher.communicate(timeout=120)
+        said, _ = launcher.communicate(timeout=240)
         assert launcher.returncode == 0, said
     finally:
         devices.kill()

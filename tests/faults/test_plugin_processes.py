@@ -36,7 +36,7 @@ def test_a_process_that_exits_has_left_word_where_it_was(
     protocol = spoil(f"{role} {method} {at} exiting")
     process = multiprocessing.get_context("fork").Process(target=run_through, args=(protocol,))
     process.start()
-    process.join(60)
+    process.join(240)
     assert process.exitcode == 7
     data = protocol.parent / "data"
     written = list(data.glob("*/ses-01_run.where"))

@@ -81,7 +81,7 @@ class Conversation:
         self.process.stdin.flush()
 
     def end(self) -> str:
-        self.process.wait(60)
+        self.process.wait(240)
         self._reader.join()
         self.process.stdout.close()
         self.process.stdin.close()

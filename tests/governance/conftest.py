@@ -23,7 +23,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Lab:
     with (tables / "trials.csv").open("w", newline="") as file:
         csv.writer(file).writerows(rows)
     (tables / "sub-P007_events.tsv").write_text("onset\tparticipant\n1.0\tP007\n")
-    (tables / "all.mat").write_bytes(b"binary P001 P007")
+    (tables / "all.mat").write_bytes(b"binary\x00 P001 P007")
     (tables / "P001.txt").write_text("P001 only")
     files = {
         Path("trials.csv"): ["P001", "P002", "P007"],

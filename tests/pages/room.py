@@ -62,7 +62,7 @@ class Room:
             self.said.append(line)
 
     def links(self) -> dict[str, str]:
-        found = re.findall(r"(\w+) page: (http://\S+)", "".join(self.said))
+        found = re.findall(r"(\w+) page: (https?://\S+)", "".join(self.said))
         return dict(found)
 
     def process(self, word: str) -> psutil.Process | None:
@@ -85,7 +85,7 @@ class Room:
     def port(self) -> int:
         return int(re.search(r":(\d+)/", self.links()["supervisor"])[1])
 
-    def ended(self, patience_s: float = 120.0) -> None:
+    def ended(self, patience_s: float = 240.0) -> None:
         """See that the run ends by itself, and well."""
         try:
             code = self.launcher.wait(patience_s)
@@ -99,7 +99,7 @@ class Room:
             processes += processes[0].children(recursive=True)
             for process in processes:
                 process.kill()
-            psutil.wait_procs(processes, timeout=10)
+            psutil.wait_procs(processes, timeout=240)
             self.launcher.wait()
         self._reader.join()
         self.launcher.stdout.close()

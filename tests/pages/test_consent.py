@@ -51,6 +51,6 @@ def test_a_run_that_is_ended_instead_leaves_nobody_in_the_register(tmp_path: Pat
     with a_room(lab.protocol, lab.places.root, pilot=False) as room:
         wait_for(lambda: "waiting for P001's consent" in "".join(room.said))
         room.launcher.send_signal(signal.SIGINT)
-        assert room.launcher.wait(60) == 2
+        assert room.launcher.wait(240) == 2
         wait_for(lambda: "P001 has not consented to consent_v2.txt" in "".join(room.said))
     assert not lab.places.register.exists()

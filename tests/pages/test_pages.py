@@ -150,7 +150,7 @@ def test_the_pages_end_without_a_complaint_of_pythons(tmp_path: Path) -> None:
     with a_room(path, tmp_path / "data") as room:
         wait_for(lambda: room.process("pages"))
         room.process("session").kill()
-        assert room.launcher.wait(60) == 1
+        assert room.launcher.wait(240) == 1
     said = "".join(room.said)
     assert "participant file: " in said
     assert not re.search("leaked|Traceback", said), said
@@ -167,7 +167,7 @@ def test_no_answer_is_lost_when_the_session_is_killed_in_the_middle(
         write(browser, "age-field", "44")
         shown(browser, "status-age", "saved")
         room.process("session").kill()
-        assert room.launcher.wait(60) == 1
+        assert room.launcher.wait(240) == 1
     table = open_recording(data / "P001-PILOT" / "P001-PILOT.h5").session(1).questionnaires
     assert table[["item", "value"]].to_numpy().tolist() == [["age", 44.0]]
     with a_room(protocol, data, "resume") as room:
@@ -183,7 +183,7 @@ def test_no_answer_is_lost_when_the_session_is_killed_in_the_middle(
         press(browser, "submit")
         wait_for(lambda: browser.find_elements(By.ID, "rating-3"))
         room.process("session").kill()
-        assert room.launcher.wait(60) == 1
+        assert room.launcher.wait(240) == 1
     events = open_recording(data / "P001-PILOT" / "P001-PILOT.h5").session(1).events
     [done] = events[events["name"] == "questionnaire.end"]["data"]
     assert (done["questionnaire"], done["missing"]) == ("demographics", 0)

@@ -22,7 +22,7 @@ def ask(
     room: Room, method: str, path: str, cookie: str = "", body: str = ""
 ) -> tuple[int, str, str]:
     """Return status, cookie and text of an answer."""
-    to = http.client.HTTPConnection("127.0.0.1", room.port, timeout=20)
+    to = http.client.HTTPConnection("127.0.0.1", room.port, timeout=240)
     to.request(method, path, body, {"Cookie": cookie} if cookie else {})
     answer = to.getresponse()
     given = (answer.getheader("set-cookie") or "").partition(";")[0]
@@ -124,7 +124,9 @@ def test_a_refusal_says_why_and_gives_nothing_away(visited) -> None:
     answers, *_ = visited
     text = answers["no token"][2]
     assert text == "labcrane: no token; use the link that labcrane run has printed"
-    assert answers["participant's order"][2] == "the participant page has no right to order end"
+    assert answers["participant's order"][2] == (
+        "the participant page asked for end: no right to order it"
+    )
 
 
 def test_every_refusal_is_in_the_record(visited) -> None:
@@ -161,6 +163,6 @@ def test_a_port_that_is_taken_says_what_to_do(tmp_path: Path) -> None:
         run = labcrane(
             "run", tmp_path / "study.yaml", "--participant", "P001", "--pilot", "--local"
         )
-        said, _ = run.communicate(timeout=60)
+        said, _ = run.communicate(timeout=240)
     assert run.returncode == 1
     assert f"the page cannot be served on 127.0.0.1:{port}: Address already in use" in said

@@ -84,7 +84,7 @@ def session(folder: Path, controls: str, seconds: int) -> list:
 
 
 def told(process: subprocess.Popen[str]) -> dict[str, str]:
-    output, _ = process.communicate(timeout=20)
+    output, _ = process.communicate(timeout=240)
     return dict(line.split(" ", 1) for line in output.splitlines() if " " in line)
 
 
@@ -134,7 +134,7 @@ def test_the_gateway_bridges_a_panel_to_a_session_over_lsl_and_the_flow_back(
         assert process.stdout.readline() == "open\n"
         frames = session(tmp_path, "{use: gateway, stream: bridged.command}", seconds)
         said = told(process)
-        spoken, _ = bridge.communicate(timeout=20)
+        spoken, _ = bridge.communicate(timeout=240)
     finally:
         bridge.kill()
         bridge.communicate()

@@ -91,7 +91,7 @@ def test_a_panel_behind_socketcand_is_read_told_lost_and_found_again(server: Ser
     device.open(run)
 
     def read_until(ready: Callable[[list[float]], bool]) -> list[float]:
-        end = time.perf_counter() + 5.0
+        end = time.perf_counter() + 240.0
         while time.perf_counter() < end:
             now = time.perf_counter()
             axes = device.read(Tick(0, now, now), make_frame(run))[:4].tolist()

@@ -110,7 +110,7 @@ def run_python(code: str, **environment: str) -> subprocess.CompletedProcess[str
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=240,
     )
 
 
@@ -156,7 +156,7 @@ def test_the_program_without_sticks_ends_with_the_error_and_no_traceback():
         capture_output=True,
         text=True,
         check=False,
-        timeout=60,
+        timeout=240,
     )
     assert done.returncode == 1
     assert done.stderr.startswith("two joysticks ffff:fffe are needed, but none of that model")

@@ -57,7 +57,7 @@ class Desk:
 
     def read_until(self, condition: object) -> np.ndarray:
         """Read in real time until what is read is as wanted."""
-        deadline = time.monotonic() + 20.0
+        deadline = time.monotonic() + 240.0
         while not condition(row := self.read()[0]):
             assert time.monotonic() < deadline, f"last read {row}; {self.keyboard.fault}"
             time.sleep(1 / RATE_HZ)
@@ -89,7 +89,7 @@ def a_view_that_sends(
 def press(desk: Desk, outlet: pylsl.StreamOutlet, *states: float) -> None:
     """Send the keys' states, and wait until they have come: a ramp begins with the next tick."""
     outlet.push_sample([0.0, *states])
-    wait_for(desk.keyboard._keys._inlet.samples_available, patience_s=10.0)
+    wait_for(desk.keyboard._keys._inlet.samples_available)
 
 
 ORDER = ("a", "arrow_up", "d", "arrow_down")  # not the order in which axes name them

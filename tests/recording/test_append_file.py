@@ -80,7 +80,7 @@ def test_a_failed_sync_is_raised_by_the_next_write(tmp_path: Path) -> None:
     kept = os.dup(fd)
     os.dup2(sending, fd)
     file.write(b"a")
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 240.0
     while file.failure is None:
         assert time.monotonic() < deadline
     with pytest.raises(RecordingError, match="cannot bring to disk"):
@@ -96,7 +96,7 @@ def test_a_file_is_synced_in_the_background(tmp_path: Path) -> None:
     """What the kernel still has to write back is known per file."""
     file = AppendFile(tmp_path / "x", sync_s=0.01)
     file.write(bytes(100_000))
-    deadline = time.monotonic() + 10
+    deadline = time.monotonic() + 240.0
     while file.synced < file.size:
         assert time.monotonic() < deadline
     assert file.free > 0

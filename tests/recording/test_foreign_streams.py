@@ -184,7 +184,7 @@ def test_correcting_again_waits_for_whoever_writes_the_participant_file(folder: 
     again.start()
     assert not entered.wait(0.5)
     os.close(held)
-    again.join(60)
+    again.join(240)
     assert entered.is_set()
 
 

@@ -16,7 +16,7 @@ from labcrane.session.commands import Command, Order, StreamBack, StreamLost
 from results.recorded import STUDY, record, study
 
 ROOT = Path(__file__).parents[2]
-CH8 = Path(labcrane.__file__).parent / "machines" / "ch8.yaml"
+CH8 = Path(labcrane.__file__).parent / "machines" / "data" / "ch8.yaml"
 
 
 @pytest.fixture(scope="module")

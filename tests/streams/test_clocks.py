@@ -25,6 +25,8 @@ from labcrane.streams.sync.dejitter import Dejitter
 from labcrane.streams.sync.raw import raw_of
 from labcrane.streams.sync.resync import resync
 
+pytestmark = pytest.mark.quiet  # how right stamps are shows the computer too
+
 EXACT = Treatment(rate_hz=1000.0)
 CHUNKS = Treatment(rate_hz=1000.0, dejitter=Dejitter.ENVELOPE, transport_s=0.008)
 

@@ -34,8 +34,19 @@ def check(
             typer.echo(json.dumps({"fine": False, "problems": str(error).splitlines()}))
         raise
     if as_json:
-        typer.echo(json.dumps({"fine": True, "problems": [], "study": study.protocol.study}))
+        typer.echo(
+            json.dumps(
+                {
+                    "fine": True,
+                    "problems": [],
+                    "warnings": list(study.warnings()),
+                    "study": study.protocol.study,
+                }
+            )
+        )
         return
+    for warning in study.warnings():
+        typer.echo(f"{protocol}: warning: {warning}", err=True)
     sessions = len(study.protocol.sessions)
     # One plain line, for which rich is not worth loading.
     typer.echo(

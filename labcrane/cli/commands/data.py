@@ -13,6 +13,22 @@ if TYPE_CHECKING:
     from labcrane.participants.copies import Reach
 
 
+def where(participant: Someone, data: Data = HERE) -> None:
+    """List every place that holds a participant's data."""
+    from labcrane.cli.output import whole_table
+    from labcrane.participants.folders import Places
+    from labcrane.participants.whereabouts import whereabouts
+
+    found = whereabouts(Places(data), participant)
+    if not found:
+        out.print(f"nothing of {participant} is in {data}, nor known to its register", markup=False)
+        return
+    table = whole_table("what", "where", "state")
+    for each in found:
+        table.add_row(each.what, each.where, each.state)
+    out.print(table)
+
+
 def erase(participant: Someone, reason: Reason, data: Data = HERE) -> None:
     """Remove a participant's data from everything labcrane wrote; a tombstone stays."""
     from labcrane.participants import recovery as unfinished
@@ -60,7 +76,19 @@ def _say(reach: "Reach") -> None:
         out.print(f"removed: {path}", markup=False)
     for path in reach.changed:
         out.print(f"changed: {path}", markup=False)
+    for what in reach.again:
+        out.print(
+            f"removed, since it was worked out of everybody's data; make it again: {what}",
+            markup=False,
+        )
     for owed in reach.owed:
+        if owed.link:
+            out.print(
+                f"a link, which is not followed; remove what is behind it, then the link: "
+                f"{owed.folder}",
+                markup=False,
+            )
+            continue
         out.print(
             f"cannot be reached now, and is done by the next call of erase, relabel or transfer "
             f"that finds it: {owed.folder}",

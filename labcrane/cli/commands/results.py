@@ -1,8 +1,7 @@
 """Commands that work on recordings: export, report, replay."""
 
-import shutil
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -16,6 +15,7 @@ from labcrane.errors import LabcraneError, ProtocolError, RecordingError
 if TYPE_CHECKING:
     from labcrane.analysis.cohort import Cohort, Participant, Struck
     from labcrane.analysis.movements import Groups
+    from labcrane.participants.products import Product
 
 DataFolder = Annotated[Path, typer.Argument(metavar="DATA", help="the study's data folder")]
 Include = Annotated[
@@ -30,7 +30,6 @@ AcceptUnprobed = Annotated[
     bool,
     typer.Option("--accept-unprobed", help="use streams whose clock was never probed as well"),
 ]
-MANIFEST = "labcrane_export.json"
 
 LEFT_OUT = 3
 """Exit status of what was done, but without recordings that cannot be used."""
@@ -69,21 +68,23 @@ def export(
     unknown = check_probed(cohort.included, accept=accept_unprobed)
     _, first = next(cohort.included[0].sessions())
     exporter = oversight.call(place, offer.build, chosen, machine_of(first))
-    folder.mkdir(parents=True, exist_ok=True)
 
     def attempt(cohort: "Cohort") -> None:
         people = _Read(_measured(cohort, workers, scheduler))
-        with progress_bar(f"export to {to}", len(cohort.included)) as advance:
+        with (
+            _product(data, to, folder, cohort, shared=exporter.shared) as made,
+            progress_bar(f"export to {to}", len(cohort.included)) as advance,
+        ):
+            handed = made.handing_out((person.name, person) for person in people.counted(advance))
             try:
-                oversight.call(place, exporter.export, people.counted(advance), folder)
+                oversight.call(place, exporter.export, handed, made.folder)
             except LabcraneError as error:
                 if people.now is None:  # nobody's data were being read
                     raise
                 raise _Unusable(people.now, str(error)) from error
+            _write_manifest(made.folder, to, chosen.model_dump(mode="json"), cohort, unknown)
 
-    cohort = _without_bad(attempt, cohort, folder)
-    _write_manifest(folder, to, chosen.model_dump(mode="json"), cohort, unknown)
-    _keep_track(data, to, folder, cohort)
+    cohort = _without_bad(attempt, cohort)
     out.print(f"{to}: {folder}", markup=False)
     _tell_left_out(cohort)
 
@@ -111,18 +112,13 @@ class _Read:
         self.now = None
 
 
-def _without_bad(attempt: "Callable[[Cohort], None]", cohort: "Cohort", folder: Path) -> "Cohort":
-    """Do something with a cohort; without whoever's data cannot be used, who is named.
-
-    ``folder`` is new or was empty: what an attempt that failed has left in it is removed.
-    """
+def _without_bad(attempt: "Callable[[Cohort], None]", cohort: "Cohort") -> "Cohort":
+    """Do something with a cohort; without whoever's data cannot be used, who is named."""
     while True:
         try:
             attempt(cohort)
         except _Unusable as bad:
             cohort = _leave_out(cohort, bad.name, bad.why)
-            for entry in folder.iterdir():
-                shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
         else:
             return cohort
 
@@ -179,16 +175,19 @@ def report(
         nonlocal cohort
         cohort = _leave_out(cohort, name, why)
 
-    with progress_bar("report", len(cohort.included)) as advance:
+    with (
+        _product(data, "report", folder, cohort, whole=True) as made,
+        progress_bar("report", len(cohort.included)) as advance,
+    ):
         page = write_report(
             cohort,
-            folder,
+            made.folder,
             leave_out=leave_out,
             progress=lambda done, of: advance(),
             workers=workers,
             scheduler=scheduler,
         )
-    out.print(f"report: {page}", markup=False)
+    out.print(f"report: {folder / page.name}", markup=False)
     _tell_left_out(cohort)
 
 
@@ -232,10 +231,12 @@ def replay(
 def _write_measures(recording: Path, session: int, frames: "Groups", path: Path) -> None:
     """Write the measures of a session's movements in the ``frames`` of its replay."""
     from labcrane.analysis.measures import measure_session
+    from labcrane.participants.products import written_about
     from labcrane.recording.participant_file.reader import open_recording
 
     record = open_recording(recording).session(session)
-    measure_session(record, frames=frames).to_csv(path, index=False)
+    with written_about(recording, "replay", path) as beside:
+        measure_session(record, frames=frames).to_csv(beside, index=False)
     out.print(f"measures: {path}", markup=False)
 
 
@@ -269,21 +270,25 @@ def _struck(data: Path) -> "dict[str, Struck]":
     return struck
 
 
-def _keep_track(data: Path, to: str, folder: Path, cohort: "Cohort") -> None:
-    """Note in the register where data of its participants went, for erasing and relabelling."""
-    from labcrane.participants.copies import record_export
-    from labcrane.participants.folders import Places
+def _product(
+    data: Path,
+    writer: str,
+    folder: Path,
+    cohort: "Cohort",
+    *,
+    shared: Sequence[str] = (),
+    whole: bool = False,
+) -> "AbstractContextManager[Product]":
+    """Return a folder to write into that the register knows; see :mod:`~.participants.products`.
 
-    if not Places(data).register.exists():
-        return  # pilots and simulations only: nobody's data have gone anywhere
-    names = [person.name for person in cohort.included]
-    files = {}
-    for path in (path for path in folder.rglob("*") if path.is_file()):
-        inside = path.relative_to(folder)
-        # A file that is named after somebody holds nobody else; a table may hold everybody.
-        named = [name for name in names if name in str(inside)]
-        files[inside] = named or names
-    record_export(Places(data), to, folder, files, today())
+    Those who were left out are listed in it, with the reason.
+    """
+    from labcrane.analysis.cohort import Status
+    from labcrane.participants.products import product
+
+    people = [*cohort.included, *cohort.left_out]
+    names = [person.name for person in people if person.status is not Status.ERASED]
+    return product(data, writer, folder, names, today(), shared=shared, whole=whole)
 
 
 @contextmanager
@@ -336,12 +341,11 @@ def _write_manifest(
 
     BIDS and Psych-DS allow no further files, so it is hidden from them under ``.labcrane``.
     """
-    import json
     from datetime import UTC, datetime
 
     from labcrane import __version__
+    from labcrane.participants.copies import write_manifest
 
-    (folder / ".labcrane").mkdir()
     content = {
         "labcrane": __version__,
         "format": to,
@@ -351,5 +355,4 @@ def _write_manifest(
         "participants": cohort.listing().to_dict("records"),
         "unprobed": unprobed,
     }
-    path = folder / ".labcrane" / MANIFEST
-    path.write_text(json.dumps(content, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_manifest(folder, content)

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labcrane.cli.commands.approval import today
 from labcrane.cli.commands.results import cohort_of
 from labcrane.cli.output import out
 
@@ -32,12 +33,15 @@ def score(
 
     from labcrane.analysis.operator_tests import operator_tests
     from labcrane.analysis.report.workbook import advice, write_workbook
+    from labcrane.participants.products import product
 
     # Operators are scored while they are still in training.
     cohort = cohort_of(folder, [HALF_FINISHED, *(include or ())])
     tests = operator_tests(cohort, _settings(settings) if settings else None)
     path = into or folder / "evaluation.xlsx"
-    write_workbook(tests, path)
+    names = [person.name for person in cohort.included]
+    with product(folder, "score", path.resolve().parent, names, today(), whole=True) as made:
+        write_workbook(tests, made.folder / path.name)
     table = Table("operator", "session", "trial", "scenario", "raw", "percent")
     for test in tests:
         raw, percent = test.indicator.raw, test.indicator.percent

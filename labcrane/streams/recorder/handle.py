@@ -39,7 +39,7 @@ class RecorderHandle:
         self._requests = tuple(requests)
         self._part = max((part_number(part) for part in parts(journal)), default=0)
         self._known: tuple[str, ...] = ()
-        self._spares = [_Recorder() for _ in range(RECORDERS + SPARES)]
+        self._spares = [_Recorder() for _ in range(RECORDERS)]
         self._recorders = [self._began() for _ in range(RECORDERS)]
 
     @property
@@ -77,7 +77,7 @@ class RecorderHandle:
         """Replace recorders that have died; whether one had."""
         for spare in [one for one in self._spares if one.exit_code is not None]:
             spare.kill()
-            self._spares[self._spares.index(spare)] = _Recorder()
+            self._spares.remove(spare)
         dead = [one for one in self._recorders if one.exit_code is not None]
         for recorder in dead:
             recorder.kill()
@@ -85,6 +85,8 @@ class RecorderHandle:
             self._known = tuple(recorder.status.get("known", self._known))
             self._recorders.remove(recorder)
             self._recorders.append(self._began())
+        if self.status and len(self._spares) < SPARES:  # not while everything else is started
+            self._spares.append(_Recorder())
         return bool(dead)
 
     def stop(self) -> None:
@@ -96,14 +98,12 @@ class RecorderHandle:
             recorder.stop(max(deadline - time.monotonic(), 1.0))
 
     def _began(self) -> "_Recorder":
-        """Give a recorder that waits its orders, and have another one ready."""
-        recorder = self._spares.pop(0)
+        """Give a recorder that waits its orders."""
+        recorder = self._spares.pop(0) if self._spares else _Recorder()
         self._part += 1
         recorder.tell(
             RecorderConfig(self._journal, self._requests, part=self._part, known=self._known)
         )
-        if len(self._spares) < SPARES:
-            self._spares.append(_Recorder())
         return recorder
 
 

@@ -115,7 +115,7 @@ class Lab:
                     pipe.close()
 
 
-def until(recorder: subprocess.Popen[str], holds, wait_s: float = 30.0) -> dict:
+def until(recorder: subprocess.Popen[str], holds, wait_s: float = 240.0) -> dict:
     """Read the recorder's status until something holds of it."""
     deadline = time.monotonic() + wait_s
     status = None
@@ -137,7 +137,7 @@ def stop(recorder: subprocess.Popen[str]) -> int:
     recorder.stdin.write("stop\n")
     recorder.stdin.flush()
     recorder.stdout.read()
-    return recorder.wait(20)
+    return recorder.wait(240)
 
 
 def truth(stream: RecordedStream) -> np.ndarray:

@@ -1,0 +1,186 @@
+"""Questionnaires as tidy tables: one row per answer, and one per score."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from labcrane.analysis.cohort import Participant
+from labcrane.recording.participant_file.questionnaires import ANSWER, END, SCORE
+from labcrane.recording.participant_file.reader import SessionRecord
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+START = "questionnaire.start"
+DECLINED, OMITTED, LEFT = "declined", "not answered", "questionnaire not handed in"
+"""Why an answer or a score is missing."""
+
+WHEN = ("participant", "status", "session", "step", "block", "trial", "questionnaire")
+ANSWERS = (*WHEN, "version", "language", "item", "value", "text", "missing", "time")
+SCORES = (*WHEN, "version", "score", "value", "missing", "time")
+
+MEANING = {
+    "step": ("", "number of the step in the session, from 1"),
+    "block": ("", "number of the block under way or before it; 0 before the first"),
+    "trial": ("", "number of the trial it follows; empty where it follows none"),
+    "questionnaire": ("", "the study's name for the questionnaire"),
+    "version": ("", "what was asked: offer, plugin and version"),
+    "language": ("", "language of the questions"),
+    "item": ("", "name of the question"),
+    "value": ("", "the answer as a number, or the score; empty where it is none"),
+    "text": ("", "the answer in words, or the choice; empty where it is a number"),
+    "missing": ("", f"why there is none: {DECLINED}, {OMITTED}, {LEFT}"),
+    "score": ("", "name of the score"),
+    "time": ("s", "when it was given or worked out, on the session's clock"),
+}
+
+
+@dataclass
+class Occasion:
+    """One time that a questionnaire was asked.
+
+    Attributes
+    ----------
+    step, block, trial
+        Where in the session; ``trial`` is NaN where it follows none.
+    answers
+        What held at the end, by item, with the time at which it was given.
+    scores
+        What was made of them.
+    handed_in
+        Whether it was handed in.
+    ended
+        When it ended; NaN where the program was stopped before.
+    """
+
+    questionnaire: str
+    step: float
+    trial: float
+    block: float
+    answers: dict[str, tuple[Any, float]] = field(default_factory=dict)
+    scores: dict[str, Any] = field(default_factory=dict)
+    handed_in: bool = False
+    ended: float = np.nan
+
+
+def occasions(session: SessionRecord) -> list[Occasion]:
+    """Return each time that a questionnaire was asked in a session, in order."""
+    found: dict[tuple[object, ...], Occasion] = {}
+    block = 0
+    events = session.events.sort_values("time", kind="stable")
+    for name, time, data in zip(events["name"], events["time"], events["data"], strict=True):
+        if name == "block.start":
+            block = int(data.get("block", block))
+        if name not in {START, ANSWER, END}:
+            continue
+        trial = float(data.get("trial", np.nan))
+        key = (data["questionnaire"], data["step"], str(trial))
+        asked = found.setdefault(
+            key, Occasion(data["questionnaire"], float(data["step"]), trial, float(block))
+        )
+        if name == ANSWER:
+            asked.answers[data["item"]] = (data["value"], float(time))
+        elif name == END:
+            asked.ended, asked.handed_in = float(time), bool(data.get("handed_in"))
+            asked.scores = {
+                key.removeprefix(SCORE): value
+                for key, value in data.items()
+                if key.startswith(SCORE)
+            }
+    return list(found.values())
+
+
+def asked_in(session: SessionRecord) -> Mapping[str, Mapping[str, Any]]:
+    """Return title, language, items and scores of each questionnaire of a session's study.
+
+    As the recording says them; older recordings do not.
+    """
+    about: Mapping[str, Mapping[str, Any]] = session.context.get("questionnaires", {})
+    return about
+
+
+def version_of(session: SessionRecord, questionnaire: str) -> str:
+    """Return offer, plugin and version of a questionnaire, as recorded."""
+    context = session.context
+    part = context.get("components", {}).get(f"questionnaires.{questionnaire}", {})
+    versions = context.get("versions", {})
+    plugin = str(part.get("plugin", ""))
+    version = versions.get(plugin) or versions.get("labcrane", "")
+    return " ".join(filter(None, (part.get("use", questionnaire), plugin, version)))
+
+
+def answers_of(participant: Participant) -> "pd.DataFrame":
+    """Return one row per answer, and per question without one, of all sessions.
+
+    ``value`` holds numbers and ``text`` words and choices; where both are empty, ``missing`` says
+    why. Of an answer that was changed, the last one holds.
+    """
+    import pandas as pd
+
+    rows = [
+        {**_when(participant, number, asked), **row}
+        for number, session in participant.sessions()
+        for asked in occasions(session)
+        for row in _answers(session, asked)
+    ]
+    return pd.DataFrame(rows, columns=list(ANSWERS))
+
+
+def scores_of(participant: Participant) -> "pd.DataFrame":
+    """Return one row per score of all sessions."""
+    import pandas as pd
+
+    rows = [
+        {
+            **_when(participant, number, asked),
+            "version": version_of(session, asked.questionnaire),
+            "score": name,
+            "value": _number(value),
+            "missing": "" if value is not None else OMITTED if asked.handed_in else LEFT,
+            "time": asked.ended,
+        }
+        for number, session in participant.sessions()
+        for asked in occasions(session)
+        for name, value in asked.scores.items()
+    ]
+    return pd.DataFrame(rows, columns=list(SCORES))
+
+
+def _when(participant: Participant, number: int, asked: Occasion) -> dict[str, Any]:
+    return {
+        "participant": participant.name,
+        "status": str(participant.status),
+        "session": number,
+        "step": asked.step,
+        "block": asked.block,
+        "trial": asked.trial,
+        "questionnaire": asked.questionnaire,
+    }
+
+
+def _answers(session: SessionRecord, asked: Occasion) -> Iterator[dict[str, Any]]:
+    about = asked_in(session).get(asked.questionnaire, {})
+    items = [item["name"] for item in about.get("items", ())]
+    # What was answered and is not among the items can only be of an older recording.
+    for name in dict.fromkeys([*items, *asked.answers]):
+        value, time = asked.answers.get(name, (None, asked.ended))
+        missing = ""
+        if name not in asked.answers:
+            missing = OMITTED if asked.handed_in else LEFT
+        elif value is None:
+            missing = DECLINED
+        yield {
+            "version": version_of(session, asked.questionnaire),
+            "language": str(about.get("language", "")),
+            "item": name,
+            "value": _number(value),
+            "text": value if isinstance(value, str) else "",
+            "missing": missing,
+            "time": time,
+        }
+
+
+def _number(value: object) -> float:
+    return float(value) if isinstance(value, int | float) else np.nan

@@ -1,0 +1,138 @@
+"""Names that become parts of paths: of participants, studies, streams and files.
+
+One white list for all of them, so that whatever passes at the door can be recorded, exported,
+copied to any disk, relabelled and erased.
+"""
+
+import re
+import unicodedata
+from hashlib import sha256
+
+from labcrane.errors import ProtocolError
+
+LONGEST = 40
+"""Most characters of a name; file names are made of several, and some disks take 143 in all."""
+
+ALLOWED = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9_-]*[A-Za-z0-9])?")
+
+STAMPS = ("PILOT", "SIMULATED")
+"""What is put after a pseudonym, with a hyphen, where no person's session was recorded."""
+
+OURS = frozenset(
+    [
+        "register",
+        "exports",
+        "pool",
+        "evaluation",
+        "labcrane",
+        "labcrane-report",
+        "report",
+        "simulation",
+        "participants",
+        "participant",
+        "session",
+        "sessions",
+        "ses",
+        "sub",
+        "run",
+        "streams",
+        "stream",
+        "trials",
+        "trial",
+        "events",
+        "event",
+        "figures",
+        "tables",
+        "table",
+        "phenotype",
+        "motion",
+        "beh",
+        "eeg",
+        "physio",
+        "code",
+        "data",
+        "derivatives",
+        "sourcedata",
+        "stimuli",
+        "nan",
+        "none",
+        "null",
+        "true",
+        "false",
+    ]
+)
+"""Folders, files and words of our own records: nobody can be called that."""
+
+DEVICES = frozenset(
+    ["con", "prn", "aux", "nul", "conin", "conout", "clock"]
+    + [f"{port}{number}" for port in ("com", "lpt") for number in range(10)]
+)
+"""What no file can be called on Windows, with any ending."""
+
+HASHED = 8
+
+
+def check_name(name: str, what: str) -> str:
+    """Return a name as it is, if it can be part of a path everywhere.
+
+    Parameters
+    ----------
+    what
+        Whose name it is, for the message.
+
+    Raises
+    ------
+    ProtocolError
+        It cannot.
+    """
+    if why := misfit(name):
+        raise ProtocolError(f"{what} {name!r} {why}")
+    return name
+
+
+def misfit(name: str, *, person: bool = True) -> str | None:
+    """Return why a name cannot be part of a path everywhere, and what to do; None if it can.
+
+    Parameters
+    ----------
+    person
+        Whether it is a participant's: those lie beside our own folders, and have stamps.
+    """
+    if not ALLOWED.fullmatch(name):
+        return (
+            "cannot be the name of a folder everywhere; take letters A to Z, digits, and hyphens "
+            "or underscores between them"
+        )
+    if len(name) > LONGEST:
+        return f"has {len(name)} characters; take {LONGEST} at most"
+    low = name.lower()
+    if low in DEVICES:
+        return "is a device on Windows; take another name"
+    if not person:
+        return None
+    if low in OURS:
+        return "is a word of labcrane's own files; take another name"
+    for stamp in STAMPS:
+        if low.endswith(f"-{stamp.lower()}"):
+            return f"ends in -{stamp}, which labcrane puts there itself; leave it out"
+    return None
+
+
+def twin_key(name: str) -> str:
+    """Return what two names have in common that some disk or format takes for the same.
+
+    Upper and lower case, forms of the same letter, and whatever is neither letter nor digit.
+    """
+    folded = unicodedata.normalize("NFKC", name).casefold()
+    return "".join(letter for letter in folded if letter.isalnum())
+
+
+def file_name_of(text: str) -> str:
+    """Return a name for a file about something that others have named: a stream, an area.
+
+    Different texts have different names, upper and lower case apart.
+    """
+    name = re.sub(r"[^A-Za-z0-9_.-]+", "_", text).strip("._-")[:LONGEST].rstrip("._-")
+    if name and name == text and name.lower().split(".")[0] not in DEVICES:
+        return name
+    return f"{name or 'x'}-{sha256(text.encode('utf-8', 'surrogatepass')).hexdigest()[:HASHED]}"

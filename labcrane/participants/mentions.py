@@ -1,0 +1,63 @@
+"""Pseudonyms in texts and paths: whole words only, in every spelling that exports use."""
+
+import re
+from collections.abc import Iterable
+
+from labcrane.files.names import STAMPS
+
+LETTER = r"[A-Za-z0-9]"
+
+
+def spellings(name: str) -> list[str]:
+    """Return how a pseudonym is written: as it is, and as BIDS and Psych-DS want it.
+
+    Those take letters and digits only: ``VP-001-PILOT`` is ``VP001PILOT`` there.
+    """
+    bare = re.sub(r"[^A-Za-z0-9]", "", name)
+    pilot, simulated = STAMPS
+    ends = ("", pilot, simulated, f"{pilot}{simulated}")
+    return list(dict.fromkeys([name, *(f"{bare}{end}" for end in ends)]))
+
+
+class Mentions:
+    """Finds whose pseudonyms a text holds.
+
+    A word that may be two people's is the longer name's. A name without a letter cannot be told
+    from a number, and is found only where it is the whole text, or follows ``sub-``.
+    """
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self._owners = {word: name for name in names for word in spellings(name)}
+        self._pattern = _pattern(list(self._owners))
+
+    def of(self, text: str) -> set[str]:
+        """Return whose pseudonyms are in ``text``."""
+        return {self._owners[match[0]] for match in self._pattern.finditer(text)}
+
+    def renamed(self, text: str, old: str, new: str) -> str:
+        """Return ``text`` with ``new`` where ``old`` was, each in the same spelling."""
+        words = dict(zip(_all_spellings(old), _all_spellings(new), strict=True))
+
+        def put(match: re.Match[str]) -> str:
+            word = match[0]
+            return words[word] if self._owners[word] == old else word
+
+        return self._pattern.sub(put, text)
+
+
+def _all_spellings(name: str) -> list[str]:
+    bare = re.sub(r"[^A-Za-z0-9]", "", name)
+    pilot, simulated = STAMPS
+    return [name, *(f"{bare}{end}" for end in ("", pilot, simulated, f"{pilot}{simulated}"))]
+
+
+def _pattern(words: list[str]) -> re.Pattern[str]:
+    words = sorted(words, key=len, reverse=True)
+    named = "|".join(re.escape(word) for word in words if re.search("[A-Za-z]", word))
+    numbers = "|".join(re.escape(word) for word in words if not re.search("[A-Za-z]", word))
+    parts = []
+    if named:
+        parts.append(rf"(?<!{LETTER})(?:{named})(?!{LETTER})")
+    if numbers:
+        parts.append(rf"(?:(?<=\Asub-)|(?<=/sub-)|(?<=/)|(?<![\s\S]))(?:{numbers})(?![^_/.])")
+    return re.compile("|".join(parts) or r"(?!)")

@@ -1,0 +1,234 @@
+"""Every product of every command, for people whose names overlap: one is erased, or relabelled."""
+
+import subprocess
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from governance.every_product import (
+    PEOPLE,
+    Snapshot,
+    everything,
+    files,
+    killed_and_finished,
+    own,
+    says,
+)
+from governance.kept_people import REASON
+from governed import TODAY, Lab
+
+from labcrane.cli.app import main
+from labcrane.participants import recovery as unfinished
+from labcrane.participants.register import read
+from labcrane.participants.whereabouts import whereabouts
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Snapshot:
+    folder = tmp_path_factory.mktemp("every") / "product"
+    everything(folder)
+    return Snapshot(folder)
+
+
+def root_of(lab: Lab) -> Path:
+    return lab.folder.parent
+
+
+def erased(lab: Lab, name: str, before: dict[str, dict[str, str]]) -> None:
+    """Open every file that is left."""
+    left = [path for path in root_of(lab).rglob("*") if path.is_file()]
+    assert len(left) > 60
+    assert [path for path in left if path != lab.places.register and says(path, name)] == []
+    assert not [path for path in root_of(lab).rglob("*") if path.is_dir() and says_name(path, name)]
+    assert lab.places.register.read_text().count(f'"{name}"') == 1  # the tombstone
+    for other in PEOPLE:
+        if other != name:
+            assert own(root_of(lab), other) == before[other]
+    elsewhere = root_of(lab) / "elsewhere"
+    assert (elsewhere / "tables" / "read.R").is_file()
+    assert (lab.places.exports / "psychds" / "dataset_description.json").is_file()
+    assert list((elsewhere / "report").rglob("*")) == []
+    assert not (lab.places.root / "evaluation.xlsx").exists()
+    rest = sorted(set(PEOPLE) - {name})
+    for table in ("trials", "events", "participants"):
+        found = pd.read_csv(elsewhere / "tables" / f"{table}.csv")
+        assert sorted(set(found["participant"])) == rest
+    for table in ("trials", "events"):
+        found = pd.read_parquet(elsewhere / "tables" / f"{table}.parquet")
+        assert sorted(set(found["participant"])) == rest
+
+
+def says_name(path: Path, name: str) -> bool:
+    import re
+
+    words = {name, name.replace("-", "")}
+    return bool(words & set(re.split(r"[^A-Za-z0-9-]+", path.name)))
+
+
+@pytest.mark.parametrize("name", PEOPLE)
+def test_nothing_of_an_erased_person_is_left_and_nothing_of_others_is_touched(
+    made: Snapshot, name: str
+) -> None:
+    lab = made.put_back()
+    before = {other: own(root_of(lab), other) for other in PEOPLE}
+    assert all(len(each) > 15 for each in before.values())
+    assert sum(says(path, name) for path in root_of(lab).rglob("*") if path.is_file()) > 25
+    done = unfinished.erase(lab.places, name, REASON, TODAY)
+    erased(lab, name, before)
+    assert done.mentions == []
+    assert done.reach.owed == []
+    assert len(done.reach.again) == 2  # report and workbook
+
+
+def test_the_shared_files_that_stay_work(made: Snapshot) -> None:
+    lab = made.put_back()
+    unfinished.erase(lab.places, "P001", REASON, TODAY)
+    tables = root_of(lab) / "elsewhere" / "tables"
+    said = subprocess.run(
+        ["Rscript", "-e", f"source('{tables}/read.R'); x <- read_labcrane('{tables}'); "
+         "cat(sort(unique(as.character(x$trials$participant))))"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert said.returncode == 0, said.stderr
+    assert said.stdout.split() == ["P0011", "VP-001"]
+
+
+def test_an_erasure_killed_at_random_writes_is_finished_by_the_next_call(made: Snapshot) -> None:
+    lab = made.put_back()
+    before = {other: own(root_of(lab), other) for other in PEOPLE}
+    killed = killed_and_finished(
+        made, 20261122, 4,
+        lambda lab: unfinished.erase(lab.places, "P001", REASON, TODAY),
+        lambda lab: bool(read(lab.places).tombstones),
+        lambda lab: erased(lab, "P001", before),
+    )  # fmt: skip
+    assert killed >= 3
+
+
+@pytest.mark.long
+def test_an_erasure_killed_at_very_many_writes_is_finished_by_the_next_call(
+    made: Snapshot,
+) -> None:
+    lab = made.put_back()
+    before = {other: own(root_of(lab), other) for other in PEOPLE}
+    killed = killed_and_finished(
+        made, 7, 60,
+        lambda lab: unfinished.erase(lab.places, "VP-001", REASON, TODAY),
+        lambda lab: bool(read(lab.places).tombstones),
+        lambda lab: erased(lab, "VP-001", before),
+    )  # fmt: skip
+    assert killed > 40
+
+
+def relabelled(lab: Lab, before: dict[str, dict[str, str]]) -> None:
+    left = [path for path in root_of(lab).rglob("*") if path.is_file()]
+    formerly = {lab.places.register, *lab.places.raw("P100").glob("*")}
+    formerly |= set((root_of(lab) / "store" / "rehearsal" / "P100").glob("*"))
+    assert [path for path in left if path not in formerly and says(path, "P001")] == []
+    for other in ("P0011", "VP-001"):
+        assert own(root_of(lab), other) == before[other]
+    assert (lab.places.raw("P100") / "P100.h5").is_file()
+    tables = root_of(lab) / "elsewhere" / "tables"
+    for table in ("trials", "events"):
+        text, packed = (
+            pd.read_csv(tables / f"{table}.csv"),
+            pd.read_parquet(tables / f"{table}.parquet"),
+        )
+        assert sorted(set(text["participant"])) == ["P0011", "P100", "VP-001"]
+        assert sorted(set(packed["participant"])) == ["P0011", "P100", "VP-001"]
+    assert (tables / "streams" / "P100_ses-01_frames.parquet").is_file()
+    assert (tables / "read.R").is_file()
+
+
+def test_after_relabelling_the_old_name_is_nowhere_but_on_record(made: Snapshot) -> None:
+    lab = made.put_back()
+    before = {other: own(root_of(lab), other) for other in PEOPLE}
+    unfinished.correct(lab.places, "P001", "P100", "typed wrongly", TODAY)
+    relabelled(lab, before)
+
+
+def test_a_relabelling_killed_at_random_writes_is_finished_by_the_next_call(
+    made: Snapshot,
+) -> None:
+    lab = made.put_back()
+    before = {other: own(root_of(lab), other) for other in PEOPLE}
+    killed = killed_and_finished(
+        made, 22, 4,
+        lambda lab: unfinished.correct(lab.places, "P001", "P100", "typed wrongly", TODAY),
+        lambda lab: "P100" in read(lab.places).participants and read(lab.places).work is None,
+        lambda lab: relabelled(lab, before),
+    )  # fmt: skip
+    assert killed >= 3
+
+
+def test_where_lists_every_file_that_holds_a_person(
+    made: Snapshot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lab = made.put_back()
+    for name in PEOPLE:
+        listed = {Path(each.where) for each in whereabouts(lab.places, name)}
+        for path in root_of(lab).rglob("*"):
+            if path.is_file() and path.name != "labcrane_export.json" and says(path, name):
+                assert listed & {path, *path.parents}, path
+    capsys.readouterr()
+    assert main(["where", "P0011", "--data", str(lab.places.root)]) == 0
+    said = capsys.readouterr().out
+    assert "fitted P0011.yaml" in said
+    assert "P001/" not in said
+    unfinished.erase(lab.places, "P0011", REASON, TODAY)
+    (each,) = whereabouts(lab.places, "P0011")
+    assert each.state == "tombstone: was erased"
+
+
+def test_a_product_whose_writer_is_killed_is_known_and_erased(made: Snapshot) -> None:
+    import os
+    import signal
+
+    from labcrane.participants.products import product
+
+    lab = made.put_back()
+    out = root_of(lab) / "elsewhere" / "half"
+    child = os.fork()
+    if child == 0:
+        try:
+            with product(lab.places.root, "tables", out, PEOPLE, TODAY) as making:
+                (making.folder / "P001.csv").write_text("P001\n")
+                os.kill(os.getpid(), signal.SIGKILL)
+        finally:
+            os._exit(1)
+    _, status = os.waitpid(child, 0)
+    assert os.WIFSIGNALED(status)
+    assert [path.name for path in out.rglob("*.csv")] == ["P001.csv"]
+    assert "not finished" in {each.state for each in whereabouts(lab.places, "P001")}
+    unfinished.erase(lab.places, "P001", REASON, TODAY)
+    assert not list(out.rglob("*.csv"))
+
+
+def test_an_empty_mount_point_is_not_taken_for_the_disk(made: Snapshot) -> None:
+    lab = made.put_back()
+    disk = root_of(lab) / "elsewhere" / "tables"
+    away = disk.with_name("unplugged")
+    disk.rename(away)
+    disk.mkdir()  # what is left where a stick was mounted
+    done = unfinished.erase(lab.places, "P001", REASON, TODAY)
+    assert [owed.folder for owed in done.reach.owed] == [str(disk)]
+    unfinished.move(lab.places, root_of(lab) / "store")
+    assert [each.state for each in whereabouts(lab.places, "P001")][1:] == [
+        "due: to be erased or relabelled"
+    ]
+    disk.rmdir()
+    away.rename(disk)
+    unfinished.move(lab.places, root_of(lab) / "store")
+    assert not [path for path in disk.rglob("*") if path.is_file() and says(path, "P001")]
+    assert (disk / "streams" / "P0011_ses-01_frames.parquet").is_file()
+    assert read(lab.places).owed == []
+
+
+def test_files_of_others_in_the_same_folder_stay(made: Snapshot) -> None:
+    lab = made.put_back()
+    report = root_of(lab) / "elsewhere" / "report"
+    (report / "my notes.txt").write_text("nobody in particular")
+    (report / "empty").mkdir()
+    unfinished.erase(lab.places, "P001", REASON, TODAY)
+    assert files(report) == files(report) != {}
+    assert sorted(path.name for path in report.iterdir()) == ["empty", "my notes.txt"]

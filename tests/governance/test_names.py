@@ -1,0 +1,241 @@
+"""Names of participants, studies and streams: what passes at the door can be handled everywhere."""
+
+import re
+import stat
+import unicodedata
+from pathlib import Path
+
+import pytest
+from governance.kept_people import REASON, store_of
+from governed import TODAY, Lab
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from rehearsal import SHORT, a_study
+
+from labcrane import ProtocolError, RecordingError
+from labcrane.files.names import DEVICES, LONGEST, OURS, check_name, file_name_of, misfit, twin_key
+from labcrane.participants import recovery
+from labcrane.participants.enrolment import check_apart
+from labcrane.participants.erasure import mentions
+from labcrane.participants.folders import Places, keep_private
+from labcrane.participants.mentions import Mentions
+from labcrane.participants.register import Entry, Register, read
+from labcrane.participants.whereabouts import whereabouts
+
+LIKELY = st.text("PVp-_01a9", min_size=1, max_size=8)
+ANY = st.text(min_size=0, max_size=60)
+
+
+@given(ANY | LIKELY)
+@example("register")
+@example("CON")
+@example("Exports")
+@example("P001 ")
+@example("P001.")
+@example("..")
+@example("P001/../P002")
+@example("P001-PILOT")
+@example("P001-simulated")
+@example("P\u0660\u0660\u0661")  # Arabic digits, which \d matches
+@example("\uff30001")  # a full-width P
+@example("P001\n")
+def test_a_name_that_passes_is_one_folder_of_its_own_on_every_disk(name: str) -> None:
+    if misfit(name) is not None:
+        with pytest.raises(ProtocolError, match=r"(?s)^participant .+; (take|leave) "):
+            check_name(name, "participant")
+        return
+    assert check_name(name, "participant") == name
+    assert Path(name).name == name
+    assert not name.startswith((".", "-", "~"))
+    assert name == unicodedata.normalize("NFC", name) == unicodedata.normalize("NFKD", name)
+    assert name.isascii()
+    assert len(name) <= LONGEST
+    assert not set(name) & set('<>:"/\\|?*. \t\r\n\0$')
+    low = name.casefold()
+    assert low not in {"con", "prn", "aux", "nul", "com1", "lpt9"} | DEVICES
+    assert low not in {"register", "exports"} | OURS
+    assert not low.endswith(("-pilot", "-simulated"))
+
+
+@given(ANY)
+def test_every_text_has_a_file_name_of_its_own(text: str) -> None:
+    name = file_name_of(text)
+    assert re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]*", name)
+    assert len(name) <= LONGEST + 9
+    assert not name.endswith(".")
+    assert name.lower().split(".")[0] not in DEVICES
+    if name != text:  # what has been changed carries a mark, so that no two become one
+        assert file_name_of(text + "'") != name
+
+
+def registered(*names: str) -> Register:
+    entry = Entry(slot=1, seed=1, enrolled="2026-01-01", holds_slot=False)
+    return Register(participants=dict.fromkeys(names, entry))
+
+
+def admitted(names: list[str]) -> list[str]:
+    """Return those who would be let in, one after the other."""
+    let_in: list[str] = []
+    for name in names:
+        try:
+            check_apart(registered(*let_in), name)
+        except ProtocolError:
+            continue
+        if name not in let_in:
+            let_in.append(name)
+    return let_in
+
+
+@settings(max_examples=300)
+@given(st.lists(LIKELY, min_size=2, max_size=6), st.data())
+def test_a_text_about_one_person_never_mentions_another(
+    names: list[str], data: st.DataObject
+) -> None:
+    people = admitted(names)
+    for name in people:
+        bare = re.sub("[^A-Za-z0-9]", "", name)
+        for text in (
+            name, f"{name}-PILOT", f"{name}_ses-01_frames.csv.gz", f"sub-{bare}/ses-01",
+            f"sub-{bare}_task-crane", f"labcrane/study/{name}/ses-01", f'{{"is": "{name}"}}',
+            f"study-x_subject-{bare}_session-1_data.csv", f"{bare}SIMULATED",
+        ):  # fmt: skip
+            assert Mentions(people).of(text) == {name}, text
+    assert len({twin_key(name) for name in people}) == len(people)
+
+
+@given(LIKELY, LIKELY, st.text("P01-_/. ", max_size=30))
+def test_renaming_is_undone_by_renaming_back(old: str, new: str, text: str) -> None:
+    people = admitted([old, new])
+    if len(people) < 2 or Mentions([new]).of(text):
+        return
+    named = Mentions(people)
+    assert named.renamed(named.renamed(text, old, new), new, old) == text
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("p001", "p001 could be taken for P001, who is in the register"),
+        ("P-001", "P-001 could be taken for P001"),
+        ("P001-2", "P001-2 could be taken for P001"),
+        ("001", "'001' cannot be told from a number in a text"),
+        ("lpt1", "'lpt1' is a device on Windows; take another name"),
+        ("Register", "'Register' is a word of labcrane's own files"),
+        ("P001-PILOT", "ends in -PILOT, which labcrane puts there itself"),
+        ("P" * 41, "has 41 characters; take 40 at most"),
+        ("P001.", "cannot be the name of a folder everywhere"),
+    ],
+)
+def test_a_pseudonym_that_could_be_mistaken_is_refused_in_words(name: str, said: str) -> None:
+    with pytest.raises(ProtocolError, match=re.escape(said)):
+        check_apart(registered("P001"), name)
+
+
+@pytest.mark.parametrize("word", ["register", "exports", "..", "P007-PILOT", "", "P007/../P001"])
+def test_words_that_are_no_participants_are_not_erased(lab: Lab, word: str) -> None:
+    before = {path: path.read_bytes() for path in lab.places.files() if path.suffix != ".lock"}
+    with pytest.raises(ProtocolError):
+        recovery.erase(lab.places, word, REASON, TODAY)
+    with pytest.raises(ProtocolError):
+        recovery.correct(lab.places, "P007", word, "typed wrongly", TODAY)
+    after = {path: path.read_bytes() for path in lab.places.files() if path.suffix != ".lock"}
+    assert after == before
+
+
+@pytest.mark.parametrize("study", ["con", "a-", "study_", "x" * 41])
+def test_a_study_that_cannot_be_a_folder_is_refused(tmp_path: Path, study: str) -> None:
+    with pytest.raises(ProtocolError, match=rf"study: .*{study}"):
+        a_study(tmp_path, SHORT.replace("study: rehearsal", f"study: {study}"))
+
+
+def test_a_stream_whose_name_leaves_the_folder_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ProtocolError, match="cannot be the name of a folder everywhere"):
+        a_study(tmp_path, f"{SHORT}streams: {{'../eeg': {{name: EEG}}}}\n")
+
+
+def test_somebody_recorded_under_a_name_that_is_refused_today_can_be_erased(lab: Lab) -> None:
+    from labcrane.participants.register import changed
+
+    old = "Ü07"
+    lab.places.raw("P007").rename(lab.places.raw(old))
+    with changed(lab.places) as register:
+        register.participants[old] = register.participants.pop("P007")
+    recovery.erase(lab.places, old, REASON, TODAY)
+    assert not lab.places.raw(old).exists()
+    assert old not in read(lab.places).participants
+
+
+def test_a_folder_that_differs_in_capitals_only_is_refused(lab: Lab) -> None:
+    visit = lab.visit("P001", pilot=True)
+    (lab.places.root / "p001-pilot").mkdir()
+    with pytest.raises(ProtocolError, match=r"P001-PILOT and p001-pilot, who is here already"):
+        visit.folder.claim(1)
+
+
+def outside(lab: Lab) -> Path:
+    folder = lab.folder / "outside"
+    folder.mkdir()
+    (folder / "P007.txt").write_text("P007")
+    (folder / "P007.txt").chmod(0o644)
+    folder.chmod(0o755)
+    return folder
+
+
+def test_permissions_behind_links_stay_and_dangling_ones_do_not_matter(lab: Lab) -> None:
+    folder = outside(lab)
+    raw = lab.places.raw("P007")
+    (raw / "link").symlink_to(folder)
+    (raw / "file").symlink_to(folder / "P007.txt")
+    (raw / "dangling").symlink_to(folder / "gone")
+    keep_private(raw)
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o755
+    assert stat.S_IMODE((folder / "P007.txt").stat().st_mode) == 0o644
+    assert stat.S_IMODE((raw / "P007.h5").stat().st_mode) == 0o600
+
+
+def test_erasing_removes_links_and_never_what_is_behind_them(lab: Lab) -> None:
+    folder = outside(lab)
+    raw = lab.places.raw("P007")
+    (raw / "link").symlink_to(folder)
+    (raw / "dangling").symlink_to(folder / "gone")
+    (lab.places.root / "loop").symlink_to(lab.places.root)
+    recovery.erase(lab.places, "P007", REASON, TODAY)
+    assert not raw.exists()
+    assert (folder / "P007.txt").read_text() == "P007"
+    assert mentions(lab.places, "P007") == []
+
+
+def test_a_link_in_the_place_of_a_recording_is_told_and_due_until_it_is_gone(lab: Lab) -> None:
+    raw = lab.places.raw("P007")
+    moved = lab.folder / "P007 moved"
+    raw.rename(moved)
+    raw.symlink_to(moved)
+    before = sorted(moved.iterdir())
+    done = recovery.erase(lab.places, "P007", REASON, TODAY)
+    assert [(owed.folder, owed.link) for owed in done.reach.owed] == [(str(raw), True)]
+    assert sorted(moved.iterdir()) == before
+    assert raw.is_symlink()
+    recovery.move(lab.places, store_of(lab))
+    assert [each.what for each in whereabouts(lab.places, "P007")].count("owed") == 1
+    raw.unlink()
+    recovery.move(lab.places, store_of(lab))
+    assert read(lab.places).owed == []
+
+
+def test_no_session_is_recorded_behind_a_link(tmp_path: Path) -> None:
+    study = a_study(tmp_path)
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "P001").symlink_to(tmp_path / "elsewhere")
+    from labcrane.recording.data_folder import DataFolder
+
+    assert study.protocol.study == "rehearsal"
+    with pytest.raises(RecordingError, match="is a link, and links are never followed"):
+        DataFolder(tmp_path, "P001", pilot=False, simulated=False).claim(1)
+
+
+def test_transfer_follows_no_links(lab: Lab) -> None:
+    (lab.places.raw("P001") / "notes.txt").symlink_to(outside(lab) / "P007.txt")
+    done = recovery.move(lab.places, store_of(lab))
+    assert "P001/notes.txt: a link, which is not followed" in done.only_here
+    assert not (store_of(lab) / "rehearsal" / "P001" / "notes.txt").exists()
+    assert Places(lab.places.root).raw("P001").is_dir()

@@ -1,0 +1,169 @@
+"""What is on the screen while a crane moves: whole pictures only, in windows with names."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import ImageGrab
+from plugins.whole_picture import counted
+from windows import a_view, an_x_server, make_frame
+
+from labcrane_view.settings import ViewSettings
+from labcrane_view.window import free_place
+
+GRABS = 40
+SIZE = (480, 320)
+
+
+@contextmanager
+def moving(display: str, renderer: str, name: str) -> Iterator[dict[str, int]]:
+    """Open a window in which the crane turns; give what its whole pictures hold at least."""
+    program = Path(__file__).with_name("moving_window.py")
+    tests = str(Path(__file__).parents[1])
+    process = subprocess.Popen(
+        [sys.executable, str(program), renderer, name, f"{name} - whole"],
+        env={**os.environ, "DISPLAY": display, "PYTHONPATH": tests},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+    try:
+        yield json.loads(process.stdout.readline())
+    finally:
+        process.stdin.close()
+        process.wait()
+        process.stdout.close()
+
+
+def windows(display: str) -> dict[str, tuple[int, int]]:
+    """Return where the windows are that have a name, as the X server says."""
+    done = subprocess.run(
+        ["xwininfo", "-root", "-tree"],
+        env={**os.environ, "DISPLAY": display},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    found = {}
+    for line in done.stdout.splitlines():
+        if ' - whole"' in line:
+            place = line.split()[-1]
+            x, y = (int(number) for number in place.lstrip("+").split("+"))
+            found[line.split('"')[1]] = (x, y)
+    return found
+
+
+@pytest.mark.parametrize("renderer", ["auto", "software"])
+def test_every_grab_of_two_windows_shows_whole_pictures_while_the_crane_moves(
+    renderer: str,
+) -> None:
+    with an_x_server() as display, ExitStack() as both:
+        least = {
+            name: both.enter_context(moving(display, renderer, name))
+            for name in ("operator", "examiner")
+        }
+        places = windows(display)
+        assert set(places) == {"operator - whole", "examiner - whole"}
+        halves = {name: places[f"{name} - whole"] for name in least}
+        (left, top), (right, below) = halves.values()
+        assert abs(right - left) >= SIZE[0] or abs(below - top) >= SIZE[1]
+        broken, seen = [], set()
+        for _ in range(GRABS):
+            grab = np.asarray(ImageGrab.grab(xdisplay=display))
+            for name, (x, y) in halves.items():
+                picture = grab[y : y + SIZE[1], x : x + SIZE[0]]
+                seen.add((name, picture.tobytes()))
+                has = counted(picture)
+                lacking = [each for each, count in least[name].items() if has[each] < 0.8 * count]
+                if lacking:
+                    broken.append((name, lacking))
+            time.sleep(0.013)  # not in step with the pictures
+        assert broken == []
+        assert len(seen) > GRABS / 4, "the crane did not move"
+
+
+def test_windows_lie_beside_those_before_them_where_there_is_room() -> None:
+    desktop = (1920, 1080)
+    operator = ((0, 0), (1280, 720))
+    assert free_place((600, 500), [operator], desktop) == (1280, 0)
+    assert free_place((1280, 300), [operator], desktop) == (0, 720)
+    second = ((1280, 0), (600, 500))
+    assert free_place((600, 500), [operator, second], desktop) == (1280, 500)
+    x, y = free_place((1900, 1000), [operator], desktop)
+    assert x + 1900 <= 1920
+    assert y + 1000 <= 1080
+
+
+def test_paused_covers_the_whole_picture() -> None:
+    frame = make_frame()
+    with a_view(hud=None, content="feedback", targets=False) as view:
+        view.present(frame)
+        view.present(frame)
+        running = view.picture().astype(int)
+        frame.paused = True
+        view.present(frame)
+        view.present(frame)
+        paused = view.picture().astype(int)
+        frame.paused = False
+        view.present(frame)
+        view.present(frame)
+        again = view.picture().astype(int)
+    white = np.nonzero((paused.min(axis=-1) > 200) & (running.min(axis=-1) < 100))
+    height, width = running.shape[:2]
+    assert white[1].max() - white[1].min() > 0.5 * width
+    assert white[0].max() - white[0].min() > 0.1 * height
+    assert abs((white[0].max() + white[0].min()) / 2 - height / 2) < 0.05 * height
+    assert abs((white[1].max() + white[1].min()) / 2 - width / 2) < 0.05 * width
+    np.testing.assert_array_equal(again, running)
+
+
+@pytest.mark.parametrize("digits", ["0", "1", "3", "4", "5", "7", "9"])
+def test_digits_are_as_high_as_capitals_and_stand_on_the_line(digits: str) -> None:
+    from panda3d import core
+
+    from labcrane_view.window import font
+
+    def extent(text: str) -> tuple[float, float]:
+        node = core.TextNode("digits")
+        node.set_font(font(None))
+        node.set_text(text)
+        low, high = core.NodePath(node.generate()).get_tight_bounds()
+        return low[2], high[2]
+
+    for digit in digits:
+        np.testing.assert_allclose(extent(digit), extent("H"), atol=0.04)
+
+
+def test_the_operator_sees_no_distance_unless_asked_for_and_the_examiner_does() -> None:
+    assert ViewSettings().hud_lines == ("block", "trial")
+    assert ViewSettings(seen_by="examiner").hud_lines == ("block", "trial", "distance")
+    assert ViewSettings().warnings() == ()
+    assert ViewSettings(seen_by="examiner", hud=("distance",)).warnings() == ()
+    (warning,) = ViewSettings(hud=("distance",)).warnings()
+    assert "tells the operator the task's error in every group" in warning
+
+
+def test_check_warns_of_an_error_that_every_group_is_shown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from rehearsal import SHORT
+
+    from labcrane.cli.app import main
+
+    path = tmp_path / "study.yaml"
+    path.write_text(SHORT + "views: {cab: {use: view, hud: [trial, distance]}}\n")
+    assert main(["check", str(path)]) == 0
+    said = capsys.readouterr()
+    assert "warning: views.cab: hud: distance tells the operator the task's error" in said.err
+    path.write_text(SHORT + "views: {cab: {use: view}}\n")
+    assert main(["check", str(path)]) == 0
+    assert capsys.readouterr().err == ""
