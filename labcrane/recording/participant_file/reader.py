@@ -14,8 +14,9 @@ import numpy.typing as npt
 from labcrane.errors import RecordingError
 from labcrane.recording.journal import GROUPS
 from labcrane.recording.participant_file.columns import holds_texts, text_of, texts_of
+from labcrane.recording.participant_file.session_group import SYNC_REPORT
 from labcrane.recording.participant_file.stream_group import BASES
-from labcrane.recording.participant_file.writer import SYNC_REPORT, group_name, reading
+from labcrane.recording.participant_file.writer import group_name, reading
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:

@@ -57,6 +57,7 @@ class Recorder:
         self._writer = XdfWriter(next_part(journal) if part is None else part_path(journal, part))
         self._streams: dict[tuple[str, str, str], _Recorded] = {}
         self._latest: dict[tuple[str, str, str], pylsl.StreamInfo] = {}
+        self._there: set[tuple[str, str, str]] = set()
         self._since: dict[str, float] = {}
         self._fault: str | None = None
         self._feed = None if monitors is None else SignalFeed(monitors)
@@ -75,6 +76,7 @@ class Recorder:
         found = [info for info in self._search.results() if self._wanted(info) is not None]
         now = time.monotonic()
         self._since = {info.uid(): self._since.get(info.uid(), now) for info in found}
+        self._there = {_key(info) for info in found}
         for info in found:
             self._latest[_key(info)] = info  # a program that was started again has other ports
             self._start(info)
@@ -85,7 +87,7 @@ class Recorder:
     def health(self) -> list[Health]:
         """Return how each stream is now, also those asked for that are not there."""
         now = time.perf_counter()
-        found = [_health(one, now) for one in self._streams.values()]
+        found = [_health(one, now, self._rivals(one)) for one in self._streams.values()]
         there = {one.request.label for one in self._streams.values()}
         return found + [_absent(one) for one in self._requests if one.label not in there]
 
@@ -132,6 +134,21 @@ class Recorder:
         inlet = Inlet(info, self._writer, request.counter, (*warnings,), self._feed)
         self._streams[key] = _Recorded(request, inlet, misfits, warnings)
 
+    def _rivals(self, recorded: _Recorded) -> list[str]:
+        """Say which other streams fit a request for one; all are recorded, none is chosen."""
+        request = recorded.request
+        names = sorted(
+            f"{one.inlet.info.name()!r} ({one.inlet.info.source_id()})"
+            for key, one in self._streams.items()
+            if one.request is request and key in self._there
+        )
+        if request.several or len(names) < 2:  # noqa: PLR2004
+            return []
+        return [
+            f"fits {request}, but so do {len(names)} streams: {', '.join(names)}; give the name or "
+            "source_id of the one that is meant, or several: true"
+        ]
+
     def _find_duplicates(self, found: "list[pylsl.StreamInfo]", now: float) -> None:
         """Warn of two live streams that LSL cannot tell apart: it may reconnect to the other."""
         for key, recorded in self._streams.items():
@@ -154,7 +171,7 @@ def _key(info: "pylsl.StreamInfo") -> tuple[str, str, str]:
     return info.source_id() or info.uid(), info.name(), info.type()
 
 
-def _health(recorded: _Recorded, now: float) -> Health:
+def _health(recorded: _Recorded, now: float, rivals: list[str]) -> Health:
     inlet, flow, info = recorded.inlet, recorded.inlet.flow, recorded.inlet.info
     probe, signals = flow.probe, inlet.signals
     # The time of the measurement on our clock, not the time when liblsl told of it.
@@ -177,8 +194,8 @@ def _health(recorded: _Recorded, now: float) -> Health:
         rtt_s=None if probe is None else probe.rtt,
         missing=flow.missing,
         resets=flow.resets,
-        misfits=recorded.misfits,
-        warnings=list(recorded.warnings),
+        misfits=[*recorded.misfits, *rivals],
+        warnings=[*recorded.warnings, *rivals],
         signals=list(signals.faults.values()) if signals else [],
         unwatched=signals.failed if signals else {},
     )
