@@ -149,6 +149,24 @@ class SessionRecord:
         return Stream(name, attrs, self._path, f"{path}/data", f"{path}/{time}")
 
     @cached_property
+    def signal_faults(self) -> "pd.DataFrame":
+        """One row per fault of a signal: stream, channel, kind, message, start and end in s."""
+        return self._table("signal_faults")
+
+    @cached_property
+    def trial_signal_faults(self) -> "pd.DataFrame":
+        """One row per trial and fault that touches it: trial, attempt, stream, channel, seconds."""
+        return self._table("trial_signal_faults")
+
+    def _table(self, name: str) -> "pd.DataFrame":
+        """Return a group of columns of one length; empty where the session has none."""
+        import pandas as pd  # noqa: PLC0415
+
+        with reading(self._path) as file:
+            group = file[self._group].get(name, {})
+            return pd.DataFrame({column: _values(group[column]) for column in group})
+
+    @cached_property
     def events(self) -> "pd.DataFrame":
         """One row per event: time, tick, part, trial, name and data, a dict."""
         import pandas as pd  # noqa: PLC0415

@@ -21,6 +21,7 @@ from labcrane.recording.journal_reader import JournalState, SessionLog, read_jou
 from labcrane.recording.participant_file.columns import node_names, write_attributes
 from labcrane.recording.participant_file.containment import check_containment, check_heaps
 from labcrane.recording.participant_file.session_group import write_session
+from labcrane.recording.participant_file.signal_faults import write_signal_faults
 from labcrane.recording.participant_file.stream_group import write_streams
 from labcrane.recording.paths import parts, session_of
 
@@ -198,6 +199,7 @@ def _write(beside: Path, path: Path, session: _Session, conclude: Conclude | Non
         write_attributes(group, {"session": session.number, "participant": path.stem})
         write_session(group, session.log, session.journals)
         write_streams(group, session.streams)
+        write_signal_faults(group, session.log, session.streams)
         if conclude is not None:
             conclude(group)
 

@@ -1,7 +1,7 @@
 """Records the streams of others: whatever was asked for, late or again after a restart."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ from labcrane.recording.paths import next_part, part_path
 from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.streams.recorder.health import Condition, Health, complaints, condition, rate
 from labcrane.streams.recorder.inlet import Inlet
+from labcrane.streams.recorder.signal_feed import SignalFeed
 from labcrane.streams.request import StreamRequest, unstable_id
 from labcrane.streams.search import Search, known_stream
 
@@ -50,6 +51,7 @@ class Recorder:
         requests: Sequence[StreamRequest],
         part: int | None = None,
         known: Sequence[str] = (),
+        monitors: Mapping[str, Any] | None = None,
     ) -> None:
         self._requests = tuple(requests)
         self._writer = XdfWriter(next_part(journal) if part is None else part_path(journal, part))
@@ -58,6 +60,7 @@ class Recorder:
         self._there: set[tuple[str, str, str]] = set()
         self._since: dict[str, float] = {}
         self._fault: str | None = None
+        self._feed = None if monitors is None else SignalFeed(monitors)
         for info in map(known_stream, known):
             if info is not None:
                 self._start(info)
@@ -78,6 +81,8 @@ class Recorder:
             self._latest[_key(info)] = info  # a program that was started again has other ports
             self._start(info)
         self._find_duplicates(found, now)
+        if self._feed is not None:
+            self._feed.look()
 
     def health(self) -> list[Health]:
         """Return how each stream is now, also those asked for that are not there."""
@@ -98,12 +103,15 @@ class Recorder:
             "faults": sorted(str(fault) for fault in faults),
             "streams": [one.as_json() for one in streams],
             "known": [self._latest.get(key, one.inlet.info).as_xml() for key, one in recorded],
+            "monitors": self._feed.fault if self._feed else None,
         }
 
     def close(self) -> bool:
         """Write down all that has come and close the journal; whether all of it went in."""
         self._search.close()
         whole = [one.inlet.close() for one in self._streams.values()]
+        if self._feed is not None:
+            self._feed.close()
         try:
             self._writer.close()
         except RecordingError as error:  # the disk is still full: footers are missing, no samples
@@ -123,7 +131,7 @@ class Recorder:
         warnings = list(misfits)
         if (unstable := unstable_id(info.source_id())) is not None:
             warnings.append(unstable)
-        inlet = Inlet(info, self._writer, request.counter, (*warnings,))
+        inlet = Inlet(info, self._writer, request.counter, (*warnings,), self._feed)
         self._streams[key] = _Recorded(request, inlet, misfits, warnings)
 
     def _rivals(self, recorded: _Recorded) -> list[str]:
@@ -165,7 +173,7 @@ def _key(info: "pylsl.StreamInfo") -> tuple[str, str, str]:
 
 def _health(recorded: _Recorded, now: float, rivals: list[str]) -> Health:
     inlet, flow, info = recorded.inlet, recorded.inlet.flow, recorded.inlet.info
-    probe = flow.probe
+    probe, signals = flow.probe, inlet.signals
     # The time of the measurement on our clock, not the time when liblsl told of it.
     age = None if probe is None else now - (probe.remote_time + probe.offset)
     health = Health(
@@ -188,6 +196,8 @@ def _health(recorded: _Recorded, now: float, rivals: list[str]) -> Health:
         resets=flow.resets,
         misfits=[*recorded.misfits, *rivals],
         warnings=[*recorded.warnings, *rivals],
+        signals=list(signals.faults.values()) if signals else [],
+        unwatched=signals.failed if signals else {},
     )
     health.warnings.extend(complaints(health))
     return health
