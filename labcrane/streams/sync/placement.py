@@ -18,8 +18,8 @@ WRONG_CLOCK_S = 0.25
 ORDER_S = 2.0
 """Samples are pushed out of order by less than this."""
 
-LONGEST_S = 30.0
-"""The first samples cannot be so much older than others: LSL keeps nothing from before."""
+LONGEST_S = 360.0
+"""The first samples cannot be older: LSL keeps six minutes at most."""
 
 EARLY_S = 0.005
 """No sample arrives so long before it was taken."""
