@@ -5,8 +5,10 @@ repository there is a page for each that says so, to which links lead. ``python 
 FOLDER`` writes them for reading.
 """
 
+import ast
 import re
 import sys
+import tomllib
 from collections.abc import Iterator, Mapping
 from inspect import cleandoc
 from pathlib import Path
@@ -252,6 +254,36 @@ def signal_row(signal: Signal) -> str:
     return f"| `{signal.name}` | {signal.unit} | {parts} |"
 
 
+def floors() -> str:
+    """Return the contract of imports as a picture: a row for each layer, what each is for."""
+    contract = tomllib.loads((HERE.parent / "pyproject.toml").read_text(encoding="utf-8"))
+    (layers,) = contract["tool"]["importlinter"]["contracts"]
+    lines = ["| floor | for |", "|---|---|"]
+    for row in layers["layers"]:
+        names = [name.strip() for name in re.split(r"[|:]", row)]
+        lines.append(f"| {' · '.join(f'`{name}`' for name in names)} | {floor_of(names)} |")
+    return "\n".join(lines)
+
+
+def floor_of(names: list[str]) -> str:
+    """Return the first sentence of each module's docstring."""
+    said = []
+    for name in names:
+        package = HERE.parent / "labcrane" / name / "__init__.py"
+        path = package if package.exists() else package.parent.with_suffix(".py")
+        text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+        said.append(cell(text.split("\n\n")[0]))
+    return " ".join(said)
+
+
+FLOORS = re.compile(r"(<!-- floors -->\n).*?(<!-- /floors -->)", re.DOTALL)
+
+
+def with_floors(page: str) -> str:
+    """Return the page of the architecture with the picture of today."""
+    return FLOORS.sub(lambda match: f"{match[1]}{floors()}\n{match[2]}", page)
+
+
 def decisions_page() -> str:
     """Return the list of decisions with their titles."""
     lines = ["# Decisions", "", "Choices that took an argument: why, what, and what follows.", ""]
@@ -281,7 +313,10 @@ def on_page_markdown(markdown: str, *, page: Any, **_: Any) -> str:
     return MENTION.sub(lambda match: f"[{match[1]}]({up}{match[1]}.md)", markdown)
 
 
-if __name__ == "__main__":
+if __name__ == "__main__" and sys.argv[1] == "--architecture":
+    page = HERE / "architecture.md"
+    page.write_text(with_floors(page.read_text(encoding="utf-8")), encoding="utf-8")
+elif __name__ == "__main__":
     for name, text in pages().items():
         target = Path(sys.argv[1]) / name
         target.parent.mkdir(parents=True, exist_ok=True)

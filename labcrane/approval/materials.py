@@ -13,7 +13,7 @@ from labcrane.errors import ProtocolError
 from labcrane.files.atomic import sha256
 from labcrane.files.yaml import YamlFile, parse_yaml
 from labcrane.protocol.study import Study
-from labcrane.registry.entry_points import PROJECT
+from labcrane.registry.hookspecs import PROJECT
 from labcrane.registry.registry import Registry
 
 DATA = frozenset({".yaml", ".yml", ".json"})

@@ -4,14 +4,14 @@ import re
 import sys
 from collections.abc import Callable, Mapping
 from importlib.machinery import ModuleSpec
+from importlib.metadata import entry_points
 
 import typer
 
 from labcrane.cli.help import Plain
 from labcrane.errors import PluginError
-from labcrane.registry.entry_points import PROJECT, declared
 
-GROUP = f"{PROJECT}.commands"
+GROUP = "labcrane.commands"
 """Entry points that name a group of commands, and the module with its hook: known without importing
 any plugin (docs/decisions/0091-groups-by-entry-point.md)."""
 
@@ -28,8 +28,7 @@ def extend(app: typer.Typer, first: str, *, everything: bool) -> None:
     # Two plugins can share a group; its help is by the one that is found first.
     modules = {
         point.name: point.value.partition(":")[0]
-        for point in reversed(list(declared()))
-        if point.group == GROUP
+        for point in reversed(list(entry_points(group=GROUP)))
     }
     for group, module in sorted(modules.items()):
         if group in own:

@@ -5,7 +5,7 @@ from .items import AnswerError, Answers, Item, Score, numeric_answers
 from .primitives import Shape, TargetFinder
 from .records import CameraImage, SessionState, Value
 from .settings import StudyPath, read_yaml
-from .signals import Layout, signals_of
+from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
 
 __all__ = [
     "AnswerError",
@@ -17,6 +17,9 @@ __all__ = [
     "Score",
     "SessionState",
     "Shape",
+    "SignalChannel",
+    "SignalFault",
+    "SignalStream",
     "StudyPath",
     "TargetFinder",
     "Value",

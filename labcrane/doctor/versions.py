@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, entry_points, version
 from pathlib import Path
 
-from labcrane.registry.entry_points import PROJECT
+from labcrane.registry.hookspecs import PROJECT
 
 LIBRARIES = (
     "numpy", "scipy", "pandas", "h5py", "pydantic", "pylsl", "panda3d", "pybullet", "pyo", "pygame",

@@ -25,10 +25,13 @@ from labcrane.core.roles import (
     Feedback,
     InputDevice,
     Questionnaire,
+    SignalMonitor,
     Task,
 )
-from labcrane.registry.entry_points import PROJECT
 from labcrane.registry.offers import CommandOffer, Offer
+
+PROJECT = "labcrane"
+"""The entry-point group of plugins; groups below it say more of them: ``labcrane.commands``."""
 
 hookspec = pluggy.HookspecMarker(PROJECT)
 hookimpl = pluggy.HookimplMarker(PROJECT)
@@ -68,6 +71,12 @@ def labcrane_exporters() -> Sequence[Offer[Exporter]]:
 @hookspec
 def labcrane_questionnaires() -> Sequence[Offer[Questionnaire]]:
     """Offer questions for the participant."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_monitors() -> Sequence[Offer[SignalMonitor]]:
+    """Offer monitors that tell whether the signal of a stream is alive."""
     raise NotImplementedError
 
 
@@ -175,6 +184,13 @@ ROLES: Mapping[type[Component], RoleEntry] = {
         several=True,
         step="questionnaire",
         returns={},
+    ),
+    SignalMonitor: RoleEntry(
+        labcrane_monitors,
+        "monitor",
+        "a monitor of other programs' signals",
+        ("monitors",),
+        several=True,
     ),
     Cue: RoleEntry(
         labcrane_cues,

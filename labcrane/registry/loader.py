@@ -4,7 +4,7 @@ import hashlib
 import sys
 from collections.abc import Callable, Collection, Iterable, Set
 from importlib.machinery import SourceFileLoader
-from importlib.metadata import EntryPoint
+from importlib.metadata import EntryPoint, entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import CodeType, ModuleType
@@ -13,8 +13,7 @@ from typing import Any, NamedTuple, TypeVar
 import pluggy
 
 from labcrane.errors import PluginError, suggestion
-from labcrane.registry.entry_points import PROJECT, declared
-from labcrane.registry.hookspecs import ROLES, labcrane_commands
+from labcrane.registry.hookspecs import PROJECT, ROLES, labcrane_commands
 from labcrane.registry.offers import API
 from labcrane.registry.traceback import told
 
@@ -60,15 +59,11 @@ class PluginModules:
         self.manager.add_hookspecs(type("Hooks", (), _hooks()))
         self.broken: dict[str, str] = {}
         self.local = own_plugins(study) if study else {}
-        lines = list(declared()) if installed is None else ()
         offers: dict[str, set[str]] = {}
-        for group, name, value in lines:
-            if group == OFFERS:
-                offers.setdefault(value, set()).add(name)
         if installed is None:
-            installed = [
-                EntryPoint(n, value, group) for group, n, value in lines if group == PROJECT
-            ]
+            installed = entry_points(group=PROJECT)
+            for point in entry_points(group=OFFERS):
+                offers.setdefault(point.value, set()).add(point.name)
         self._waiting = [
             _Waiting(point.name, point.load, offers.get(point.value)) for point in installed
         ]

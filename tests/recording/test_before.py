@@ -21,10 +21,10 @@ import labcrane
 
 BEFORE = Path(__file__).parent / "before"
 NAME = "P001-SIMULATED"
-OF_THE_COMPUTER = {"versions"}
-"""What the start of a session says of where it was recorded, and not of what."""
-ADDED = {"done"}
-"""What events say since, beside all that they said before: whether a step's work was done."""
+OF_THE_COMPUTER = {"versions", "sync"}
+"""What the start of a session says of the program: versions, and the limits that it judges by."""
+ADDED = {"done", "owed"}
+"""What events say since, beside all that they said: whether a step was done, what is owed."""
 OF_THE_JOURNAL = {"ses-01/journals/size", "ses-01/context"}
 """How long versions' names are; the context is compared by its content."""
 
