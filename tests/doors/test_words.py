@@ -14,7 +14,7 @@ from labcrane.core.items import AnswerError, Item
 from labcrane.limits import LIMITS, LimitError, check_text, read_json
 from labcrane.participants.personal_data import personal
 from labcrane.protocol.study import Study
-from labcrane.session.commands import FAULTS, KINDS, Command, Order, QueueConsole, beyond_limits
+from labcrane.session.commands import KINDS, Command, Order, QueueConsole, beyond_limits
 from labcrane.session.questionnaire import QuestionnaireForm
 
 QUESTIONS = """\
@@ -26,7 +26,7 @@ sessions:
       - questionnaire: [subjective_accuracy, words]
 """
 
-PEOPLE = sorted(set(Order) - FAULTS - {Order.END, Order.SUBMIT})
+PEOPLE = sorted(set(Order) - {Order.END, Order.SUBMIT})
 
 HOSTILE = [
     "[" * 100_000,
