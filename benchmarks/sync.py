@@ -159,7 +159,9 @@ def run(cases: tuple[Case, ...], folder: Path, seconds: float, load: int) -> boo
                 ),
             )
         lab.markers()
-        recorder = lab.recorder(*({"label": kind, "type": kind} for kind in ("EEG", "Markers")))
+        recorder = lab.recorder(
+            *({"label": kind, "type": kind, "several": True} for kind in ("EEG", "Markers"))
+        )
         count = len(cases) + 1
         until(recorder, lambda status: status["ready"] and len(status["streams"]) == count)
         for _ in range(load):

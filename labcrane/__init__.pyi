@@ -5,7 +5,16 @@ from .analysis.exporter import Exporter
 from .core.clock import Tick
 from .core.primitives import Cylinder, Sphere
 from .core.records import Event, Frame, Phase, PlannedTrial, Run, Trial, TrialStatus
-from .core.roles import Controller, Cue, Dynamics, Feedback, InputDevice, Questionnaire, Task
+from .core.roles import (
+    Controller,
+    Cue,
+    Dynamics,
+    Feedback,
+    InputDevice,
+    Questionnaire,
+    SignalMonitor,
+    Task,
+)
 from .core.settings import Settings
 from .core.signals import Signal
 from .errors import (
@@ -16,7 +25,6 @@ from .errors import (
     RecordingError,
     StreamError,
 )
-from .files.yaml import read_yaml
 from .machines.machine import Machine
 from .recording.participant_file.reader import open_recording
 from .registry.hookspecs import hookimpl
@@ -24,7 +32,6 @@ from .registry.offers import Offer, offer
 from .types import FloatArray
 
 __version__: str
-from .streams.newest import NewestSample
 
 __all__ = [
     "Controller",
@@ -40,7 +47,6 @@ __all__ = [
     "InputDevice",
     "LabcraneError",
     "Machine",
-    "NewestSample",
     "Offer",
     "Phase",
     "PlannedTrial",
@@ -51,6 +57,7 @@ __all__ = [
     "Run",
     "Settings",
     "Signal",
+    "SignalMonitor",
     "Sphere",
     "StreamError",
     "Task",
@@ -64,7 +71,6 @@ __all__ = [
     "offer",
     "open_recording",
     "participants",
-    "read_yaml",
     "recording",
     "registry",
     "replay",

@@ -4,8 +4,10 @@ Tests run in several processes at once, each with an LSL session of its own, and
 of the computer in turn: see ``needs`` and ``pytest_runtest_protocol``.
 """
 
+import atexit
 import fcntl
 import os
+import shutil
 import signal
 import tempfile
 from collections.abc import Iterator
@@ -17,8 +19,9 @@ from needs import need, not_tried
 
 from labcrane.streams.network import LOOPBACK
 
-_FOLDER = tempfile.TemporaryDirectory(prefix="labcrane-tests-")
-_CONFIG = Path(_FOLDER.name) / "lsl_api.cfg"
+_FOLDER = Path(tempfile.mkdtemp(prefix="labcrane-tests-"))
+atexit.register(shutil.rmtree, _FOLDER, ignore_errors=True)
+_CONFIG = _FOLDER / "lsl_api.cfg"
 _CONFIG.write_text(LOOPBACK.replace("[lab]", f"[lab]\nSessionID = labcrane-tests-{os.getpid()}"))
 os.environ["LSLAPICFG"] = str(_CONFIG)
 # One thread each: the processes would take the cores from each other.
@@ -38,7 +41,7 @@ TURNS = "LABCRANE_TEST_TURNS"
 
 def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput"):
-        os.environ[TURNS] = _FOLDER.name
+        os.environ[TURNS] = str(_FOLDER)
 
 
 def pytest_xdist_auto_num_workers() -> int:

@@ -15,7 +15,7 @@ from labcrane.session.commands import Command, Order, QueueConsole
 
 if TYPE_CHECKING:
     from labcrane.approval.lock import Lock
-    from labcrane.session.session import Visit
+    from labcrane.session.visit import Visit
 
 LOOK_S = 0.05
 NOBODY = "nobody"

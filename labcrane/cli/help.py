@@ -14,8 +14,8 @@ SECTIONS = {
     "Run it": ("demo", "run", "resume", "consent", "streams", "record"),
     "Analyse it": ("report", "score", "export", "replay"),
     "Keep people and data": (
-        "participants", "note", "exclude", "waive", "deviations", "recover", "resync", "erase",
-        "relabel", "transfer",
+        "participants", "where", "note", "exclude", "waive", "deviations", "recover", "resync",
+        "erase", "relabel", "transfer",
     ),
 }  # fmt: skip
 """What commands are for, in the order of a study."""

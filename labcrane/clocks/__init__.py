@@ -1,6 +1,7 @@
 """The correction of clocks for any recording, as a function of plain arrays.
 
-In come stamps and clock probes; out go corrected times, and how right each of them is.
+In come stamps of another clock, and what is known of it; out go times on the receiver's clock, and
+how far each may be off.
 """
 
 from labcrane.clocks.arrays import Corrected, correct

@@ -4,8 +4,8 @@ from .findings import Finding, Verdict
 from .items import AnswerError, Answers, Item, Score, numeric_answers
 from .primitives import Shape, TargetFinder
 from .records import CameraImage, SessionState, Value
-from .settings import StudyPath
-from .signals import Layout, signals_of
+from .settings import StudyPath, read_yaml
+from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
 
 __all__ = [
     "AnswerError",
@@ -17,10 +17,14 @@ __all__ = [
     "Score",
     "SessionState",
     "Shape",
+    "SignalChannel",
+    "SignalFault",
+    "SignalStream",
     "StudyPath",
     "TargetFinder",
     "Value",
     "Verdict",
     "numeric_answers",
+    "read_yaml",
     "signals_of",
 ]

@@ -8,6 +8,7 @@ pluggy, so it must return soon and must not block. ``labcrane.testing`` has a co
 every role; a plugin's tests subclass it.
 
 :class:`~labcrane.analysis.exporter.Exporter` works on what was recorded, long after.
+A SignalMonitor looks at the streams of other programs, in a process beside the recorder.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ if TYPE_CHECKING:  # a protocol is checked without loading what it does not need
         TrialStatus,
         Value,
     )
-    from labcrane.core.signals import Signal
+    from labcrane.core.signals import Signal, SignalFault, SignalStream
     from labcrane.machines.machine import Body
     from labcrane.types import FloatArray
 
@@ -171,6 +172,36 @@ class Questionnaire(Component):
     @abstractmethod
     def score(self, answers: Answers) -> Mapping[str, float]:
         """Return every score by its name; NaN for one that needs an answer that is missing."""
+
+
+class SignalMonitor(Component):
+    """What tells whether the signal of a stream of another program is alive.
+
+    Built anew for every stream that it knows; ``open``, ``begin_trial`` and ``close`` are never
+    called. It runs in a process of its own beside the recorder, or behind ``streams --watch``. One
+    that raises is left out, and that is said.
+    """
+
+    @abstractmethod
+    def knows(self, stream: SignalStream) -> bool:
+        """Whether it can judge this stream, by its type, rate and channels."""
+
+    @abstractmethod
+    def begin(self, stream: SignalStream) -> None:
+        """Be told which stream comes, before its first samples; forget all others."""
+
+    @abstractmethod
+    def look(self, times: FloatArray, samples: FloatArray) -> Sequence[SignalFault]:
+        """Take the next samples and return all that is wrong now, for as long as it is.
+
+        Parameters
+        ----------
+        times
+            Stamps on the source's clock in seconds, shape ``(n,)``; they may jump or repeat.
+        samples
+            Shape ``(n, n_channels)``, in the units of the stream's header, with whatever the source
+            sends; ``n`` is what has come, from 1 to some seconds of it.
+        """
 
 
 class Cue(Component):

@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import AfterValidator, ValidationInfo
 
 from labcrane.files.model import StrictModel
+from labcrane.files.yaml import read_yaml as read_yaml  # noqa: PLC0414 - public here
 
 
 class Settings(StrictModel):

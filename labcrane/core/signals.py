@@ -115,3 +115,57 @@ def signals_of(names: Sequence[str], units: Mapping[str, str]) -> tuple[Signal, 
         else:
             signals.append(Signal(column, units[column]))
     return tuple(signals)
+
+
+@dataclass(frozen=True, slots=True)
+class SignalChannel:
+    """One channel of a stream, as its header states it.
+
+    Attributes
+    ----------
+    label, unit, type
+        As the XDF metadata conventions have them; unit and type may be empty.
+    """
+
+    label: str
+    unit: str = ""
+    type: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class SignalStream:
+    """A stream of another program, as a signal monitor is told of it.
+
+    Attributes
+    ----------
+    name, type
+        As LSL has them.
+    rate_hz
+        Nominal samples per second, 0 for an irregular stream.
+    channels
+        In the order of the samples' columns.
+    """
+
+    name: str
+    type: str
+    rate_hz: float
+    channels: tuple[SignalChannel, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SignalFault:
+    """Something that is wrong with a signal now.
+
+    Attributes
+    ----------
+    channel
+        Label of the channel; empty for the whole stream.
+    kind
+        Which fault, in two or three words: ``"flat line"``.
+    message
+        What is seen, with units, and what to do about it.
+    """
+
+    channel: str
+    kind: str
+    message: str

@@ -26,8 +26,11 @@ from labcrane.registry.registry import Registry, discover
 WAIT_S = 30.0
 """How long a look may take; with a person who moves things, ten times as long."""
 
-START_S = 10.0
-"""How much longer is waited: a process must start, and say at the end where it stands."""
+START_S = 60.0
+"""How much longer a process may take that has to start first, on a busy computer too."""
+
+TIMEOUT = "Timeout ("
+"""How faulthandler begins when the time of a look is over."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,12 +108,14 @@ def _examine(look: Look, complaints: Path, *, move: bool) -> Sequence[Finding]:
     theirs.close()
     try:
         if not ours.poll(wait_s + START_S):
-            where = _stuck(complaints.read_text(errors="replace"))
-            return [_fault(look, f"did not answer within {wait_s:g} s{where}")]
+            return [_fault(look, f"did not answer within {wait_s + START_S:g} s")]
         found: Sequence[Finding] = ours.recv()
     except EOFError:
         process.join()
-        *_, last = ["", *complaints.read_text(errors="replace").splitlines()]
+        text = complaints.read_text(errors="replace")
+        if TIMEOUT in text:
+            return [_fault(look, f"did not answer within {wait_s:g} s{_stuck(text)}")]
+        *_, last = ["", *text.splitlines()]
         why = f"; the last it said was {last.strip()!r}" if last else ""
         return [_fault(look, f"ended its process with exit code {process.exitcode}{why}")]
     else:
@@ -160,12 +165,12 @@ def _look(
     # Sound libraries fill the terminal with what they did not find; it is kept for a crash.
     with Path(complaints).open("a") as file:
         os.dup2(file.fileno(), sys.stderr.fileno())
-    # Even what hangs in C and lets no Python run is seen by this.
-    faulthandler.dump_traceback_later(wait_s, file=sys.stderr)
     registry = discover(study=look.study)
     (role,) = (role for role, entry in ROLES.items() if entry.word == look.role)
     examine = registry.offers[role][look.name].examine
     assert examine is not None  # noqa: S101 - why it is looked at
+    # Even what hangs in C and lets no Python run is seen by this, and ended.
+    faulthandler.dump_traceback_later(wait_s, exit=True, file=sys.stderr)
     try:
         found = list(examine(look.settings, _say if move else None))
     except Exception as error:  # noqa: BLE001 - a plugin's look can raise anything

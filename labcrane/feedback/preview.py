@@ -18,8 +18,8 @@ from labcrane.recording.frame_log import LOOP, FrameRow
 from labcrane.recording.participant_file.reader import SessionRecord, open_recording
 from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order, QueueConsole
-from labcrane.session.session import Visit
 from labcrane.session.session import run as run_session
+from labcrane.session.visit import Visit
 
 
 def write_preview(

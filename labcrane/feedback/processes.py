@@ -14,7 +14,7 @@ from labcrane.protocol import rig
 from labcrane.protocol.components import ComponentSpec
 from labcrane.protocol.study import Study
 from labcrane.session.commands import FeedbackLost, FeedbackReady
-from labcrane.session.session import Visit
+from labcrane.session.visit import Visit
 from labcrane.streams.feedback_log import log_source
 from labcrane.streams.request import StreamRequest
 

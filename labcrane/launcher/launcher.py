@@ -6,6 +6,7 @@ the participant file, to be gone on with by ``labcrane resume``.
 """
 
 import multiprocessing
+import pickle
 import queue
 import threading
 import time
@@ -18,7 +19,8 @@ from typing import TYPE_CHECKING, Any
 from labcrane.core.records import Event
 from labcrane.feedback.processes import FeedbackProcesses, log_requests
 from labcrane.launcher.hang_detector import HangDetector
-from labcrane.launcher.session_process import Ended, Offered, SessionConfig, serve
+from labcrane.launcher.session_process import Ended, Offered, serve
+from labcrane.launcher.signal_reporter import SignalReporter, monitor_config
 from labcrane.recording.crash_marker import read_whereabouts
 from labcrane.recording.paths import parts
 from labcrane.session.commands import (
@@ -33,7 +35,8 @@ from labcrane.session.commands import (
     encode,
 )
 from labcrane.session.eligibility import check_eligibility
-from labcrane.session.session import Visit, finish, outlook, recording, running
+from labcrane.session.session import finish, outlook, recording, running
+from labcrane.session.visit import Visit
 from labcrane.streams.recorder.handle import RecorderHandle
 from labcrane.streams.sync.sync_report import SyncReport
 
@@ -160,17 +163,15 @@ class Launcher:
         Tells people what the launcher itself has to say.
     """
 
-    def __init__(
-        self, order: SessionConfig, console: QueueConsole, say: Callable[[str], None]
-    ) -> None:
-        self._order = order
-        self._visit: Visit = order.visit()
+    def __init__(self, visit: Visit, console: QueueConsole, say: Callable[[str], None]) -> None:
+        self._visit = visit
         self._console = console
         self._say = say
         self._recorder: RecorderHandle | None = None
         self._crew: FeedbackProcesses | None = None
         self._lost: set[str] = set()
-        self._kept: list[Command] = []
+        self._signals = SignalReporter(say)
+        self._kept: list[Message] = []
         self._owed = ""
         self.sync_report: SyncReport | None = None
 
@@ -198,13 +199,13 @@ class Launcher:
             need.request(label, required=not visit.simulated)
             for label, need in visit.study.protocol.streams.items()
         ]
-        if self._order.feedback:
+        if visit.feedback:
             requests += log_requests(visit)
         if requests:
-            self._recorder = RecorderHandle(visit.streams_journal, requests)
+            self._recorder = RecorderHandle(visit.streams_journal, requests, monitor_config(visit))
         report = None
         try:
-            if self._order.feedback:
+            if visit.feedback:
                 self._crew = FeedbackProcesses(visit)
             died = self._run() if self._gate() else None
         finally:
@@ -230,6 +231,7 @@ class Launcher:
         told: list[str] = []
         while recorder is not None and not recorder.ready:
             recorder.watch()
+            self._kept += self._signals.news(recorder)
             if recorder.status and recorder.complaints() != told:
                 told = recorder.complaints()
                 self._say("waiting for streams:\n" + "\n".join(f"  {line}" for line in told))
@@ -253,7 +255,9 @@ class Launcher:
     def _run(self) -> int | None:
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
-        process = context.Process(target=serve, args=(self._order, theirs), name="session")
+        process = context.Process(
+            target=serve, args=(pickle.dumps(self._visit), theirs), name="session"
+        )
         process.start()
         theirs.close()
         sender = MessageSender(ours, self._say)
@@ -314,6 +318,8 @@ class Launcher:
             return
         if recorder.watch():
             self._say("a recorder died: the other one has all streams, and a new one was started")
+        for news in self._signals.news(recorder):
+            send(news)
         lost = recorder.lost() if recorder.status else {RECORDER}
         for what in sorted(lost - self._lost):
             send(StreamLost(what))

@@ -11,7 +11,7 @@ from labcrane.session.commands import QueueConsole
 if TYPE_CHECKING:
     from labcrane.launcher.launcher import Launcher
     from labcrane.protocol.pages import PageSettings
-    from labcrane.session.session import Visit
+    from labcrane.session.visit import Visit
 
 
 LOOPBACK = ("127.0.0.1", "::1", "localhost")

@@ -4,18 +4,16 @@ The pipe carries messages to the session, as JSON of a declared size, and events
 from it, as pickled records.
 """
 
+import pickle
 import queue
 import signal
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from pathlib import Path
 
 from labcrane.core.records import Event
 from labcrane.errors import LabcraneError
-from labcrane.protocol.study import load
-from labcrane.registry.registry import discover
 from labcrane.session.commands import (
     MOST_BYTES,
     Command,
@@ -25,46 +23,10 @@ from labcrane.session.commands import (
     Order,
     decode,
 )
-from labcrane.session.resume import Policy
-from labcrane.session.session import Visit, record
+from labcrane.session.session import record
 
 MOST_A_TICK = 16
 """Orders taken up in one tick; what else has come waits for the next."""
-
-
-@dataclass(frozen=True, slots=True)
-class SessionConfig:
-    """What a session process is told: a visit by the names of things, so that it can be sent.
-
-    Attributes
-    ----------
-    feedback
-        Whether the launcher starts the views and sounds.
-    """
-
-    protocol: Path
-    participant: str
-    session: int
-    data: Path
-    simulated: bool = False
-    pilot: bool = False
-    resumed: bool = False
-    policy: Policy | None = None
-    feedback: bool = True
-
-    def visit(self) -> Visit:
-        """Load the study and return the visit."""
-        return Visit(
-            load(self.protocol, discover(study=self.protocol)),
-            self.participant,
-            self.session,
-            self.data,
-            simulated=self.simulated,
-            pilot=self.pilot,
-            resumed=self.resumed,
-            policy=self.policy,
-            feedback=self.feedback,
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,12 +98,13 @@ class PipeConsole:
                 return
 
 
-def serve(order: SessionConfig, pipe: Connection) -> None:
-    """Run a session; the process's main function."""
+def serve(visit: bytes, pipe: Connection) -> None:
+    """Run a session; the process's main function. ``visit`` is pickled: it loads the study."""
     # An interrupt from the keyboard reaches the launcher too, which ends the session in order.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     console = PipeConsole(pipe)
-    console.end(_ended(lambda: record(order.visit(), console, console.offer)))
+    # Whoever wrote it is the launcher.
+    console.end(_ended(lambda: record(pickle.loads(visit), console, console.offer)))  # noqa: S301
 
 
 def _ended(run: Callable[[], None]) -> Ended:

@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, TypeVar
 
-from labcrane.core.roles import Component, Cue, Feedback, Questionnaire
+from labcrane.core.roles import Component, Cue, Feedback, Questionnaire, SignalMonitor
 from labcrane.core.settings import Settings
 from labcrane.errors import PluginError, ProtocolError
 from labcrane.files.yaml import Place, YamlFile
@@ -96,6 +96,11 @@ class ComponentResolver:
                 elif choice := self.choose(role, (key,)):
                     found[key] = choice
         return found
+
+    def choose_monitors(self) -> dict[str, ComponentSpec] | None:
+        """Return the monitors of signals by the protocol's names; None where it leaves them out."""
+        written = self._at(("monitors",))
+        return None if written is None else self.choose_several(SignalMonitor, "monitors")
 
     def choose_questionnaires(self, protocol: Protocol) -> dict[str, ComponentSpec]:
         """Return the questionnaires that the protocol asks, noting those that there are not."""

@@ -37,7 +37,10 @@ def protocol_schema(registry: Registry) -> Schema:
     for key, of in one.items():
         protocol["properties"][key] = _use(registry, of, named)
     for key, of in by_name.items():
-        protocol["properties"][key] |= {"additionalProperties": _use(registry, of, named)}
+        place = protocol["properties"][key]
+        for part in (place, *place.get("anyOf", ())):  # null may stand for a default
+            if part.get("type") == "object":
+                part |= {"additionalProperties": _use(registry, of, named)}
     named[Session]["properties"]["steps"]["items"] = _step(references[(Block, "validation")])
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

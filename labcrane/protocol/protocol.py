@@ -150,6 +150,10 @@ class Protocol(Section):
     )
     """Streams of others to be recorded, by the study's names for them."""
 
+    monitors: dict[str, Use] | None = None
+    """What tells whether the signals of those streams are alive, by name. Without this key all that
+    are installed do, as they are without settings; ``{}`` is none."""
+
     sync: TimeLimits = TimeLimits()
     """How right the time stamps must be."""
 

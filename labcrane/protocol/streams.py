@@ -25,6 +25,10 @@ class StreamNeed(Settings):
     source_id: str | None = None
     """LSL source id."""
 
+    several: bool = False
+    """Whether all streams that fit are meant. Otherwise one is, and a session does not begin while
+    two fit: another program's stream derived from yours is of its type as well."""
+
     required: bool = True
     """Whether a session starts only when it flows."""
 
@@ -74,6 +78,7 @@ class StreamNeed(Settings):
             rate_hz=self.rate_hz,
             channels=self.channels,
             counter=self.counter,
+            several=self.several,
         )
 
     def is_for(self, header: "StreamHeader") -> bool:

@@ -39,6 +39,8 @@ class Study:
     cues, sounds, views
         What presents the session to people, by the protocol's names: cues and sounds are switched
         on block by block, views are always there.
+    monitors
+        What looks at the signals of streams; None for all that are installed.
     others
         Components of roles that have no place of their own here, by the part they play.
     oversight
@@ -61,6 +63,7 @@ class Study:
     cues: dict[str, ComponentSpec] = field(default_factory=dict)
     sounds: dict[str, ComponentSpec] = field(default_factory=dict)
     views: dict[str, ComponentSpec] = field(default_factory=dict)
+    monitors: dict[str, ComponentSpec] | None = None
     others: Mapping[str, ComponentSpec] = field(default_factory=dict)
     oversight: CallMonitor = field(default_factory=CallMonitor)
 
@@ -77,6 +80,7 @@ class Study:
             "questionnaires": self.questionnaire_choices,
             "feedback": self.cues | self.sounds,
             "views": self.views,
+            "monitors": self.monitors or {},
         }
         return {
             "input": self.input,
@@ -237,7 +241,7 @@ def load(path: Path, registry: Registry) -> Study:
     cues, sounds, views = chooser.choose_feedback()
     if protocol is not None:
         Checker(source, protocol).check(tasks, questionnaires)
-    others = chooser.choose_others()
+    monitors, others = chooser.choose_monitors(), chooser.choose_others()
     source.raise_problems()
     if not (protocol and machine and device and operator and scheme and dynamics):
         raise AssertionError("a missing part is a problem, and problems were raised")
@@ -258,6 +262,7 @@ def load(path: Path, registry: Registry) -> Study:
         cues=cues,
         sounds=sounds,
         views=views,
+        monitors=monitors,
         others=others,
         oversight=chooser.oversight,
     )

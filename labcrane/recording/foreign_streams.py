@@ -28,6 +28,12 @@ PROBES = "probes"
 ARRIVALS = "arrivals"
 NOTES = "notes"
 
+SIGNAL = "signal"
+"""A note of a fault of a signal that was found (``bad``), or that is there no more."""
+
+MONITORS = "monitors"
+"""A note of the monitors that look at the signal from now on; what others told has ended."""
+
 OPENED = "opened"
 """The first note of every part: its recorder began to receive the stream."""
 

@@ -25,6 +25,7 @@ from labcrane.core.roles import (
     Feedback,
     InputDevice,
     Questionnaire,
+    SignalMonitor,
     Task,
 )
 from labcrane.registry.offers import CommandOffer, Offer
@@ -70,6 +71,12 @@ def labcrane_exporters() -> Sequence[Offer[Exporter]]:
 @hookspec
 def labcrane_questionnaires() -> Sequence[Offer[Questionnaire]]:
     """Offer questions for the participant."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_monitors() -> Sequence[Offer[SignalMonitor]]:
+    """Offer monitors that tell whether the signal of a stream is alive."""
     raise NotImplementedError
 
 
@@ -177,6 +184,13 @@ ROLES: Mapping[type[Component], RoleEntry] = {
         several=True,
         step="questionnaire",
         returns={},
+    ),
+    SignalMonitor: RoleEntry(
+        labcrane_monitors,
+        "monitor",
+        "a monitor of other programs' signals",
+        ("monitors",),
+        several=True,
     ),
     Cue: RoleEntry(
         labcrane_cues,

@@ -76,6 +76,18 @@ class StreamBack:
 
 
 @dataclass(frozen=True, slots=True)
+class SignalReport:
+    """A signal of a stream has gone bad, or is well again."""
+
+    stream: str
+    channel: str
+    fault: str
+    message: str
+    bad: bool
+    kind: Literal["signal"] = "signal"
+
+
+@dataclass(frozen=True, slots=True)
 class FeedbackLost:
     """A view or sound has failed, and is left out or started again."""
 
@@ -107,7 +119,7 @@ class LauncherGone:
     kind: Literal["launcher gone"] = "launcher gone"
 
 
-ProcessReport = StreamLost | StreamBack | FeedbackLost | FeedbackReady | LauncherGone
+ProcessReport = StreamLost | StreamBack | SignalReport | FeedbackLost | FeedbackReady | LauncherGone
 """What becomes of the other processes of a run: said by the launcher, not by people."""
 
 Message = Command | ProcessReport

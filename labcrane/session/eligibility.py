@@ -6,8 +6,7 @@ repeated, and :func:`close_visit` when its participant file is written.
 
 from dataclasses import dataclass
 from datetime import date, datetime
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from labcrane.approval.decision import verify
 from labcrane.approval.lock import Lock
@@ -17,28 +16,8 @@ from labcrane.participants.deviations import settle
 from labcrane.participants.folders import Places, keep_private
 from labcrane.participants.register import Sitting, read
 from labcrane.participants.session_windows import check_visit, enter_sitting
-from labcrane.protocol.study import Study
-from labcrane.recording.data_folder import DataFolder
 from labcrane.registry.registry import discover
-
-
-class Visiting(Protocol):
-    """A session to be run, as far as it matters here."""
-
-    @property
-    def study(self) -> Study: ...
-    @property
-    def participant(self) -> str: ...
-    @property
-    def session(self) -> int: ...
-    @property
-    def data(self) -> Path: ...
-    @property
-    def simulated(self) -> bool: ...
-    @property
-    def pilot(self) -> bool: ...
-    @property
-    def folder(self) -> DataFolder: ...
+from labcrane.session.visit import Visit
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +40,7 @@ EXEMPT = Admission(None, {"approval": "none"})
 """Pilots and simulations need no approval: what they leave is stamped PILOT or SIMULATED."""
 
 
-def check_eligibility(visit: Visiting, today: date | None = None) -> Admission:
+def check_eligibility(visit: Visit, today: date | None = None) -> Admission:
     """Let a visit pass, or say why not; enter it in the register.
 
     Raises
@@ -110,7 +89,7 @@ def check_eligibility(visit: Visiting, today: date | None = None) -> Admission:
     )
 
 
-def close_visit(visit: Visiting) -> None:
+def close_visit(visit: Visit) -> None:
     """Write into the register how the session went, and keep its files to the user."""
     if visit.folder.path.is_dir():
         keep_private(visit.folder.path)

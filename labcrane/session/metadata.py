@@ -6,7 +6,7 @@ from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib.metadata import entry_points, version
 from importlib.util import find_spec
-from typing import Any, Protocol
+from typing import Any
 
 from labcrane.core.records import Run
 from labcrane.core.roles import Questionnaire
@@ -16,10 +16,10 @@ from labcrane.protocol.components import ComponentSpec
 from labcrane.protocol.referenced_files import named_files
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
-from labcrane.recording.data_folder import DataFolder
 from labcrane.recording.trial_columns import trial_units
 from labcrane.registry.hookspecs import PROJECT
 from labcrane.registry.loader import own_plugins
+from labcrane.session.visit import Visit
 
 RECORDED_PACKAGES = (
     "labcrane",
@@ -33,26 +33,7 @@ RECORDED_PACKAGES = (
 )
 
 
-class Recorded(Protocol):
-    """A session as far as its context goes."""
-
-    @property
-    def study(self) -> Study: ...
-    @property
-    def session(self) -> int: ...
-    @property
-    def simulated(self) -> bool: ...
-    @property
-    def fast(self) -> bool: ...
-    @property
-    def pilot(self) -> bool: ...
-    @property
-    def resumed(self) -> bool: ...
-    @property
-    def folder(self) -> DataFolder: ...
-
-
-def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> dict[str, Any]:
+def context(visit: Visit, plan: SessionPlan, the_rig: Rig, this_run: Run) -> dict[str, Any]:
     """Return everything that whoever reads the recording must know, ready for JSON."""
     return {
         **_of_visit(visit, plan),
@@ -69,7 +50,7 @@ def context(visit: Recorded, plan: SessionPlan, the_rig: Rig, this_run: Run) -> 
     }
 
 
-def _of_visit(visit: Recorded, plan: SessionPlan) -> dict[str, Any]:
+def _of_visit(visit: Visit, plan: SessionPlan) -> dict[str, Any]:
     """Return who and when this is, and whether it counts."""
     return {
         "study": visit.study.protocol.study,
@@ -132,7 +113,7 @@ def _asked(questionnaire: Questionnaire, choice: ComponentSpec | None) -> dict[s
     }
 
 
-def _started(visit: Recorded) -> datetime:
+def _started(visit: Visit) -> datetime:
     """Return when the session begins: with --fast on the simulation's clock, which starts at 0."""
     return datetime.fromtimestamp(0.0, UTC) if visit.fast else datetime.now(UTC)
 

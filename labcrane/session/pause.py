@@ -9,6 +9,7 @@ from labcrane.session.commands import (
     FeedbackReady,
     LauncherGone,
     ProcessReport,
+    SignalReport,
     StreamBack,
     StreamLost,
 )
@@ -89,6 +90,10 @@ class Suspenders:
             case StreamBack(what):
                 self._note("stream.back", {"what": what})
                 self.release(what)
+            case SignalReport(stream, channel, fault, message, bad):
+                about: dict[str, Value] = {"stream": stream, "channel": channel, "kind": fault}
+                name = "signal.bad" if bad else "signal.good"
+                self._note(name, about | ({"message": message} if bad else {}))
             case FeedbackReady(what, facts):
                 self._note("feedback.ready", {"what": what, "facts": facts})
                 self.awaited.discard(what)

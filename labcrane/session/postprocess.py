@@ -12,8 +12,8 @@ from labcrane.protocol.streams import StreamNeed, TimeLimits
 from labcrane.recording.foreign_streams import RecordedStream
 from labcrane.recording.participant_file.columns import text_of
 from labcrane.recording.participant_file.recorrect import read_channel, read_stream
+from labcrane.recording.participant_file.session_group import write_sync_report
 from labcrane.recording.participant_file.stream_group import write_time, write_uncorrected
-from labcrane.recording.participant_file.writer import write_sync_report
 from labcrane.streams.recorder.health import counter_label
 from labcrane.streams.sync.correction import Treatment, correct
 from labcrane.streams.sync.limits import Limits

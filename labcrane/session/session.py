@@ -3,7 +3,6 @@
 import gc
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +12,11 @@ from labcrane.design.plan import SessionPlan, plan_session
 from labcrane.errors import DeviceError, PluginError, ProtocolError
 from labcrane.files.lock import held
 from labcrane.protocol import rig
-from labcrane.protocol.study import Study
-from labcrane.recording.crash_marker import CrashMarker, read_whereabouts, whereabouts_path
-from labcrane.recording.data_folder import DataFolder
+from labcrane.recording.crash_marker import CrashMarker, read_whereabouts
 from labcrane.recording.frame_log import BatchLog, FrameLog, columns, frame_bytes
 from labcrane.recording.journal import SessionJournal
 from labcrane.recording.participant_file.writer import consolidate
-from labcrane.recording.paths import journal_path, next_part, parts
+from labcrane.recording.paths import next_part, parts
 from labcrane.registry.proxies import hurried
 from labcrane.session import loop
 from labcrane.session.commands import Console
@@ -40,71 +37,11 @@ from labcrane.session.resume import (
     within_limits,
 )
 from labcrane.session.sequencer import Sequencer
+from labcrane.session.visit import Visit
 from labcrane.streams.sync.sync_report import SyncReport
 
 RESERVE_S = 60.0
 """Seconds of recording for which the disk must always have room; below it the session pauses."""
-
-
-@dataclass(frozen=True, slots=True)
-class Visit:
-    """One session to be run.
-
-    Attributes
-    ----------
-    participant, session
-        Who, and which of the protocol's sessions, counted from 1.
-    data
-        The study's data folder.
-    simulated
-        Whether a simulated operator takes the controls.
-    fast
-        Whether to run as fast as the machine can, without LSL; for simulations only.
-    pilot
-        Whether this is a trial run, to be stamped as one.
-    resumed
-        Whether the session goes on after its process died.
-    policy
-        Where it goes on; what the protocol says by default.
-    feedback
-        Whether the launcher starts the views and sounds, so that the session waits for them.
-    """
-
-    study: Study
-    participant: str
-    session: int
-    data: Path
-    simulated: bool = False
-    fast: bool = False
-    pilot: bool = False
-    resumed: bool = False
-    policy: Policy | None = None
-    feedback: bool = False
-
-    @property
-    def folder(self) -> DataFolder:
-        """Where it is recorded."""
-        return DataFolder(self.data, self.participant, self.pilot, self.simulated)
-
-    @property
-    def source(self) -> str:
-        """Which session this is, the same whenever it is resumed; its streams are named by it."""
-        return f"{self.study.protocol.study}/{self.folder.name}/ses-{self.session:02}"
-
-    @property
-    def journal(self) -> Path:
-        """The first part of the session's journal."""
-        return journal_path(self.folder.path, self.session, "run")
-
-    @property
-    def whereabouts(self) -> Path:
-        """The file that says in which component it is, while it runs and after it has died."""
-        return whereabouts_path(self.journal)
-
-    @property
-    def streams_journal(self) -> Path:
-        """The first part of the journal of the streams of others."""
-        return journal_path(self.folder.path, self.session, "streams")
 
 
 def run(visit: Visit, console: Console) -> Path:

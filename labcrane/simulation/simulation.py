@@ -22,7 +22,8 @@ from labcrane.protocol.study import Study, load
 from labcrane.recording.data_folder import DataFolder
 from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
-from labcrane.session.session import Visit, run
+from labcrane.session.session import run
+from labcrane.session.visit import Visit
 from labcrane.simulation.population import read_population
 
 ABOUT = "simulation.json"

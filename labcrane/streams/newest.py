@@ -78,7 +78,7 @@ class NewestSample:
         return self._inlet is not None
 
     def wait(self, seconds: float) -> bool:
-        """Wait until the stream is received, at most so long; whether it is."""
+        """Wait until the stream is received, at most so many seconds; whether it is."""
         return self._connected.wait(seconds)
 
     def pull(self, most: int = MOST) -> tuple[Sequence[Sequence[Any]], Sequence[float]]:

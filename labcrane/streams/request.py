@@ -36,6 +36,8 @@ class StreamRequest:
         What is expected of it; None is anything.
     counter
         Label of a channel that counts samples, to find lost ones.
+    several
+        Whether all streams that fit are meant, and not one.
     """
 
     label: str
@@ -46,6 +48,7 @@ class StreamRequest:
     rate_hz: float | None = None
     channels: int | None = None
     counter: str | None = None
+    several: bool = False
 
     def __post_init__(self) -> None:
         if self.type is None and self.name is None and self.source_id is None:

@@ -13,6 +13,7 @@ from labcrane.testing.commands import CommandContract
 from labcrane.testing.components import PluginContract, check_closes_after_failed_open, check_soon
 from labcrane.testing.examinations import ExaminationContract
 from labcrane.testing.exporters import ExporterContract
+from labcrane.testing.monitors import SignalMonitorContract
 from labcrane.testing.presentation import TARGETS, CueContract, FeedbackContract, make_target
 from labcrane.testing.questionnaires import QuestionnaireContract
 from labcrane.testing.roles import (
@@ -47,6 +48,7 @@ __all__ = [
     "InputContract",
     "PluginContract",
     "QuestionnaireContract",
+    "SignalMonitorContract",
     "TaskContract",
     "ch8",
     "check_array",

@@ -187,5 +187,9 @@ def _health(desk: PageContext) -> list[str]:
     return [
         f"{stream['label']}: {stream['condition']}"
         + "".join(f"; {warning}" for warning in stream["warnings"])
+        + "".join(
+            f"\n  {fault['channel'] or 'all'}: {fault['kind']}: {fault['message']}"
+            for fault in stream["signals"]
+        )
         for stream in streams
     ]

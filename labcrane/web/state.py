@@ -10,7 +10,7 @@ from labcrane.core.records import Event, Value, is_done
 KEPT = 200
 """Newest events that a page can show."""
 
-ROUTINE = ("trial.", "order.", "questionnaire.", "step.", "block.", "pause.", "session.")
+ROUTINE = ("trial.", "order.", "questionnaire.", "step.", "block.", "pause.", "session.", "signal.")
 """Beginnings of event names that are no counts of a trial."""
 
 

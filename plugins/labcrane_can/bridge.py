@@ -6,7 +6,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from labcrane import NewestSample
+from labcrane.streams import NewestSample
 from labcrane_can.avc import ESTIMATED, encode_flow
 from labcrane_can.command_state import PanelCommands
 from labcrane_can.listener import Listener

@@ -9,7 +9,8 @@ from typing import Any, Literal
 from pydantic import Field, NonNegativeFloat, ValidationError, model_validator
 from ruamel.yaml import YAML
 
-from labcrane import ProtocolError, Settings, read_yaml
+from labcrane import ProtocolError, Settings
+from labcrane.core import read_yaml
 from labcrane_dmd.interpolation import Layer
 from labcrane_dmd.model import Direction, Model, Segment, Source
 from labcrane_dmd.output import written

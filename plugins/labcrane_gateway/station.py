@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane import FloatArray, Frame, InputDevice, Machine, NewestSample, Run, Signal, Tick
+from labcrane import FloatArray, Frame, InputDevice, Machine, Run, Signal, Tick
+from labcrane.streams import NewestSample
 from labcrane_gateway.settings import GatewaySettings
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from typing import Any, Self
 from pydantic import Field, ValidationError, model_validator
 from ruamel.yaml import YAML
 
-from labcrane import DeviceError, ProtocolError, Settings, read_yaml
+from labcrane import DeviceError, ProtocolError, Settings
+from labcrane.core import read_yaml
 
 RUN_AGAIN = "run 'python -m labcrane_joystick' to identify and calibrate the sticks"
 REMOVE = f"remove it and {RUN_AGAIN}"

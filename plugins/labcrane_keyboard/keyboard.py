@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane import FloatArray, Frame, InputDevice, NewestSample, Run, Signal, Tick
+from labcrane import FloatArray, Frame, InputDevice, Run, Signal, Tick
 from labcrane.core import Value
+from labcrane.streams import NewestSample
 from labcrane_keyboard.settings import KeyboardSettings
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from typing import Any, Literal
 
 from pydantic import ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
-from labcrane import ProtocolError, Settings, read_yaml
-from labcrane.core import Item, StudyPath
+from labcrane import ProtocolError, Settings
+from labcrane.core import Item, StudyPath, read_yaml
 
 NAME = r"^[a-z][a-z0-9_]*$"
 

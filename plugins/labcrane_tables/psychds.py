@@ -43,12 +43,14 @@ class PsychDs(Exporter):
                 subject = _key(participant.name)
                 name = f"study-{_key(study)}_subject-{subject}_session-{number}_data.csv"
                 write_csv(own, folder / "data" / name)
-            others = book[book["table"].isin(OTHERS)]
-            for row in others.itertuples(index=False):
-                name = str(row.column)
-                variables.setdefault(name, _variable(name, *map(str, row[2:])))
             for what, answers in zip(OTHERS, (answers_of, scores_of), strict=True):
-                for number, own in answers(participant).groupby("session"):
+                told = answers(participant)
+                if told.empty:  # what is in no file is not described either
+                    continue
+                for row in book[book["table"] == what].itertuples(index=False):
+                    name = str(row.column)
+                    variables.setdefault(name, _variable(name, *map(str, row[2:])))
+                for number, own in told.groupby("session"):
                     subject = _key(participant.name)
                     name = f"study-{_key(study)}_subject-{subject}_session-{number}_desc-{what}"
                     write_csv(own, folder / "data" / f"{name}_data.csv")

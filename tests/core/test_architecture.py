@@ -39,6 +39,7 @@ def imported_modules(source: str) -> set[str]:
 
 PUBLIC = (
     "core", "machines", "recording", "analysis", "replay", "registry", "participants", "testing",
+    "streams",
 )  # fmt: skip
 """Packages whose names are public beside those of ``labcrane`` itself."""
 

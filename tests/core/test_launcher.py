@@ -9,8 +9,8 @@ from faults.sessions import STUDY, unique, wait_for
 from labcrane import open_recording
 from labcrane.launcher import launcher as launcher_module
 from labcrane.launcher.launcher import Launcher
-from labcrane.launcher.session_process import SessionConfig
 from labcrane.session.commands import Command, Order, QueueConsole
+from labcrane.session.visit import visit_of
 from labcrane.streams.recorder import handle as recorder_handle
 from labcrane.streams.recorder.handle import RecorderHandle
 
@@ -36,6 +36,12 @@ class LateRecorder:
     def complaints(self) -> list[str]:
         return []
 
+    def signals(self) -> dict[tuple[str, str, str], str]:
+        return {}
+
+    def unwatched(self) -> list[str]:
+        return []
+
     def stop(self) -> None:
         pass
 
@@ -53,9 +59,9 @@ def test_a_note_that_is_given_while_streams_are_waited_for_is_in_the_record(
         Command(Order.START),
     ):
         console.give(command)
-    order = SessionConfig(protocol, "P001", 1, tmp_path / "data", simulated=True, feedback=False)
+    order = visit_of(protocol, "P001", 1, tmp_path / "data", simulated=True, feedback=False)
     assert Launcher(order, console, said.append).run().died is None
-    session = open_recording(order.visit().folder.participant_file).session(1)
+    session = open_recording(order.folder.participant_file).session(1)
     events = session.events.set_index("name")["data"]
     assert events["order.note"]["text"] == "the participant is nervous"
     assert events["order.note"]["by"] == "supervisor"

@@ -52,6 +52,7 @@ MODULES = (
     labcrane.recording,
     labcrane.registry,
     labcrane.replay,
+    labcrane.streams,
     labcrane.testing,
 )
 

@@ -48,6 +48,10 @@ def labcrane_feedback():
 '''
 
 
+LINE = 1 + LAMP.splitlines().index("        time.sleep(60)")
+"""Where the lamp stands still."""
+
+
 @pytest.fixture
 def lamp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> type[labcrane.Settings]:
     """A plugin whose examination does what its settings say."""
@@ -79,7 +83,7 @@ def lamp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> type[labcrane.Setti
             "hangs",
             Verdict.FAIL,
             "looking at feedback 'lamp' did not answer within 1 s; it "
-            "stood still in examine() (labcrane_doctors_lamp.py:15)",
+            f"stood still in examine() (labcrane_doctors_lamp.py:{LINE})",
         ),
     ],
 )
@@ -118,7 +122,9 @@ def test_the_command_says_all_as_json_and_keeps_it_for_the_record(
     status = main(["doctor", "--protocol", path, "--json", "--local"])
     said = json.loads(capfd.readouterr().out)
     areas = {check["area"] for check in said["checks"]}
-    assert areas == {"clock", "scheduling", "disk", "input dual_joystick", "lsl"}
+    assert areas == {
+            "version", "clock", "scheduling", "disk", "input dual_joystick", "lsl"
+        }  # fmt: skip
     failed = [check for check in said["checks"] if check["verdict"] == "FAIL"]
     assert all(check["advice"] for check in failed)
     assert (status == 1) == bool(failed)

@@ -13,8 +13,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from labcrane import LabcraneError, ProtocolError, read_yaml
+from labcrane import LabcraneError, ProtocolError
 from labcrane.cli.app import main
+from labcrane.core import read_yaml
 from labcrane.files.yaml import YamlFile, parse_yaml
 from labcrane.protocol.study import load
 from labcrane.registry.registry import Registry, discover

@@ -7,9 +7,9 @@ from jack_server import a_jack_server, underruns
 
 from labcrane import open_recording
 from labcrane.launcher.launcher import Launcher
-from labcrane.launcher.session_process import SessionConfig
 from labcrane.recording import SessionRecord
 from labcrane.session.commands import QueueConsole
+from labcrane.session.visit import visit_of
 
 
 class Examiner(QueueConsole):
@@ -24,7 +24,7 @@ def a_jack_session(
     """Run a simulated session; return its record, and what the server complained of."""
     path = folder / "study.yaml"
     path.write_text(protocol)
-    order = SessionConfig(path, "P001", 1, folder / "data", simulated=True)
+    order = visit_of(path, "P001", 1, folder / "data", simulated=True, feedback=True)
     said: list[str] = []
     with (
         a_jack_server(folder, real_time=real_time) as (name, log),

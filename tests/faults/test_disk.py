@@ -72,6 +72,66 @@ print("whole")
 """
 
 
+VANISHES = (
+    SESSION[: SESSION.index("class FillsTheDisk")]
+    + """
+import subprocess
+disk = Path(tempfile.mkdtemp())
+
+
+def mount(*words):
+    subprocess.run([*map(str, words)], check=True)
+
+
+mount("mount", "-t", "tmpfs", "none", disk)
+mount("mount", "--bind", disk, folder)
+
+
+class TakesTheDiskAway:
+    def __init__(self):
+        self.tick, self.told = -1, []
+
+    def commands(self):
+        self.tick += 1
+        if self.tick == AWAY:
+            mount("umount", "--lazy", folder)
+        if self.tick == BACK:
+            mount("mount", "--bind", disk, folder)
+        return []
+
+    def report(self, event):
+        self.told.append(event)
+
+
+study = a_study(Path(tempfile.mkdtemp()), SHORT)
+console = TakesTheDiskAway()
+path = run(Visit(study, "P001", 1, folder / "data", simulated=True), console)
+names = [event.name for event in console.told]
+assert names.count("disk.lost") == 1, names
+assert names.count("disk.back") == 1, names
+recorded = open_recording(path).session(1)
+loop = recorded.streams["loop"].data
+ticks = loop["tick"].to_numpy()
+np.testing.assert_array_equal(ticks, np.arange(len(ticks)))  # no frame is missing
+paused = np.flatnonzero(loop["paused"].to_numpy())
+assert AWAY <= paused[0] <= AWAY + 2, paused[0]  # by the first write that finds it gone
+assert (np.diff(paused) == 1).all() and paused[-1] >= BACK - 1
+assert all(outcome == "success" for outcome in recorded.trials["outcome"])
+print("whole")
+"""
+)
+
+
+@needs_mounts
+def test_a_disk_that_vanishes_is_noticed_by_the_next_write_and_loses_no_frame(
+    tmp_path: Path,
+) -> None:
+    script = VANISHES.replace("AWAY", "400").replace("BACK", "900")
+    done = in_namespace("size=48m", script, tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "whole" in done.stdout
+
+
 @needs_mounts
 def test_a_session_on_a_full_disk_is_held_and_loses_no_frame(tmp_path: Path) -> None:
     script = SESSION.replace("FILL", "400").replace("FREE", "1200")

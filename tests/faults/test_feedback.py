@@ -13,9 +13,9 @@ from simple_crane import FORM
 import labcrane as lab
 from labcrane.core.records import Event
 from labcrane.launcher.launcher import Launcher
-from labcrane.launcher.session_process import SessionConfig
 from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.session.commands import Command, Order, QueueConsole
+from labcrane.session.visit import visit_of
 
 STUDY = (
     """\
@@ -131,7 +131,7 @@ def test_killed_hanging_and_raising_feedback_leave_the_session_as_it_is(
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     data, console, said = tmp_path / "data", QueueConsole(), []
     told = Told(console)
-    order = SessionConfig(protocol, "P001", 1, data, simulated=True)
+    order = visit_of(protocol, "P001", 1, data, simulated=True, feedback=True)
     with ThreadPoolExecutor(1) as elsewhere:
         outcome = elsewhere.submit(Launcher(order, console, said.append).run)
         try:

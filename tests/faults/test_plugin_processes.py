@@ -20,9 +20,9 @@ from labcrane.cli.app import main
 from labcrane.feedback import handle as feedback_keeper
 from labcrane.launcher import hang_detector as stillness_module
 from labcrane.launcher.launcher import Launcher, Outcome
-from labcrane.launcher.session_process import SessionConfig
 from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.session.commands import QueueConsole
+from labcrane.session.visit import visit_of
 
 
 @pytest.mark.long
@@ -65,9 +65,7 @@ def recorded_in_parts(protocol: Path) -> SessionRecord:
 
 
 def launch(protocol: Path) -> tuple[Outcome, list[str]]:
-    order = SessionConfig(
-        protocol, "P001", 1, protocol.parent / "data", simulated=True, feedback=False
-    )
+    order = visit_of(protocol, "P001", 1, protocol.parent / "data", simulated=True, feedback=False)
     told: list[str] = []
     return Launcher(order, QueueConsole(), told.append).run(), told
 
@@ -124,7 +122,7 @@ def present(protocol: Path, cue: str, views: list[str]) -> tuple[SessionRecord, 
     lines = "\n".join(f"  {view}: {{use: faulty_feedback, how: {view}}}" for view in views)
     study = protocol.read_text().replace("limit_s: 0.5", "limit_s: 3")
     protocol.write_text(study + PRESENTING.format(cue=cue, views=lines))
-    order = SessionConfig(protocol, "P001", 1, protocol.parent / "data", simulated=True)
+    order = visit_of(protocol, "P001", 1, protocol.parent / "data", simulated=True, feedback=True)
     assert Launcher(order, QueueConsole(), lambda text: None).run().died is None
     session = recorded(protocol)
     assert session is not None

@@ -17,14 +17,14 @@ from governed import GOVERNED, TODAY, Lab
 from pyarrow import parquet
 
 from labcrane.analysis.indicator import Performance, indicate
+from labcrane.analysis.indicator_settings import IndicatorSettings
 from labcrane.analysis.operator_tests import OperatorTest
 from labcrane.analysis.report.workbook import write_workbook
 from labcrane.cli.app import main
-from labcrane.participants import recovery as unfinished
+from labcrane.participants import recovery
 from labcrane.participants.folders import Places
 from labcrane.participants.products import product, written_about
 from labcrane.participants.register import read
-from labcrane.protocol.evaluation import IndicatorSettings
 
 PEOPLE = ("P001", "P0011", "VP-001")
 """Each name, or its number, is a part of another."""
@@ -174,7 +174,7 @@ def killed_and_finished(
         lab = snapshot.put_back()
         killed += killed_at(draws.randint(1, 120), lambda lab=lab: work(lab))
         if is_done(lab):
-            unfinished.move(lab.places, snapshot._folder / "store")
+            recovery.move(lab.places, snapshot._folder / "store")
         else:
             work(lab)
         assert read(lab.places).work is None

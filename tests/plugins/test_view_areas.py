@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from needs import GRAPHICS, need
 from scipy.spatial.transform import Rotation
 from windows import MACHINE, SIZE, a_scene, make_frame, projected
 
@@ -33,6 +34,7 @@ def moving(name: str, where: tuple[float, ...], turn: tuple[float, ...]) -> Fram
 
 @contextmanager
 def a_view(moves: str, bodies: tuple[Body, ...], *areas: str) -> Iterator[View]:
+    need(*GRAPHICS)
     run = a_scene()
     signals = (
         Signal(f"{moves}.position", "m", ("x", "y", "z")),

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from needs import GRAPHICS, needs
 from rehearsal import SHORT, a_study
 from windows import MACHINE, POSE, make_frame, projected
 
@@ -192,6 +193,7 @@ def spots(picture: np.ndarray) -> np.ndarray:
     return (red > 60) & (blue > 60) & (green < 0.4 * red)
 
 
+@needs(*GRAPHICS)
 def test_a_link_is_drawn_as_its_mesh(tmp_path: Path) -> None:
     machine = meshed(tmp_path, scale=0.3, position=(-0.5, 0.0, 0.0))
     run = replace(make_run(machine, task=TARGETS), bodies=link_boxes(machine))
@@ -232,6 +234,7 @@ def a_scene_file(folder: Path) -> Path:
     return path
 
 
+@needs(*GRAPHICS)
 def test_a_scene_is_drawn_where_its_things_stand_and_are_moved(tmp_path: Path) -> None:
     things = place_objects(load_scene(a_scene_file(tmp_path)), 1)
     assert read_placed(write_placed(things)) == things

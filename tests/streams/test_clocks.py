@@ -49,7 +49,9 @@ def recorded(library, tmp_path_factory):
         lab.device("Chunks", Skew(mode="chunk"))
         first = lab.device("Restarted", Skew())
         lab.markers()
-        recorder = lab.recorder(*({"label": kind, "type": kind} for kind in ("EEG", "Markers")))
+        recorder = lab.recorder(
+            *({"label": kind, "type": kind, "several": True} for kind in ("EEG", "Markers"))
+        )
         until(recorder, lambda status: status["ready"] and len(status["streams"]) == 5)
         begin = time.monotonic()
         time.sleep(SECONDS / 3)

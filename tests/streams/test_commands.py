@@ -29,13 +29,13 @@ def source() -> Iterator[str]:
     sender.wait()
 
 
-def labcrane(*arguments: object) -> subprocess.CompletedProcess[str]:
+def labcrane(*arguments: object, columns: int = 200) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "labcrane", *map(str, arguments)],
         capture_output=True,
         text=True,
         check=False,
-        env={**os.environ, "COLUMNS": "200"},
+        env={**os.environ, "COLUMNS": str(columns)},
     )
 
 
@@ -55,6 +55,23 @@ def test_streams_lists_type_rate_units_host_and_offset(source: str) -> None:
     assert "microvolts" in channels
     assert re.fullmatch(r"  host: \S+, clock offset [+-]\d\.\d{6} s", host)
     assert ident == "  source id: "
+
+
+def test_streams_are_watched_until_it_is_known_how_they_come(source: str) -> None:
+    done = labcrane("streams", "--watch", "--seconds", 12, columns=80)
+    assert done.returncode == 0, done.stderr
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    about = " ".join(done.stdout.partition("Amplifier: ")[2].split("Amplifier: ")[0].split())
+    assert about.startswith("EEG, 2 channels at 100 Hz, in 1, microvolts clock ")
+    assert re.search(r"clock [+-]0\.000\d{3} s, [+-]\d+\.\d ppm, round trip \d+\.\d\d ms", about)
+    assert "0 lost by its counter" in about
+    assert "signal alive" in about
+
+
+def test_what_belongs_to_the_watch_is_refused_without_it() -> None:
+    done = labcrane("streams", "--seconds", 8)
+    assert done.returncode != 0
+    assert "--seconds and --protocol belong to --watch; add it" in done.stderr
 
 
 def test_streams_are_recorded_without_an_experiment(recorded: Path) -> None:

@@ -174,3 +174,19 @@ def test_a_recorder_that_is_told_nonsense_says_what_it_understands():
 def test_a_request_that_any_stream_would_meet_is_refused():
     with pytest.raises(StreamError, match="give its type, name or source_id"):
         StreamRequest("anything")
+
+
+def test_a_request_that_two_streams_meet_takes_none_silently(lab):
+    """A neighbour's derived stream is of the same type; both are recorded, the session waits."""
+    lab.sender("Amplifier", "EEG", "amplifier-1")
+    lab.sender("Filtered", "EEG", "filter-1")
+    recorder = lab.recorder(EEG)
+    status = until(recorder, lambda status: len(status["streams"]) == 2)
+    status = until(recorder, lambda status: named(status, "Filtered")["samples"] > 0)
+    assert not status["ready"]
+    for name in ("Amplifier", "Filtered"):
+        (text,) = named(status, name)["misfits"]
+        assert "so do 2 streams: 'Amplifier' (" in text
+        assert "give the name or source_id of the one that is meant, or several: true" in text
+    assert stop(recorder) == 0
+    assert set(lab.streams()) == {"Amplifier", "Filtered"}

@@ -106,7 +106,7 @@ def test_restarts_and_warnings_of_the_recorder_are_told():
     ]
 
 
-def test_resets_in_a_later_part_count_from_its_first_sample():
+def test_a_reset_in_a_later_part_is_found_there():
     times, later = 100.0 + np.arange(10_000) / 500.0, 130.0 + np.arange(20_000) / 500.0
     first = recorded(times=times)
     second = recorded(clock=SourceClock(offset=5000.0), times=later)
@@ -115,7 +115,11 @@ def test_resets_in_a_later_part_count_from_its_first_sample():
         time_raw=np.r_[first.time_raw, second.time_raw],
         probes=np.r_[first.probes, second.probes],
         arrivals=np.r_[first.arrivals, second.arrivals + np.array([10_000, 0.0])],
-        notes=(*first.notes, *second.notes, Note(129.0, {"event": "reset", "samples": [0, 0]})),
+        notes=(
+            *first.notes,
+            *second.notes,
+            Note(129.0, {"event": "reset", "samples": [10_000, 10_000]}),
+        ),
         starts=(0, 10_000),
     )
     corrected = resync(stream)

@@ -148,7 +148,7 @@ def warming(random):
 def receivers_clock(random):
     times = regular(random, 250.0)
     clock = Clock(random)
-    clock.offset = random.choice([-1, 1]) * random.uniform(0.06, 0.5)
+    clock.offset = random.choice([-1, 1]) * random.uniform(0.06, 0.5) - 1e-6 * clock.ppm * START
     drawn = received(random, clock, times, 250.0, faults=frozenset({Fault.RECEIVER}), clean=False)
     return Drawn(
         RawStream.of(times, drawn.raw.probes, drawn.raw.arrivals),

@@ -29,6 +29,7 @@ class Score:
     clean: bool
     limit: float
     samples: int
+    hidden: float
 
 
 def draw(row: str, seed: int) -> Drawn:
@@ -52,6 +53,7 @@ def score(row: str, seed: int, *, usual: bool = False) -> Score:
         float(np.mean(error <= 1e3 * corrected.error)), 1e3 * float(np.median(corrected.error)),
         verdict is Verdict.PASS, as_pyxdf(drawn) if usual else np.nan,
         float(np.quantile(raw, 0.95)), named, drawn.faults, drawn.clean, drawn.limit_ms, len(error),
+        1e3 * q.hidden_s if np.isfinite(q.hidden_s) else 0.0,
     )  # fmt: skip
 
 
@@ -96,7 +98,8 @@ def shortcomings(one: Score) -> list[str]:
         found.append(f"error beyond {one.limit} ms")
     if one.p95 > one.untouched + WORSE_MS:
         found.append("worse than no correction")
-    if one.p95 > one.usual + WORSE_MS:
+    # Half the shortest round trip nobody can know; others' errors may cancel it by luck.
+    if one.p95 > one.usual + WORSE_MS + one.hidden:
         found.append("worse than pyxdf")
     if one.cover < 0.95:
         found.append("not covered")

@@ -11,17 +11,33 @@ from labcrane.cli.output import out
 from labcrane.errors import ProtocolError, RecordingError
 
 if TYPE_CHECKING:
+    from labcrane.monitoring.config import MonitorBuilder
+    from labcrane.monitoring.watch import StreamWatch
     from labcrane.streams.recorder.handle import RecorderHandle
     from labcrane.streams.request import StreamRequest
 
 
 def streams(
     wait: Annotated[float, typer.Option(help="seconds to look for", min=0.1)] = 1.5,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="stay, and say whether each signal is alive")
+    ] = False,
+    seconds: Annotated[
+        float | None, typer.Option(help="how long to watch; until Ctrl-C by default", min=0.1)
+    ] = None,
+    protocol: Annotated[
+        Path | None, typer.Option(help="whose monitors and streams to watch with")
+    ] = None,
     local: Local = False,
 ) -> None:
-    """List the streams on the network."""
+    """List the streams on the network, or watch them."""
     if local:
         stay_on_this_computer()
+    if watch:
+        _watch(wait, seconds, protocol)
+        return
+    if seconds is not None or protocol is not None:
+        raise ProtocolError("--seconds and --protocol belong to --watch; add it")
     from labcrane.streams.discovery import discover
 
     found = discover(wait)
@@ -38,6 +54,64 @@ def streams(
         out.print(f"  source id: {one.source_id or 'none'}", markup=False)
         for warning in one.warnings:
             out.print(f"{one.name}: {warning}", markup=False)
+
+
+def _watch(wait: float, seconds: float | None, protocol: Path | None) -> None:
+    import pylsl
+
+    from labcrane.monitoring.watch import StreamWatch
+
+    builder = _monitors(protocol)
+    infos = pylsl.resolve_streams(wait)
+    if not infos:
+        out.print(f"no stream answered within {wait:g} s")
+        return
+    watch = StreamWatch(infos, builder)
+    try:
+        _show(watch, seconds)
+    finally:
+        watch.close()
+
+
+def _monitors(protocol: Path | None) -> "MonitorBuilder":
+    """Return what looks at signals: as a protocol has it, or all that is installed."""
+    from labcrane.monitoring.config import MonitorBuilder, MonitorConfig
+
+    if protocol is None:
+        return MonitorBuilder(MonitorConfig())
+    from labcrane.protocol.study import load
+    from labcrane.registry.registry import discover
+
+    study = load(protocol, discover(study=protocol))
+    chosen, folder = study.monitors, protocol.parent
+    use = None if chosen is None else [one.described(folder) for one in chosen.values()]
+    return MonitorBuilder(MonitorConfig(str(protocol), study.protocol.machine, use))
+
+
+def _show(watch: "StreamWatch", seconds: float | None) -> None:
+    """Show what is seen, again and again on a terminal, and once at the end."""
+    from rich.live import Live
+    from rich.text import Text
+
+    from labcrane.cli.streams import watched_lines
+
+    def text() -> Text:
+        width = min(out.console.width, 100)
+        return Text(
+            "\n".join(line for view in watch.views() for line in watched_lines(view, width))
+        )
+
+    ends = None if seconds is None else time.monotonic() + seconds
+    live = Live(console=out.console, auto_refresh=False, transient=True)
+    try:
+        with live:
+            while ends is None or time.monotonic() < ends:
+                if out.console.is_terminal:
+                    live.update(text(), refresh=True)
+                time.sleep(0.25)
+    except KeyboardInterrupt:
+        pass
+    out.console.print(text())
 
 
 def record(
@@ -62,7 +136,7 @@ def record(
         folder.mkdir(parents=True)
     except FileExistsError:
         raise RecordingError(f"{folder} exists; give a new folder for the recording") from None
-    keeper = RecorderHandle(journal_path(folder, 1, "streams"), requests)
+    keeper = RecorderHandle(journal_path(folder, 1, "streams"), requests, {})
     out.print("recording; Ctrl-C ends it")
     try:
         _wait(keeper, seconds)
@@ -81,8 +155,11 @@ def _wanted(text: str) -> "StreamRequest":
 
 
 def _wait(keeper: "RecorderHandle", seconds: float | None) -> None:
+    from labcrane.launcher.signal_reporter import SignalReporter
+
     ends = None if seconds is None else time.monotonic() + seconds
     told: list[str] = []
+    reporter = SignalReporter(lambda line: out.print(line, markup=False))
     try:
         while ends is None or time.monotonic() < ends:
             if keeper.watch():
@@ -91,6 +168,7 @@ def _wait(keeper: "RecorderHandle", seconds: float | None) -> None:
                 told = keeper.complaints()
                 for line in told:
                     out.print(line, markup=False)
+            reporter.news(keeper)
             time.sleep(0.1)
     except KeyboardInterrupt:
         return

@@ -12,7 +12,7 @@ from labcrane.cli.output import out
 from labcrane.errors import LabcraneError, PluginError, ProtocolError
 
 if TYPE_CHECKING:
-    from labcrane.launcher.session_process import SessionConfig
+    from labcrane.session.visit import Visit
 
 Participant = Annotated[str, typer.Option(help="pseudonym: P001")]
 SessionNumber = Annotated[int, typer.Option(help="which of the protocol's sessions")]
@@ -50,23 +50,23 @@ def run(
     """Run a session of a study."""
     if fast and not simulate:
         raise ProtocolError("--fast needs --simulate: people cannot be hurried")
-    from labcrane.launcher.session_process import SessionConfig
+    from labcrane.session.visit import visit_of
 
-    order = SessionConfig(
+    visit = visit_of(
         protocol,
         participant,
         session,
         data_folder(data, protocol),
-        simulate,
-        pilot,
+        simulated=simulate,
+        pilot=pilot,
         feedback=not simulate if feedback is None else feedback,
     )
     if local or simulate:
         stay_on_this_computer()
     if fast:
-        out.print(f"participant file: {_run_fast(order)}", markup=False)
+        out.print(f"participant file: {_run_fast(visit)}", markup=False)
     else:
-        _launch(order, page=not simulate if page is None else page)
+        _launch(visit, page=not simulate if page is None else page)
 
 
 def resume(
@@ -84,17 +84,25 @@ def resume(
     page: Page = None,
     feedback: WithFeedback = None,
 ) -> None:
-    """Go on with a session whose process died."""
-    from labcrane.launcher.session_process import SessionConfig
+    """Go on with a session that stopped: do what it still owes."""
+    from labcrane.session.visit import visit_of
 
     folder = data_folder(data, protocol)
     if local or simulate:
         stay_on_this_computer()
     shown = not simulate if feedback is None else feedback
-    order = SessionConfig(
-        protocol, participant, session, folder, simulate, pilot, True, policy, shown
+    visit = visit_of(
+        protocol,
+        participant,
+        session,
+        folder,
+        simulated=simulate,
+        pilot=pilot,
+        resumed=True,
+        policy=policy,
+        feedback=shown,
     )
-    _launch(order, page=not simulate if page is None else page)
+    _launch(visit, page=not simulate if page is None else page)
 
 
 def demo(
@@ -105,30 +113,30 @@ def demo(
     from importlib.resources import files
 
     from labcrane.analysis.report.session_figure import draw
-    from labcrane.launcher.session_process import SessionConfig
     from labcrane.recording.participant_file.reader import open_recording
+    from labcrane.session.visit import visit_of
 
-    order = SessionConfig(
+    visit = visit_of(
         Path(str(files("labcrane.cli") / "demo.yaml")), "P001", 1, data, simulated=True
     )
     number = 1
-    while order.visit().folder.path.exists():  # a demo can be run again; nothing is overwritten
+    while visit.folder.path.exists():  # a demo can be run again; nothing is overwritten
         number += 1
-        order = replace(order, participant=f"P{number:03}")
-    path = _run_fast(order)
+        visit = replace(visit, participant=f"P{number:03}")
+    path = _run_fast(visit)
     picture = path.with_suffix(".png")
     draw(open_recording(path).session(1), picture)
     out.print(f"participant file: {path}", markup=False)
     out.print(f"the movements:    {picture}", markup=False)
 
 
-def _run_fast(order: "SessionConfig") -> Path:
+def _run_fast(visit: "Visit") -> Path:
     from labcrane.cli.terminal import Terminal
     from labcrane.design.plan import plan_session
     from labcrane.session.commands import QueueConsole
     from labcrane.session.session import run as run_session
 
-    visit = replace(order.visit(), fast=True)
+    visit = replace(visit, fast=True)
     visit.study.check_installed(simulated=True, feedback=False)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
@@ -136,7 +144,7 @@ def _run_fast(order: "SessionConfig") -> Path:
         return run_session(visit, console)
 
 
-def _launch(order: "SessionConfig", *, page: bool) -> None:
+def _launch(visit: "Visit", *, page: bool) -> None:
     from labcrane.cli.consent import ask_for_consent, await_consent
     from labcrane.cli.sync import print_report
     from labcrane.cli.terminal import Terminal
@@ -147,10 +155,9 @@ def _launch(order: "SessionConfig", *, page: bool) -> None:
     from labcrane.session.commands import QueueConsole
     from labcrane.session.session import check_free
 
-    visit = order.visit()
     check_free(visit)  # before anything is shown
-    if not order.resumed:
-        visit.folder.check_new(order.session)
+    if not visit.resumed:
+        visit.folder.check_new(visit.session)
     visit.study.check_installed(simulated=visit.simulated, feedback=visit.feedback)
     needs = {"pylsl": LAB, **({"nicegui": LAB} if page else {})}
     if missing := not_installed(needs):
@@ -161,9 +168,9 @@ def _launch(order: "SessionConfig", *, page: bool) -> None:
     keys, asked = not visit.simulated, visit.study.questionnaires
     shown, count = out.console, len(plan.trials)
     with Terminal(console, shown, count, keys=keys, questionnaires=asked) as terminal:
-        launcher = Launcher(order, console, terminal.say)
+        launcher = Launcher(visit, console, terminal.say)
         with (
-            pages(visit, launcher, console, terminal.say, feedback=order.feedback)
+            pages(visit, launcher, console, terminal.say, feedback=visit.feedback)
             if page
             else nullcontext()
         ):
@@ -175,8 +182,8 @@ def _launch(order: "SessionConfig", *, page: bool) -> None:
     if visit.folder.participant_file.exists():
         out.print(f"participant file: {visit.folder.participant_file}", markup=False)
     again = (
-        f"go on with: labcrane resume {order.protocol} --participant {order.participant} "
-        f"--session {order.session}"
+        f"go on with: labcrane resume {visit.study.path} --participant {visit.participant} "
+        f"--session {visit.session}"
     )
     if outcome.owed:
         out.print(f"the session is not complete: {outcome.owed}; {again}", markup=False)

@@ -14,8 +14,9 @@ import numpy.typing as npt
 from labcrane.errors import RecordingError
 from labcrane.recording.journal import GROUPS
 from labcrane.recording.participant_file.columns import holds_texts, text_of, texts_of
+from labcrane.recording.participant_file.session_group import SYNC_REPORT
 from labcrane.recording.participant_file.stream_group import BASES
-from labcrane.recording.participant_file.writer import SYNC_REPORT, group_name, reading
+from labcrane.recording.participant_file.writer import group_name, reading
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -146,6 +147,24 @@ class SessionRecord:
         path = f"{self._group}/streams/{name}"
         attrs = {**_attributes(group), **_attributes(group[time]), "corrected": time == "time"}
         return Stream(name, attrs, self._path, f"{path}/data", f"{path}/{time}")
+
+    @cached_property
+    def signal_faults(self) -> "pd.DataFrame":
+        """One row per fault of a signal: stream, channel, kind, message, start and end in s."""
+        return self._table("signal_faults")
+
+    @cached_property
+    def trial_signal_faults(self) -> "pd.DataFrame":
+        """One row per trial and fault that touches it: trial, attempt, stream, channel, seconds."""
+        return self._table("trial_signal_faults")
+
+    def _table(self, name: str) -> "pd.DataFrame":
+        """Return a group of columns of one length; empty where the session has none."""
+        import pandas as pd  # noqa: PLC0415
+
+        with reading(self._path) as file:
+            group = file[self._group].get(name, {})
+            return pd.DataFrame({column: _values(group[column]) for column in group})
 
     @cached_property
     def events(self) -> "pd.DataFrame":

@@ -20,6 +20,7 @@ from labcrane.recording.participant_file.questionnaires import write_questionnai
 if TYPE_CHECKING:
     import h5py
 
+SYNC_REPORT = "sync_report"
 TRIAL_END = "trial.end"
 COUNTED = "counted"
 """Only trials whose end says so are results, and rows of the trial table."""
@@ -132,3 +133,10 @@ def _write_trials(group: "h5py.Group", log: SessionLog) -> None:
     for number, (name, safe) in enumerate(node_names(columns)):
         write_values(group, safe, [row.get(name) for row in rows], units.get(name))
         write_attributes(group[safe], {"name": name, "position": number})
+
+
+def write_sync_report(group: "h5py.Group", report: Mapping[str, Any]) -> None:
+    """Write a session's sync report into its group, in place of an earlier one."""
+    if SYNC_REPORT in group:
+        del group[SYNC_REPORT]
+    write_text(group, SYNC_REPORT, json.dumps(report, ensure_ascii=False, allow_nan=False))

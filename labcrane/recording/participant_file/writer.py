@@ -4,13 +4,12 @@ HDF5 is never open for writing while people are recorded. Each session is added 
 the old one, which is brought to the disk, read again, and only then takes the old one's name.
 """
 
-import json
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,9 +18,10 @@ from labcrane.files.atomic import replacing
 from labcrane.files.lock import alone_in
 from labcrane.recording.foreign_streams import RecordedStream, read_streams
 from labcrane.recording.journal_reader import JournalState, SessionLog, read_journal
-from labcrane.recording.participant_file.columns import node_names, write_attributes, write_text
+from labcrane.recording.participant_file.columns import node_names, write_attributes
 from labcrane.recording.participant_file.containment import check_containment, check_heaps
 from labcrane.recording.participant_file.session_group import write_session
+from labcrane.recording.participant_file.signal_faults import write_signal_faults
 from labcrane.recording.participant_file.stream_group import write_streams
 from labcrane.recording.paths import parts, session_of
 
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
 FORMAT = "labcrane participant file"
 VERSION = "1"
-SYNC_REPORT = "sync_report"
 
 Conclude = Callable[["h5py.Group"], object]
 """Works something out of a session's group in a participant file, and writes it there."""
@@ -77,13 +76,6 @@ class _Session:
     @property
     def group(self) -> str:
         return group_name(self.number)
-
-
-def write_sync_report(group: "h5py.Group", report: Mapping[str, Any]) -> None:
-    """Write a session's sync report into its group, in place of an earlier one."""
-    if SYNC_REPORT in group:
-        del group[SYNC_REPORT]
-    write_text(group, SYNC_REPORT, json.dumps(report, ensure_ascii=False, allow_nan=False))
 
 
 def group_name(session: int) -> str:
@@ -207,6 +199,7 @@ def _write(beside: Path, path: Path, session: _Session, conclude: Conclude | Non
         write_attributes(group, {"session": session.number, "participant": path.stem})
         write_session(group, session.log, session.journals)
         write_streams(group, session.streams)
+        write_signal_faults(group, session.log, session.streams)
         if conclude is not None:
             conclude(group)
 

@@ -6,7 +6,7 @@ over at once, even when both die in one moment.
 """
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,9 @@ MODULE = "labcrane.streams.recorder.process"
 PATIENCE_S = 15.0
 """How long a recorder may take to close its journal when it is told to stop, or a spare to end."""
 
+OF_SIGNALS = ("signals", "unwatched")
+"""What of a stream's status only the recorder beside the monitors knows."""
+
 RECORDERS = 2
 SPARES = 2
 
@@ -31,24 +34,50 @@ class RecorderHandle:
     ----------
     restarts
         How many had to be replaced.
+
+    Parameters
+    ----------
+    journal, requests
+        Where the streams go, and which.
+    monitors
+        What looks at their signals, as of :class:`labcrane.monitoring.config.MonitorConfig`: beside
+        one of the recorders, for all see the same. None for nothing.
     """
 
-    def __init__(self, journal: Path, requests: Sequence[StreamRequest]) -> None:
+    def __init__(
+        self,
+        journal: Path,
+        requests: Sequence[StreamRequest],
+        monitors: Mapping[str, Any] | None = None,
+    ) -> None:
         self.restarts = 0
         self._journal = journal
         self._requests = tuple(requests)
+        self._monitors = monitors
+        self._monitoring: _Recorder | None = None
+        self._recorders: list[_Recorder] = []
         self._part = max((part_number(part) for part in parts(journal)), default=0)
         self._known: tuple[str, ...] = ()
         self._spares = [_Recorder() for _ in range(RECORDERS)]
-        self._recorders = [self._began() for _ in range(RECORDERS)]
+        for _ in range(RECORDERS):
+            self._recorders.append(self._began())
 
     @property
     def status(self) -> dict[str, Any]:
         """The last report of who has recorded longest; empty before any has spoken."""
         for recorder in self._recorders:
             if recorder.exit_code is None and recorder.status:
-                return recorder.status
+                return recorder.status | {"streams": self._with_signals(recorder.status)}
         return {}
+
+    def _with_signals(self, status: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """Return a recorder's streams with what the one beside the monitors knows of them."""
+        monitoring = self._monitoring.status if self._monitoring else {}
+        known = {_key(stream): stream for stream in monitoring.get("streams", ())}
+        return [
+            stream | {name: known.get(_key(stream), stream)[name] for name in OF_SIGNALS}
+            for stream in status.get("streams", ())
+        ]
 
     @property
     def ready(self) -> bool:
@@ -72,6 +101,28 @@ class RecorderHandle:
             if not (stream["sane"] or stream["warnings"] or stream["misfits"]):
                 lines.append(f"{stream['label']}: {stream['condition']}")
         return list(dict.fromkeys(lines))
+
+    def signals(self) -> dict[tuple[str, str, str], str]:
+        """Return what is wrong with signals: the message by stream, channel and kind of fault.
+
+        Streams have the study's names; the channel is empty for a whole stream.
+        """
+        return {
+            (stream["label"], fault["channel"], fault["kind"]): fault["message"]
+            for stream in self.status.get("streams", ())
+            for fault in stream["signals"]
+        }
+
+    def unwatched(self) -> list[str]:
+        """Return which monitors look no more, one line for each."""
+        died = self._monitoring.status.get("monitors") if self._monitoring else None
+        lines = [died] if died else []
+        for stream in self.status.get("streams", ()):
+            lines += [
+                f"{stream['label']}: monitor {name!r} was left out: {why}"
+                for name, why in stream["unwatched"].items()
+            ]
+        return lines
 
     def watch(self) -> bool:
         """Replace recorders that have died; whether one had."""
@@ -101,8 +152,17 @@ class RecorderHandle:
         """Give a recorder that waits its orders."""
         recorder = self._spares.pop(0) if self._spares else _Recorder()
         self._part += 1
+        monitors = None
+        if self._monitors is not None and self._monitoring not in self._recorders:
+            self._monitoring, monitors = recorder, self._monitors
         recorder.tell(
-            RecorderConfig(self._journal, self._requests, part=self._part, known=self._known)
+            RecorderConfig(
+                self._journal,
+                self._requests,
+                part=self._part,
+                known=self._known,
+                monitors=monitors,
+            )
         )
         return recorder
 
@@ -117,3 +177,7 @@ class _Recorder(ProcessHandle):
 
     def _hear_of(self, status: dict[str, Any]) -> None:
         self.status = status
+
+
+def _key(stream: Mapping[str, Any]) -> tuple[str, ...]:
+    return tuple(str(stream[name]) for name in ("label", "name", "type", "source_id"))

@@ -1,6 +1,7 @@
 """Health of streams: what has come of each, and how it flows now."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import Any
@@ -77,6 +78,11 @@ class Health:
     resets: int
     misfits: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    signals: list[Mapping[str, str]] = field(default_factory=list)
+    """What is wrong with its signal now: channel, kind and message of each fault."""
+
+    unwatched: Mapping[str, str] = field(default_factory=dict)
+    """Why a monitor does not look at it any more, by its name."""
 
     @property
     def sane(self) -> bool:

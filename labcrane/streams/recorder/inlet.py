@@ -15,6 +15,7 @@ from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.streams.probes import ClockProbe, was_reset
 from labcrane.streams.recorder.companions import RecordedStreamWriter
 from labcrane.streams.recorder.health import Counter, Flow
+from labcrane.streams.recorder.signal_feed import SignalFeed, SignalTap
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -45,6 +46,8 @@ class Inlet:
         Label of the channel that counts samples, if there is one.
     warnings
         What is known to be wrong with it, noted beside the stream.
+    feed
+        To whom its samples are passed on, to see whether its signal is alive.
     """
 
     def __init__(
@@ -53,6 +56,7 @@ class Inlet:
         writer: XdfWriter,
         counter: str | None = None,
         warnings: tuple[str, ...] = (),
+        feed: SignalFeed | None = None,
     ) -> None:
         self.info = info
         self.flow = Flow()
@@ -63,6 +67,7 @@ class Inlet:
         self._stop = threading.Event()
         self._give_up = threading.Event()
         self._companions: RecordedStreamWriter | None = None
+        self.signals = None if feed is None else SignalTap(feed, self.note)
         name = info.name()
         self._threads = [
             threading.Thread(target=self._watched, args=(self._receive,), name=f"pull {name}")
@@ -124,6 +129,8 @@ class Inlet:
         self.note(OPENED)
         for text in self._warnings:
             self.note("warning", text=text)
+        if self.signals is not None:
+            self.signals.begin(header)
         prober = threading.Thread(
             target=self._watched,
             args=(partial(self._probe, ClockProbe(inlet), companions),),
@@ -198,6 +205,8 @@ class Inlet:
         self.flow.came(arrival, len(stamps))
         count = self.flow.samples
         self._insist(lambda: companions.arrival(count, arrival))
+        if self.signals is not None:
+            self.signals.give(stamps, data, count - len(stamps))
 
     def _count(self, counter: Counter, data: FloatArray) -> None:
         if missing := counter.missing(data):

@@ -68,6 +68,9 @@ class RecorderConfig:
         Which part it writes, counted from 1; None for the first that there is not yet.
     known
         Descriptions of streams that another recorder has found, so that they need no search.
+    monitors
+        What looks at the signals, as of :class:`labcrane.monitoring.config.MonitorConfig`; None for
+        nothing.
     """
 
     journal: Path
@@ -75,6 +78,7 @@ class RecorderConfig:
     grace_s: float = 3.0
     part: int | None = None
     known: tuple[str, ...] = ()
+    monitors: Mapping[str, Any] | None = None
 
     @classmethod
     def of(cls, fields: Mapping[str, Any]) -> "RecorderConfig":
@@ -112,7 +116,7 @@ def main(arguments: Sequence[str]) -> int:
 def run(orders: RecorderConfig, chief: Chief) -> int:
     """Record until told to stop, or until whoever started it has died."""
     check_clock()
-    recorder = Recorder(orders.journal, orders.streams, orders.part, orders.known)
+    recorder = Recorder(orders.journal, orders.streams, orders.part, orders.known, orders.monitors)
     try:
         for due in _watch(orders, chief):
             recorder.look()

@@ -1,7 +1,7 @@
 """Records the streams of others: whatever was asked for, late or again after a restart."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ from labcrane.recording.paths import next_part, part_path
 from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.streams.recorder.health import Condition, Health, complaints, condition, rate
 from labcrane.streams.recorder.inlet import Inlet
+from labcrane.streams.recorder.signal_feed import SignalFeed
 from labcrane.streams.request import StreamRequest, unstable_id
 from labcrane.streams.search import Search, known_stream
 
@@ -50,13 +51,16 @@ class Recorder:
         requests: Sequence[StreamRequest],
         part: int | None = None,
         known: Sequence[str] = (),
+        monitors: Mapping[str, Any] | None = None,
     ) -> None:
         self._requests = tuple(requests)
         self._writer = XdfWriter(next_part(journal) if part is None else part_path(journal, part))
         self._streams: dict[tuple[str, str, str], _Recorded] = {}
         self._latest: dict[tuple[str, str, str], pylsl.StreamInfo] = {}
+        self._there: set[tuple[str, str, str]] = set()
         self._since: dict[str, float] = {}
         self._fault: str | None = None
+        self._feed = None if monitors is None else SignalFeed(monitors)
         for info in map(known_stream, known):
             if info is not None:
                 self._start(info)
@@ -72,15 +76,18 @@ class Recorder:
         found = [info for info in self._search.results() if self._wanted(info) is not None]
         now = time.monotonic()
         self._since = {info.uid(): self._since.get(info.uid(), now) for info in found}
+        self._there = {_key(info) for info in found}
         for info in found:
             self._latest[_key(info)] = info  # a program that was started again has other ports
             self._start(info)
         self._find_duplicates(found, now)
+        if self._feed is not None:
+            self._feed.look()
 
     def health(self) -> list[Health]:
         """Return how each stream is now, also those asked for that are not there."""
         now = time.perf_counter()
-        found = [_health(one, now) for one in self._streams.values()]
+        found = [_health(one, now, self._rivals(one)) for one in self._streams.values()]
         there = {one.request.label for one in self._streams.values()}
         return found + [_absent(one) for one in self._requests if one.label not in there]
 
@@ -96,12 +103,15 @@ class Recorder:
             "faults": sorted(str(fault) for fault in faults),
             "streams": [one.as_json() for one in streams],
             "known": [self._latest.get(key, one.inlet.info).as_xml() for key, one in recorded],
+            "monitors": self._feed.fault if self._feed else None,
         }
 
     def close(self) -> bool:
         """Write down all that has come and close the journal; whether all of it went in."""
         self._search.close()
         whole = [one.inlet.close() for one in self._streams.values()]
+        if self._feed is not None:
+            self._feed.close()
         try:
             self._writer.close()
         except RecordingError as error:  # the disk is still full: footers are missing, no samples
@@ -121,8 +131,23 @@ class Recorder:
         warnings = list(misfits)
         if (unstable := unstable_id(info.source_id())) is not None:
             warnings.append(unstable)
-        inlet = Inlet(info, self._writer, request.counter, (*warnings,))
+        inlet = Inlet(info, self._writer, request.counter, (*warnings,), self._feed)
         self._streams[key] = _Recorded(request, inlet, misfits, warnings)
+
+    def _rivals(self, recorded: _Recorded) -> list[str]:
+        """Say which other streams fit a request for one; all are recorded, none is chosen."""
+        request = recorded.request
+        names = sorted(
+            f"{one.inlet.info.name()!r} ({one.inlet.info.source_id()})"
+            for key, one in self._streams.items()
+            if one.request is request and key in self._there
+        )
+        if request.several or len(names) < 2:  # noqa: PLR2004
+            return []
+        return [
+            f"fits {request}, but so do {len(names)} streams: {', '.join(names)}; give the name or "
+            "source_id of the one that is meant, or several: true"
+        ]
 
     def _find_duplicates(self, found: "list[pylsl.StreamInfo]", now: float) -> None:
         """Warn of two live streams that LSL cannot tell apart: it may reconnect to the other."""
@@ -146,9 +171,9 @@ def _key(info: "pylsl.StreamInfo") -> tuple[str, str, str]:
     return info.source_id() or info.uid(), info.name(), info.type()
 
 
-def _health(recorded: _Recorded, now: float) -> Health:
+def _health(recorded: _Recorded, now: float, rivals: list[str]) -> Health:
     inlet, flow, info = recorded.inlet, recorded.inlet.flow, recorded.inlet.info
-    probe = flow.probe
+    probe, signals = flow.probe, inlet.signals
     # The time of the measurement on our clock, not the time when liblsl told of it.
     age = None if probe is None else now - (probe.remote_time + probe.offset)
     health = Health(
@@ -169,8 +194,10 @@ def _health(recorded: _Recorded, now: float) -> Health:
         rtt_s=None if probe is None else probe.rtt,
         missing=flow.missing,
         resets=flow.resets,
-        misfits=recorded.misfits,
-        warnings=list(recorded.warnings),
+        misfits=[*recorded.misfits, *rivals],
+        warnings=[*recorded.warnings, *rivals],
+        signals=list(signals.faults.values()) if signals else [],
+        unwatched=signals.failed if signals else {},
     )
     health.warnings.extend(complaints(health))
     return health

@@ -20,7 +20,7 @@ CRYSTAL_WALK = 1e-6
 """Variance by which a sampler's rate usually walks in a second, in ppm squared."""
 
 FEWEST = 50
-MOST_BLOCKS = 400
+MOST_BLOCKS = 100
 
 STRETCH_S = 120.0
 BLOCK_S = 0.05
@@ -73,7 +73,9 @@ def follow_sample_clock(times: FloatArray, index: FloatArray) -> tuple[FloatArra
     blocks = np.array_split(np.arange(len(times)), min(max(len(times) // FEWEST, 3), MOST_BLOCKS))
     middle = np.array([float(due[block].mean()) for block in blocks])
     rest = np.array([float((times[block] - due[block]).mean()) for block in blocks])
-    scatter = 1.4826 * float(np.median(np.abs(np.diff(rest)))) / np.sqrt(2.0) + 1e-6
+    change = np.abs(np.diff(rest)) / np.sqrt(2.0)
+    # Means of late stamps have a long tail, which the median does not see and a mean does.
+    scatter = max(1.4826 * float(np.median(change)), 0.8 * float(np.std(change) * 1.66)) + 1e-6
     followed = smooth(
         middle,
         rest,

@@ -132,11 +132,11 @@ def _soonest(lag: FloatArray, arrival: FloatArray) -> float:
 
 def _stamped_by(stamps: FloatArray, arrival: FloatArray, least: float) -> str:
     """Return whose clock the stamps are of, if samples could not have come when they came."""
+    raw = _soonest(arrival - stamps, arrival)
+    if -EARLY_S <= raw <= LATE_S and (least < -EARLY_S or raw < least - EARLY_S):
+        return "receiver"
     if -EARLY_S <= least <= LATE_S:
         return ""
-    lag = arrival - stamps
-    if -EARLY_S <= _soonest(lag, arrival) <= LATE_S:
-        return "receiver"
     return "foreign" if least < -EARLY_S or least > FOREIGN_S else ""
 
 

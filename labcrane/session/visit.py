@@ -1,0 +1,95 @@
+"""Visit of a participant: which session is to be run, of whom, how, and where it is recorded."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from labcrane.protocol.study import Study, load
+from labcrane.recording.crash_marker import whereabouts_path
+from labcrane.recording.data_folder import DataFolder
+from labcrane.recording.paths import journal_path
+from labcrane.registry.registry import discover
+from labcrane.session.resume import Policy
+
+
+@dataclass(frozen=True, slots=True)
+class Visit:
+    """One session to be run.
+
+    Attributes
+    ----------
+    participant, session
+        Who, and which of the protocol's sessions, counted from 1.
+    data
+        The study's data folder.
+    simulated
+        Whether a simulated operator takes the controls.
+    fast
+        Whether to run as fast as the machine can, without LSL; for simulations only.
+    pilot
+        Whether this is a trial run, to be stamped as one.
+    resumed
+        Whether the session goes on after its process died.
+    policy
+        Where it goes on; what the protocol says by default.
+    feedback
+        Whether the launcher starts the views and sounds, so that the session waits for them.
+    """
+
+    study: Study
+    participant: str
+    session: int
+    data: Path
+    simulated: bool = False
+    fast: bool = False
+    pilot: bool = False
+    resumed: bool = False
+    policy: Policy | None = None
+    feedback: bool = False
+
+    @property
+    def folder(self) -> DataFolder:
+        """Where it is recorded."""
+        return DataFolder(self.data, self.participant, self.pilot, self.simulated)
+
+    @property
+    def source(self) -> str:
+        """Which session this is, the same whenever it is resumed; its streams are named by it."""
+        return f"{self.study.protocol.study}/{self.folder.name}/ses-{self.session:02}"
+
+    @property
+    def journal(self) -> Path:
+        """The first part of the session's journal."""
+        return journal_path(self.folder.path, self.session, "run")
+
+    @property
+    def whereabouts(self) -> Path:
+        """The file that says in which component it is, while it runs and after it has died."""
+        return whereabouts_path(self.journal)
+
+    @property
+    def streams_journal(self) -> Path:
+        """The first part of the journal of the streams of others."""
+        return journal_path(self.folder.path, self.session, "streams")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Cross to another process by the names of things: the study is loaded again there."""
+        rest = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "study"}
+        return _again, (self.study.path, rest)
+
+
+def visit_of(protocol: Path, participant: str, session: int, data: Path, **options: Any) -> Visit:
+    """Return a visit of the study in ``protocol``; ``options`` are the visit's other attributes.
+
+    Raises
+    ------
+    ProtocolError
+        The protocol is not as it should be.
+    """
+    study = load(protocol, discover(study=protocol))
+    return Visit(study, participant, session, data, **options)
+
+
+def _again(protocol: Path, rest: Mapping[str, Any]) -> Visit:
+    return Visit(load(protocol, discover(study=protocol)), **rest)

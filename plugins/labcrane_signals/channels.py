@@ -1,0 +1,67 @@
+"""Channels by what they measure: units as factors, and which channels are no signal at all."""
+
+from collections.abc import Sequence
+
+from labcrane.core import SignalChannel, SignalStream
+
+MICROVOLTS = {
+    "": 1.0,  # the XDF convention for EEG, ECG and EMG
+    "uv": 1.0,
+    "µv": 1.0,
+    "μv": 1.0,
+    "microvolt": 1.0,
+    "microvolts": 1.0,
+    "nv": 1e-3,
+    "nanovolt": 1e-3,
+    "nanovolts": 1e-3,
+    "mv": 1e3,
+    "millivolt": 1e3,
+    "millivolts": 1e3,
+    "v": 1e6,
+    "volt": 1e6,
+    "volts": 1e6,
+}
+"""What one of a unit is in microvolts."""
+
+NO_SIGNAL = (
+    "counter",
+    "trigger",
+    "trig",
+    "status",
+    "battery",
+    "marker",
+    "event",
+    "validity",
+    "timestamp",
+    "framenumber",
+    "sequence",
+    "button",
+)
+"""Words in the label or type of a channel that is no signal: it may stand still or jump."""
+
+
+def word(text: str) -> str:
+    """Return a label's letters and digits alone, in lower case."""
+    return "".join(letter for letter in text.lower() if letter.isalnum())
+
+
+def is_signal(channel: SignalChannel) -> bool:
+    """Whether a channel measures something, rather than counting or marking."""
+    said = (word(channel.label), word(channel.type))
+    return not any(each in text for each in NO_SIGNAL for text in said)
+
+
+def electrodes(stream: SignalStream) -> tuple[list[int], list[float]]:
+    """Return the columns that hold voltages, and what one of their units is in microvolts."""
+    columns, factors = [], []
+    for column, channel in enumerate(stream.channels):
+        factor = MICROVOLTS.get(channel.unit.strip().lower())
+        if factor is not None and is_signal(channel):
+            columns.append(column)
+            factors.append(factor)
+    return columns, factors
+
+
+def labels(stream: SignalStream, columns: Sequence[int]) -> list[str]:
+    """Return the labels of some columns."""
+    return [stream.channels[column].label for column in columns]

@@ -1,0 +1,57 @@
+"""What a protocol may say about the monitors of signals."""
+
+from typing import Literal
+
+from pydantic import PositiveFloat
+
+from labcrane import Settings
+
+
+class ElectrodeSettings(Settings):
+    """What is expected of the signal of electrodes."""
+
+    mains_hz: Literal[50, 60] | None = None
+    """Frequency of the mains where the study runs, in Hz; none looks for both."""
+
+    hum_uv: PositiveFloat = 10.0
+    """Mains hum from which on it is told, in microvolts, root mean square."""
+
+
+class EegSettings(ElectrodeSettings):
+    """Whether each electrode of an EEG is alive: flat, railing, hum, disconnected, bridged."""
+
+
+class EcgSettings(ElectrodeSettings):
+    """Whether an ECG is alive: flat, railing, hum, disconnected."""
+
+    hum_uv: PositiveFloat = 50.0
+    """Mains hum from which on it is told, in microvolts, root mean square."""
+
+
+class EmgSettings(ElectrodeSettings):
+    """Whether an EMG is alive: flat, railing, hum."""
+
+    hum_uv: PositiveFloat = 20.0
+    """Mains hum from which on it is told, in microvolts, root mean square."""
+
+
+class GazeSettings(Settings):
+    """Whether an eye tracker sees the eyes: gaze lost, pupil implausible, wrong unit."""
+
+    confidence: PositiveFloat = 0.3
+    """Confidence below which a sample shows no gaze, 0 to 1."""
+
+
+class StickSettings(Settings):
+    """Whether the axes of sticks, streamed by another program, are alive."""
+
+
+class ForceSettings(Settings):
+    """Whether a force sensor is alive: flat, railing, beyond what it can measure."""
+
+    largest: PositiveFloat | None = None
+    """Largest force that the sensor measures, in the unit of its stream; none checks no range."""
+
+
+class AnySettings(Settings):
+    """Whether any regular stream of numbers is alive: flat, railing, no values."""

@@ -1,0 +1,69 @@
+"""Sliding windows over samples that come in pieces, and faults that last."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from labcrane import FloatArray
+
+WIDTH_S = 1.0
+HOP_S = 0.5
+"""A window is judged so often: a fault that holds for six of them is told within 4.5 s."""
+
+BoolArray = npt.NDArray[np.bool_]
+
+
+class Windows:
+    """Cuts a signal into windows of one second, half of it new.
+
+    Parameters
+    ----------
+    rate_hz
+        Samples per second, above 0.
+    channels
+        How many there are.
+    """
+
+    def __init__(self, rate_hz: float, channels: int) -> None:
+        self.hop = max(round(rate_hz * HOP_S), 1)
+        self.width = max(round(rate_hz * WIDTH_S), 2)
+        self._rest = np.empty((0, channels))
+
+    def feed(self, samples: FloatArray) -> Iterator[FloatArray]:
+        """Yield each window that is complete now, shape ``(width, n_channels)``, oldest first."""
+        self._rest = np.concatenate([self._rest, samples])
+        begin = 0
+        while begin + self.width <= len(self._rest):
+            yield self._rest[begin : begin + self.width]
+            begin += self.hop
+        if begin:
+            self._rest = self._rest[begin:]
+
+
+class Streak:
+    """Whether something has been so for several windows, for each channel.
+
+    A good window takes bad ones back, so that what flickers is raised late.
+
+    Parameters
+    ----------
+    need
+        Bad windows until it counts.
+    channels
+        How many there are.
+    back
+        Bad windows that a good one takes back: few for what comes and goes with the signal.
+    """
+
+    def __init__(self, need: int, channels: int, back: int = 2) -> None:
+        self._need, self._back = need, back
+        self._count = np.zeros(channels, dtype=np.int64)
+        self.raised: BoolArray = np.zeros(channels, dtype=np.bool_)
+
+    def add(self, bad: BoolArray) -> BoolArray:
+        """Take the next window's verdict, shape ``(n_channels,)``; return what is raised now."""
+        count = np.where(bad, self._count + 1, self._count - self._back)
+        self._count = np.clip(count, 0, self._need + 2)
+        self.raised = (self._count >= self._need) | (self.raised & (self._count > 0))
+        return self.raised

@@ -1,0 +1,143 @@
+"""Searches that wait as long as they are told, take few ports, and end with their process."""
+
+import random
+import subprocess
+import sys
+import time
+from contextlib import closing
+
+import psutil
+import pylsl
+import pytest
+from faults.sessions import unique, wait_for
+
+from labcrane.errors import StreamError
+from labcrane.streams import NewestSample
+from labcrane.streams.network import port_range
+from labcrane.streams.search import PORTS, Search, equal, find, known_stream
+
+SENDS = """
+import sys, time, pylsl
+info = pylsl.StreamInfo(sys.argv[1], "Test", 2, 100.0, "float32", sys.argv[1])
+outlet = pylsl.StreamOutlet(info)
+print("ready", flush=True)
+while True:
+    time.sleep(0.01)
+    outlet.push_sample([float(sys.argv[2]), 1.0])
+"""
+
+LOSES = """
+import subprocess, sys, threading, time
+from labcrane.streams import NewestSample
+from labcrane.streams.search import Search
+import pylsl
+stream, other = NewestSample({"name": sys.argv[1]}), Search()
+assert stream.wait(30.0)
+inlet = pylsl.StreamInlet(stream.info, recover=False)
+print("ready", flush=True)
+sys.stdin.readline()
+time.sleep(float(sys.argv[2]))
+"""
+
+
+def sender(name: str, value: float) -> "subprocess.Popen[str]":
+    process = subprocess.Popen(
+        [sys.executable, "-c", SENDS, name, str(value)], stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline() == "ready\n"
+    return process
+
+
+def end(process: "subprocess.Popen[str]") -> None:
+    process.kill()
+    process.wait()
+    process.stdout.close()
+
+
+def ports() -> int:
+    """Return how many UDP ports of liblsl's range this process has."""
+    held = psutil.Process().net_connections("udp")
+    return sum(one.laddr.port in port_range() for one in held)
+
+
+def test_a_search_that_finds_nothing_waits_as_long_as_told_and_not_for_liblsl() -> None:
+    """Told a multiple of liblsl's waves, its own search waits up to 5 s longer."""
+    draw = random.Random(7)
+    for wait_s in (0.0, 0.5, *(draw.choice([0.1, 0.25, 0.4]) * draw.randint(1, 4) for _ in "abc")):
+        began = time.monotonic()
+        assert find(equal(name=unique("nobody")), wait_s) == []
+        assert wait_s <= time.monotonic() - began < wait_s + 0.9  # not liblsl's 1 s for answers
+
+
+def test_a_search_takes_the_ports_of_one_look_however_many_there_are() -> None:
+    before = ports()
+    searches = [Search(equal(name=unique("nobody"))) for _ in range(4)]
+    most = 0
+    ends = time.monotonic() + 5.0
+    while time.monotonic() < ends:
+        most = max(most, ports() - before)
+        time.sleep(0.01)
+    for search in searches:
+        search.close(patience_s=6.0)
+    assert 1 <= most <= PORTS
+
+
+def test_the_newest_sample_is_of_whoever_sends_now() -> None:
+    name = unique("newest")
+    first = sender(name, 1.0)
+    with closing(NewestSample({"name": name})) as stream:
+        assert stream.wait(30.0)
+        wait_for(lambda: stream.newest() == [1.0, 1.0], patience_s=30.0)
+        end(first)
+        second = sender(name, 2.0)
+        wait_for(lambda: stream.newest() == [2.0, 1.0], patience_s=60.0)
+        end(second)
+
+
+def test_a_stream_that_is_refused_says_why_and_is_not_received() -> None:
+    name = unique("refused")
+    process = sender(name, 1.0)
+    with closing(NewestSample({"name": name}, lambda info: f"it has {info.channel_count()}")) as it:
+        wait_for(lambda: it.complaint == "it has 2", patience_s=30.0)
+        assert not it.connected
+        assert it.newest() is None
+    end(process)
+
+
+def test_a_stream_on_this_computer_is_received_by_its_description_without_a_search() -> None:
+    name = unique("known")
+    outlet = pylsl.StreamOutlet(pylsl.StreamInfo(name, "Test", 1, 0.0, "float32", name))
+    text = outlet.get_info().as_xml()
+    info = known_stream(text)
+    assert info is not None
+    inlet = pylsl.StreamInlet(info, recover=False)
+    inlet.open_stream(10.0)
+    outlet.push_sample([7.0])
+    assert inlet.pull_sample(10.0)[0] == [7.0]
+    assert known_stream(text.replace(info.hostname(), "another-computer")) is None
+
+
+def test_a_name_with_a_quote_is_searched_for_and_with_both_is_refused() -> None:
+    assert equal(name="it's", type="EEG") == "name=\"it's\" and type='EEG'"
+    with pytest.raises(StreamError, match="it holds both kinds of quotes; rename it"):
+        equal(name='it\'s "so"')
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_a_process_that_loses_its_stream_ends_without_an_abort(number: int) -> None:
+    """It ends while the stream is searched for again, at some moment of a look."""
+    name = unique("lost")
+    source = sender(name, 1.0)
+    after = str(random.Random(number).uniform(0.0, 2.0))
+    process = subprocess.Popen(
+        [sys.executable, "-c", LOSES, name, after],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout.readline() == "ready\n"
+    end(source)
+    _, said = process.communicate("now\n", timeout=60)
+    assert process.returncode == 0, said
+    assert "terminate" not in said
