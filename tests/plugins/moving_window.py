@@ -11,7 +11,7 @@ import threading
 from plugins.whole_picture import counted
 from windows import MACHINE, POSE, a_scene, make_frame
 
-from labcrane import SessionState
+from labcrane.core import SessionState
 from labcrane.testing import crane_at
 from labcrane_view.settings import ViewSettings
 from labcrane_view.view import View
