@@ -25,7 +25,7 @@ from benchmarks.table import Row
 from labcrane import Frame, InputDevice, Signal, Tick
 from labcrane.core.clock import Clock, ManualClock, SystemClock, ticks
 from labcrane.design.plan import plan_session
-from labcrane.protocol import rig
+from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study, load
 from labcrane.recording.frame_log import FrameLog, columns
 from labcrane.recording.journal import SessionJournal
@@ -107,20 +107,20 @@ def study_at(rate_hz: float, folder: Path) -> Study:
 def whole(study: Study, folder: Path, clock: Clock, count: int, *, lsl: bool) -> list[Frame]:
     """Run ``count`` whole ticks; return their frames, and the end of each in ``frame.elapsed``."""
     plan = plan_session(study, "P001", 1)
-    the_rig = rig.build(study, simulated=True)
-    the_rig = replace(the_rig, input=Waves(study.protocol.rate_hz))
+    rig = Rig.build(study, simulated=True)
+    rig = replace(rig, input=Waves(study.protocol.rate_hz))
     seen: list[Frame] = []
 
     def end_of_tick(frame: Frame) -> None:
         frame.elapsed = time.perf_counter()
         seen.append(frame)
 
-    with rig.opened(the_rig, study, plan.seed) as run:
-        course = Sequencer(study, plan, the_rig, waits=False)
+    with rig.opened(study, plan.seed) as run:
+        course = Sequencer(study, plan, rig, waits=False)
         path = folder / f"{time.perf_counter_ns()}.xdf"
         with SessionJournal(path, columns(run), run.rate_hz) as journal, outlets(run, lsl) as push:
             log, sinks = FrameLog(journal, run), (*push, end_of_tick)
-            loop.run(the_rig, run, course, clock, UntilTick(count), log, sinks)
+            loop.run(rig, run, course, clock, UntilTick(count), log, sinks)
         path.unlink()
     return seen
 

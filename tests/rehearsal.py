@@ -10,7 +10,7 @@ from simple_crane import CRANE
 from labcrane.core.clock import ManualClock
 from labcrane.core.records import Event, Frame, Run
 from labcrane.design.plan import plan_session
-from labcrane.protocol import rig
+from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study, load
 from labcrane.registry.registry import discover
 from labcrane.session import loop
@@ -91,15 +91,15 @@ def rehearse(
     *,
     waits: bool = False,
     awaits: Sequence[str] = (),
-    the_rig: rig.Rig | None = None,
+    rig: Rig | None = None,
 ) -> Rehearsal:
     """Run the first session of P001 and keep every frame."""
     plan = plan_session(study, "P001", 1)
-    the_rig = the_rig or rig.build(study, simulated=True)
-    with rig.opened(the_rig, study, plan.seed) as run:
-        course = Sequencer(study, plan, the_rig, waits=waits, awaits=awaits)
+    rig = rig or Rig.build(study, simulated=True)
+    with rig.opened(study, plan.seed) as run:
+        course = Sequencer(study, plan, rig, waits=waits, awaits=awaits)
         seen = Rehearsal(run)
         console = ScriptedConsole(orders)
         keep = [lambda frame: seen.frames.append(copy.deepcopy(frame))]
-        loop.run(the_rig, run, course, ManualClock(start=1000.0), console, NoLog(), keep)
+        loop.run(rig, run, course, ManualClock(start=1000.0), console, NoLog(), keep)
     return seen

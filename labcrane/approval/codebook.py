@@ -9,7 +9,7 @@ from labcrane.core.records import Value
 from labcrane.core.signals import Layout
 from labcrane.design.plan import plan_session
 from labcrane.design.pseudonyms import pseudonyms
-from labcrane.protocol import rig
+from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.recording.frame_log import LOOP
 from labcrane.recording.trial_columns import UNITS, trial_units
@@ -51,7 +51,7 @@ class Column:
 
 def codebook(study: Study) -> list[Column]:
     """Return every column of frames, events and trials; nothing is opened for it."""
-    parts = rig.build(study, simulated=False)
+    parts = Rig.build(study, simulated=False)
     tasks = {choice.name: choice for choice in study.task_choices.values()}
     task_source = ", ".join(f"{choice.plugin}: {choice.name}" for choice in tasks.values())
     found = [Column("loop", name, unit, CORE) for name, unit in LOOP]

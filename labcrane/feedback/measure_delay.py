@@ -17,7 +17,7 @@ from labcrane.feedback.delay_analysis import Change, Kind, delay, onsets, steps
 from labcrane.feedback.delays import Measured
 from labcrane.feedback.presenter import Presenter
 from labcrane.feedback.processes import host_orders
-from labcrane.protocol import rig
+from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.registry.registry import discover
 from labcrane.streams.newest import NewestSample
@@ -151,8 +151,8 @@ def measure(
         It cannot be measured.
     """
     kind, event = _kind(study, name)
-    built = rig.build(study, simulated=True)
-    with rig.opened(built, study, 0) as run:
+    built = Rig.build(study, simulated=True)
+    with built.opened(study, 0) as run:
         (order,) = (each for each in host_orders(study, run, "doctor") if each.name == name)
         order = replace(order, cues={}, always=kind == "display")
         frame = _frame(run, built.dynamics.state().copy())

@@ -12,7 +12,7 @@ from labcrane.errors import DeviceError
 from labcrane.feedback.handle import FeedbackHandle
 from labcrane.feedback.processes import host_orders
 from labcrane.machines.scene_codec import SCENE_PLACED
-from labcrane.protocol import rig
+from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 
 LOOK_S = 0.05
@@ -41,7 +41,7 @@ def play(study: Study, frames: Sequence[Frame], scene: str, say: Callable[[str],
     DeviceError
         No view and no sound of the study can be started here.
     """
-    run = rig.describe(rig.build(study, simulated=True), study, participant_seed=0)
+    run = Rig.build(study, simulated=True).describe(study, participant_seed=0)
     source = f"{study.protocol.study}/preview-{os.getpid()}"
     orders = [replace(order, recorded=False) for order in host_orders(study, run, source)]
     keepers = [FeedbackHandle(order, "continue") for order in orders]

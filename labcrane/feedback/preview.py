@@ -12,7 +12,7 @@ from labcrane.errors import ProtocolError
 from labcrane.feedback.presenter import Presenter
 from labcrane.feedback.processes import host_orders
 from labcrane.machines.scene_codec import SCENE_PLACED
-from labcrane.protocol import rig
+from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.recording.frame_log import LOOP, FrameRow
 from labcrane.recording.participant_file.reader import SessionRecord, open_recording
@@ -44,7 +44,7 @@ def write_preview(
         The files written: pictures of every view, a sound file of every sound.
     """
     frames, scene = chosen(study, recording, session, trial)
-    run = rig.describe(rig.build(study, simulated=True), study, participant_seed=0)
+    run = Rig.build(study, simulated=True).describe(study, participant_seed=0)
     folder.mkdir(parents=True, exist_ok=True)
     written: list[Path] = []
     for order in host_orders(study, run, "preview"):

@@ -10,8 +10,8 @@ from labcrane.errors import DeviceError
 from labcrane.feedback.config import FeedbackConfig, Part
 from labcrane.feedback.delays import read_delays
 from labcrane.feedback.handle import FeedbackHandle
-from labcrane.protocol import rig
 from labcrane.protocol.components import ComponentSpec
+from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.session.commands import FeedbackLost, FeedbackReady
 from labcrane.session.visit import Visit
@@ -106,7 +106,7 @@ def _orders_of(visit: Visit) -> list[FeedbackConfig]:
     if not (study.sounds or study.views):
         return []
     seed = derive(study.protocol.study, visit.participant)
-    run = rig.describe(rig.build(study, simulated=visit.simulated), study, seed)
+    run = Rig.build(study, simulated=visit.simulated).describe(study, seed)
     known = read_delays(study.path)
     orders = host_orders(study, run, visit.source)
     return [replace(order, measured=known.get(order.name)) for order in orders]

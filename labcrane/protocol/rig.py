@@ -1,4 +1,4 @@
-"""Build the components that a study names, and open them together."""
+"""Rig: the components that a study names, built and opened together."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -40,44 +40,42 @@ class Rig:
             for name, value in component.metadata().items()
         }
 
+    @classmethod
+    def build(cls, study: Study, *, simulated: bool) -> "Rig":
+        """Build, but do not open, what ``study`` names; a simulated operator replaces the input."""
+        machine = study.machine
+        device = (study.operator if simulated else study.input).build(machine)
+        controller = study.scheme.build(machine)
+        dynamics = study.dynamics.build(machine)
+        # The registry filed each offer under its role.
+        assert isinstance(device, InputDevice)  # noqa: S101
+        assert isinstance(controller, Controller)  # noqa: S101
+        assert isinstance(dynamics, Dynamics)  # noqa: S101
+        return cls(device, controller, dynamics, study.tasks)
 
-def build(study: Study, *, simulated: bool) -> Rig:
-    """Build, but do not open, what ``study`` names; a simulated operator replaces the input."""
-    machine = study.machine
-    device = (study.operator if simulated else study.input).build(machine)
-    controller = study.scheme.build(machine)
-    dynamics = study.dynamics.build(machine)
-    # The registry filed each offer under its role.
-    assert isinstance(device, InputDevice)  # noqa: S101
-    assert isinstance(controller, Controller)  # noqa: S101
-    assert isinstance(dynamics, Dynamics)  # noqa: S101
-    return Rig(device, controller, dynamics, study.tasks)
+    def describe(self, study: Study, participant_seed: int) -> Run:
+        """Return the run of the rig, which need not be open: signals are known before."""
+        return Run(
+            rate_hz=study.protocol.rate_hz,
+            machine=study.machine,
+            participant_seed=participant_seed,
+            axes=Layout("the input", self.input.signals),
+            command=Layout("the scheme", self.controller.signals),
+            state=Layout("the machine", self.dynamics.signals),
+            task=Layout("the tasks", _task_signals(self.tasks)),
+            inverse=self.controller.inverse,
+            bodies=tuple(self.dynamics.bodies()),
+        )
 
-
-def describe(rig: Rig, study: Study, participant_seed: int) -> Run:
-    """Return the run of a rig, which need not be open: signals are known before."""
-    return Run(
-        rate_hz=study.protocol.rate_hz,
-        machine=study.machine,
-        participant_seed=participant_seed,
-        axes=Layout("the input", rig.input.signals),
-        command=Layout("the scheme", rig.controller.signals),
-        state=Layout("the machine", rig.dynamics.signals),
-        task=Layout("the tasks", _task_signals(rig.tasks)),
-        inverse=rig.controller.inverse,
-        bodies=tuple(rig.dynamics.bodies()),
-    )
-
-
-@contextmanager
-def opened(rig: Rig, study: Study, participant_seed: int) -> Iterator[Run]:
-    """Open every component, hardware last, and close them all however that ends."""
-    run = describe(rig, study, participant_seed)
-    with ExitStack() as closing:
-        for component in (rig.dynamics, *rig.tasks.values(), rig.controller, rig.input):
-            closing.callback(component.close)
-            component.open(run)
-        yield run
+    @contextmanager
+    def opened(self, study: Study, participant_seed: int) -> Iterator[Run]:
+        """Open every component, hardware last, and close them all however that ends."""
+        run = self.describe(study, participant_seed)
+        with ExitStack() as closing:
+            for component in (self.dynamics, *self.tasks.values(), self.controller, self.input):
+                closing.callback(component.close)
+                component.open(run)
+            yield run
 
 
 def _task_signals(tasks: Mapping[str, Task]) -> tuple[Signal, ...]:

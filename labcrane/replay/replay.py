@@ -19,7 +19,6 @@ from labcrane.core.clock import ManualClock, SystemClock, Tick
 from labcrane.core.records import Frame, Run
 from labcrane.design.plan import plan_session
 from labcrane.errors import ProtocolError, RecordingError
-from labcrane.protocol import rig
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study, load
 from labcrane.recording.data_folder import DataFolder
@@ -139,20 +138,20 @@ def _run(
     plan = plan_session(study, participant, session)
     machine = study.machine
     controller, dynamics = study.scheme.build(machine), study.dynamics.build(machine)
-    the_rig = Rig(script.input, controller, dynamics, study.tasks)  # type: ignore[arg-type]
+    rig = Rig(script.input, controller, dynamics, study.tasks)  # type: ignore[arg-type]
     with ExitStack() as closing:
-        this_run = closing.enter_context(rig.opened(the_rig, study, plan.seed))
-        log = _Log(this_run, script)
+        run = closing.enter_context(rig.opened(study, plan.seed))
+        log = _Log(run, script)
         waits = not bool(record.context["simulated"])
-        course = Sequencer(study, plan, the_rig, waits=waits, awaits=script.awaited)
+        course = Sequencer(study, plan, rig, waits=waits, awaits=script.awaited)
         shown: list[Callable[[Frame], None]] = []
         if speed is not None:
-            show = _Show(this_run, f"replay/{participant}/ses-{session:02}", speed)
+            show = _Show(run, f"replay/{participant}/ses-{session:02}", speed)
             closing.callback(show.close)
             shown.append(show)
         clock = ManualClock(start=script.start)
         with suppress(RecordOver):
-            loop.run(the_rig, this_run, course, clock, script, log, (*sinks, *shown))
+            loop.run(rig, run, course, clock, script, log, (*sinks, *shown))
     return Replayed(log.ticks, parts, log.compare(record), log.frames())
 
 

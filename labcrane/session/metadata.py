@@ -33,13 +33,13 @@ RECORDED_PACKAGES = (
 )
 
 
-def context(visit: Visit, plan: SessionPlan, the_rig: Rig, this_run: Run) -> dict[str, Any]:
+def context(visit: Visit, plan: SessionPlan, rig: Rig, run: Run) -> dict[str, Any]:
     """Return everything that whoever reads the recording must know, ready for JSON."""
     return {
         **_of_visit(visit, plan),
-        "rate_hz": this_run.rate_hz,
+        "rate_hz": run.rate_hz,
         **_of_study(visit.study, simulated=visit.simulated),
-        "facts": the_rig.metadata(),
+        "facts": rig.metadata(),
         "versions": _versions(),
         # What a simulation records does not depend on the computer that it is made on.
         "doctor": None if visit.fast else at_start(visit.folder.root),

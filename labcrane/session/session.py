@@ -11,7 +11,7 @@ from labcrane.core.records import Event, Frame, Phase, Run
 from labcrane.design.plan import SessionPlan, plan_session
 from labcrane.errors import DeviceError, PluginError, ProtocolError
 from labcrane.files.lock import held
-from labcrane.protocol import rig
+from labcrane.protocol.rig import Rig
 from labcrane.recording.crash_marker import CrashMarker, read_whereabouts
 from labcrane.recording.frame_log import BatchLog, FrameLog, columns, frame_bytes
 from labcrane.recording.journal import SessionJournal
@@ -157,18 +157,18 @@ def _record(
     so_far, plan = go_on(visit, whole) if visit.resumed else (None, whole)
     if so_far is None:
         visit.folder.claim(visit.session)
-    the_rig = rig.build(study, simulated=visit.simulated)
+    rig = Rig.build(study, simulated=visit.simulated)
     clock = _clock(visit, so_far)
     died = read_whereabouts(visit.whereabouts) if visit.resumed else None
     with (
-        _watching(visit, the_rig),
-        rig.opened(the_rig, study, plan.seed) as this_run,
+        _watching(visit, rig),
+        rig.opened(study, plan.seed) as run,
     ):
         if so_far is not None and so_far.angles:
-            the_rig.dynamics.reset(within_limits(study, so_far.angles))
-        second = frame_bytes(this_run) * this_run.rate_hz
+            rig.dynamics.reset(within_limits(study, so_far.angles))
+        second = frame_bytes(run) * run.rate_hz
         visit.folder.check_space(plan.expected_s, second, RESERVE_S)
-        about = context(visit, plan, the_rig, this_run) | admission.context
+        about = context(visit, plan, rig, run) | admission.context
         awaits = (*study.views, *study.sounds) if visit.feedback else ()
         opening = list(_opening(about, so_far, died, clock.now()))
         if so_far is not None:
@@ -178,17 +178,17 @@ def _record(
         for event in opening:
             ledger.take(event.name, event.data)
         waits = not visit.simulated
-        course = Sequencer(study, plan, the_rig, waits=waits, awaits=awaits, ledger=ledger)
-        log = _log(visit, this_run, clock, reserve=round(RESERVE_S * second))
+        course = Sequencer(study, plan, rig, waits=waits, awaits=awaits, ledger=ledger)
+        log = _log(visit, run, clock, reserve=round(RESERVE_S * second))
         try:
             for event in opening:
                 log.note(event)
-            with _outlets(visit, plan, this_run, offer) as outlets:
+            with _outlets(visit, plan, run, offer) as outlets:
                 sinks = [*outlets, _teller(console)]
                 if not visit.fast:
-                    sinks.append(OverrunReporter(study.oversight, this_run.rate_hz, log, console))
+                    sinks.append(OverrunReporter(study.oversight, run.rate_hz, log, console))
                 with _settled():
-                    loop.run(the_rig, this_run, course, clock, console, log, sinks)
+                    loop.run(rig, run, course, clock, console, log, sinks)
         except (PluginError, DeviceError) as error:
             log.note(Event("session.failed", clock.now(), {"why": str(error)}))
             error.add_note(
@@ -200,18 +200,18 @@ def _record(
             log.close()
 
 
-def _watching(visit: Visit, the_rig: rig.Rig) -> AbstractContextManager[None]:
+def _watching(visit: Visit, rig: Rig) -> AbstractContextManager[None]:
     if visit.fast:
         visit.whereabouts.unlink(missing_ok=True)  # of a process that died, and was read
-        return hurried((*the_rig.components, *the_rig.tasks.values()))
+        return hurried((*rig.components, *rig.tasks.values()))
     return visit.study.oversight.published(visit.whereabouts)
 
 
-def _log(visit: Visit, this_run: Run, clock: Clock, reserve: int) -> FrameLog:
+def _log(visit: Visit, run: Run, clock: Clock, reserve: int) -> FrameLog:
     now = clock.now if visit.fast else None
-    path, held = next_part(visit.journal), columns(this_run)
-    journal = SessionJournal(path, held, this_run.rate_hz, now=now)
-    return BatchLog(journal, this_run) if visit.fast else FrameLog(journal, this_run, reserve)
+    path, held = next_part(visit.journal), columns(run)
+    journal = SessionJournal(path, held, run.rate_hz, now=now)
+    return BatchLog(journal, run) if visit.fast else FrameLog(journal, run, reserve)
 
 
 def _clock(visit: Visit, so_far: Progress | None) -> Clock:
@@ -313,7 +313,7 @@ def _teller(console: Console) -> Callable[[Frame], None]:
 def _outlets(
     visit: Visit,
     plan: SessionPlan,
-    this_run: Run,
+    run: Run,
     offer: Callable[[Mapping[str, str]], None] | None,
 ) -> Iterator[list[Callable[[Frame], None]]]:
     if visit.fast:  # its stamps are not the computer's time, so nobody could use the streams
@@ -323,9 +323,9 @@ def _outlets(
     from labcrane.streams.frames import FRAME, FrameOutlet  # noqa: PLC0415
     from labcrane.streams.outlets import Outlets  # noqa: PLC0415 - loads liblsl
 
-    frames = FrameOutlet(this_run, visit.source)
-    about = ContextOutlet(this_run, visit.source, len(plan.trials))
-    outlets = (Outlets(this_run, visit.source), frames, about)
+    frames = FrameOutlet(run, visit.source)
+    about = ContextOutlet(run, visit.source, len(plan.trials))
+    outlets = (Outlets(run, visit.source), frames, about)
     if offer:
         offer({FRAME: frames.description, CONTEXT: about.description})
     try:

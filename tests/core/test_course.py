@@ -9,7 +9,7 @@ from rehearsal import SHORT, a_study, rehearse
 
 from labcrane import InputDevice
 from labcrane.core.records import Phase
-from labcrane.protocol import rig
+from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.session.commands import Command, FeedbackLost, FeedbackReady, Order
 
@@ -183,9 +183,9 @@ class Unplugged:
 
 
 def test_lost_input_stops_the_machine_at_once_and_goes_on_when_it_is_back(study: Study) -> None:
-    the_rig = rig.build(study, simulated=True)
-    the_rig = replace(the_rig, input=Unplugged(the_rig.input, 300, 400))
-    seen = rehearse(study, the_rig=the_rig)
+    rig = Rig.build(study, simulated=True)
+    rig = replace(rig, input=Unplugged(rig.input, 300, 400))
+    seen = rehearse(study, rig=rig)
     assert seen.events("input.lost")[0].data["why"] == "the left stick is unplugged"
     assert seen.events("input.lost")[0].time == seen.frames[300].tick.due
     assert all(frame.paused and not frame.command[:4].any() for frame in seen.frames[300:400])
@@ -196,9 +196,9 @@ def test_lost_input_stops_the_machine_at_once_and_goes_on_when_it_is_back(study:
 
 def test_lost_input_ends_the_session_when_the_protocol_says_so(tmp_path: Path) -> None:
     study = a_study(tmp_path, SHORT + "on_fault: {input_lost: end}\n")
-    the_rig = rig.build(study, simulated=True)
-    the_rig = replace(the_rig, input=Unplugged(the_rig.input, 300, 400))
-    seen = rehearse(study, the_rig=the_rig)
+    rig = Rig.build(study, simulated=True)
+    rig = replace(rig, input=Unplugged(rig.input, 300, 400))
+    seen = rehearse(study, rig=rig)
     assert seen.events("session.end")[0].data["reason"] == "input lost"
     assert seen.frames[-1].tick.number <= 301
 

@@ -17,7 +17,7 @@ from virtual_sticks import desk
 
 import labcrane
 from labcrane import DeviceError, Event, PluginError, ProtocolError, RecordingError
-from labcrane.protocol import rig
+from labcrane.protocol.rig import Rig
 from labcrane.session.session import Visit, run
 
 ROOT = Path(__file__).parents[2]
@@ -226,8 +226,8 @@ def test_two_sticks_drive_a_trial_are_unplugged_and_plugged_in_again(
     """Through SDL's own event path, with a hand that closes the loop on the virtual sticks."""
     monkeypatch.setenv("LABCRANE_CONFIG", str(tmp_path))
     study = a_study(tmp_path, SHORT)
-    people = rig.build(study, simulated=False)
-    hand = rig.build(study, simulated=True).input
+    people = Rig.build(study, simulated=False)
+    hand = Rig.build(study, simulated=True).input
     with desk() as table:
         sticks = {"left": table.plug(), "right": table.plug()}
         device = people.input
@@ -253,7 +253,7 @@ def test_two_sticks_drive_a_trial_are_unplugged_and_plugged_in_again(
         monkeypatch.setattr(device, "read", hand_and_read)
         monkeypatch.setattr(device, "open", _opens_both(device.open, hand))
         monkeypatch.setattr(device, "begin_trial", hand.begin_trial)
-        seen = rehearse(study, the_rig=people)
+        seen = rehearse(study, rig=people)
     lost, back = seen.events("input.lost"), seen.events("input.back")
     assert lost[0].time == seen.frames[400].tick.due
     assert "left" in lost[0].data["why"]
@@ -268,8 +268,8 @@ def test_two_sticks_drive_a_trial_are_unplugged_and_plugged_in_again(
 
 
 def _opens_both(open_device, hand):
-    def both(this_run):
-        hand.open(this_run)
-        open_device(this_run)
+    def both(run):
+        hand.open(run)
+        open_device(run)
 
     return both

@@ -6,7 +6,7 @@ import pytest
 
 from labcrane import ProtocolError, Signal
 from labcrane.core import Layout, signals_of
-from labcrane.protocol.rig import Rig, describe
+from labcrane.protocol.rig import Rig
 
 SIGNALS = (
     Signal("left", "1", ("x", "trigger")),
@@ -46,4 +46,4 @@ def test_tasks_that_show_other_signals_are_named_with_what_they_show() -> None:
     with pytest.raises(
         ProtocolError, match=r"'aim' shows left, joint.angle; 'idle' shows nothing; put them into"
     ):
-        describe(Rig(device, device, device, tasks), study, participant_seed=1)
+        Rig(device, device, device, tasks).describe(study, participant_seed=1)

@@ -15,7 +15,7 @@ from pages.room import STUDY, Room, a_room, photograph, press, shown, text
 from selenium import webdriver
 
 from labcrane import Frame, Tick, open_recording
-from labcrane.protocol import rig
+from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import load
 from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.registry.registry import discover
@@ -142,7 +142,7 @@ def test_the_supervisor_sees_cameras_and_torques(tmp_path: Path, browser: webdri
 def drawn_from(session: SessionRecord, protocol: Path, row: int) -> np.ndarray:
     """Return the second camera's picture of a recorded frame."""
     study = load(protocol, discover())
-    run = rig.describe(rig.build(study, simulated=True), study, participant_seed=0)
+    run = Rig.build(study, simulated=True).describe(study, participant_seed=0)
     state = session.streams["state"].data.to_numpy()[row]
     nothing = np.zeros(0)
     frame = Frame(Tick(0, 0.0, 0.0), 0.0, nothing, nothing, state, np.full(run.task.size, math.nan))

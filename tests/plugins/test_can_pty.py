@@ -12,7 +12,7 @@ from rehearsal import NoLog, ScriptedConsole
 
 from labcrane.core.clock import SystemClock
 from labcrane.design.plan import plan_session
-from labcrane.protocol import rig
+from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
 from labcrane.session import loop
@@ -68,18 +68,18 @@ def session(folder: Path, controls: str, seconds: int) -> list:
     (folder / "ied_arm.yaml").write_text((RETRIEVAL / "ied_arm.yaml").read_text())
     study = load(folder / "study.yaml", discover())
     plan = plan_session(study, "P001", 1)
-    the_rig = rig.build(study, simulated=False)
+    rig = Rig.build(study, simulated=False)
     frames = []
-    with rig.opened(the_rig, study, plan.seed) as run:
+    with rig.opened(study, plan.seed) as run:
         signal = run.command.find("valve.signal")
 
         def keep(frame):
             command = frame.command[signal].copy()
             frames.append((frame.tick.woke, command, frame.paused, frame.events))
 
-        course = Sequencer(study, plan, the_rig, waits=False)
+        course = Sequencer(study, plan, rig, waits=False)
         console = ScriptedConsole({240 * seconds: [Command(Order.END)]})
-        loop.run(the_rig, run, course, SystemClock(), console, NoLog(), [keep])
+        loop.run(rig, run, course, SystemClock(), console, NoLog(), [keep])
     return frames
 
 

@@ -13,7 +13,7 @@ from rehearsal import Rehearsal, rehearse
 from labcrane import FloatArray, Frame, InputDevice, Phase, Run, Signal, Tick
 from labcrane.machines import reach
 from labcrane.machines.library import load_machine
-from labcrane.protocol import rig
+from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
@@ -134,7 +134,7 @@ def run_of(
     (folder / "scene.yaml").write_text(SCENE.format(things=things, start=start_at(height)))
     (folder / "study.yaml").write_text(STUDY.format(folder=RETRIEVAL))
     study = load(folder / "study.yaml", discover())
-    return rehearse(study, orders, the_rig=replace(rig.build(study, simulated=True), input=hand))
+    return rehearse(study, orders, rig=replace(Rig.build(study, simulated=True), input=hand))
 
 
 def column(seen: Rehearsal, name: str) -> FloatArray:

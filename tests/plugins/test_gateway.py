@@ -16,7 +16,7 @@ from rehearsal import NoLog, ScriptedConsole
 from labcrane import FloatArray, InputDevice, Run, Tick
 from labcrane.core.clock import SystemClock
 from labcrane.design.plan import plan_session
-from labcrane.protocol import rig
+from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
 from labcrane.session import loop
@@ -59,23 +59,23 @@ def test_a_program_written_from_the_documentation_drives_the_arm(tmp_path: Path)
     (tmp_path / "ied_arm.yaml").write_text((RETRIEVAL / "ied_arm.yaml").read_text())
     study = load(tmp_path / "study.yaml", discover())
     plan = plan_session(study, "P001", 1)
-    the_rig = rig.build(study, simulated=False)
+    rig = Rig.build(study, simulated=False)
     program = subprocess.Popen(
         [sys.executable, str(TESTS / "gateway_program.py"), "7"], stdout=subprocess.PIPE, text=True
     )
     seen = []
     try:
-        with rig.opened(the_rig, study, plan.seed) as run:
+        with rig.opened(study, plan.seed) as run:
             arm = run.state.index("joint.angle.arm")
             signal = run.command.find("valve.signal")
-            course = Sequencer(study, plan, the_rig, waits=False)
+            course = Sequencer(study, plan, rig, waits=False)
 
             def keep(frame):
                 moved = frame.state[arm], frame.command[signal].tolist()
                 seen.append((frame.tick.woke, frame.paused, *moved, frame.events))
 
             console = ScriptedConsole({240 * 10: [Command(Order.END)]})
-            loop.run(the_rig, run, course, SystemClock(), console, NoLog(), [keep])
+            loop.run(rig, run, course, SystemClock(), console, NoLog(), [keep])
         output, _ = program.communicate(timeout=240)
     finally:
         program.kill()

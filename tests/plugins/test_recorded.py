@@ -7,7 +7,7 @@ import pytest
 from rehearsal import SHORT, ScriptedConsole, a_study, rehearse
 
 from labcrane import InputDevice, ProtocolError, open_recording
-from labcrane.protocol import rig
+from labcrane.protocol.rig import Rig
 from labcrane.session.session import Visit, run
 from labcrane.testing import InputContract, ch8
 from labcrane_operator import labcrane_inputs
@@ -33,7 +33,7 @@ class TestContract(InputContract):
 def test_the_same_axes_move_the_machine_the_same_way(recording: Path, tmp_path: Path) -> None:
     text = BULLET.replace("{use: dual_joystick}", f"{{use: recorded, file: {recording}}}")
     study = a_study(tmp_path, text)
-    seen = rehearse(study, the_rig=rig.build(study, simulated=False))
+    seen = rehearse(study, rig=Rig.build(study, simulated=False))
     state = open_recording(recording).session(1).streams["state"].data.to_numpy()
     np.testing.assert_array_equal([frame.state for frame in seen.frames], state)
 
@@ -43,7 +43,7 @@ def test_a_recording_that_ends_early_is_lost_input(recording: Path, tmp_path: Pa
     study = a_study(
         tmp_path, text.replace("pairs: 1", "pairs: 2") + "on_fault: {input_lost: end}\n"
     )
-    seen = rehearse(study, the_rig=rig.build(study, simulated=False))
+    seen = rehearse(study, rig=Rig.build(study, simulated=False))
     assert "has ended" in seen.events("input.lost")[0].data["why"]
     assert seen.events("session.end")[0].data["reason"] == "input lost"
 
@@ -52,7 +52,7 @@ def test_a_recording_of_another_rate_is_refused(recording: Path, tmp_path: Path)
     text = BULLET.replace("{use: dual_joystick}", f"{{use: recorded, file: {recording}}}")
     study = a_study(tmp_path, text.replace("rate_hz: 240", "rate_hz: 250"))
     with pytest.raises(ProtocolError, match="recorded at 240 Hz and cannot be played at 250 Hz"):
-        rehearse(study, the_rig=rig.build(study, simulated=False))
+        rehearse(study, rig=Rig.build(study, simulated=False))
 
 
 def test_a_recording_that_is_not_there_is_told() -> None:

@@ -23,7 +23,7 @@ from labcrane.machines import (
     read_placed,
     write_placed,
 )
-from labcrane.protocol import rig
+from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study, load
 from labcrane.registry.registry import discover
 from labcrane.streams.context import situation_after, situation_of
@@ -47,7 +47,7 @@ def study() -> Study:
 
 @pytest.fixture(scope="module")
 def run(study: Study) -> Run:
-    return rig.describe(rig.build(study, simulated=True), study, participant_seed=0)
+    return Rig.build(study, simulated=True).describe(study, participant_seed=0)
 
 
 @pytest.fixture(scope="module", params=["auto", "software"])

@@ -10,7 +10,7 @@ from rehearsal import ScriptedConsole, a_study
 from labcrane.core.clock import ManualClock
 from labcrane.core.records import Event
 from labcrane.design.plan import plan_session
-from labcrane.protocol import rig
+from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.recording.foreign_streams import companion_headers
 from labcrane.recording.frame_log import FrameLog, columns
@@ -68,14 +68,14 @@ def record(
     visit = Visit(the_study, participant, 1, data, simulated=simulated, fast=True, pilot=pilot)
     plan = plan_session(the_study, participant, 1)
     visit.folder.claim(1)
-    the_rig = rig.build(the_study, simulated=True)
+    rig = Rig.build(the_study, simulated=True)
     clock = ManualClock(start=100.0)
-    with rig.opened(the_rig, the_study, plan.seed) as run:
-        course = Sequencer(the_study, plan, the_rig, waits=False)
+    with rig.opened(the_study, plan.seed) as run:
+        course = Sequencer(the_study, plan, rig, waits=False)
         with SessionJournal(visit.journal, columns(run), run.rate_hz) as journal:
             log = FrameLog(journal, run)
-            log.note(Event("session.start", clock.now(), context(visit, plan, the_rig, run)))
-            loop.run(the_rig, run, course, clock, ScriptedConsole(orders), log, [])
+            log.note(Event("session.start", clock.now(), context(visit, plan, rig, run)))
+            loop.run(rig, run, course, clock, ScriptedConsole(orders), log, [])
     journals = [visit.journal]
     if gaze:
         journals.append(_gaze(visit.streams_journal, clock.now()))

@@ -109,13 +109,13 @@ def _session_bytes(study: "Study") -> float:
     """Return what the longest session takes, with the same margin as ``labcrane run`` asks for."""
     from labcrane.design.plan import plan_session
     from labcrane.design.pseudonyms import pseudonyms
-    from labcrane.protocol import rig
+    from labcrane.protocol.rig import Rig
     from labcrane.recording.data_folder import needed_bytes
     from labcrane.recording.frame_log import frame_bytes
     from labcrane.session.session import RESERVE_S
 
     (name,) = pseudonyms(study.protocol.participants.pattern, 1)
-    run = rig.describe(rig.build(study, simulated=True), study, 0)
+    run = Rig.build(study, simulated=True).describe(study, 0)
     longest = max(
         plan_session(study, name, number).expected_s
         for number in range(1, len(study.protocol.sessions) + 1)
