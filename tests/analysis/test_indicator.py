@@ -6,6 +6,7 @@ import subprocess
 from datetime import date
 from pathlib import Path
 
+import numpy as np
 import pytest
 from needs import need
 
@@ -143,8 +144,10 @@ def record(
         "participant": operator, "study": "rescue", "indicator": LITERAL.model_dump(),
         "simulated": operator.endswith("-SIMULATED"),
     }  # fmt: skip
-    with SessionJournal(path, [Column("loop", "tick", "1")], 240.0) as journal:
+    columns = [Column("loop", "tick", "1"), Column("state", "joint.angle.boom", "rad")]
+    with SessionJournal(path, columns, 240.0) as journal:
         journal.write_event(Event("session.start", 1.0, about), 0)
+        journal.write_frame(1.0, np.zeros(2))
         for at, row in enumerate(rows, start=1):
             data = {**ROW, "trial": at, "ended": 10.0 * at, **row}
             rating = data.pop("ratings", (0.7, 0.6))
