@@ -1,6 +1,7 @@
 """A YAML file that remembers where everything stands, so that every mistake gets a line."""
 
 import re
+import warnings
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
 from datetime import date
@@ -11,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning, YAMLError
 from ruamel.yaml.reader import ReaderError
 
 from labcrane.errors import ProtocolError, suggestion
@@ -254,7 +255,14 @@ def _load(text: str, name: str) -> Any:
         raise ProtocolError(f"{name}:{line}: nested deeper than {DEEPEST} levels; write it flat")
     try:
         # Also where no line is asked for: the plain loader copies each merge into the next.
-        return YAML(typ="rt", pure=True).load(text)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", ReusedAnchorWarning)
+            return YAML(typ="rt", pure=True).load(text)
+    except ReusedAnchorWarning as error:
+        raise ProtocolError(
+            f"{name}: this is no YAML that can be trusted: an anchor is given twice; give each its "
+            "own name"
+        ) from error
     except MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         raise ProtocolError(f"{name}:{line}: this is no YAML: {error.problem}") from error

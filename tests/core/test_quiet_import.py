@@ -7,12 +7,18 @@ from pathlib import Path
 
 GREETING = 'import os\nos.write(2, b"hello from C\\n")\nplace = "here"\n'
 
+IMPORTS = "import os\nfrom labcrane.registry import quietly_imported"
+
 
 def said(program: str, folder: Path) -> "subprocess.CompletedProcess[str]":
     (folder / "greeting.py").write_text(GREETING)
     (folder / "broken.py").write_text(GREETING + 'raise OSError("no such engine")\n')
     return subprocess.run(
-        [sys.executable, "-c", f"import os\nfrom labcrane import quietly_imported\n{program}"],
+        [
+            sys.executable,
+            "-c",
+            f"import os\nfrom labcrane.registry import quietly_imported\n{program}",
+        ],
         env={**os.environ, "PYTHONPATH": str(folder)},
         capture_output=True,
         text=True,
