@@ -84,7 +84,7 @@ def test_aliases_and_merges_mean_what_they_always_did() -> None:
         ("[null, {block: {task: aiming}}]", "with a value, not None"),
         ("[{}, {block: {task: aiming}}]", "with a value, not {}"),
         ("[{block: }]", "must be a mapping of keys, but is None"),
-        ("[]", "should have at least 1 item"),
+        ("[]", "is []; it needs at least 1"),
     ],
 )
 def test_a_step_that_is_none_is_told_with_its_line(
