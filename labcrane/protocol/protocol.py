@@ -70,6 +70,12 @@ class Participants(Section):
             raise ValueError(f"{pattern!r} is no regular expression: {error}") from None
         return pattern
 
+    @property
+    def ends_early(self) -> bool:
+        """Whether the pattern asks for something before its beginning or behind its end."""
+        plain = re.sub(r"\\.|\[\^?\]?[^]]*\]", "x", self.pattern)
+        return bool(re.search(r"\$[^)|$]|[^(|^]\^", plain))
+
 
 class OnFault(Section):
     """What happens when something fails during a session."""

@@ -66,27 +66,36 @@ class ReferenceChecker:
             for mention in written:
                 at = (*place, *mention.place)
                 if isinstance(mention.mark, Reference):
-                    self._refers(at, mention, mention.mark, settings)
+                    self._refers(at, mention, mention.mark, choice)
                 elif place != ("operator",):
                     self._whole(at, mention.mark, mention.value)
-            for kind, names in settings.needs(self._machine).items():
-                known = self._names(kind, place)
+            for kind, names in self._needed(place, settings):
+                known = self._names(kind, place) if kind in OWNERS else self._own(choice, kind)
                 said = {mention.value for mention in written if mention.mark == Reference(kind)}
                 for name in names:
                     if known is not None and name not in known and name not in said:
                         message = f"{_dotted(place)} needs the {kind} {name!r}, and "
                         self._source.misnamed(place, message + _has(kind, name, known))
 
-    def _refers(self, at: Place, mention: Mentioned, mark: Reference, settings: Settings) -> None:
+    def _refers(
+        self, at: Place, mention: Mentioned, mark: Reference, choice: ComponentSpec
+    ) -> None:
         name = mark.bare(mention.value)
-        if mark.own:
-            known: Known = frozenset(settings.provides(self._machine).get(mark.kind, ()))
-        else:
-            known = self._names(mark.kind, at)
+        known = self._own(choice, mark.kind) if mark.own else self._names(mark.kind, at)
         if known is None or name in known:
             return
         message = f"{_dotted(at)} is {mention.value!r}, and {_has(mark.kind, name, known)}"
         self._source.misnamed(at, message, key=mention.key)
+
+    def _needed(self, place: Place, settings: Settings) -> Iterator[tuple[str, Sequence[str]]]:
+        try:
+            yield from settings.needs(self._machine).items()
+        except LabcraneError as error:  # a file that it has to look into
+            self._source.problem(place, str(error))
+
+    def _own(self, choice: ComponentSpec, kind: str) -> Known:
+        said = self._said(choice, kind)
+        return None if said is None else frozenset(said)
 
     def _whole(self, at: Place, mark: Mark, value: Any) -> None:
         """Note what a mapping leaves out or has twice."""

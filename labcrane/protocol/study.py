@@ -145,6 +145,13 @@ class Checker:
         """Note every such mistake, given the tasks and questionnaires that could be built."""
         self._check_feedback()
         self._check_names()
+        if self._protocol.participants.ends_early:
+            self._source.misnamed(
+                ("participants", "pattern"),
+                f"participants.pattern '{self._protocol.participants.pattern}' is matched by "
+                "nobody; ^ stands at a name's beginning only and $ at its end, and neither is "
+                "needed",
+            )
         self._check_blocks(tasks)
         self._check_stop_rules(asked)
         if len(tasks) == len(self._protocol.tasks):

@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from labcrane import Machine, Settings
-from labcrane.core import AxisName, JointName, Names, Once, StudyPath
+from labcrane.core import AxisName, JointName, Names, Once, StudyPath, read_yaml
 
 
 class ValveSettings(Settings):
@@ -86,7 +86,13 @@ class ArmSettings(Settings):
         from labcrane.machines import load_scene  # noqa: PLC0415 - loads numpy
 
         things = {thing for path in self.scenes for thing in load_scene(path).things}
-        return {"object": [*sorted(things), *(("jaw_upper", "jaw_lower") if self.jaws else ())]}
+        written = read_yaml(self.model)
+        described = written.get("joints") if isinstance(written, dict) else None
+        laws = [*(described if isinstance(described, dict) else ()), *self.proportional]
+        return {
+            "speed law": laws,
+            "object": [*sorted(things), *(("jaw_upper", "jaw_lower") if self.jaws else ())],
+        }
 
     def needs(self, machine: Machine) -> Names:
-        return {"joint": [self.jaws.joint]} if self.jaws else {}
+        return {"joint": [self.jaws.joint] if self.jaws else [], "speed law": machine.names}
