@@ -87,7 +87,7 @@ class ArmSettings(Settings):
 
         things = {thing for path in self.scenes for thing in load_scene(path).things}
         written = read_yaml(self.model)
-        described = written.get("joints") if isinstance(written, dict) else None
+        described = written.get("segments") if isinstance(written, dict) else None
         laws = [*(described if isinstance(described, dict) else ()), *self.proportional]
         return {
             "speed law": laws,
