@@ -72,9 +72,13 @@ class Participants(Section):
 
     @property
     def ends_early(self) -> bool:
-        """Whether the pattern asks for something before its beginning or behind its end."""
-        plain = re.sub(r"\\.|\[\^?\]?[^]]*\]", "x", self.pattern)
-        return bool(re.search(r"\$[^)|$]|[^(|^]\^", plain))
+        """Whether the pattern asks for a sign before its beginning or behind its end.
+
+        Of patterns with alternatives nothing is said: another one may match.
+        """
+        plain = re.sub(r"\\[AbBZ]", "", self.pattern)
+        plain = re.sub(r"\\.|\[\^?\]?[^]]*\]", "x", plain)
+        return "|" not in plain and bool(re.search(r"\$\w(?![*?{])|\w\^", plain))
 
 
 class OnFault(Section):

@@ -18,6 +18,7 @@ from labcrane.core import ButtonName, Covers, JointName, Layout, Once
 from labcrane.core.references import EVENTS, Mentioned, Reference, mentioned
 from labcrane.core.roles import InputDevice
 from labcrane.machines import load_machine
+from labcrane.protocol.protocol import Participants
 from labcrane.protocol.study import Study, load
 from labcrane.registry.registry import Registry, discover
 
@@ -84,7 +85,9 @@ def test_a_name_of_nothing_is_told_where_it_stands(
     assert old in text
     lines = told(study, text.replace(old, new, 1))
     assert [line for line in lines if line.startswith(said)], lines
-    assert {line.split(":")[0] for line in lines} <= {said.split(":", maxsplit=1)[0], "13", "15"}, lines
+    assert {line.split(":")[0] for line in lines} <= {said.split(":", maxsplit=1)[0], "13", "15"}, (
+        lines
+    )
 
 
 def test_a_session_without_steps_is_told(told) -> None:
@@ -107,6 +110,30 @@ def test_a_file_in_another_encoding_is_told_to_be_saved_as_utf_8(
     path.write_bytes("labcrane: 1\ntitle: Übung\n".encode("latin-1"))
     with pytest.raises(ProtocolError, match=r"study\.yaml:2: byte 0xDC is no UTF-8; .* save it as"):
         load(path, registry)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "ends_early"),
+    [
+        (r"P\d{3}$", False),
+        (r"^P\d{3}$", False),
+        (r"(?:^P)\d+", False),
+        (r"P$x|P\d{3}", False),
+        (r"P\$1", False),
+        (r"[$^]P", False),
+        (r"P$\d*", False),
+        (r"P\d{3}$1", True),
+        (r"P^\d{3}", True),
+    ],
+)
+def test_a_pattern_with_something_behind_its_end_is_told_from_one_without(
+    pattern: str, ends_early: bool
+) -> None:
+    assert Participants(pattern=pattern).ends_early is ends_early
+    if ends_early:
+        assert not any(
+            re.fullmatch(pattern, f"P{n:03}{tail}") for n in range(1000) for tail in ("", "1")
+        )
 
 
 class Finger(Settings):
