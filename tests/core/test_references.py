@@ -127,7 +127,7 @@ def test_a_file_in_another_encoding_is_told_to_be_saved_as_utf_8(
     ],
 )
 def test_a_pattern_with_something_behind_its_end_is_told_from_one_without(
-    pattern: str, ends_early: bool
+    pattern: str, ends_early: object
 ) -> None:
     assert Participants(pattern=pattern).ends_early is ends_early
     if ends_early:
