@@ -4,26 +4,53 @@ from .findings import Finding, Verdict
 from .items import AnswerError, Answers, Item, Score, numeric_answers
 from .primitives import Shape, TargetFinder
 from .records import CameraImage, SessionState, Value
-from .settings import StudyPath, read_yaml
+from .references import (
+    AxisName,
+    ButtonName,
+    CameraName,
+    Covers,
+    EventName,
+    JointName,
+    LinkName,
+    Once,
+    Reference,
+    SceneObject,
+    SignalName,
+    ViewName,
+)
+from .settings import Names, StudyPath, read_yaml
 from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
 
 __all__ = [
     "AnswerError",
     "Answers",
+    "AxisName",
+    "ButtonName",
     "CameraImage",
+    "CameraName",
+    "Covers",
+    "EventName",
     "Finding",
     "Item",
+    "JointName",
     "Layout",
+    "LinkName",
+    "Names",
+    "Once",
+    "Reference",
+    "SceneObject",
     "Score",
     "SessionState",
     "Shape",
     "SignalChannel",
     "SignalFault",
+    "SignalName",
     "SignalStream",
     "StudyPath",
     "TargetFinder",
     "Value",
     "Verdict",
+    "ViewName",
     "numeric_answers",
     "read_yaml",
     "signals_of",

@@ -2,7 +2,8 @@
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from labcrane import Settings
+from labcrane import Machine, Settings
+from labcrane.core import Names
 from labcrane.machines import ACTUATOR_PRESETS, ActuatorSettings
 
 
@@ -11,6 +12,9 @@ class CraneSettings(Settings):
 
     actuator: ActuatorSettings = ACTUATOR_PRESETS["ideal"]
     """Delay between command and motion: ideal, electric, hydraulic, sluggish, or written out."""
+
+    def provides(self, machine: Machine) -> Names:
+        return {"object": ()}
 
 
 class GrappleSettings(Settings):
@@ -37,6 +41,9 @@ class BulletSettings(CraneSettings):
 
     grapple: GrappleSettings | None = None
     """None by default. ``{}`` is one with the values above."""
+
+    def provides(self, machine: Machine) -> Names:
+        return {"object": ("grapple", "grapple rod") if self.grapple else ()}
 
     @property
     def loaded(self) -> bool:

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from labcrane.core import Value
-from labcrane_joystick.stick import AXES
+from labcrane_joystick.settings import AXES
 
 NOT_READ = "not read"
 

@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from labcrane import DeviceError
+from labcrane_joystick.settings import AXES
 
 if TYPE_CHECKING:
     from pygame.joystick import JoystickType
-
-AXES = ("x", "y", "twist", "slider")
-"""The axes of a T.16000M, in SDL's order."""
 
 NUMBERS = tuple(range(len(AXES)))
 

@@ -7,8 +7,6 @@ from pathlib import Path
 
 GREETING = 'import os\nos.write(2, b"hello from C\\n")\nplace = "here"\n'
 
-IMPORTS = "import os\nfrom labcrane.registry import quietly_imported"
-
 
 def said(program: str, folder: Path) -> "subprocess.CompletedProcess[str]":
     (folder / "greeting.py").write_text(GREETING)
