@@ -1,0 +1,108 @@
+"""A crane moved by MuJoCo, with the torques that give the speeds asked for."""
+
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+
+import mujoco
+import numpy as np
+
+from labcrane import FloatArray, Machine, Run
+from labcrane.core import Crane, CraneSettings, Value
+from labcrane.machines import urdf_of
+
+GRAVITY = 9.81
+"""In m/s²."""
+
+LIMIT_STEPS = 2.0
+"""Time constant of a joint's limit, in ticks: the least for which the engine promises stability.
+With its own 20 ms a joint driven at full speed goes 0.28 degrees beyond (ch8, 240 Hz), so 0.105."""
+
+
+class MujocoCrane(Crane):
+    """Drives that give each joint its speed at the end of the tick, up to its effort.
+
+    The engine's mass matrix and bias forces say which torques that takes, as in
+    docs/decisions/0090-torques-before-passes.md; a larger torque than a drive has is cut off, and
+    the joint takes more ticks. The engine's own velocity servos cannot hold a crane at 240 Hz.
+
+    No joint is asked to go beyond its limit. One that its drive cannot stop in time is stopped by
+    the engine's limit, which is soft: it lets a joint through by what it moves in one tick.
+    """
+
+    def __init__(self, settings: CraneSettings, machine: Machine) -> None:
+        super().__init__(settings, machine)
+        self._joints = len(machine.joints)
+        self._bounds = tuple((*joint.limits, joint.effort) for joint in machine.joints)
+
+    def open(self, run: Run) -> None:
+        self._model = model = mujoco.MjModel.from_xml_string(self._urdf())
+        model.opt.timestep = 1.0 / run.rate_hz
+        model.opt.gravity[:] = (0.0, 0.0, -GRAVITY)
+        model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
+        # What the engine cannot compute must reach the loop, not begin anew with a warning.
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        model.jnt_solref[:] = (LIMIT_STEPS / run.rate_hz, 1.0)
+        self._data = data = mujoco.MjData(model)
+        # Views: asking the engine's structure for them costs more than using them.
+        self._positions, self._velocities = data.qpos, data.qvel
+        self._bias, self._passive, self._applied = (
+            data.qfrc_bias,
+            data.qfrc_passive,
+            data.qfrc_applied,
+        )
+        self._wanted: FloatArray = np.zeros(model.nv)
+        self._inertial: FloatArray = np.zeros(model.nv)
+        super().open(run)
+
+    def metadata(self) -> Mapping[str, Value]:
+        return {**super().metadata(), "engine": f"mujoco {version('mujoco')}"}
+
+    def _urdf(self) -> str:
+        return urdf_of(self._machine)
+
+    def _place(self, angles: Sequence[float]) -> None:
+        mujoco.mj_resetData(self._model, self._data)
+        self._positions[: self._joints] = angles
+        mujoco.mj_step1(self._model, self._data)
+
+    def _move(self, speeds: Sequence[float]) -> FloatArray:
+        self._push(speeds)
+        joints = self._joints
+        return self._state.fill(
+            self._positions[:joints].tolist(), self._velocities[:joints].tolist()
+        )
+
+    def _push(self, speeds: Sequence[float]) -> list[float]:
+        """Make a tick at ``speeds`` in rad/s; return the torques in N m."""
+        asked = self._torques(self._accelerations(speeds))
+        torques = [
+            effort if torque > effort else -effort if torque < -effort else torque
+            for torque, (_, _, effort) in zip(asked, self._bounds, strict=True)
+        ]
+        self._applied[: self._joints] = torques
+        mujoco.mj_step2(self._model, self._data)
+        mujoco.mj_step1(self._model, self._data)
+        return torques
+
+    def _accelerations(self, speeds: Sequence[float]) -> list[float]:
+        """Return in rad/s² what leads to ``speeds``, or up to a limit, by the end of the tick."""
+        dt, joints = self._dt, self._joints
+        angles = self._positions[:joints].tolist()
+        moving = self._velocities[:joints].tolist()
+        found = []
+        for speed, angle, was, (lowest, highest, _) in zip(
+            speeds, angles, moving, self._bounds, strict=True
+        ):
+            end = angle + speed * dt
+            if lowest <= end <= highest:
+                found.append((speed - was) / dt)
+            else:
+                nearest = lowest if end < lowest else highest
+                found.append(((nearest - angle) / dt - was) / dt)
+        return found
+
+    def _torques(self, accelerations: Sequence[float]) -> list[float]:
+        """Return in N m what gives the joints these accelerations in rad/s²."""
+        self._wanted[:] = accelerations
+        mujoco.mj_mulM(self._model, self._data, self._inertial, self._wanted)
+        return (self._inertial + self._bias).tolist()
