@@ -39,11 +39,9 @@ class LoadedCrane(MujocoCrane):
     def _move(self, speeds: Sequence[float]) -> FloatArray:
         joints = self._joints
         torques = self._push(speeds)
-        angles, turning = self._positions.tolist(), self._velocities.tolist()
+        angles, turning = self._angles, self._speeds
         crane = self._state.fill(angles[:joints], turning[:joints])
-        loads = [
-            torque / effort for torque, (_, _, effort) in zip(torques, self._bounds, strict=True)
-        ]
+        loads = [torque / effort for torque, effort in zip(torques, self._efforts, strict=True)]
         return self._load.fill(crane, loads, angles[joints:] or None, turning[joints:])
 
 
@@ -61,9 +59,9 @@ class GrappleCrane(LoadedCrane):
         self._model.dof_damping[self._joints :] = self._loaded.grapple.damping
         super()._place(angles)
         self._positions[self._joints] = -self._load.pitch(angles)
-        mujoco.mj_step1(self._model, self._data)
+        self._begin()
 
-    def _torques(self, accelerations: Sequence[float]) -> list[float]:
+    def _torques(self) -> list[float]:
         """Solve for what the hinges, which nothing drives, do meanwhile.
 
         With M the mass matrix, b the bias and p the passive forces, split into joints j and hinges
@@ -71,8 +69,6 @@ class GrappleCrane(LoadedCrane):
         engine's Euler step takes damping implicitly, which adds dt times damping to M_ff.
         """
         joints, model, data = self._joints, self._model, self._data
-        self._wanted[:joints] = accelerations
-        mujoco.mj_mulM(model, data, self._inertial, self._wanted)
         for unit, column in zip(self._unit, self._columns, strict=True):
             mujoco.mj_mulM(model, data, column, unit)
         needed = (self._inertial + self._bias).tolist()

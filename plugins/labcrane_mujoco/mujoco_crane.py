@@ -32,7 +32,8 @@ class MujocoCrane(Crane):
     def __init__(self, settings: CraneSettings, machine: Machine) -> None:
         super().__init__(settings, machine)
         self._joints = len(machine.joints)
-        self._bounds = tuple((*joint.limits, joint.effort) for joint in machine.joints)
+        self._limits = machine.limits
+        self._efforts = tuple(joint.effort for joint in machine.joints)
 
     def open(self, run: Run) -> None:
         self._model = model = mujoco.MjModel.from_xml_string(self._urdf())
@@ -45,12 +46,10 @@ class MujocoCrane(Crane):
         self._data = data = mujoco.MjData(model)
         # Views: asking the engine's structure for them costs more than using them.
         self._positions, self._velocities = data.qpos, data.qvel
-        self._bias, self._passive, self._applied = (
-            data.qfrc_bias,
-            data.qfrc_passive,
-            data.qfrc_applied,
-        )
+        self._bias, self._passive = data.qfrc_bias, data.qfrc_passive
+        self._applied = data.qfrc_applied[: self._joints]
         self._wanted: FloatArray = np.zeros(model.nv)
+        self._wanted_joints = self._wanted[: self._joints]
         self._inertial: FloatArray = np.zeros(model.nv)
         super().open(run)
 
@@ -63,46 +62,40 @@ class MujocoCrane(Crane):
     def _place(self, angles: Sequence[float]) -> None:
         mujoco.mj_resetData(self._model, self._data)
         self._positions[: self._joints] = angles
+        self._begin()
+
+    def _begin(self) -> None:
+        """Work out what the next tick's torques depend on."""
         mujoco.mj_step1(self._model, self._data)
+        self._angles: list[float] = self._positions.tolist()
+        self._speeds: list[float] = self._velocities.tolist()
 
     def _move(self, speeds: Sequence[float]) -> FloatArray:
         self._push(speeds)
-        joints = self._joints
-        return self._state.fill(
-            self._positions[:joints].tolist(), self._velocities[:joints].tolist()
-        )
+        return self._state.fill(self._angles, self._speeds)
 
     def _push(self, speeds: Sequence[float]) -> list[float]:
         """Make a tick at ``speeds`` in rad/s; return the torques in N m."""
-        asked = self._torques(self._accelerations(speeds))
+        dt = self._dt
+        self._wanted_joints[:] = [
+            (speed - was) / dt
+            if lowest <= angle + speed * dt <= highest
+            else (((lowest if angle + speed * dt < lowest else highest) - angle) / dt - was) / dt
+            for speed, was, angle, (lowest, highest) in zip(
+                speeds, self._speeds, self._angles, self._limits, strict=False
+            )
+        ]
+        mujoco.mj_mulM(self._model, self._data, self._inertial, self._wanted)
         torques = [
             effort if torque > effort else -effort if torque < -effort else torque
-            for torque, (_, _, effort) in zip(asked, self._bounds, strict=True)
+            for torque, effort in zip(self._torques(), self._efforts, strict=False)
         ]
-        self._applied[: self._joints] = torques
+        self._applied[:] = torques
         mujoco.mj_step2(self._model, self._data)
-        mujoco.mj_step1(self._model, self._data)
+        self._begin()
         return torques
 
-    def _accelerations(self, speeds: Sequence[float]) -> list[float]:
-        """Return in rad/s² what leads to ``speeds``, or up to a limit, by the end of the tick."""
-        dt, joints = self._dt, self._joints
-        angles = self._positions[:joints].tolist()
-        moving = self._velocities[:joints].tolist()
-        found = []
-        for speed, angle, was, (lowest, highest, _) in zip(
-            speeds, angles, moving, self._bounds, strict=True
-        ):
-            end = angle + speed * dt
-            if lowest <= end <= highest:
-                found.append((speed - was) / dt)
-            else:
-                nearest = lowest if end < lowest else highest
-                found.append(((nearest - angle) / dt - was) / dt)
-        return found
-
-    def _torques(self, accelerations: Sequence[float]) -> list[float]:
-        """Return in N m what gives the joints these accelerations in rad/s²."""
-        self._wanted[:] = accelerations
-        mujoco.mj_mulM(self._model, self._data, self._inertial, self._wanted)
-        return (self._inertial + self._bias).tolist()
+    def _torques(self) -> list[float]:
+        """Return in N m what gives the joints the accelerations wanted."""
+        torques: list[float] = (self._inertial + self._bias).tolist()
+        return torques

@@ -152,6 +152,19 @@ def test_a_grapple_is_drawn_where_and_as_it_hangs(name: str) -> None:
         }
 
 
+@needs_mujoco
+@pytest.mark.parametrize("settings", [{"payload_kg": 5e4}, {"payload_kg": 5e4, "grapple": {}}])
+def test_a_load_too_heavy_for_the_drives_sinks_to_the_limits(settings: dict[str, object]) -> None:
+    """Nothing is computed that is no number, whatever the limits have to bear."""
+    with standing("mujoco_crane", MACHINE, **settings) as crane:
+        states = drive(crane, np.zeros((round(10 * RATE_HZ), 4)))
+    assert np.isfinite(states).all()
+    assert states[-1, 10] < states[0, 10] - 1.0, "the tip is down"
+    lowest, highest = np.degrees(np.array(MACHINE.limits).T)
+    beyond = np.maximum(np.degrees(states[:, :4]) - highest, lowest - np.degrees(states[:, :4]))
+    assert beyond.max() < 2.0
+
+
 @engines
 def test_the_same_commands_give_the_same_swing_bit_for_bit(name: str) -> None:
     commands = np.random.default_rng(3).uniform(-0.2, 0.2, (4, 4)).repeat(120, axis=0)
