@@ -71,7 +71,7 @@ class GrappleCrane(LoadedCrane):
         joints, model, data = self._joints, self._model, self._data
         for unit, column in zip(self._unit, self._columns, strict=True):
             mujoco.mj_mulM(model, data, column, unit)
-        needed = (self._inertial + self._bias).tolist()
+        needed = self._needed.tolist()
         passive = self._passive.tolist()
         first, second = self._columns.tolist()
         stiff = self._dt * float(model.dof_damping[joints])

@@ -1,7 +1,9 @@
 """A crane moved by MuJoCo, with the torques that give the speeds asked for."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from importlib.metadata import version
+from struct import Struct
 
 import mujoco
 import numpy as np
@@ -42,15 +44,19 @@ class MujocoCrane(Crane):
         model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
         # What the engine cannot compute must reach the loop, not begin anew with a warning.
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT  # nothing here has a shape
         model.jnt_solref[:] = (LIMIT_STEPS / run.rate_hz, 1.0)
         self._data = data = mujoco.MjData(model)
         # Views: asking the engine's structure for them costs more than using them.
         self._positions, self._velocities = data.qpos, data.qvel
         self._bias, self._passive = data.qfrc_bias, data.qfrc_passive
-        self._applied = data.qfrc_applied[: self._joints]
         self._wanted: FloatArray = np.zeros(model.nv)
-        self._wanted_joints = self._wanted[: self._joints]
         self._inertial: FloatArray = np.zeros(model.nv)
+        self._needed: FloatArray = np.zeros(model.nv)
+        # Packing numbers into an array costs half of assigning them.
+        pack = Struct(f"{self._joints}d").pack_into
+        self._want = partial(pack, self._wanted.data, 0)
+        self._apply = partial(pack, data.qfrc_applied.data, 0)
         super().open(run)
 
     def metadata(self) -> Mapping[str, Value]:
@@ -77,7 +83,7 @@ class MujocoCrane(Crane):
     def _push(self, speeds: Sequence[float]) -> list[float]:
         """Make a tick at ``speeds`` in rad/s; return the torques in N m."""
         dt = self._dt
-        self._wanted_joints[:] = [
+        accelerations = [
             (speed - was) / dt
             if lowest <= angle + speed * dt <= highest
             else (((lowest if angle + speed * dt < lowest else highest) - angle) / dt - was) / dt
@@ -85,17 +91,19 @@ class MujocoCrane(Crane):
                 speeds, self._speeds, self._angles, self._limits, strict=False
             )
         ]
+        self._want(*accelerations)
         mujoco.mj_mulM(self._model, self._data, self._inertial, self._wanted)
+        np.add(self._inertial, self._bias, out=self._needed)
         torques = [
             effort if torque > effort else -effort if torque < -effort else torque
             for torque, effort in zip(self._torques(), self._efforts, strict=False)
         ]
-        self._applied[:] = torques
+        self._apply(*torques)
         mujoco.mj_step2(self._model, self._data)
         self._begin()
         return torques
 
     def _torques(self) -> list[float]:
         """Return in N m what gives the joints the accelerations wanted."""
-        torques: list[float] = (self._inertial + self._bias).tolist()
+        torques: list[float] = self._needed.tolist()
         return torques
