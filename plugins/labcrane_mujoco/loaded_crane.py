@@ -72,7 +72,7 @@ class GrappleCrane(LoadedCrane):
         for unit, column in zip(self._unit, self._columns, strict=True):
             mujoco.mj_mulM(model, data, column, unit)
         needed = self._needed.tolist()
-        passive = self._passive.tolist()
+        passive = data.qfrc_passive.tolist()
         first, second = self._columns.tolist()
         stiff = self._dt * float(model.dof_damping[joints])
         a, b, d = first[joints] + stiff, first[joints + 1], second[joints + 1] + stiff

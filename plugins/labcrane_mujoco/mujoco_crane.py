@@ -49,10 +49,13 @@ class MujocoCrane(Crane):
         self._data = data = mujoco.MjData(model)
         # Views: asking the engine's structure for them costs more than using them.
         self._positions, self._velocities = data.qpos, data.qvel
-        self._bias, self._passive = data.qfrc_bias, data.qfrc_passive
         self._wanted: FloatArray = np.zeros(model.nv)
         self._inertial: FloatArray = np.zeros(model.nv)
         self._needed: FloatArray = np.zeros(model.nv)
+        self._prepare = partial(mujoco.mj_step1, model, data)
+        self._integrate = partial(mujoco.mj_step2, model, data)
+        self._multiply = partial(mujoco.mj_mulM, model, data, self._inertial, self._wanted)
+        self._add = partial(np.add, self._inertial, data.qfrc_bias, self._needed)
         # Packing numbers into an array costs half of assigning them.
         pack = Struct(f"{self._joints}d").pack_into
         self._want = partial(pack, self._wanted.data, 0)
@@ -72,7 +75,7 @@ class MujocoCrane(Crane):
 
     def _begin(self) -> None:
         """Work out what the next tick's torques depend on."""
-        mujoco.mj_step1(self._model, self._data)
+        self._prepare()
         self._angles: list[float] = self._positions.tolist()
         self._speeds: list[float] = self._velocities.tolist()
 
@@ -92,14 +95,14 @@ class MujocoCrane(Crane):
             )
         ]
         self._want(*accelerations)
-        mujoco.mj_mulM(self._model, self._data, self._inertial, self._wanted)
-        np.add(self._inertial, self._bias, out=self._needed)
+        self._multiply()
+        self._add()
         torques = [
             effort if torque > effort else -effort if torque < -effort else torque
             for torque, effort in zip(self._torques(), self._efforts, strict=False)
         ]
         self._apply(*torques)
-        mujoco.mj_step2(self._model, self._data)
+        self._integrate()
         self._begin()
         return torques
 
