@@ -1,15 +1,19 @@
 """Payload and swinging grapple: against pendulums and levers worked out by hand."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from cranes import build, drive, engines, needs_bullet, needs_mujoco, random_poses, standing
+from rehearsal import SHORT, a_study
+from results.recorded import record
 
-from labcrane import Dynamics, FloatArray, ProtocolError
+from labcrane import Dynamics, FloatArray, ProtocolError, open_recording
 from labcrane.machines import Arm, link_frames
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
+from labcrane.replay import replay_session
 from labcrane.testing import RATE_HZ, DynamicsContract, ch8
 
 GRAVITY = 9.81
@@ -182,6 +186,18 @@ def test_a_crane_without_load_is_the_crane_as_it_was(name: str) -> None:
     bare = {"bullet_crane": "BulletCrane", "mujoco_crane": "MujocoCrane"}
     assert type(build(name, MACHINE)).__name__ == bare[name]
     assert build(name, MACHINE).signals == build("kinematic_crane", MACHINE).signals
+
+
+@engines
+@pytest.mark.parametrize("load", ["", ", payload_kg: 50, grapple: {}"])
+def test_a_recorded_session_is_replayed_bit_for_bit(name: str, load: str, tmp_path: Path) -> None:
+    text = SHORT.replace("kinematic_crane", name + load)
+    path = record(a_study(tmp_path, text), tmp_path / "data", "P001", simulated=True)
+    session = open_recording(path).session(1)
+    again = replay_session(path, 1)
+    assert again.difference is None
+    assert again.parts == ()
+    assert again.ticks == len(session.streams["state"].time) > 1000
 
 
 STUDY = """\
