@@ -17,7 +17,8 @@ GRAVITY = 9.81
 
 LIMIT_STEPS = 2.0
 """Time constant of a joint's limit, in ticks: the least for which the engine promises stability.
-With its own 20 ms a joint driven at full speed goes 0.28 degrees beyond (ch8, 240 Hz), so 0.105."""
+With its own 20 ms a joint of a stretched arm goes 0.28 degrees beyond at full speed (ch8, 240 Hz;
+ch8_cranelike 1.08), so 0.105 (0.36)."""
 
 
 class MujocoCrane(Crane):
@@ -28,7 +29,7 @@ class MujocoCrane(Crane):
     the joint takes more ticks. The engine's own velocity servos cannot hold a crane at 240 Hz.
 
     No joint is asked to go beyond its limit. One that its drive cannot stop in time is stopped by
-    the engine's limit, which is soft: it lets a joint through by what it moves in one tick.
+    the engine's limit, which is soft: it lets a joint through by some tenths of a degree at most.
     """
 
     def __init__(self, settings: CraneSettings, machine: Machine) -> None:

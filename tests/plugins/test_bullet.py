@@ -119,6 +119,24 @@ def test_no_joint_is_driven_through_its_limit(
         assert np.abs(states[-1, 4:8] / command).max() < 0.01, "and stay"
 
 
+@needs_mujoco
+@rates
+@pytest.mark.parametrize(("model", "beyond_deg"), [("ch8", 0.11), ("ch8_cranelike", 0.37)])
+def test_a_soft_limit_stops_each_joint_of_a_stretched_arm(
+    model: str, beyond_deg: float, rate_hz: float
+) -> None:
+    machine = load_machine(model)
+    lowest, highest = np.array(machine.limits).T
+    level = [0.0, *(-joint.offset for joint in machine.joints[1:])]
+    stretched = np.clip(level, lowest + 0.01, highest - 0.01)
+    with standing("mujoco_crane", machine, rate_hz) as crane:
+        for command in np.vstack([np.diag(machine.speeds), -np.diag(machine.speeds)]):
+            crane.reset(stretched.tolist())
+            states = drive(crane, np.tile(command, (round(9 * rate_hz), 1)), rate_hz)
+            beyond = np.maximum(states[:, :4] - highest, lowest - states[:, :4])
+            assert np.degrees(beyond).max() < beyond_deg
+
+
 def test_the_kinematic_crane_stops_exactly_at_its_limits_and_comes_back_at_once() -> None:
     machine = ch8()
     full = np.array(machine.speeds)
