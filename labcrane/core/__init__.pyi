@@ -1,6 +1,9 @@
 """The public names of this package, and the modules from which they are imported."""
 
+from .crane import Crane
+from .crane_settings import CraneSettings, GrappleSettings, LoadedCraneSettings
 from .findings import Finding, Verdict
+from .hanging import HangingLoad
 from .items import AnswerError, Answers, Item, Score, numeric_answers
 from .primitives import Shape, TargetFinder
 from .records import CameraImage, SessionState, Value
@@ -29,12 +32,17 @@ __all__ = [
     "CameraImage",
     "CameraName",
     "Covers",
+    "Crane",
+    "CraneSettings",
     "EventName",
     "Finding",
+    "GrappleSettings",
+    "HangingLoad",
     "Item",
     "JointName",
     "Layout",
     "LinkName",
+    "LoadedCraneSettings",
     "Names",
     "Once",
     "Reference",

@@ -1,10 +1,10 @@
-"""Settings of either crane."""
+"""Settings of cranes: how their drives follow, and what hangs on the tip."""
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from labcrane import Machine, Settings
-from labcrane.core import Names
-from labcrane.machines import ACTUATOR_PRESETS, ActuatorSettings
+from labcrane.core.settings import Names, Settings
+from labcrane.machines.actuator import ACTUATOR_PRESETS, ActuatorSettings
+from labcrane.machines.machine import Machine
 
 
 class CraneSettings(Settings):
@@ -33,7 +33,7 @@ class GrappleSettings(Settings):
     """Of either swing, in N m s/rad."""
 
 
-class BulletSettings(CraneSettings):
+class LoadedCraneSettings(CraneSettings):
     """How the crane follows its commands, and what hangs on it."""
 
     payload_kg: NonNegativeFloat = Field(default=0.0, le=1e5)
@@ -49,3 +49,8 @@ class BulletSettings(CraneSettings):
     def loaded(self) -> bool:
         """Whether anything hangs on the crane."""
         return self.grapple is not None or self.payload_kg > 0.0
+
+    @property
+    def hanging_kg(self) -> float:
+        """Mass of grapple and payload, in kg."""
+        return self.payload_kg + (self.grapple.mass_kg if self.grapple else 0.0)
