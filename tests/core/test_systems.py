@@ -14,6 +14,7 @@ import pytest
 
 from labcrane import RecordingError
 from labcrane.cli.typed import chunks_by_thread
+from labcrane.core.findings import Verdict
 from labcrane.files import atomic, lock, system
 from labcrane.files.append import AppendFile
 
@@ -202,3 +203,24 @@ def test_what_is_printed_into_a_pipe_is_utf8_whatever_the_country(tmp_path: Path
     command = [sys.executable, "-m", "labcrane", "check", "Prüfung→.yaml"]
     done = subprocess.run(command, cwd=tmp_path, env=country, capture_output=True, check=False)
     assert "Prüfung→.yaml" in (done.stdout + done.stderr).decode("utf-8")
+
+
+def test_who_may_read_is_said_where_permissions_do_not_tell(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from labcrane.doctor import disk
+
+    def said(folder: Path) -> list[tuple[str, str]]:
+        return [
+            (each.verdict, each.advice)
+            for each in disk.light(folder, 1.0)
+            if "who may" in each.text
+        ]
+
+    assert said(tmp_path) == []
+    monkeypatch.setattr(disk, "PRIVATE_MODES", False)
+    monkeypatch.setattr(Path, "home", lambda: tmp_path / "user")
+    (tmp_path / "user" / "study").mkdir(parents=True)
+    assert said(tmp_path / "user" / "study") == [(Verdict.PASS, "")]
+    fix = f'icacls "{tmp_path}" /inheritance:r /grant:r "%USERNAME%:(OI)(CI)F"'
+    assert said(tmp_path) == [(Verdict.WARN, fix)]
