@@ -65,13 +65,23 @@ class Participant:
     def context(self) -> dict[str, Any]:
         """What was known when the first session started."""
         recording = self.recording
-        return recording.session(recording.sessions[0]).context
+        return recording.session((self.usable or recording.sessions)[0]).context
 
     def sessions(self) -> Iterator[tuple[int, SessionRecord]]:
         """Yield number and record of each session, one in memory at a time."""
         recording = self.recording
-        for number in recording.sessions:
+        for number in self.usable:
             yield number, recording.session(number)
+
+    @cached_property
+    def usable(self) -> tuple[int, ...]:
+        """Numbers of the sessions that hold something: one may have ended before its first tick."""
+        recording = self.recording
+        return tuple(
+            number
+            for number in recording.sessions
+            if _hollow(number, recording.session(number)) is None
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,22 +215,21 @@ def _look(folder: Path, struck: Struck | None) -> Participant:
         recording = open_recording(path)
         if not recording.sessions:
             return Participant(folder.name, path, Status.UNREADABLE, "holds no session")
-        if (hollow := _hollow(recording)) is not None:
-            return Participant(folder.name, path, Status.UNREADABLE, hollow)
+        hollow = [_hollow(number, recording.session(number)) for number in recording.sessions]
+        if None not in hollow:
+            return Participant(folder.name, path, Status.UNREADABLE, str(hollow[0]))
         status, why = _judge(recording)
     except (RecordingError, ProtocolError) as error:  # of the file, of the protocol in it
         return Participant(folder.name, path, Status.UNREADABLE, str(error))
     return Participant(folder.name, path, status, why)
 
 
-def _hollow(recording: Recording) -> str | None:
-    """Return which session holds nothing that could be used; None when all hold something."""
-    for number in recording.sessions:
-        session = recording.session(number)
-        if not session.context:
-            return f"session {number} does not say what it is: the program was killed at its start"
-        if "state" not in session.streams or not len(session.streams["state"].time):
-            return f"session {number} holds no frames: it ended before its first tick"
+def _hollow(number: int, session: SessionRecord) -> str | None:
+    """Return why a session holds nothing that could be used; None when it holds something."""
+    if not session.context:
+        return f"session {number} does not say what it is: the program was killed at its start"
+    if "state" not in session.streams or not len(session.streams["state"].time):
+        return f"session {number} holds no frames: it ended before its first tick"
     return None
 
 
@@ -235,6 +244,8 @@ def _judge(recording: Recording) -> tuple[Status, str]:
         if stamped:
             return status, f"session {', '.join(map(str, stamped))} is stamped {word}"
     for number, session in zip(recording.sessions, sessions, strict=True):
+        if (hollow := _hollow(number, session)) is not None:
+            return Status.HALF_FINISHED, f"{hollow}; the other sessions can be used"
         if (why := _unfinished(session)) is not None:
             return Status.HALF_FINISHED, f"session {number} {why}"
     planned, done = _planned(sessions[-1].protocol), len(sessions)

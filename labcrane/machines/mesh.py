@@ -6,6 +6,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, PositiveFloat, ValidationInfo
 
 from labcrane.files.model import StrictModel
+from labcrane.limits import check_size
 
 FORMATS = (".stl", ".obj", ".gltf", ".glb")
 
@@ -19,6 +20,7 @@ def _beside(path: Path, info: ValidationInfo) -> Path:
         raise ValueError(f"{str(path)!r} is no mesh; {', '.join(FORMATS)} can be shown")
     if not file.is_file():
         raise ValueError(f"there is no mesh {str(file)!r}; a path counts from the file naming it")
+    check_size(file.stat().st_size, "mesh", f"the mesh {str(path)!r}")
     return file
 
 

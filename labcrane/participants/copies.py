@@ -8,7 +8,6 @@ import os
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from labcrane.files.atomic import UNFINISHED, replacing, write_text
 from labcrane.participants.folders import Places
 from labcrane.participants.mentions import Mentions
 from labcrane.participants.proof import mentioned
-from labcrane.participants.register import Export, Owed, Register, changed
+from labcrane.participants.register import Export, Owed, Register
 
 TABLES = {".csv": ",", ".tsv": "\t"}
 """Files in which single rows can be taken out, and what separates their cells."""
@@ -48,38 +47,6 @@ class Reach:
     removed: list[str] = field(default_factory=list)
     again: list[str] = field(default_factory=list)
     owed: list[Owed] = field(default_factory=list)
-
-
-def record_export(
-    places: Places,
-    exporter: str,
-    folder: Path,
-    files: Mapping[Path, Iterable[str]],
-    today: date,
-) -> None:
-    """Keep where data went, so that they can be erased and relabelled there.
-
-    For files that were written without :func:`~labcrane.participants.products.product`, which does
-    it by itself.
-
-    Parameters
-    ----------
-    files
-        The participants in each file, nobody in one that all share; paths in ``folder``.
-    """
-    folder = folder.resolve()
-    entry = Export(
-        date=today.isoformat(),
-        exporter=exporter,
-        folder=kept_folder(places, folder),
-        files={
-            (folder / path).relative_to(folder).as_posix(): sorted(set(names))
-            for path, names in files.items()
-        },
-        people=sorted({name for names in files.values() for name in names}),
-    )
-    with changed(places) as register:
-        enter(places, register, entry)
 
 
 def kept_folder(places: Places, folder: Path) -> str:

@@ -28,8 +28,8 @@ from labcrane.web.state import SessionView
 
 FORBIDDEN, NOT_FOUND = 403, 404
 NICENESS = 5
-"""The loop's process comes first when the computer is busy, whatever browsers ask for; but the
-pages get a third of what it gets, and answer within a second. At 15 it was a thirtieth."""
+"""The loop's process comes first when the computer is busy, whatever browsers ask for; at 15
+the pages could not be reached for more than a minute."""
 
 MOST_HEAD = 16_384
 """Bytes of a request's line and headers."""

@@ -6,6 +6,7 @@ import subprocess
 from datetime import date
 from pathlib import Path
 
+import numpy as np
 import pytest
 from needs import need
 
@@ -143,8 +144,10 @@ def record(
         "participant": operator, "study": "rescue", "indicator": LITERAL.model_dump(),
         "simulated": operator.endswith("-SIMULATED"),
     }  # fmt: skip
-    with SessionJournal(path, [Column("loop", "tick", "1")], 240.0) as journal:
+    columns = [Column("loop", "tick", "1"), Column("state", "joint.angle.boom", "rad")]
+    with SessionJournal(path, columns, 240.0) as journal:
         journal.write_event(Event("session.start", 1.0, about), 0)
+        journal.write_frame(1.0, np.zeros(2))
         for at, row in enumerate(rows, start=1):
             data = {**ROW, "trial": at, "ended": 10.0 * at, **row}
             rating = data.pop("ratings", (0.7, 0.6))
@@ -299,3 +302,14 @@ def test_runs_that_worsen_again_suggest_another_scenario() -> None:
     assert fatigue(tired).verdict == "fatigue: give another scenario"
     assert "best mean of 3 runs 91.7 %, last 81.9 %" in fatigue(tired).evidence
     assert fatigue(runs([(60, 2), (60, 1), (60, 0), (60, 0)])).verdict == "none"
+
+
+def test_a_session_without_a_tick_does_not_take_the_others_with_it(tmp_path: Path) -> None:
+    home = tmp_path / "P001"
+    record(tmp_path, "P001", the_vectors())
+    path = home / "ses-02_run.xdf"
+    with SessionJournal(path, [Column("state", "joint.angle.boom", "rad")], 240.0) as journal:
+        journal.write_event(Event("session.start", 1.0, {"participant": "P001"}), 0)
+    consolidate(home / "P001.h5", [path])
+    (person,) = find_cohort(tmp_path, ["half-finished"]).included
+    assert [number for number, _ in person.sessions()] == [1]

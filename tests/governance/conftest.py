@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 from governance.kept_people import copied
+from governance.written import record_export
 from governed import GROUPED, TODAY, Lab
-
-from labcrane.participants.copies import record_export
 
 
 @pytest.fixture(scope="session")

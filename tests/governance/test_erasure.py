@@ -12,11 +12,11 @@ from governance.kept_people import (
     others,
     store_of,
 )
+from governance.written import record_export
 from governed import TODAY, Lab
 
 from labcrane import ProtocolError
 from labcrane.participants import recovery as unfinished
-from labcrane.participants.copies import record_export
 from labcrane.participants.register import read
 
 

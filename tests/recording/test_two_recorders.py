@@ -6,12 +6,13 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from labcrane.recording.foreign_streams import OPENED, read_streams
+from labcrane.recording.foreign_streams import OPENED, RESET, read_streams
 from labcrane.recording.paths import part_path
 from labcrane.recording.xdf.header import Channel, StreamHeader
 from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.streams.probes import Probe
-from labcrane.streams.recorder.companions import RESET, RecordedStreamWriter, raw_of
+from labcrane.streams.recorder.companions import RecordedStreamWriter
+from labcrane.streams.sync.raw import raw_of
 
 EEG = StreamHeader("EEG", "EEG", (Channel("count"), Channel("E1")), "float32", 500.0, "amp")
 KEYS = StreamHeader("Keys", "Markers", (Channel("key"),), "string", 0.0, "kb")
