@@ -77,7 +77,7 @@ def test_a_part_that_is_missing_is_named_with_its_line_and_the_extra(
     path = study(tmp_path, **{key: part})
     lines = path.read_text().splitlines()
     at = 1 + lines.index(f"{key}: {part}")
-    chosen = load(path, discover())
+    chosen = load(path, discover(), recorded=True)  # whatever axes the scheme is mapped to
     with pytest.raises(labcrane.ProtocolError) as refused:
         chosen.check_installed()
     name = part.split()[1].strip("{},")

@@ -75,7 +75,7 @@ METHODS = {
     | {"metadata": 1},
     "task": {"factors": 1, "plan": 1, "open": 1, "begin_trial": 2, "evaluate": 50, "close": 1}
     | {"lift_limits": 1},
-    "questionnaire": {"items": 1, "score": 1},
+    "questionnaire": {"items": 2, "score": 1},  # the first says what will be asked
 }
 """Every method that a simulated session calls, and at which call it fails."""
 
