@@ -130,6 +130,11 @@ def _output(
         pipe = selection.make_module_pipe(module)
     if pipe is None or not pipe.is_valid():
         return None
+    if module == "p3tinydisplay" and not hidden:
+        # A window that is removed lets go of its pipe, which closes the connection to the X server,
+        # and its destructor uses that connection: a segmentation fault, if anything still refers to
+        # the window. So the connection stays until the process ends.
+        pipe.ref()
     width, height = settings.size if monitor is None else monitor.size
     window = core.WindowProperties(size=(width, height))
     window.title = title
