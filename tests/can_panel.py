@@ -36,9 +36,14 @@ for number in range(round(seconds * rate)):
         adapter = SlcanAdapter(link)
         print("back", time.perf_counter(), flush=True)
     if adapter is not None:
+        if not adapter.opened:  # its time stands still until it is listened to again
+            waited = time.perf_counter()
+            while not adapter.opened:
+                time.sleep(0.0005)
+            began += time.perf_counter() - waited
         valve = 1 + number % 4
         adapter.send(*encode(valve, round(200 / valve * math.sin(at)), 0x25))
-        sent += adapter.opened
+        sent += 1
 told = dict.fromkeys(range(1, 5), 0)
 for identifier, data in adapter.sent if adapter else ():
     if (valve := ((identifier >> 8) & 0x3FFFF) - 0xFE10) in told:  # estimated flow, ISO 11783-7

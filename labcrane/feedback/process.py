@@ -166,11 +166,15 @@ def main() -> int:
     threading.Thread(target=listen, name="from-launcher", daemon=True).start()
     try:
         process.run()
+    # The error's words are on their way before the error is let go of: with it go windows and sound
+    # servers, and their libraries may end the process.
     except LabcraneError as error:
         parent.tell({"failed": str(error)})
+        parent.close()
         return 1
     except Exception as error:
         parent.tell({"failed": told(error)})
+        parent.close()
         raise  # a plugin's mistake: its author needs the traceback
     finally:
         parent.close()

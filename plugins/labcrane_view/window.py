@@ -130,6 +130,11 @@ def _output(
         pipe = selection.make_module_pipe(module)
     if pipe is None or not pipe.is_valid():
         return None
+    if module == "p3tinydisplay" and not hidden:
+        # A window that is removed lets go of its pipe, which closes the connection to the X server,
+        # and its destructor uses that connection: a segmentation fault, if anything still refers to
+        # the window. So the connection stays until the process ends.
+        pipe.ref()
     width, height = settings.size if monitor is None else monitor.size
     window = core.WindowProperties(size=(width, height))
     window.title = title
@@ -160,15 +165,16 @@ def _output(
 
 def _taken(before: Sequence[ViewSettings], desktop: Pixels) -> list[Place]:
     """Return the places of windows, in the order in which they were given them."""
+    known = monitors() if any(view.screen is not None for view in before) else []
     places: list[Place] = []
     for view in before:
         if view.display == "hidden":
             continue
-        if view.screen is not None:
-            monitor = _monitor(view.screen)
-            places.append((monitor.origin, monitor.size))
-        else:
+        if view.screen is None:
             places.append((free_place(view.size, places, desktop), view.size))
+        elif (monitor := _find(known, view.screen)) is not None:
+            places.append((monitor.origin, monitor.size))
+        # A view on a monitor that is not there has no window, which it says itself.
     return places
 
 
@@ -199,11 +205,15 @@ def _common(one: Place, other: Place) -> int:
 
 def _monitor(wanted: int | str) -> Monitor:
     found = monitors()
-    for number, monitor in enumerate(found):
-        if wanted in (number, monitor.name):
-            return monitor
+    if (monitor := _find(found, wanted)) is not None:
+        return monitor
     known = ", ".join(f"{n} ({m.name}, {m.size[0]}x{m.size[1]})" for n, m in enumerate(found))
     raise DeviceError(f"there is no screen {wanted}; there is {known}")
+
+
+def _find(found: Sequence[Monitor], wanted: int | str) -> Monitor | None:
+    named = (m for number, m in enumerate(found) if wanted in (number, m.name))
+    return next(named, None)
 
 
 def font(path: str | None) -> Any:

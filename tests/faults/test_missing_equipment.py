@@ -1,6 +1,8 @@
 """A computer without OpenGL, second monitor, font or sound: said in words, and then as asked."""
 
 import re
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -58,7 +60,9 @@ def test_a_session_goes_on_without_what_is_missing_where_the_protocol_says_so(
     assert ready.name == "plain"
     told = "\n".join(said)
     for name, message in MESSAGES.items():
-        assert re.search(rf"^feedback {name}: {message}.*; it is left out$", told, re.M), told
+        assert re.search(rf"^feedback {name} failed: {message}.*; it is left out$", told, re.M), (
+            told
+        )
     # Without OpenGL the picture is drawn in software, and that is said.
     assert ready.facts.startswith("renderer p3tinydisplay (software: no graphics card")
 
@@ -77,3 +81,26 @@ def test_a_session_is_refused_where_it_does_not(name: str, policy: str, tmp_path
             made.wait(lambda said: None, lambda: False)
     finally:
         made.stop()
+
+
+HELD = """\
+from pathlib import Path
+from labcrane_view.settings import ViewSettings
+from labcrane_view.window import open_window
+
+def sockets():
+    links = [link for link in Path("/proc/self/fd").iterdir() if link.is_symlink()]
+    return sum("socket:" in str(link.readlink()) for link in links)
+
+window = open_window(ViewSettings(size=(160, 90), renderer="software"), "held")
+output, before = window.output, sockets()
+window.close()
+print(before, sockets())
+"""
+
+
+def test_a_window_drawn_in_software_keeps_its_connection_for_who_still_refers_to_it() -> None:
+    # Its destructor uses the connection; with none it may crash, or may not.
+    done = subprocess.run([sys.executable, "-c", HELD], check=True, stdout=subprocess.PIPE)
+    before, after = map(int, done.stdout.split())
+    assert before == after
