@@ -5,7 +5,8 @@
 A bare tick sets four motors, steps the engine and reads four joints, with the engine settings that
 the crane needs. A whole tick reads axes, applies the scheme, moves the crane, judges the aiming
 task, writes the frame through to the journal, and with LSL sends it to three outlets that a process
-of their own listens to. Rounds alternate, so that a wandering machine moves all figures together.
+of their own listens to. The engines' cranes are measured apart: a step of each, beside a step of
+PyBullet's. Rounds alternate, so that a wandering machine moves all figures together.
 """
 
 import gc
@@ -22,7 +23,7 @@ import numpy as np
 
 from benchmarks.bare_engine import PASSES, BareEngine
 from benchmarks.table import Row
-from labcrane import Frame, InputDevice, Signal, Tick
+from labcrane import Dynamics, Frame, InputDevice, Signal, Tick
 from labcrane.core.clock import Clock, ManualClock, SystemClock, ticks
 from labcrane.design.plan import plan_session
 from labcrane.protocol.rig import Rig
@@ -34,6 +35,7 @@ from labcrane.session import loop
 from labcrane.session.commands import Command, Order
 from labcrane.session.sequencer import Sequencer
 from labcrane.streams.network import use_loopback
+from labcrane.testing import ch8, make_run
 
 ROUNDS = 7
 TICKS = 2400
@@ -48,6 +50,9 @@ LIMITS = {"whole": (1.5, 2.5), "whole, LSL": (1.8, 3.5)}
 
 SLOWEST = 4.0
 """How much lower the highest rate held may be than that of a loop that does nothing."""
+
+ENGINE_LIMIT = 0.7
+"""How long a step of MuJoCo's crane may take beside one of PyBullet's, in the median."""
 
 STUDY = """\
 labcrane: 1
@@ -176,7 +181,7 @@ def rows() -> list[Row]:
     """Return the median cost of a whole tick beside a bare one."""
     use_loopback()
     with tempfile.TemporaryDirectory() as name:
-        found = costs(cost(Path(name)))
+        found = [*costs(cost(Path(name))), engine_row(engine_times())]
         held = rates(Path(name))
     what = "shortest tick that is held, LSL, ms"
     ours, bare = (1e3 / held[kind] for kind in ("whole", "empty"))
@@ -194,6 +199,41 @@ def costs(found: Mapping[str, Sequence[np.ndarray]]) -> list[Row]:
             )
             made.append(Row("tick", f"{kind}, {word}, us", ours, bare, "bare PyBullet tick", limit))
     return made
+
+
+ENGINES = ("bullet_crane", "mujoco_crane")
+
+
+def engine_times(rounds: int = ROUNDS, count: int = TICKS) -> dict[str, float]:
+    """Return the median of a step of either engine's crane, in s, over alternating rounds."""
+    machine = ch8()
+    run = make_run(machine)
+    seconds = np.arange(count) / run.rate_hz
+    hertz = np.linspace(0.1, 0.4, len(machine.joints))
+    # From rest, and gently: no motor is asked for more than it has.
+    waves = 0.4 * np.sin(2 * np.pi * np.outer(seconds, hertz)) * np.array(machine.speeds)
+    waves *= np.minimum(1.0, seconds / 0.5)[:, None]
+    found: dict[str, list[float]] = {name: [] for name in ENGINES}
+    offers = discover().offers[Dynamics]
+    for _ in range(rounds):
+        for name, medians in found.items():
+            offer = offers[name]
+            crane = offer.build(offer.settings(), machine)
+            crane.open(run)
+            gc.collect()
+            ends = []
+            for command in waves:
+                crane.step(command, 1.0 / run.rate_hz)
+                ends.append(time.perf_counter())
+            crane.close()
+            medians.append(float(np.median(np.diff(ends)[WARM_UP:])))
+    return {name: float(np.median(medians)) for name, medians in found.items()}
+
+
+def engine_row(found: Mapping[str, float]) -> Row:
+    """Return what a step of MuJoCo's crane takes beside one of PyBullet's."""
+    bullet, mujoco = (1e6 * found[name] for name in ENGINES)
+    return Row("tick", "mujoco_crane, median us", mujoco, bullet, "bullet_crane", ENGINE_LIMIT)
 
 
 KINDS = (("whole", False), ("whole, LSL", True))

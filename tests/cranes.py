@@ -10,19 +10,27 @@ from needs import needs
 
 from labcrane import Dynamics, FloatArray, Machine
 from labcrane.testing import RATE_HZ, make_run
-from labcrane_bullet import labcrane_dynamics
+from labcrane_bullet import labcrane_dynamics as bullet_dynamics
+from labcrane_mujoco import labcrane_dynamics as mujoco_dynamics
 
 needs_bullet = needs("pybullet")
-CRANES = ["kinematic_crane", pytest.param("bullet_crane", marks=needs_bullet)]
+needs_mujoco = needs("mujoco")
+ENGINES = [
+    pytest.param("bullet_crane", marks=needs_bullet),
+    pytest.param("mujoco_crane", marks=needs_mujoco),
+]
+CRANES = ["kinematic_crane", *ENGINES]
 MACHINES = ["ch8", "ch8_cranelike"]
 cranes = pytest.mark.parametrize("name", CRANES)
+engines = pytest.mark.parametrize("name", ENGINES)
 machines = pytest.mark.parametrize("model", MACHINES)
 rates = pytest.mark.parametrize("rate_hz", [240.0, 1000.0])
 
 
 def build(name: str, machine: Machine, actuator: object = "ideal", **hanging: object) -> Dynamics:
     """Return a crane as a rig builds it."""
-    (offer,) = (offer for offer in labcrane_dynamics() if offer.name == name)
+    offers = (*bullet_dynamics(), *mujoco_dynamics())
+    (offer,) = (offer for offer in offers if offer.name == name)
     settings = {"actuator": actuator, **hanging}
     return offer.build(offer.settings.model_validate(settings), machine)
 

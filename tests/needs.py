@@ -86,6 +86,7 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
     "real-time priorities": (_may_run_in_real_time, "docs/lab.md says how a user is allowed them"),
     "root": (lambda: os.geteuid() == 0, "only root may ask what a firewall would do"),
     "pybullet": (lambda: find_spec("pybullet") is not None, "Python 3.11: it has no later wheels"),
+    "mujoco": (lambda: find_spec("mujoco") is not None, "pip install mujoco"),
     "bids-validator-deno": (
         lambda: shutil.which("bids-validator-deno", path=Path(sys.executable).parent) is not None,
         "pip install bids-validator-deno",

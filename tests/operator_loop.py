@@ -19,10 +19,10 @@ from labcrane import (
     Tick,
     Trial,
 )
+from labcrane.core import CraneSettings
 from labcrane.machines import ACTUATOR_PRESETS
 from labcrane.testing import RATE_HZ, ch8, make_run
 from labcrane_bullet.kinematic_crane import KinematicCrane
-from labcrane_bullet.settings import CraneSettings
 from labcrane_operator.operator import SimulatedOperator
 from labcrane_operator.settings import OperatorSettings
 from labcrane_schemes.end_effector import EndEffector

@@ -80,6 +80,13 @@ def test_a_component_that_takes_two_milliseconds_more_a_tick_is_missed(
     assert bool(missed) == bool(slower_s), rows
 
 
+def test_an_engine_that_costs_more_than_it_may_is_missed() -> None:
+    tick = importlib.import_module("benchmarks.tick")
+    missed = importlib.import_module("benchmarks.table").missed
+    assert not missed([tick.engine_row({"bullet_crane": 1e-5, "mujoco_crane": 6e-6})])
+    assert missed([tick.engine_row({"bullet_crane": 1e-5, "mujoco_crane": 8e-6})])
+
+
 def test_memory_is_that_of_the_command_itself_and_not_of_who_started_it() -> None:
     own_process = importlib.import_module("benchmarks.own_process")
     ballast = bytearray(600_000_000)

@@ -130,8 +130,7 @@ def test_a_machine_beside_the_study_is_read_in_degrees_and_gives_radians(tmp_pat
         (
             "speed_deg_s: 20",
             "speed_deg_s: fast",
-            "digger.yaml:4: joints[1].speed_deg_s is 'fast'; it must be a valid number, unable to"
-            " parse string as a number",
+            "digger.yaml:4: joints[1].speed_deg_s is 'fast'; it must be a number, without a unit",
         ),
         (
             "    mass_kg: 9",

@@ -5,6 +5,7 @@ its name, and a command imports what it needs when it runs. The list of all comm
 names and their help only.
 """
 
+import io
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -38,6 +39,9 @@ FEEDBACK, PLUGINS = "feedback", "plugins"
 COMPLETING = "_LABCRANE_COMPLETE"
 """Set by a shell that wants to know what can follow."""
 
+UTF8 = ("utf-8", "utf8")
+"""Names of the encoding in which everything is written."""
+
 PRIVATE = 0o077
 """What labcrane writes is about people: nobody but the user may read it."""
 
@@ -45,6 +49,7 @@ PRIVATE = 0o077
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit status: 2 for what cannot be run as written."""
     before = os.umask(PRIVATE)
+    speak_utf8()
     # Pydantic would look for plugins of its own in all that is installed.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
@@ -65,6 +70,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     finally:
         os.umask(before)
     return 0
+
+
+def speak_utf8() -> None:
+    """Let what is printed into a file or a pipe be UTF-8, here and in processes started here.
+
+    On Windows it would be the code page of the country, which has no word for much of what people
+    write. A terminal keeps its own encoding, and shows a mark for what that does not have.
+    """
+    os.environ["PYTHONIOENCODING"] = "utf-8"
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.encoding.lower() not in UTF8:
+            if stream.isatty():
+                stream.reconfigure(errors="replace")
+            else:
+                stream.reconfigure(encoding="utf-8", errors=stream.errors)
 
 
 def complain(error: LabcraneError) -> None:

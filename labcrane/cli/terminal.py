@@ -3,20 +3,17 @@
 Both run in threads of their own, so that a slow terminal never makes the loop wait.
 """
 
-import codecs
 import math
-import os
 import re
-import select
 import sys
 import threading
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from labcrane.cli.questionnaire import Sheet, Sheets, sheet_line
+from labcrane.cli.typed import lines, next_key, single_keys
 from labcrane.core.items import AnswerError
 from labcrane.core.records import Event, is_done
 from labcrane.core.roles import Questionnaire
@@ -49,7 +46,6 @@ HELP = (
     "space start/go on · p pause · r repeat · s skip · e end · n note · o override · "
     "c completion · h hint · f feedback setting · q fill in the questionnaire"
 )
-POLL_S = 0.1
 
 
 class Terminal:
@@ -124,24 +120,12 @@ class Terminal:
 
     def _listen(self) -> None:
         if not sys.stdin.isatty():
-            self._listen_to_lines()
+            for line in lines(self._over):
+                self._line(line)
             return
-        with _single_keys():
-            while key := self._next_key():
+        with single_keys():
+            while key := next_key(self._over):
                 self._key(key.lower())
-
-    def _listen_to_lines(self) -> None:
-        # Read past sys.stdin, whose buffer would keep the second of two lines from select.
-        descriptor, text = sys.stdin.fileno(), b""
-        while not self._over.is_set():
-            if not select.select([descriptor], [], [], POLL_S)[0]:
-                continue
-            if not (more := os.read(descriptor, 4096)):
-                self._line(text.decode(errors="replace").strip())  # the last one may have no end
-                return
-            *lines, text = (text + more).split(b"\n")
-            for line in lines:
-                self._line(line.decode(errors="replace").strip())
 
     def _line(self, line: str) -> None:
         word, _, text = line.partition(" ")
@@ -161,21 +145,6 @@ class Terminal:
             self._console.give(Command(order, self._ask(PROMPTS[order])))
         else:
             self._console.give(Command(order))
-
-    def _next_key(self) -> str:
-        """Wait for a key; nothing when the session is over, or nobody is there any more.
-
-        Read past the buffer of sys.stdin: what that holds back, select does not see.
-        """
-        letters = codecs.getincrementaldecoder("utf-8")(errors="replace")
-        key = ""
-        while not key and not self._over.is_set():
-            if select.select([sys.stdin], [], [], POLL_S)[0]:
-                byte = os.read(sys.stdin.fileno(), 1)
-                if not byte:
-                    return ""
-                key = letters.decode(byte)  # nothing while the rest of a letter is to come
-        return key
 
     def _fill_in(self) -> None:
         """Ask the questions one by one; what is wrong is asked again.
@@ -206,7 +175,7 @@ class Terminal:
         """Read a line key by key, as the terminal gives single keys now."""
         self._progress.print(prompt, end="")
         text = ""
-        while (key := self._next_key()) not in {"\n", "\r", ""}:
+        while (key := next_key(self._over)) not in {"\n", "\r", ""}:
             text = text[:-1] if key in {"\x7f", "\b"} else text + key
         self._progress.print(text, markup=False)
         return text.strip()
@@ -252,18 +221,3 @@ def _event_line(event: Event) -> str | None:
             return f"{name.removeprefix('order.')}: {data['refused']}"
         case _:
             return sheet_line(event)
-
-
-@contextmanager
-def _single_keys() -> Iterator[None]:
-    """Let the terminal give every key at once, and put it back afterwards."""
-    import termios
-    import tty
-
-    before = termios.tcgetattr(sys.stdin)
-    try:
-        tty.setcbreak(sys.stdin)
-        yield
-    finally:
-        with suppress(termios.error):
-            termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)

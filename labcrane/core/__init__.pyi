@@ -1,29 +1,64 @@
 """The public names of this package, and the modules from which they are imported."""
 
+from .crane import Crane
+from .crane_settings import CraneSettings, GrappleSettings, LoadedCraneSettings
 from .findings import Finding, Verdict
+from .hanging import HangingLoad
 from .items import AnswerError, Answers, Item, Score, numeric_answers
 from .primitives import Shape, TargetFinder
 from .records import CameraImage, SessionState, Value
-from .settings import StudyPath, read_yaml
+from .references import (
+    AxisName,
+    ButtonName,
+    CameraName,
+    Covers,
+    EventName,
+    JointName,
+    LinkName,
+    Once,
+    Reference,
+    SceneObject,
+    SignalName,
+    ViewName,
+)
+from .settings import Names, StudyPath, read_yaml
 from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
 
 __all__ = [
     "AnswerError",
     "Answers",
+    "AxisName",
+    "ButtonName",
     "CameraImage",
+    "CameraName",
+    "Covers",
+    "Crane",
+    "CraneSettings",
+    "EventName",
     "Finding",
+    "GrappleSettings",
+    "HangingLoad",
     "Item",
+    "JointName",
     "Layout",
+    "LinkName",
+    "LoadedCraneSettings",
+    "Names",
+    "Once",
+    "Reference",
+    "SceneObject",
     "Score",
     "SessionState",
     "Shape",
     "SignalChannel",
     "SignalFault",
+    "SignalName",
     "SignalStream",
     "StudyPath",
     "TargetFinder",
     "Value",
     "Verdict",
+    "ViewName",
     "numeric_answers",
     "read_yaml",
     "signals_of",

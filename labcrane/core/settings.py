@@ -1,13 +1,21 @@
 """Settings of components: the model of what a protocol writes beside ``use``."""
 
-from collections.abc import Sequence
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import AfterValidator, ValidationInfo
 
 from labcrane.files.model import StrictModel
 from labcrane.files.yaml import read_yaml as read_yaml  # noqa: PLC0414 - public here
+
+if TYPE_CHECKING:
+    from labcrane.machines.machine import Machine
+
+Names = Mapping[str, Sequence[str]]
+"""Names by kind: ``{"axis": ("left.x", "left.y")}``."""
 
 
 class Settings(StrictModel):
@@ -16,6 +24,19 @@ class Settings(StrictModel):
     def warnings(self) -> Sequence[str]:
         """Return what is allowed but should be known beforehand; ``labcrane check`` says it."""
         return ()
+
+    def provides(self, machine: Machine) -> Names:
+        """Return the names that a component with these settings gives others to refer to, by kind.
+
+        An input says its axes, a task its events, a view its cameras, whatever is seen its objects:
+        :mod:`labcrane.core.references` has the kinds. Of a kind that a component says nothing of,
+        the core looks at the built component's signals, or takes any name for good.
+        """
+        return {}
+
+    def needs(self, machine: Machine) -> Names:
+        """Return the names that a component refers to unwritten, by kind: defaults in use."""
+        return {}
 
 
 def _beside(path: Path, info: ValidationInfo) -> Path:

@@ -4,6 +4,7 @@ Time stamps are on the monotonic clock. A step of the wall clock does not touch 
 slews, it runs fast or slow by up to 500 ppm, and other computers see that as drift.
 """
 
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -41,13 +42,14 @@ def read() -> Reading:
 
 
 def _read() -> tuple[float, Reading]:
-    if not hasattr(time, "CLOCK_MONOTONIC_RAW"):  # Windows slews no monotonic clock
-        now = time.perf_counter()
-        return 0.0, Reading(now, now, time.time())
-    before = time.clock_gettime(time.CLOCK_MONOTONIC)
-    raw = time.clock_gettime(time.CLOCK_MONOTONIC_RAW)
-    wall = time.time()
-    after = time.clock_gettime(time.CLOCK_MONOTONIC)
+    if sys.platform == "win32":  # it slews no monotonic clock
+        before = after = raw = time.perf_counter()
+        wall = time.time()
+    else:
+        before = time.clock_gettime(time.CLOCK_MONOTONIC)
+        raw = time.clock_gettime(time.CLOCK_MONOTONIC_RAW)
+        wall = time.time()
+        after = time.clock_gettime(time.CLOCK_MONOTONIC)
     return after - before, Reading(raw, (before + after) / 2.0, wall)
 
 
@@ -83,7 +85,7 @@ def _resolution() -> Finding:
 def _source(path: Path) -> list[Finding]:
     if not path.is_file():  # no Linux
         return []
-    name = path.read_text().strip()
+    name = path.read_text(encoding="utf-8").strip()
     if name.startswith(GOOD_SOURCES):
         return [Finding(Verdict.PASS, f"the clock source is {name}")]
     fix = "look into the kernel's log why it gave up tsc (dmesg | grep -i clocksource)"

@@ -12,13 +12,13 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import takewhile
-from multiprocessing.connection import Connection
 from pathlib import Path
 
 from pydantic import ValidationError
 
 from labcrane.core.findings import Finding, Verdict
 from labcrane.core.settings import Settings
+from labcrane.processes.pipe import PipeEnd
 from labcrane.protocol.study import Study
 from labcrane.registry.hookspecs import ROLES
 from labcrane.registry.registry import Registry, discover
@@ -94,8 +94,11 @@ def of_everything(registry: Registry) -> tuple[list[Look], list[str]]:
 
 def examine(look: Look, *, move: bool) -> Sequence[Finding]:
     """Return what the plugin finds; ``move`` when a person is there to move things."""
-    with tempfile.NamedTemporaryFile(prefix="labcrane-doctor-") as complaints:
-        return _examine(look, Path(complaints.name), move=move)
+    # A folder: Windows lets no second process open a temporary file that is open here.
+    with tempfile.TemporaryDirectory(prefix="labcrane-doctor-") as folder:
+        complaints = Path(folder) / "complaints"
+        complaints.touch()
+        return _examine(look, complaints, move=move)
 
 
 def _examine(look: Look, complaints: Path, *, move: bool) -> Sequence[Finding]:
@@ -112,7 +115,7 @@ def _examine(look: Look, complaints: Path, *, move: bool) -> Sequence[Finding]:
         found: Sequence[Finding] = ours.recv()
     except EOFError:
         process.join()
-        text = complaints.read_text(errors="replace")
+        text = complaints.read_text(encoding="utf-8", errors="replace")
         if TIMEOUT in text:
             return [_fault(look, f"did not answer within {wait_s:g} s{_stuck(text)}")]
         *_, last = ["", *text.splitlines()]
@@ -156,14 +159,14 @@ def _stuck(complaints: str) -> str:
 
 
 def _look(
-    pipe: Connection,
+    pipe: PipeEnd,
     look: Look,
     move: bool,  # noqa: FBT001
     complaints: str,
     wait_s: float,
 ) -> None:
     # Sound libraries fill the terminal with what they did not find; it is kept for a crash.
-    with Path(complaints).open("a") as file:
+    with Path(complaints).open("a", encoding="utf-8") as file:
         os.dup2(file.fileno(), sys.stderr.fileno())
     registry = discover(study=look.study)
     (role,) = (role for role, entry in ROLES.items() if entry.word == look.role)

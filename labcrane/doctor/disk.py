@@ -12,6 +12,7 @@ from labcrane.core.clock import SystemClock, ticks
 from labcrane.core.findings import Finding, Verdict
 from labcrane.errors import RecordingError
 from labcrane.files.append import AppendFile
+from labcrane.files.system import PRIVATE_MODES
 from labcrane.streams.sync.limits import Limit
 
 NEEDED_BYTES = 1_000_000_000
@@ -30,9 +31,9 @@ VOLATILE = ("tmpfs", "ramfs")
 
 
 def light(folder: Path, needed: float = NEEDED_BYTES) -> list[Finding]:
-    """Return what can be seen at once: free space and the kind of file system."""
+    """Return what can be seen at once: free space, the kind of file system, who may read."""
     place = existing(folder)
-    return [_space(place, needed), *_kind(place)]
+    return [_space(place, needed), *_kind(place), *_privacy(place)]
 
 
 def examine(folder: Path, needed: float = NEEDED_BYTES) -> list[Finding]:
@@ -76,6 +77,16 @@ def file_system(place: Path, mounts: str) -> str:
         if place.is_relative_to(point) and len(point.parts) >= best:
             best, kind = len(point.parts), this
     return kind
+
+
+def _privacy(place: Path) -> list[Finding]:
+    if PRIVATE_MODES:  # every file is written for this user only, wherever it is
+        return []
+    text = f"who may read what is written at {place} is for its access list to say"
+    if place.is_relative_to(Path.home()):
+        return [Finding(Verdict.PASS, f"{text}, and this user's own folders keep others out")]
+    fix = f'icacls "{place}" /inheritance:r /grant:r "%USERNAME%:(OI)(CI)F"'
+    return [Finding(Verdict.WARN, f"{text}: it may be everybody on this computer", fix)]
 
 
 def _speed(place: Path) -> list[Finding]:

@@ -150,7 +150,7 @@ def _ask(address: str, ports: range, wait_s: float) -> tuple[dict[str, ElementTr
                 for each in ready:
                     try:
                         text = each.recv(BYTES).decode(errors="replace")
-                    except ConnectionRefusedError:
+                    except (ConnectionRefusedError, ConnectionResetError):  # Windows says reset
                         refused = True
                         waiting.remove(each)
                         continue

@@ -51,7 +51,7 @@ def examine(rate_hz: float) -> list[Finding]:
 def governor(cpus: Path) -> list[Finding]:
     """Return whether the processor is allowed its full speed, below ``/sys/devices/system/cpu``."""
     files = sorted(cpus.glob("cpu[0-9]*/cpufreq/scaling_governor"))
-    names = sorted({path.read_text().strip() for path in files})
+    names = sorted({path.read_text(encoding="utf-8").strip() for path in files})
     if not names:
         return []
     text = f"the processor's governor is {', '.join(names)}"
@@ -62,15 +62,18 @@ def governor(cpus: Path) -> list[Finding]:
 
 
 def _priorities() -> list[Finding]:
-    if sys.platform != "linux":
-        return []
-    import resource  # noqa: PLC0415 - not on Windows
+    found: list[Finding] = []
+    if sys.platform == "linux":
+        import resource  # noqa: PLC0415 - not on Windows
 
-    _, most = resource.getrlimit(resource.RLIMIT_RTPRIO)
-    if most != 0 or os.geteuid() == 0:
-        return [Finding(Verdict.PASS, "real-time priorities are allowed")]
-    fix = (
-        "for sound by JACK: add '@audio - rtprio 95' to /etc/security/limits.d/audio.conf, join "
-        "the group audio, log in again"
-    )
-    return [Finding(Verdict.WARN, "real-time priorities are not allowed to this user", fix)]
+        _, most = resource.getrlimit(resource.RLIMIT_RTPRIO)
+        if most != 0 or os.geteuid() == 0:
+            found.append(Finding(Verdict.PASS, "real-time priorities are allowed"))
+        else:
+            fix = (
+                "for sound by JACK: add '@audio - rtprio 95' to /etc/security/limits.d/audio.conf, "
+                "join the group audio, log in again"
+            )
+            text = "real-time priorities are not allowed to this user"
+            found.append(Finding(Verdict.WARN, text, fix))
+    return found

@@ -9,8 +9,8 @@ from pathlib import Path
 from labcrane.registry.hookspecs import PROJECT
 
 LIBRARIES = (
-    "numpy", "scipy", "pandas", "h5py", "pydantic", "pylsl", "panda3d", "pybullet", "pyo", "pygame",
-    "python-can", "nicegui", "typer",
+    "numpy", "scipy", "pandas", "h5py", "pydantic", "pylsl", "panda3d", "mujoco", "pybullet", "pyo",
+    "pygame", "python-can", "nicegui", "typer",
 )  # fmt: skip
 """Distributions whose version has explained a fault before."""
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from labcrane.errors import RecordingError
 from labcrane.files.atomic import PRIVATE_FILE, sync_folder
+from labcrane.files.system import BINARY, free_bytes, sync
 
 SYNC_S = 1.0
 """Longest time, in seconds, that data wait for the disk: what a power cut can take."""
@@ -52,7 +53,7 @@ class AppendFile:
         self._sync_s = sync_s
         self._fd = _create(path)
         self._identity = _identity(os.fstat(self._fd))
-        self.free = _free(path)
+        self.free = free_bytes(path)
         self._ragged = False
         self.synced = 0
         self._failure: OSError | None = None
@@ -106,7 +107,7 @@ class AppendFile:
         """Bring all that was written to the disk now."""
         size = self.size
         try:
-            _datasync(self._fd)
+            sync(self._fd)
         except OSError as failure:
             raise self._error("bring to disk", failure) from failure
         self.synced = size
@@ -145,10 +146,10 @@ class AppendFile:
     def _keep_syncing(self) -> None:
         while not self._stop.wait(self._sync_s):
             try:
-                self.free = _free(self.path)
+                self.free = free_bytes(self.path)
                 if self.size > self.synced:
                     size = self.size
-                    _datasync(self._fd)
+                    sync(self._fd)
                     self.synced = size
             except OSError as failure:
                 self._failure = failure
@@ -165,8 +166,9 @@ class AppendFile:
 
 def _create(path: Path) -> int:
     """Open a new file, and make its name as durable as its content."""
+    flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL | BINARY
     try:
-        fd = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_EXCL, PRIVATE_FILE)
+        fd = os.open(path, flags, PRIVATE_FILE)
     except FileExistsError as error:
         raise RecordingError(
             f"{path} exists already and is not overwritten; go on in a new part"
@@ -181,12 +183,3 @@ def _create(path: Path) -> int:
 def _identity(status: os.stat_result) -> tuple[int, int]:
     """Return what tells a file from any other on this computer."""
     return status.st_dev, status.st_ino
-
-
-def _free(path: Path) -> int:
-    """Return the bytes free on the disk that holds ``path``."""
-    disk = os.statvfs(path)
-    return disk.f_bavail * disk.f_frsize
-
-
-_datasync = getattr(os, "fdatasync", os.fsync)  # macOS has only fsync

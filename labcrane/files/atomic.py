@@ -49,7 +49,7 @@ def replacing(path: Path, mode: int = PRIVATE_FILE) -> Iterator[Path]:
         beside.unlink(missing_ok=True)  # left by a process that was killed
         os.close(os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, PRIVATE_FILE))
         yield beside
-        with beside.open("rb") as file:
+        with beside.open("r+b") as file:  # Windows syncs only what may be written
             os.fsync(file.fileno())
         beside.chmod(mode)
         beside.replace(path)

@@ -1,5 +1,6 @@
 """One process at a time; a killed one holds nothing."""
 
+import math
 import os
 import sys
 import time
@@ -10,6 +11,9 @@ from pathlib import Path
 from labcrane.errors import RecordingError
 from labcrane.files.atomic import PRIVATE_FILE, make_folder
 
+LOOK_S = 0.05
+"""How often a lock that somebody else holds is tried again."""
+
 
 @contextmanager
 def exclusive(path: Path) -> Iterator[None]:
@@ -17,21 +21,10 @@ def exclusive(path: Path) -> Iterator[None]:
     make_folder(path.parent)
     fd = os.open(path, os.O_RDWR | os.O_CREAT, PRIVATE_FILE)
     try:
-        if sys.platform == "win32":
-            import msvcrt  # noqa: PLC0415 - Windows only
-
-            msvcrt.locking(fd, msvcrt.LK_LOCK, 1)
-        else:
-            import fcntl  # noqa: PLC0415 - Unix only
-
-            fcntl.flock(fd, fcntl.LOCK_EX)
+        _lock(fd, wait=True)
         yield
     finally:
         os.close(fd)
-
-
-LOOK_S = 0.05
-"""How often a lock that somebody else holds is tried again."""
 
 
 @contextmanager
@@ -69,24 +62,40 @@ def held(path: Path, refusal: str, patience_s: float = 0.0) -> Iterator[None]:
 
 
 def _locked(path: Path) -> int | None:
-    """Return an open file with the lock on its first byte; None when somebody else has it."""
+    """Return an open file with the lock on it; None when somebody else has it."""
     fd = os.open(path, os.O_RDWR | os.O_CREAT, PRIVATE_FILE)
-    try:
-        if sys.platform == "win32":
-            import msvcrt  # noqa: PLC0415 - Windows only
-
-            msvcrt.locking(fd, msvcrt.LK_NBLCK, 1)
-        else:
-            import fcntl  # noqa: PLC0415 - Unix only
-
-            fcntl.flock(fd, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            if not _is_at(path, fd):  # whoever held it has removed it meanwhile
-                os.close(fd)
-                return _locked(path)
-    except OSError:
+    if not _lock(fd, wait=False):
         os.close(fd)
         return None
+    if not _is_at(path, fd):  # whoever held it has removed it meanwhile
+        os.close(fd)
+        return _locked(path)
     return fd
+
+
+def _lock(fd: int, *, wait: bool) -> bool:
+    """Lock a file, on Windows its first byte; False when another open file has the lock."""
+    if sys.platform == "win32":
+        import msvcrt  # noqa: PLC0415 - Windows only
+
+        os.lseek(fd, 0, os.SEEK_SET)
+        while True:
+            try:
+                msvcrt.locking(fd, msvcrt.LK_NBLCK, 1)
+            except PermissionError:
+                if not wait:
+                    return False
+                time.sleep(LOOK_S)  # Windows' own waiting, LK_LOCK, gives up after ten seconds
+            else:
+                break
+    else:
+        import fcntl  # noqa: PLC0415 - Unix only
+
+        try:
+            fcntl.flock(fd, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except BlockingIOError:
+            return False
+    return True
 
 
 def _is_at(path: Path, fd: int) -> bool:
@@ -106,9 +115,13 @@ def _owner(path: Path) -> str:
         return "unknown"
 
 
+ALONE = ".labcrane-at-work"
+"""The lock file of a folder on Windows, where a folder itself cannot be held."""
+
+
 @contextmanager
 def alone_in(folder: Path, *, wait: bool = True) -> Iterator[None]:
-    """Hold a folder, which is there, without a lock file; Windows cannot.
+    """Hold a folder, which is there: without a lock file, but on Windows.
 
     Raises
     ------
@@ -116,18 +129,16 @@ def alone_in(folder: Path, *, wait: bool = True) -> Iterator[None]:
         Another process holds it, and it is not to be waited for.
     """
     if sys.platform == "win32":
-        yield
-        return
-    import fcntl  # noqa: PLC0415 - Unix only
-
-    fd = os.open(folder, os.O_RDONLY)
-    try:
+        with held(folder / ALONE, BUSY.format(folder), math.inf if wait else 0.0):
+            yield
+    else:
+        fd = os.open(folder, os.O_RDONLY)
         try:
-            fcntl.flock(fd, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-        except BlockingIOError:
-            raise RecordingError(
-                f"another labcrane is at work in {folder}; wait for it, or give another folder"
-            ) from None
-        yield
-    finally:
-        os.close(fd)
+            if not _lock(fd, wait=wait):
+                raise RecordingError(BUSY.format(folder))
+            yield
+        finally:
+            os.close(fd)
+
+
+BUSY = "another labcrane is at work in {}; wait for it, or give another folder"

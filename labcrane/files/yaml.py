@@ -1,7 +1,8 @@
 """A YAML file that remembers where everything stands, so that every mistake gets a line."""
 
 import re
-from collections.abc import Mapping, Set
+import warnings
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
@@ -11,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning, YAMLError
 from ruamel.yaml.reader import ReaderError
 
 from labcrane.errors import ProtocolError, suggestion
@@ -31,6 +32,7 @@ GARBLED = (ValueError, LookupError, TypeError, ArithmeticError, AttributeError, 
 
 _MARKS = re.compile(r"[,:\[\]{}\n-]")
 _BRACKETS = re.compile(r"[\[\]{}]")
+_MEMBER = re.compile(r"\[.*[\]'\"]|^(constrained-)?(str|int|float|bool)$")
 _STAIRS = re.compile(r"(?:[-?:] *){50}| {200}")
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
@@ -58,7 +60,7 @@ class YamlFile:
     text: str
     data: Any
     _marked: Any = None
-    _problems: list[tuple[int, str]] = field(default_factory=list)
+    _problems: list[tuple[int, int, str]] = field(default_factory=list)
 
     @classmethod
     def read(cls, path: Path) -> "YamlFile":
@@ -85,7 +87,35 @@ class YamlFile:
 
     def problem(self, place: Place, message: str) -> None:
         """Note a mistake at ``place``."""
-        self._problems.append((self.line(place), message))
+        self._problems.append((self.line(place), 0, message))
+
+    def misnamed(self, place: Place, message: str, *, key: bool = False) -> None:
+        """Note a mistake in the value at ``place``, or in its key, with line and column."""
+        line, column = self._position(place, key=key)
+        self._problems.append((line, column, message))
+
+    def _position(self, place: Place, *, key: bool) -> tuple[int, int]:
+        """Return line and column, from 1, of the value at ``place``; column 0 where none is known.
+
+        What a merge or a default brought stands somewhere else: its line is that of what holds it.
+        """
+        node = self._marked
+        for step in place[:-1]:
+            inside = isinstance(node, CommentedMap) and step in node
+            if not inside and not (isinstance(node, CommentedSeq) and _is_index(step, node)):
+                return self.line(place), 0
+            node = node[step]
+        last = place[-1] if place else None
+        try:
+            if isinstance(node, CommentedMap) and last in node:
+                line, column = node.lc.key(last) if key else node.lc.value(last)
+            elif isinstance(node, CommentedSeq) and _is_index(last, node):
+                line, column = node.lc.item(last)
+            else:
+                return self.line(place), 0
+        except KeyError:  # merged in from an anchor
+            return self.line(place[:-1]), 0
+        return line + 1, column + 1
 
     def check(self, model: type[ModelT], place: Place = (), value: Any = None) -> ModelT | None:
         """Return what stands at ``place`` as a ``model``, or note what is wrong and return None.
@@ -102,8 +132,8 @@ class YamlFile:
         try:
             return model.model_validate(value, context={"folder": self.path.parent})
         except ValidationError as error:
-            for each in error.errors():
-                self.problem((*place, *_inside(value, each)), explain(each, place, model))
+            for at, message in _told(error.errors(), place, model):
+                self.problem((*place, *_inside(value, at)), message)
             return None
 
     def checked(self, model: type[ModelT]) -> ModelT:
@@ -117,8 +147,35 @@ class YamlFile:
     def raise_problems(self) -> None:
         """Raise :class:`ProtocolError` with one line for every mistake, in the file's order."""
         if self._problems:
-            lines = [f"{self.path}:{line}: {message}" for line, message in sorted(self._problems)]
+            lines = [
+                f"{self.path}:{line}:{column}: {text}" if column else f"{self.path}:{line}: {text}"
+                for line, column, text in sorted(self._problems)
+            ]
             raise ProtocolError("\n".join(dict.fromkeys(lines)))
+
+
+def _told(
+    errors: Sequence[ErrorDetails], place: Place, model: type[BaseModel]
+) -> Iterator[tuple[Place, str]]:
+    """Yield what pydantic complains of; where a value is no member of a union, in one line.
+
+    Pydantic complains once for every member, each as if it were the only one.
+    """
+    unions: dict[Place, list[ErrorDetails]] = {}
+    for each in errors:
+        loc = each["loc"]
+        at = next((n for n, step in enumerate(loc) if _is_member(step)), None)
+        if at is None or at + 1 < len(loc):
+            yield loc, explain(each, place, model)
+        else:
+            unions.setdefault(loc[:at], []).append(each)
+    for loc, several in unions.items():
+        said = [explain(each, place, model) for each in several]
+        head, wanted = (
+            said[0].partition("; it must be ")[0],
+            [text.partition("; it must be ")[2] or text for text in said],
+        )
+        yield loc, f"{head}; it must be {', or '.join(dict.fromkeys(wanted))}"
 
 
 def explain(error: ErrorDetails, place: Place, model: type[BaseModel]) -> str:
@@ -131,10 +188,64 @@ def explain(error: ErrorDetails, place: Place, model: type[BaseModel]) -> str:
         return f"{str(key)!r} is not a key of {_name((*place, *loc[:-1]))}; {instead}"
     if error["type"] == "missing":
         return f"{_name((*place, *loc[:-1]))} needs {str(key)!r}"
+    name = _name((*place, *(step for step in loc if not _is_member(step))))
     what = error["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     if error["type"] == "value_error":
-        return f"{_name((*place, *loc))}: {what}"
-    return f"{_name((*place, *loc))} is {error['input']!r}; it must be {what}"
+        return f"{name}: {what}"
+    if error["type"] in {"too_short", "too_long"}:
+        return f"{name} is {_short(error['input'])}; {_how_many(error)}"
+    if error["type"] == "string_pattern_mismatch":
+        what = PATTERNS.get(error.get("ctx", {}).get("pattern", ""), what)
+    return f"{name} is {_short(error['input'])}; it must be {WANTED.get(error['type'], what)}"
+
+
+WANTED = {
+    "tuple_type": "a list: [.., ..]",
+    "list_type": "a list: [.., ..]",
+    "dict_type": "a mapping of keys: {key: value}",
+    "model_type": "a mapping of keys: {key: value}",
+    "string_type": "text; put it in quotation marks if it is",
+    "bool_type": "true or false",
+    "int_type": "a whole number",
+    "int_parsing": "a whole number",
+    "float_type": "a number, without a unit",
+    "float_parsing": "a number, without a unit",
+}
+"""What each of pydantic's types is for people who write YAML."""
+
+PATTERNS = {
+    "^[a-z][a-z0-9_-]*$": "lower-case letters, digits, hyphens and underscores, a letter first",
+    "^[a-z][a-z0-9_]*$": "lower-case letters, digits and underscores, a letter first",
+    "^-?[a-z][a-z0-9_.]*$": "the name of an axis, as left.x, or -left.x to turn it round",
+}
+"""Patterns in words."""
+
+MOST_SHOWN = 60
+"""Characters of a value that a message repeats."""
+
+
+def _short(value: object) -> str:
+    """Return a value as a message repeats it: a whole section is not printed over a screen."""
+    text = repr(value)
+    if len(text) <= MOST_SHOWN:
+        return text
+    if isinstance(value, Mapping):
+        return f"a mapping of {', '.join(map(str, value))}"[:MOST_SHOWN]
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}"
+    return f"{text[:MOST_SHOWN]}..."
+
+
+def _how_many(error: ErrorDetails) -> str:
+    about = error.get("ctx", {})
+    if error["type"] == "too_short":
+        return f"it needs at least {about.get('min_length')}"
+    return f"it can have at most {about.get('max_length')}"
+
+
+def _is_member(step: object) -> bool:
+    """Whether part of pydantic's location is its name for a member of a union."""
+    return isinstance(step, str) and bool(_MEMBER.search(step))
 
 
 def _keys(model: type[BaseModel], place: Place) -> list[str]:
@@ -154,10 +265,10 @@ def _is_model(annotation: Any) -> bool:
     return isinstance(annotation, type) and issubclass(annotation, BaseModel)
 
 
-def _inside(value: Any, error: ErrorDetails) -> Place:
+def _inside(value: Any, loc: Place) -> Place:
     """Return the part of pydantic's location that is really in the file."""
     place: list[str | int] = []
-    for step in error["loc"]:
+    for step in loc:
         is_key = isinstance(value, Mapping) and step in value
         is_item = isinstance(value, list) and isinstance(step, int) and step < len(value)
         if not (is_key or is_item):
@@ -165,6 +276,10 @@ def _inside(value: Any, error: ErrorDetails) -> Place:
         value = value[step]
         place.append(step)
     return tuple(place)
+
+
+def _is_index(step: object, node: CommentedSeq) -> bool:
+    return isinstance(step, int) and 0 <= step < len(node)
 
 
 def _name(place: Place) -> str:
@@ -193,7 +308,14 @@ def read_text(path: Path) -> str:
         ) from None
     except LimitError as error:
         raise ProtocolError(f"{path} cannot be read: {error}; split it up") from None
-    except (OSError, ValueError) as error:  # a path with a NUL, bytes that are no UTF-8
+    except UnicodeDecodeError as error:
+        raw: bytes = error.object
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise ProtocolError(
+            f"{path}:{line}: byte 0x{raw[error.start]:02X} is no UTF-8; open the file in an "
+            "editor and save it as UTF-8"
+        ) from None
+    except (OSError, ValueError) as error:  # a path with a NUL
         raise ProtocolError(f"{path} cannot be read: {error}") from error
 
 
@@ -254,9 +376,21 @@ def _load(text: str, name: str) -> Any:
         raise ProtocolError(f"{name}:{line}: nested deeper than {DEEPEST} levels; write it flat")
     try:
         # Also where no line is asked for: the plain loader copies each merge into the next.
-        return YAML(typ="rt", pure=True).load(text)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", ReusedAnchorWarning)
+            return YAML(typ="rt", pure=True).load(text)
+    except ReusedAnchorWarning as error:
+        raise ProtocolError(
+            f"{name}: this is no YAML that can be trusted: an anchor is given twice; give each its "
+            "own name"
+        ) from error
     except MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
+        if "'\\t'" in str(error.problem):
+            raise ProtocolError(
+                f"{name}:{line}: there is a tab, which YAML does not take for indentation; write "
+                "spaces, and set the editor to do so"
+            ) from error
         raise ProtocolError(f"{name}:{line}: this is no YAML: {error.problem}") from error
     except ReaderError as error:
         line = text.count("\n", 0, error.position) + 1

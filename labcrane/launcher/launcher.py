@@ -13,7 +13,6 @@ import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 
 from labcrane.core.records import Event
@@ -21,6 +20,7 @@ from labcrane.feedback.processes import FeedbackProcesses, log_requests
 from labcrane.launcher.hang_detector import HangDetector
 from labcrane.launcher.session_process import Ended, Offered, serve
 from labcrane.launcher.signal_reporter import SignalReporter, monitor_config
+from labcrane.processes.pipe import PipeEnd
 from labcrane.recording.crash_marker import read_whereabouts
 from labcrane.recording.paths import parts
 from labcrane.session.commands import (
@@ -84,7 +84,7 @@ class MessageSender:
     for it is the launcher that finds out.
     """
 
-    def __init__(self, pipe: Connection, say: Callable[[str], None]) -> None:
+    def __init__(self, pipe: PipeEnd, say: Callable[[str], None]) -> None:
         self._pipe = pipe
         self._say = say
         self._waiting: queue.Queue[bytes | None] = queue.Queue(MOST_WAITING)
@@ -125,7 +125,7 @@ class MessageReceiver:
         Whether it will say no more, and all it said has been taken: it has ended or died.
     """
 
-    def __init__(self, pipe: Connection) -> None:
+    def __init__(self, pipe: PipeEnd) -> None:
         self.over = False
         self._pipe = pipe
         self._said: queue.SimpleQueue[Event | Offered | Ended | None] = queue.SimpleQueue()

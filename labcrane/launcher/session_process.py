@@ -10,10 +10,10 @@ import signal
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 
 from labcrane.core.records import Event
 from labcrane.errors import LabcraneError
+from labcrane.processes.pipe import PipeEnd
 from labcrane.session.commands import (
     MOST_BYTES,
     Command,
@@ -51,7 +51,7 @@ class PipeConsole:
     nobody could stop it any more.
     """
 
-    def __init__(self, pipe: Connection) -> None:
+    def __init__(self, pipe: PipeEnd) -> None:
         self._pipe = pipe
         self._incoming: queue.SimpleQueue[Message] = queue.SimpleQueue()
         self._outgoing: queue.SimpleQueue[Event | Offered | Ended] = queue.SimpleQueue()
@@ -98,7 +98,7 @@ class PipeConsole:
                 return
 
 
-def serve(visit: bytes, pipe: Connection) -> None:
+def serve(visit: bytes, pipe: PipeEnd) -> None:
     """Run a session; the process's main function. ``visit`` is pickled: it loads the study."""
     # An interrupt from the keyboard reaches the launcher too, which ends the session in order.
     signal.signal(signal.SIGINT, signal.SIG_IGN)

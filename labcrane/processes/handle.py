@@ -245,5 +245,7 @@ def _speak(life: _Life) -> None:
 def _apart() -> Mapping[str, Any]:
     """Return how a child is kept from the terminal's interrupts: it ends when it is told to."""
     if sys.platform == "win32":
-        return {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
-    return {"start_new_session": True}
+        apart: Mapping[str, Any] = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
+    else:
+        apart = {"start_new_session": True}
+    return apart

@@ -70,6 +70,16 @@ class Participants(Section):
             raise ValueError(f"{pattern!r} is no regular expression: {error}") from None
         return pattern
 
+    @property
+    def ends_early(self) -> bool:
+        """Whether the pattern asks for a sign before its beginning or behind its end.
+
+        Of patterns with alternatives nothing is said: another one may match.
+        """
+        plain = re.sub(r"\\[AbBZ]", "", self.pattern)
+        plain = re.sub(r"\\.|\[\^?\]?[^]]*\]", "x", plain)
+        return "|" not in plain and bool(re.search(r"\$\w(?![*?{])|\w\^", plain))
+
 
 class OnFault(Section):
     """What happens when something fails during a session."""

@@ -13,6 +13,7 @@ from labcrane.files.yaml import Place, YamlFile
 from labcrane.machines.machine import Machine
 from labcrane.protocol.components import ComponentResolver, ComponentSpec
 from labcrane.protocol.protocol import DEFAULT_OPERATOR, Protocol, read
+from labcrane.protocol.references import Parts, ReferenceChecker, twice
 from labcrane.protocol.steps import Block
 from labcrane.registry.call_monitor import CallMonitor
 from labcrane.registry.registry import Registry
@@ -143,10 +144,26 @@ class Checker:
     def check(self, tasks: Mapping[str, Task], asked: Mapping[str, Questionnaire]) -> None:
         """Note every such mistake, given the tasks and questionnaires that could be built."""
         self._check_feedback()
+        self._check_names()
+        if self._protocol.participants.ends_early:
+            self._source.misnamed(
+                ("participants", "pattern"),
+                f"participants.pattern '{self._protocol.participants.pattern}' is matched by "
+                "nobody; ^ stands at a name's beginning only and $ at its end, and neither is "
+                "needed",
+            )
         self._check_blocks(tasks)
         self._check_stop_rules(asked)
         if len(tasks) == len(self._protocol.tasks):
             self._check_order(tasks)
+
+    def _check_names(self) -> None:
+        """Note two sessions of one name."""
+        names = [session.name for session in self._protocol.sessions]
+        for name in twice(names):
+            number = len(names) - 1 - names[::-1].index(name)
+            message = f"two sessions are called {name!r}; give each a name of its own"
+            self._source.misnamed(("sessions", number, "name"), message)
 
     def _check_blocks(self, tasks: Mapping[str, Task]) -> None:
         """Note blocks that name no task, or limit what the task does not vary."""
@@ -214,11 +231,16 @@ class Checker:
                 self._source.problem(place, f"there is no feedback {name!r}; there is {known}")
 
 
-def load(path: Path, registry: Registry) -> Study:
+def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
     """Read and check a protocol.
 
     Components are checked even when other parts of the file are wrong, so that one look at the
     messages is enough.
+
+    Parameters
+    ----------
+    recorded
+        Whether it has been run: what its components refer to was there, and is not looked up again.
 
     Raises
     ------
@@ -242,6 +264,19 @@ def load(path: Path, registry: Registry) -> Study:
     if protocol is not None:
         Checker(source, protocol).check(tasks, questionnaires)
     monitors, others = chooser.choose_monitors(), chooser.choose_others()
+    if machine and not recorded:
+        chosen: dict[Place, ComponentSpec | None] = {
+            ("input",): device,
+            ("operator",): operator,
+            ("scheme",): scheme,
+            ("dynamics",): dynamics,
+            **{("tasks", name): choice for name, choice in choices.items()},
+            **{("feedback", name): choice for name, choice in (cues | sounds).items()},
+            **{("views", name): choice for name, choice in views.items()},
+            **{tuple(part.split(".", 1)): choice for part, choice in others.items()},
+        }
+        there = {place: choice for place, choice in chosen.items() if choice}
+        ReferenceChecker(source, Parts(machine[0], there, tasks)).check()
     source.raise_problems()
     if not (protocol and machine and device and operator and scheme and dynamics):
         raise AssertionError("a missing part is a problem, and problems were raised")

@@ -120,7 +120,11 @@ def replay_session(
             "not part of the input, so only sessions of one piece can be replayed"
         )
     with TemporaryDirectory(prefix="labcrane-replay-") as folder:
-        study = load(restore(record, Path(folder), protocol, machine), discover(study=protocol))
+        study = load(
+            restore(record, Path(folder), protocol, machine),
+            discover(study=protocol),
+            recorded=True,
+        )
         parts = differing_parts(record, study)
         return _run(record, study, session, parts, speed, sinks)  # components read files too
 

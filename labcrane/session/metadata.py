@@ -23,6 +23,7 @@ from labcrane.session.visit import Visit
 
 RECORDED_PACKAGES = (
     "labcrane",
+    "mujoco",
     "numpy",
     "panda3d",
     "pybullet",

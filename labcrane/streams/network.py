@@ -90,7 +90,7 @@ def use_loopback() -> Network:
             "was set; call use_loopback() first"
         )
     handle, name = tempfile.mkstemp(prefix="labcrane-lsl-", suffix=".cfg")
-    with os.fdopen(handle, "w") as file:
+    with os.fdopen(handle, "w", encoding="utf-8") as file:
         file.write(LOOPBACK)
     atexit.register(_remove, name, os.getpid())
     os.environ[VARIABLE] = name
@@ -103,7 +103,7 @@ def describe() -> Network:
         return Network(None, loopback=False)
     parser = configparser.ConfigParser(strict=False, interpolation=None)
     try:
-        parser.read_string(Path(name).read_text())
+        parser.read_string(Path(name).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, configparser.Error) as error:
         raise StreamError(
             f"{VARIABLE} names {name}, which cannot be read ({error}); correct it or unset it"
@@ -121,7 +121,7 @@ def port_range() -> range:
     """
     parser = configparser.ConfigParser(strict=False, interpolation=None)
     if config := describe().config:
-        parser.read_string(config.read_text())
+        parser.read_string(config.read_text(encoding="utf-8"))
     first = parser.getint("ports", "BasePort", fallback=FIRST_PORT)
     return range(first, first + parser.getint("ports", "PortRange", fallback=PORTS))
 

@@ -5,11 +5,12 @@ import queue
 import socket
 import threading
 from collections.abc import Callable
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import wait
 from typing import Any
 
 from labcrane.core.records import Event
 from labcrane.errors import DeviceError
+from labcrane.processes.pipe import PipeEnd
 from labcrane.session.commands import Command
 from labcrane.web.service import PageConfig, Report, Streams, Used, serve
 
@@ -107,7 +108,7 @@ class PageHandle:
             self.restarts += 1
             self._say("the page died and is started again")
 
-    def _receive(self, pipe: Connection, sentinel: int) -> None:
+    def _receive(self, pipe: PipeEnd, sentinel: int) -> None:
         while not self._over.is_set():
             ready = wait([pipe, sentinel], LOOK_S)
             self._news.put(Streams(self._streams()))
@@ -125,7 +126,7 @@ class PageHandle:
         else:
             self._give(message)
 
-    def _send(self, pipe: Connection) -> None:
+    def _send(self, pipe: PipeEnd) -> None:
         news = self._news
         while (message := news.get()) is not None:
             try:

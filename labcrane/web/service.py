@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from labcrane.approval.lock import read_lock
 from labcrane.core.records import Event
 from labcrane.design.plan import plan_session
 from labcrane.limits import LIMITS
+from labcrane.processes.pipe import PipeEnd
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
@@ -89,7 +89,7 @@ class Report:
     lines: list[str]
 
 
-def serve(order: PageConfig, pipe: Connection) -> None:
+def serve(order: PageConfig, pipe: PipeEnd) -> None:
     """Serve both pages until the launcher closes the pipe; the process's main function."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the launcher says when it is over
     if hasattr(os, "nice"):
@@ -147,7 +147,7 @@ def _count(denials: Denials) -> None:
         denials.flush()
 
 
-def _listen(pipe: Connection, board: SessionView, end: Callable[[], None]) -> None:
+def _listen(pipe: PipeEnd, board: SessionView, end: Callable[[], None]) -> None:
     while True:
         try:
             message = pipe.recv()

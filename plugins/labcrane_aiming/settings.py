@@ -1,10 +1,22 @@
 """Settings of the aiming task."""
 
+import math
 from typing import Annotated, Literal
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import (
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+    ValidationInfo,
+    field_validator,
+)
 
-from labcrane import Settings
+from labcrane import Machine, Settings
+from labcrane.core import ButtonName, Names
+
+EVENTS = ("targets.shown", "target.entered", "command.onset", "movement.onset", "movement.offset")
+"""What a movement tells beside its beginning and end."""
 
 
 class AimingSettings(Settings):
@@ -33,7 +45,7 @@ class AimingSettings(Settings):
     """What ends a movement: the tip at rest inside the circle, the tip at rest once most of the
     way is done, or the trigger. With ``rest_inside`` an error cannot exceed the radius."""
 
-    trigger: str = "right.trigger"
+    trigger: ButtonName = "right.trigger"
     """The button that ends a movement when ``end`` is ``trigger``."""
 
     rest_speed: PositiveFloat = 0.02
@@ -56,3 +68,30 @@ class AimingSettings(Settings):
 
     limit_s: PositiveFloat = 30.0
     """Longest a movement may take, in seconds; then it ends as a time-out."""
+
+    def provides(self, machine: Machine) -> Names:
+        return {"object": ("target", "other"), "event": EVENTS}
+
+    def needs(self, machine: Machine) -> Names:
+        return {"axis": [self.trigger]} if self.end == "trigger" else {}
+
+    @field_validator("distances")
+    @classmethod
+    def _each_is_one(cls, distances: tuple[float, ...]) -> tuple[float, ...]:
+        if twice := [each for each in distances if distances.count(each) > 1]:
+            raise ValueError(
+                f"{twice[0]:g} m is there twice; write each distance once, and decimals with a "
+                "point: [1.5, 2.5, 4]"
+            )
+        return distances
+
+    @field_validator("width")
+    @classmethod
+    def _circles_are_apart(cls, width: float, info: ValidationInfo) -> float:
+        shortest = min(info.data.get("distances", ()), default=math.inf)
+        if width >= shortest:
+            raise ValueError(
+                f"a circle {width:g} m wide holds the middle of its partner {shortest:g} m away; "
+                f"write less than {shortest:g}"
+            )
+        return width

@@ -7,11 +7,9 @@ from importlib.metadata import version
 from pathlib import Path
 
 from labcrane import FloatArray, Machine, PluginError, Run
-from labcrane.core import Value
+from labcrane.core import Crane, CraneSettings, Value
 from labcrane.machines import urdf_of
-from labcrane_bullet.crane import Crane
 from labcrane_bullet.engine import pybullet
-from labcrane_bullet.settings import CraneSettings
 
 GRAVITY = 9.81
 """In m/s²."""

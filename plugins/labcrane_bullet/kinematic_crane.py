@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from labcrane import FloatArray
-from labcrane_bullet.crane import Crane
+from labcrane.core import Crane
 
 
 class KinematicCrane(Crane):

@@ -5,8 +5,8 @@ from typing import Annotated
 
 from pydantic import Field, PositiveFloat, PositiveInt, field_validator, model_validator
 
-from labcrane import Settings
-from labcrane.core import StudyPath
+from labcrane import Machine, Settings
+from labcrane.core import JointName, Names, StudyPath
 
 Node = Annotated[int, Field(ge=0, le=253)]
 """Source address on the bus; 254 and 255 are no node."""
@@ -20,7 +20,7 @@ Valve = Annotated[int, Field(ge=1, le=15)]
 class ValveMap(Settings):
     """Which messages are the commands of which joints."""
 
-    valves: dict[str, Valve | str]
+    valves: dict[JointName, Valve | str]
     """For each joint the number of its auxiliary valve, or with ``map`` the name of message and
     signal: ``Levers.Boom``."""
 
@@ -40,6 +40,10 @@ class ValveMap(Settings):
     timeout_s: PositiveFloat = 0.25
     """Age, in seconds, at which a valve's last command counts no more and the valve shuts; the
     panel is lost when that is so of all of them, or of one that was open."""
+
+    def provides(self, machine: Machine) -> Names:
+        pairs = [f"{what}.{joint}" for what in ("valve", "float") for joint in self.valves]
+        return {"axis": [*pairs, "panel.connected"]}
 
     @model_validator(mode="after")
     def _names_need_a_map(self) -> "ValveMap":

@@ -4,17 +4,14 @@ from typing import Annotated
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from labcrane import Settings
-from labcrane.core import StudyPath
-
-AxisName = Annotated[str, Field(pattern=r"^-?[a-z][a-z0-9_.]*$")]
-"""An axis of the input, ``valve.boom``; a leading minus turns it round."""
+from labcrane import Machine, Settings
+from labcrane.core import AxisName, JointName, Names, Once, StudyPath, read_yaml
 
 
 class ValveSettings(Settings):
     """The operator's axes go to the valves as they are."""
 
-    map: dict[str, AxisName] = Field(default_factory=dict)
+    map: Annotated[dict[JointName, AxisName], Once()] = Field(default_factory=dict)
     """Which axis opens which joint's valve; joints that are not named here have the axis
     ``valve.<joint>``, which is what a control panel gives."""
 
@@ -22,11 +19,14 @@ class ValveSettings(Settings):
     """The arm's Dynamic Model Description, for simulated operators: a practised hand knows how
     far to push for a speed. Without one they take speed for proportional to the signal."""
 
+    def needs(self, machine: Machine) -> Names:
+        return {"axis": [f"valve.{name}" for name in machine.names if name not in self.map]}
+
 
 class JawsSettings(Settings):
     """The pair of jaws at the end of the arm."""
 
-    joint: str = "jaws"
+    joint: JointName = "jaws"
     """The machine's joint whose angle is their opening. It must be the last and have length 0: the
     arm's tip is the point between the jaws."""
 
@@ -65,7 +65,7 @@ class ArmSettings(Settings):
     model: StudyPath
     """The model's YAML file, made with ``labcrane dmd fit``."""
 
-    proportional: tuple[str, ...] = ()
+    proportional: tuple[JointName, ...] = ()
     """Joints that the model does not describe and whose speed is proportional to the signal, up
     to the machine's joint speed. Every joint is either here or in the model."""
 
@@ -81,3 +81,18 @@ class ArmSettings(Settings):
 
     window_s: PositiveFloat = 0.05
     """Force is the contact impulse over this time divided by it, and load its mean, in seconds."""
+
+    def provides(self, machine: Machine) -> Names:
+        from labcrane.machines import load_scene  # noqa: PLC0415 - loads numpy
+
+        things = {thing for path in self.scenes for thing in load_scene(path).things}
+        written = read_yaml(self.model)
+        described = written.get("segments") if isinstance(written, dict) else None
+        laws = [*(described if isinstance(described, dict) else ()), *self.proportional]
+        return {
+            "speed law": laws,
+            "object": [*sorted(things), *(("jaw_upper", "jaw_lower") if self.jaws else ())],
+        }
+
+    def needs(self, machine: Machine) -> Names:
+        return {"joint": [self.jaws.joint] if self.jaws else [], "speed law": machine.names}

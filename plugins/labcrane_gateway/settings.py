@@ -2,7 +2,8 @@
 
 from pydantic import Field, PositiveFloat
 
-from labcrane import Settings
+from labcrane import Machine, Settings
+from labcrane.core import Names
 
 
 class GatewaySettings(Settings):
@@ -16,3 +17,6 @@ class GatewaySettings(Settings):
 
     timeout_s: PositiveFloat = 0.25
     """Age of the last command, in seconds, at which all valves shut and the station is lost."""
+
+    def provides(self, machine: Machine) -> Names:
+        return {"axis": [*(f"valve.{name}" for name in machine.names), "panel.connected"]}

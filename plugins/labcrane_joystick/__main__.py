@@ -14,8 +14,8 @@ from labcrane import DeviceError
 from labcrane_joystick import sdl
 from labcrane_joystick.calibration import default_path, save
 from labcrane_joystick.procedure import Look, Say, calibrate
-from labcrane_joystick.settings import JoystickSettings
-from labcrane_joystick.stick import AXES, attached, pair
+from labcrane_joystick.settings import AXES, JoystickSettings
+from labcrane_joystick.stick import attached, pair
 
 BETWEEN_LOOKS_S = 0.005
 

@@ -20,14 +20,11 @@ from labcrane_joystick.calibration import (
     load,
 )
 from labcrane_joystick.kernel import smoothing
-from labcrane_joystick.settings import JoystickSettings
-from labcrane_joystick.stick import AXES, Stick, attached, matching, model_of, pair
+from labcrane_joystick.settings import AXES, PARTS, SIDES, JoystickSettings
+from labcrane_joystick.stick import Stick, attached, matching, model_of, pair
 
 if TYPE_CHECKING:
     from pygame.event import Event
-
-SIDES = ("left", "right")
-PARTS = (*AXES, "trigger", "connected")
 
 
 class DualJoystick(InputDevice):

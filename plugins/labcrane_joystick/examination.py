@@ -10,9 +10,9 @@ from labcrane.core import Finding, Verdict
 from labcrane.registry import Prompt
 from labcrane_joystick import sdl
 from labcrane_joystick.calibration import RUN_AGAIN, Calibration, Calibrations, default_path, load
-from labcrane_joystick.dual_joystick import SIDES, tell_apart
-from labcrane_joystick.settings import JoystickSettings
-from labcrane_joystick.stick import AXES, Stick, attached, pair
+from labcrane_joystick.dual_joystick import tell_apart
+from labcrane_joystick.settings import AXES, SIDES, JoystickSettings
+from labcrane_joystick.stick import Stick, attached, pair
 
 Look = Callable[[float], float]
 """Waits so many seconds, lets SDL take in what the sticks did, and returns the time in s."""

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 from labcrane.core import Value
-from labcrane_joystick.stick import AXES
+from labcrane_joystick.settings import AXES
 
 NOT_READ = "not read"
 
@@ -24,22 +24,21 @@ def smoothing(node: Path | None) -> list[tuple[Value, Value]]:
     The kernel holds back or averages changes about as small as ``fuzz``, by default 1/256 of
     the range; a udev rule can set it to 0. ``flat`` is its dead zone, which SDL ignores.
     """
-    if sys.platform != "linux" or node is None:
-        return [(NOT_READ, NOT_READ)] * len(AXES)
-    import fcntl  # noqa: PLC0415 - not on Windows
+    found: list[tuple[Value, Value]] = []
+    if sys.platform == "linux" and node is not None:
+        import fcntl  # noqa: PLC0415 - not on Windows
 
-    try:
-        device = os.open(node, os.O_RDONLY | os.O_NONBLOCK)
-    except OSError as error:
-        return [(f"{NOT_READ}: {error}",) * 2] * len(AXES)
-    try:
-        bits = fcntl.ioctl(device, read_request(0x20 + EV_ABS, BITS), bytes(BITS))
-        found = [
-            fuzz_and_flat(fcntl.ioctl(device, read_request(0x40 + code, ABSINFO.size), bytes(24)))
-            for code in axis_codes(bits)[: len(AXES)]
-        ]
-    finally:
-        os.close(device)
+        try:
+            device = os.open(node, os.O_RDONLY | os.O_NONBLOCK)
+        except OSError as error:
+            return [(f"{NOT_READ}: {error}",) * 2] * len(AXES)
+        try:
+            bits = fcntl.ioctl(device, read_request(0x20 + EV_ABS, BITS), bytes(BITS))
+            for code in axis_codes(bits)[: len(AXES)]:
+                request = read_request(0x40 + code, ABSINFO.size)
+                found.append(fuzz_and_flat(fcntl.ioctl(device, request, bytes(24))))
+        finally:
+            os.close(device)
     return [*found, *[(NOT_READ, NOT_READ)] * (len(AXES) - len(found))]
 
 

@@ -6,7 +6,8 @@ from statistics import median
 
 from labcrane import DeviceError
 from labcrane_joystick.calibration import AxisRange, Calibration, Calibrations
-from labcrane_joystick.stick import AXES, Stick
+from labcrane_joystick.settings import AXES
+from labcrane_joystick.stick import Stick
 
 AT_REST = 100
 """The last looks of which the median is taken for the centre: half a second."""

@@ -2,7 +2,14 @@
 
 from pydantic import Field
 
-from labcrane import Settings
+from labcrane import Machine, Settings
+from labcrane.core import Names
+
+SIDES = ("left", "right")
+AXES = ("x", "y", "twist", "slider")
+"""The axes of a T.16000M, in SDL's order."""
+
+PARTS = (*AXES, "trigger", "connected")
 
 
 class JoystickSettings(Settings):
@@ -11,3 +18,6 @@ class JoystickSettings(Settings):
     stick: str = Field(default="044f:b10a", pattern="^[0-9a-f]{4}:[0-9a-f]{4}$")
     """USB vendor and product of both sticks, four hexadecimal digits each; a Thrustmaster
     T.16000M unless said otherwise."""
+
+    def provides(self, machine: Machine) -> Names:
+        return {"axis": [f"{side}.{part}" for side in SIDES for part in PARTS]}

@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from labcrane import DeviceError
+from labcrane_joystick.settings import AXES
 
 if TYPE_CHECKING:
     from pygame.joystick import JoystickType
-
-AXES = ("x", "y", "twist", "slider")
-"""The axes of a T.16000M, in SDL's order."""
 
 NUMBERS = tuple(range(len(AXES)))
 
@@ -143,10 +141,9 @@ def model_of(guid: str) -> str:
 
 def open_nodes(folder: Path) -> set[Path]:
     """Return the event devices in ``folder`` that this process holds open; Linux only."""
-    if sys.platform != "linux" or not folder.is_dir():
-        return set()
+    linux = sys.platform == "linux" and folder.is_dir()
     nodes = set()
-    for link in Path("/proc/self/fd").iterdir():
+    for link in Path("/proc/self/fd").iterdir() if linux else ():
         try:
             target = link.readlink()
         except FileNotFoundError:  # the listing's own descriptor is gone by now

@@ -2,13 +2,14 @@
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
 
-from labcrane import Settings
+from labcrane import Machine, Settings
+from labcrane.core import Names, ViewName
 
 
 class KeyboardSettings(Settings):
     """Settings of :class:`labcrane_keyboard.keyboard.Keyboard`."""
 
-    view: str
+    view: ViewName
     """Name of the view whose window has the keyboard's focus; the keys must be among its own."""
 
     axes: dict[str, tuple[str, str]] = Field(min_length=1)
@@ -25,6 +26,9 @@ class KeyboardSettings(Settings):
     timeout_s: PositiveFloat = 0.5
     """Silence of the view, in seconds, after which the keyboard is lost and all axes are at
     rest."""
+
+    def provides(self, machine: Machine) -> Names:
+        return {"axis": [*(f"keyboard.{name}" for name in self.axes), "view.connected"]}
 
     @field_validator("axes")
     @classmethod

@@ -9,10 +9,9 @@ from labcrane import FloatArray, Frame, InputDevice, Phase, Run, Signal, Tick, T
 from labcrane.core import Layout, Value
 from labcrane_operator.aimer import STILL, Aimer
 from labcrane_operator.noise import Noise
-from labcrane_operator.settings import OperatorSettings
+from labcrane_operator.settings import STICK, OperatorSettings
 
 RUNNING = Phase.RUNNING  # Python 3.11 takes long to find it there in every tick; 3.12 does not
-STICK = ("x", "y", "twist", "slider", "trigger", "connected")
 
 
 class SimulatedOperator(InputDevice):

@@ -4,7 +4,10 @@ from pathlib import Path
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
-from labcrane import Settings
+from labcrane import Machine, Settings
+from labcrane.core import Names
+
+STICK = ("x", "y", "twist", "slider", "trigger", "connected")
 
 
 class OperatorSettings(Settings):
@@ -70,6 +73,9 @@ class OperatorSettings(Settings):
 
     press_s: PositiveFloat = 0.1
     """How long the trigger of the right stick is pressed at rest inside the target, in seconds."""
+
+    def provides(self, machine: Machine) -> Names:
+        return {"axis": [f"{side}.{part}" for side in ("left", "right") for part in STICK]}
 
 
 class RecordedSettings(Settings):

@@ -2,8 +2,14 @@
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
-from labcrane import Settings
-from labcrane.core import StudyPath
+from labcrane import Machine, Settings
+from labcrane.core import ButtonName, JointName, Names, StudyPath
+
+EVENTS = (
+    "goal.reached", "mistakes.too_many", "deformity.found", "drop", "overload", "contact.object",
+    "contact.body", "scene.placed",
+)  # fmt: skip
+"""What a run tells beside its beginning and end."""
 
 
 class ScenarioSettings(Settings):
@@ -26,12 +32,20 @@ class ScenarioSettings(Settings):
     hold_s: NonNegativeFloat = 0.2
     """... for this time, in seconds. Until then it is one mistake."""
 
-    find_axis: str | None = None
+    find_axis: ButtonName | None = None
     """Button with which the operator reports a deformity, while the tip is near it; none by
     default. The supervisor reports one with a note that begins with "found"."""
 
     find_m: PositiveFloat = 0.5
     """How near the tip must be then to the middle of the limb, in metres."""
+
+    def provides(self, machine: Machine) -> Names:
+        from labcrane.machines import load_scene  # noqa: PLC0415 - loads numpy
+
+        scenes = [load_scene(path) for path in self.scenes]
+        things = {thing for scene in scenes for thing in scene.things}
+        figure = ("figure",) if any(scene.figure for scene in scenes) else ()
+        return {"object": ["target", *sorted(things), *figure], "event": EVENTS}
 
 
 class OperatorSettings(Settings):
@@ -46,8 +60,14 @@ class OperatorSettings(Settings):
     reaction_s: NonNegativeFloat = 0.4
     """Time from a new goal to the first movement, in seconds."""
 
-    jaws: str = "jaws"
+    jaws: JointName = "jaws"
     """The joint that opens the jaws."""
 
     signal: float = Field(default=0.5, gt=0.0, le=1.0)
     """Share of full signal with which the jaws are moved."""
+
+    def provides(self, machine: Machine) -> Names:
+        return {"axis": [*(f"valve.{name}" for name in machine.names), "panel.connected"]}
+
+    def needs(self, machine: Machine) -> Names:
+        return {"joint": [self.jaws]}

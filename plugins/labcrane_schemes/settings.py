@@ -5,9 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from labcrane import Settings
-
-AxisName = Annotated[str, Field(pattern=r"^-?[a-z][a-z0-9_.]*$")]
-"""An axis of the input, ``left.x``; a leading minus turns it round, ``-right.y``."""
+from labcrane.core import AxisName, ButtonName, Covers, JointName, Once
 
 DIRECTIONS = {"base": ("x", "y", "z"), "arm": ("radial", "tangential", "vertical")}
 """What the stick moves the tip along, for each ``frame``."""
@@ -30,7 +28,7 @@ class HandlingSettings(Settings):
 class JointVelocitySettings(HandlingSettings):
     """Each axis turns one joint."""
 
-    map: dict[str, AxisName]
+    map: Annotated[dict[JointName, AxisName], Covers("joint"), Once()]
     """Which axis turns which joint, one for every joint of the machine."""
 
     speed: float = Field(default=1.0, gt=0.0, le=1.0)
@@ -40,7 +38,7 @@ class JointVelocitySettings(HandlingSettings):
 class EndEffectorSettings(HandlingSettings):
     """Each axis moves the tip along one direction."""
 
-    map: dict[str, AxisName]
+    map: Annotated[dict[str, AxisName], Once()]
     """Which axis moves the tip along which direction: x, y and z of the base frame, or radial,
     tangential and vertical as seen from the slew axis (see ``frame``)."""
 
@@ -75,7 +73,7 @@ class EndEffectorSettings(HandlingSettings):
 class SwitchableSettings(Settings):
     """Two schemes, and a button that changes between them during a trial."""
 
-    button: AxisName
+    button: ButtonName
     """The button: pressed beyond half, it changes the scheme."""
 
     joint_velocity: JointVelocitySettings

@@ -14,22 +14,6 @@ PRIORITY = 1
 """Above all ordinary programs, and below JACK, which has 5 unless it was told otherwise."""
 
 
-def others_are_real_time() -> bool:
-    """Whether any other thread of this process has a real-time priority."""
-    if sys.platform != "linux":
-        return False
-    own = threading.get_native_id()
-    others = {int(task.name) for task in Path("/proc/self/task").iterdir()} - {own}
-    return any(_policy(thread) in (os.SCHED_FIFO, os.SCHED_RR) for thread in others)
-
-
-def _policy(thread: int) -> int:
-    try:
-        return os.sched_getscheduler(thread) & ~os.SCHED_RESET_ON_FORK
-    except ProcessLookupError:  # it ended a moment ago
-        return os.SCHED_OTHER
-
-
 def follow() -> str:
     """Give the calling thread a real-time priority if another one has it; say what it has now.
 
@@ -37,18 +21,46 @@ def follow() -> str:
     """
     if not others_are_real_time():
         return "ordinary"
-    try:
-        _schedule(os.SCHED_FIFO, PRIORITY)
-    except PermissionError:  # JACK may have asked a service that is allowed more than this user
+    if not _schedule(real_time=True):  # JACK may have asked a service that is allowed more
         return "ordinary, only JACK's is real time"
     return "real time"
 
 
 def unfollow() -> None:
     """Make the calling thread an ordinary one again."""
-    _schedule(os.SCHED_OTHER, 0)
+    _schedule(real_time=False)
 
 
-def _schedule(policy: int, priority: int) -> None:
-    # 0 is the calling thread. Who is not root may set the flag, and never take it away again.
-    os.sched_setscheduler(0, policy | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
+if sys.platform == "linux":
+
+    def others_are_real_time() -> bool:
+        """Whether any other thread of this process has a real-time priority."""
+        own = threading.get_native_id()
+        others = {int(task.name) for task in Path("/proc/self/task").iterdir()} - {own}
+        return any(_policy(thread) in (os.SCHED_FIFO, os.SCHED_RR) for thread in others)
+
+    def _policy(thread: int) -> int:
+        try:
+            return os.sched_getscheduler(thread) & ~os.SCHED_RESET_ON_FORK
+        except ProcessLookupError:  # it ended a moment ago
+            return os.SCHED_OTHER
+
+    def _schedule(*, real_time: bool) -> bool:
+        """Give the calling thread a priority; whether this user is allowed to."""
+        policy, priority = (os.SCHED_FIFO, PRIORITY) if real_time else (os.SCHED_OTHER, 0)
+        # 0 is the calling thread. Who is not root may set the flag, and never take it away again.
+        try:
+            os.sched_setscheduler(0, policy | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
+        except PermissionError:
+            return False
+        return True
+
+else:
+
+    def others_are_real_time() -> bool:
+        """Whether any other thread has a real-time priority: asked where JACK is used, on Linux."""
+        return False
+
+    def _schedule(*, real_time: bool) -> bool:
+        """Leave the calling thread as it is, an ordinary one."""
+        return not real_time

@@ -4,7 +4,8 @@ from typing import Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
-from labcrane import Settings
+from labcrane import Machine, Settings
+from labcrane.core import Names
 
 MOST_OVERTONES = 15
 
@@ -53,6 +54,9 @@ class SonificationSettings(Settings):
 
     device: int | None = None
     """Number of the output device, as PortAudio counts; the system's default by default."""
+
+    def provides(self, machine: Machine) -> Names:
+        return {"object": ()}
 
     @model_validator(mode="after")
     def _levels_and_overtones_are_possible(self) -> "SonificationSettings":

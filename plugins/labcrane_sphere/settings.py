@@ -4,7 +4,8 @@ from typing import Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from labcrane import Settings
+from labcrane import Machine, Settings
+from labcrane.core import Names
 
 
 class SphereSettings(Settings):
@@ -42,6 +43,9 @@ class SphereSettings(Settings):
 
     opacity: float = Field(default=0.45, gt=0.0, le=1.0)
     """1 hides what is behind it."""
+
+    def provides(self, machine: Machine) -> Names:
+        return {"object": ["sphere"]}
 
     @model_validator(mode="after")
     def _sizes_rise(self) -> "SphereSettings":

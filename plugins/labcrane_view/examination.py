@@ -36,7 +36,7 @@ def monitors() -> list[Finding]:
         done = subprocess.run(
             ["xrandr"],  # noqa: S607 - wherever it is installed
             capture_output=True,
-            text=True,
+            encoding="utf-8",
             check=True,
         )
     except (FileNotFoundError, subprocess.CalledProcessError):

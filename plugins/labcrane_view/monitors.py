@@ -30,7 +30,7 @@ def monitors() -> list[Monitor]:
         done = subprocess.run(
             ["xrandr", "--listactivemonitors"],  # noqa: S607 - wherever it is installed
             capture_output=True,
-            text=True,
+            encoding="utf-8",
             check=True,
         )
     except FileNotFoundError:

@@ -13,7 +13,8 @@ from pydantic import (
 )
 from pydantic import PositiveInt as Pixels
 
-from labcrane import Settings
+from labcrane import Machine, Settings
+from labcrane.core import CameraName, EventName, LinkName, Names, SceneObject
 
 Triple = tuple[float, float, float]
 
@@ -33,7 +34,7 @@ class CameraSettings(Settings):
     fov_deg: float = Field(default=70.0, gt=1.0, lt=170.0)
     """Horizontal field of view, in degrees."""
 
-    on: str | None = None
+    on: LinkName | None = None
     """Joint behind whose link it rides; it stands in the scene by default."""
 
     shows: Literal["colour", "depth"] = "colour"
@@ -74,17 +75,17 @@ def _named(value: Any) -> Any:
     return CAMERAS[value]
 
 
-CameraName = Annotated[str, Field(json_schema_extra={"enum": list(CAMERAS)})]
+NamedCamera = Annotated[str, Field(json_schema_extra={"enum": list(CAMERAS)})]
 Camera = Annotated[
     CameraSettings,
-    BeforeValidator(_named, json_schema_input_type=CameraName | CameraSettings),
+    BeforeValidator(_named, json_schema_input_type=NamedCamera | CameraSettings),
 ]
 
 
 class PatchSettings(Settings):
     """A square in a corner for a photodiode: it changes between black and white."""
 
-    on: tuple[str, ...] = ("trial.start", "trial.end", "target.entered")
+    on: tuple[EventName, ...] = ("trial.start", "trial.end", "target.entered")
     """Events at each of which it changes."""
 
     corner: Literal["bottom_left", "bottom_right", "top_left", "top_right"] = "bottom_left"
@@ -97,7 +98,7 @@ class PatchSettings(Settings):
 class SupervisorSettings(Settings):
     """Which pictures the supervisor's page shows."""
 
-    cameras: tuple[str, ...] = ()
+    cameras: tuple[CameraName, ...] = ()
     """Names of the cameras; all by default."""
 
     rate_hz: float = Field(default=4.0, ge=1.0, le=10.0)
@@ -172,7 +173,7 @@ class ViewSettings(Settings):
     patch: PatchSettings | None = None
     """Square for a photodiode; none by default."""
 
-    areas: tuple[str, ...] = ("tip", "target", "other", "sphere")
+    areas: tuple[SceneObject, ...] = ("tip", "target", "other", "sphere")
     """What has a box for eye tracking: tip, targets, shapes of cues; links, the grapple and things
     by name, around what is drawn of them, wherever it moves."""
 
@@ -184,6 +185,10 @@ class ViewSettings(Settings):
 
     renderer: Literal["auto", "software"] = "auto"
     """``software`` draws without any graphics driver, and without shadows."""
+
+    def provides(self, machine: Machine) -> Names:
+        cameras = [camera.name for camera in (self.camera, *self.beside)]
+        return {"camera": cameras, "object": ("tip",)}
 
     @property
     def hud_lines(self) -> tuple[HudLine, ...]:
@@ -200,13 +205,3 @@ class ViewSettings(Settings):
                 "examiner if the operator does not see this view",
             )
         return ()
-
-    @model_validator(mode="after")
-    def _sends_what_it_has(self) -> "ViewSettings":
-        has = [camera.name for camera in (self.camera, *self.beside)]
-        for name in self.supervisor.cameras if self.supervisor else ():
-            if name not in has:
-                raise ValueError(
-                    f"supervisor: there is no camera {name!r}; there is {', '.join(has)}"
-                )
-        return self

@@ -17,7 +17,10 @@ import labcrane
 
 ROOT = Path(__file__).parents[2]
 PLUGINS = sorted(path for path in (ROOT / "plugins").iterdir() if (path / "__init__.py").exists())
-HEAVY = {"pybullet", "pygame", "pyo", "panda3d", "pandas", "h5py", "nicegui", "pylsl", "matplotlib"}
+HEAVY = {
+    "mujoco", "pybullet", "pygame", "pyo", "panda3d", "pandas", "h5py", "nicegui", "pylsl",
+    "matplotlib",
+}  # fmt: skip
 AIMING = str(ROOT / "protocols" / "aiming" / "protocol.yaml")
 
 

@@ -67,6 +67,7 @@ def study(folder: Path, **parts: str) -> Path:
         ("input", "{use: dual_joystick}", "pygame"),
         ("input", "{use: gateway}", "pylsl"),
         ("dynamics", "{use: bullet_crane}", "pybullet"),
+        ("dynamics", "{use: mujoco_crane}", "mujoco"),
     ],
 )
 def test_a_part_that_is_missing_is_named_with_its_line_and_the_extra(
@@ -96,7 +97,7 @@ def test_every_module_of_a_laboratory_is_asked_for_by_the_offer_that_imports_it(
             used = {
                 module
                 for path in folder.rglob("*.py")
-                for module in ("pygame", "pybullet", "pyo", "panda3d", "cantools")
+                for module in ("pygame", "mujoco", "pybullet", "pyo", "panda3d", "cantools")
                 if f"import {module}" in path.read_text() or f"from {module}" in path.read_text()
             }
             declared = {m for each in found.values() for m in each.needs} - lean

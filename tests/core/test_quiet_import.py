@@ -12,7 +12,11 @@ def said(program: str, folder: Path) -> "subprocess.CompletedProcess[str]":
     (folder / "greeting.py").write_text(GREETING)
     (folder / "broken.py").write_text(GREETING + 'raise OSError("no such engine")\n')
     return subprocess.run(
-        [sys.executable, "-c", f"import os\nfrom labcrane import quietly_imported\n{program}"],
+        [
+            sys.executable,
+            "-c",
+            f"import os\nfrom labcrane.registry import quietly_imported\n{program}",
+        ],
         env={**os.environ, "PYTHONPATH": str(folder)},
         capture_output=True,
         text=True,

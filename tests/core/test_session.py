@@ -12,6 +12,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from cranes import ENGINES
 from rehearsal import SHORT, ScriptedConsole, a_study, rehearse
 from virtual_sticks import desk
 
@@ -21,7 +22,6 @@ from labcrane.protocol.rig import Rig
 from labcrane.session.session import Visit, run
 
 ROOT = Path(__file__).parents[2]
-BULLET = SHORT.replace("kinematic_crane", "bullet_crane")
 
 
 @pytest.fixture
@@ -174,9 +174,10 @@ def labcrane_process(*arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_two_fast_runs_in_two_processes_give_the_same_bits(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ENGINES)
+def test_two_fast_runs_in_two_processes_give_the_same_bits(name: str, tmp_path: Path) -> None:
     study = tmp_path / "study.yaml"
-    study.write_text(BULLET)
+    study.write_text(SHORT.replace("kinematic_crane", name))
     digests = []
     for data in ("one", "two"):
         arguments = ["run", str(study), "--participant", "P001", "--simulate", "--fast"]

@@ -22,6 +22,7 @@ from hypothesis.stateful import (
 from labcrane import ProtocolError
 from labcrane.design.plan import plan_session
 from labcrane.errors import DeviceError
+from labcrane.protocol.rig import Rig
 from labcrane.protocol.steps import Step
 from labcrane.protocol.study import Study
 from labcrane.recording.journal_reader import LoggedEvent, SessionLog, read_journal
@@ -344,7 +345,7 @@ def stops(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> type[Stops]:
     study = stoppable(tmp_path)
     # What a session knows of the computer and its packages takes longer than all its ticks.
     monkeypatch.setattr(session_module, "context", lambda *_: {})
-    monkeypatch.setattr(session_module.rig, "build", lambda study, simulated: idle_rig(study))
+    monkeypatch.setattr(Rig, "build", lambda study, simulated: idle_rig(study))
     return type("StopsHere", (Stops,), {"folder": tmp_path, "study": study})
 
 

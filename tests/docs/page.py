@@ -198,7 +198,7 @@ class Reader:
     def _stand_in(self, programs: Mapping[str, str]) -> None:
         """Let other programs answer to these names from here on."""
         bin_ = self._folder / "stand-ins"
-        bin_.mkdir()
+        bin_.mkdir(exist_ok=True)
         for name, does in programs.items():
             (bin_ / name).write_text(f"#!/bin/sh\n{does}\n")
             (bin_ / name).chmod(0o755)

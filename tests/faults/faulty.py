@@ -10,11 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from labcrane import Cue, Feedback, Questionnaire, Settings, Signal, Sphere, hookimpl, offer
-from labcrane.core import Item
+from labcrane.core import CraneSettings, Item
 from labcrane_aiming.aiming import Aiming
 from labcrane_aiming.settings import AimingSettings
 from labcrane_bullet.kinematic_crane import KinematicCrane
-from labcrane_bullet.settings import CraneSettings
 from labcrane_operator.operator import SimulatedOperator
 from labcrane_operator.settings import OperatorSettings
 from labcrane_schemes.joint_velocity import JointVelocity

@@ -96,10 +96,10 @@ def test_a_component_that_hangs_is_named_and_its_process_ended(
 ) -> None:
     monkeypatch.setattr(stillness_module, "TELL_S", 0.5)
     monkeypatch.setattr(stillness_module, "HANG_S", 1.5)
-    protocol = spoil("task judge 30 hanging")
+    protocol = spoil("task evaluate 30 hanging")
     outcome, told = launch(protocol)
     assert outcome.died == -9
-    place = "task 'faulty_task' of plugin 'plugins/faulty.py', in judge() ("
+    place = "task 'faulty_task' of plugin 'plugins/faulty.py', in evaluate() ("
     assert outcome.where.startswith(place)
     (said,) = (line for line in told if "stood still" in line)
     assert place in said

@@ -47,8 +47,8 @@ def test_a_method_that_raises_is_named_with_its_line_and_nothing_is_lost(
 def test_a_machine_that_cannot_be_reset_is_named_when_its_session_is_gone_on_with(
     spoil: Spoil,
 ) -> None:
-    protocol = spoil("task judge 50 raising")
-    with pytest.raises(PluginError, match=r"in judge\(\)"):
+    protocol = spoil("task evaluate 50 raising")
+    with pytest.raises(PluginError, match=r"in evaluate\(\)"):
         run_fast(protocol)
     # The crane resets itself once when it is opened.
     (protocol.parent / "plugins" / "order.txt").write_text("dynamics reset 2 raising")

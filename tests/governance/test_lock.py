@@ -181,7 +181,7 @@ def test_every_plugin_that_the_protocol_names_is_locked_and_no_other(lab: Lab) -
 def test_labcranes_own_source_is_locked(lab: Lab) -> None:
     lock = read_lock(lab.protocol).content["materials"]
     assert "labcrane/session/loop.py" in lock["labcrane"]["files"]
-    assert "labcrane/machines/ch8.yaml" in lock["labcrane"]["files"]
+    assert "labcrane/machines/data/ch8.yaml" in lock["labcrane"]["files"]
     changed = json.loads(json.dumps(lock))
     changed["labcrane"]["files"]["labcrane/session/loop.py"] = "0" * 64
     assert differences(lock, changed) == [
@@ -206,7 +206,8 @@ def test_the_lock_holds_on_another_computer_under_another_path(lab: Lab, tmp_pat
         "import sys; sys.path.insert(0, sys.argv[1])\n"
         "import labcrane; assert labcrane.__file__.startswith(sys.argv[1])\n"
         "from pathlib import Path; from datetime import date\n"
-        "from labcrane.registry.registry import discover; from labcrane.study import load\n"
+        "from labcrane.registry.registry import discover\n"
+        "from labcrane.protocol.study import load\n"
         "from labcrane.approval.decision import verify\n"
         "registry = discover()\n"
         "print(verify(load(Path(sys.argv[2]), registry), registry, date.today()).seal)\n"

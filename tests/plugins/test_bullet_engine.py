@@ -1,4 +1,4 @@
-"""The engine against the velocity law, other geometries, and itself."""
+"""The engines against the velocity law, other geometries, and itself."""
 
 import hashlib
 import subprocess
@@ -13,8 +13,10 @@ from cranes import (
     build,
     cranes,
     drive,
+    engines,
     machines,
     needs_bullet,
+    needs_mujoco,
     random_poses,
     random_sticks,
     rates,
@@ -80,25 +82,43 @@ def engine(tmp_path: Path) -> Engine:
     return Engine(tmp_path)
 
 
-@needs_bullet
+@engines
 @machines
 @rates
 @pytest.mark.parametrize("actuator", ACTUATOR_PRESETS)
-def test_the_engine_follows_the_velocity_law(model: str, rate_hz: float, actuator: str) -> None:
+def test_an_engine_follows_the_velocity_law(
+    name: str, model: str, rate_hz: float, actuator: str
+) -> None:
     """Tolerance 1e-9: commands that the motors are strong enough for are met exactly."""
     machine = load_machine(model)
     commands = random_sticks(machine, rate_hz, 10.0)
     paths = []
-    for name in ("bullet_crane", "kinematic_crane"):
-        with standing(name, machine, rate_hz, actuator) as crane:
+    for each in (name, "kinematic_crane"):
+        with standing(each, machine, rate_hz, actuator) as crane:
             paths.append(drive(crane, commands, rate_hz))
     assert np.ptp(paths[1][:, :4], axis=0).min() > np.radians(1), "every joint moves"
     np.testing.assert_allclose(paths[0], paths[1], rtol=0, atol=1e-9)
 
 
 @needs_bullet
+@needs_mujoco
+@machines
 @rates
-def test_only_the_efforts_part_the_engine_from_the_law(rate_hz: float) -> None:
+def test_both_engines_put_the_joints_in_the_same_place(model: str, rate_hz: float) -> None:
+    """Tolerance 1e-12: without a load, and as long as the motors suffice."""
+    machine = load_machine(model)
+    commands = random_sticks(machine, rate_hz, 20.0, seed=12)
+    paths = []
+    for name in ("bullet_crane", "mujoco_crane"):
+        with standing(name, machine, rate_hz) as crane:
+            paths.append(drive(crane, commands, rate_hz)[:, :4])
+    assert np.ptp(paths[1], axis=0).min() > np.radians(1), "every joint moves"
+    np.testing.assert_allclose(paths[0], paths[1], rtol=0, atol=1e-12)
+
+
+@engines
+@rates
+def test_only_the_efforts_part_an_engine_from_the_law(name: str, rate_hz: float) -> None:
     """Random steps of command ask for any torque: with strong motors they too are met exactly."""
     machine = ch8()
     strong = tuple(joint.model_copy(update={"effort": 1e9}) for joint in machine.joints)
@@ -107,8 +127,8 @@ def test_only_the_efforts_part_the_engine_from_the_law(rate_hz: float) -> None:
     gaps = {}
     for model in (machine, machine.model_copy(update={"joints": strong})):
         paths = []
-        for name in ("bullet_crane", "kinematic_crane"):
-            with standing(name, model, rate_hz) as crane:
+        for each in (name, "kinematic_crane"):
+            with standing(each, model, rate_hz) as crane:
                 crane.reset([0.0] * 4)
                 paths.append(drive(crane, commands, rate_hz))
         gaps[model is machine] = np.abs(paths[0] - paths[1])[:, :4].max()
@@ -164,9 +184,10 @@ PROGRAM = """
 import hashlib, sys
 import numpy as np
 from labcrane.testing import make_run, ch8, RATE_HZ
-from labcrane_bullet import labcrane_dynamics
+import labcrane_bullet, labcrane_mujoco
 name, actuator = sys.argv[1:]
-(offer,) = (offer for offer in labcrane_dynamics() if offer.name == name)
+offers = (*labcrane_bullet.labcrane_dynamics(), *labcrane_mujoco.labcrane_dynamics())
+(offer,) = (offer for offer in offers if offer.name == name)
 crane = offer.build(offer.settings.model_validate({"actuator": actuator}), ch8())
 crane.open(make_run(ch8()))
 random, digest = np.random.default_rng(7), hashlib.sha256()
@@ -209,15 +230,15 @@ def test_a_crane_that_has_hit_its_limits_resets_to_the_bits_of_a_new_one(name: s
     assert digests[0] == digests[1]
 
 
-@needs_bullet
-def test_two_cranes_in_one_process_leave_each_other_alone() -> None:
+@engines
+def test_two_cranes_in_one_process_leave_each_other_alone(name: str) -> None:
     machine = ch8()
     commands = random_sticks(machine, RATE_HZ, 1.0)
-    with standing("bullet_crane", machine) as crane:
+    with standing(name, machine) as crane:
         alone = drive(crane, commands)
     with (
-        standing("bullet_crane", machine) as crane,
-        standing("bullet_crane", machine) as other,
+        standing(name, machine) as crane,
+        standing(name, machine) as other,
     ):
         beside = []
         for command in commands:

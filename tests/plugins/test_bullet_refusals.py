@@ -85,21 +85,27 @@ def test_the_record_says_which_delays_were_used(name: str) -> None:
     assert facts["actuator.dead_time_s"] == 0.06
     assert facts["actuator.lag_s"] == 0.15
     assert facts["actuator.rate_limit"] == 4.0
-    assert str(facts.get("engine", "")).startswith("pybullet") == (name == "bullet_crane")
+    engines = {"kinematic_crane": "", "bullet_crane": "pybullet", "mujoco_crane": "mujoco"}
+    assert str(facts.get("engine", "")).partition(" ")[0] == engines[name]
 
 
-def test_without_pybullet_the_other_crane_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "pybullet", None)
+@pytest.mark.parametrize("engine", ["pybullet", "mujoco"])
+def test_without_an_engine_the_other_cranes_are_named(
+    engine: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, engine, None)
     offers = discover().offers[Dynamics]
-    assert re.match(r"needs pybullet, .*'kinematic_crane'", offers["bullet_crane"].missing)
+    crane = {"pybullet": "bullet_crane", "mujoco": "mujoco_crane"}[engine]
+    assert re.match(rf"needs {engine}, .*'kinematic_crane'", offers[crane].missing)
     assert not offers["kinematic_crane"].missing
     build("kinematic_crane", ch8())
 
 
 def test_listing_the_offers_loads_no_engine() -> None:
     program = (
-        "import sys, labcrane_bullet as b; names = [o.name for o in b.labcrane_dynamics()];"
-        "assert names == ['bullet_crane', 'kinematic_crane'], names;"
-        "assert 'pybullet' not in sys.modules"
+        "import sys, labcrane_bullet as b, labcrane_mujoco as m;"
+        "names = [o.name for o in (*b.labcrane_dynamics(), *m.labcrane_dynamics())];"
+        "assert names == ['bullet_crane', 'kinematic_crane', 'mujoco_crane'], names;"
+        "assert not {'pybullet', 'mujoco'} & set(sys.modules)"
     )
     subprocess.run([sys.executable, "-c", program], check=True)

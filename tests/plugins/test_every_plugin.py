@@ -101,6 +101,6 @@ def test_a_plugin_contract_notices_what_is_not_documented_or_not_said() -> None:
     contract = PluginContract()
     with pytest.raises(AssertionError, match="write labcrane_api = 1"):
         contract.test_plugin_says_for_which_interface_it_is_built(plugin)
-    with pytest.raises(AssertionError, match=r"Bare\.gain needs a docstring, with its unit"):
+    with pytest.raises(AssertionError, match=r"Bare\.gain needs a docstring: write what"):
         contract.test_every_setting_says_what_it_means(plugin)
     contract.test_settings_refuse_keys_that_they_do_not_have(plugin)

@@ -5,9 +5,9 @@ from io import BytesIO
 import matplotlib.image
 import numpy as np
 import pytest
-from pydantic import ValidationError
 from windows import SIZE, a_view, an_x_server, make_frame
 
+from labcrane.machines import load_machine
 from labcrane.streams.pictures import png
 from labcrane_view.settings import ViewSettings
 
@@ -56,10 +56,10 @@ def test_a_view_sends_nothing_unless_it_is_asked_to() -> None:
         assert view.pictures() == {}
 
 
-def test_a_camera_that_is_not_there_cannot_be_sent() -> None:
-    said = "supervisor: there is no camera 'depht'; there is still, depth"
-    with pytest.raises(ValidationError, match=said):
-        ViewSettings(camera=STILL, beside=(DEPTH,), supervisor={"cameras": ["depht"]})
+def test_the_cameras_that_can_be_sent_are_those_of_the_view() -> None:
+    # A name that is not among them is refused by the core: tests/core/test_references.py.
+    settings = ViewSettings(camera=STILL, beside=(DEPTH,))
+    assert settings.provides(load_machine("ch8"))["camera"] == ["still", "depth"]
 
 
 @pytest.mark.parametrize("shape", [(7, 11), (5, 3, 3)])

@@ -1,22 +1,45 @@
-"""Common part of both cranes: their signals, their drives and their visual shape."""
+"""Crane whose joints follow speed commands: its signals, its drives and its visual shape."""
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 
-from labcrane import Dynamics, FloatArray, Machine, PluginError, ProtocolError, Run
-from labcrane.core import Value
-from labcrane.machines import Actuator, Body, link_boxes
-from labcrane_bullet.crane_state import CraneState, crane_signals
-from labcrane_bullet.pose import check_pose
-from labcrane_bullet.settings import CraneSettings
+from labcrane.core.crane_settings import CraneSettings
+from labcrane.core.records import Run, Value
+from labcrane.core.roles import Dynamics
+from labcrane.core.signals import Signal
+from labcrane.errors import PluginError, ProtocolError
+from labcrane.machines.actuator import Actuator
+from labcrane.machines.crane_state import CraneState
+from labcrane.machines.links import link_boxes
+from labcrane.machines.machine import Body, Machine
+from labcrane.machines.pose import check_pose
+from labcrane.types import FloatArray
 
 ROUNDING_S = 1e-9
+
+
+def crane_signals(machine: Machine) -> tuple[Signal, ...]:
+    """Return what a crane's state holds, in order."""
+    return (
+        Signal("joint.angle", "rad", machine.names),
+        Signal("joint.velocity", "rad/s", machine.names),
+        Signal("tip.position", "m", ("x", "y", "z")),
+        Signal("tip.velocity", "m/s", ("x", "y", "z")),
+    )
 
 
 class Crane(Dynamics):
     """A crane whose joints follow speed commands through their actuators.
 
-    A subclass says how joints move at given speeds. A speed holds over its tick.
+    What moves them is a subclass: it says how to stand at angles (``_place``) and how joints move
+    for one tick at given speeds (``_move``). A speed holds over its tick.
+
+    Parameters
+    ----------
+    settings
+        The delays of its drives.
+    machine
+        Its joints, limits and links.
     """
 
     def __init__(self, settings: CraneSettings, machine: Machine) -> None:

@@ -3,7 +3,8 @@
 import math
 from collections.abc import Sequence
 
-from labcrane import Machine, ProtocolError
+from labcrane.errors import ProtocolError
+from labcrane.machines.machine import Machine
 
 ROUNDING = 1e-9
 """How far in rad a pose may lie outside the limits: degrees do not convert exactly."""

@@ -1,4 +1,4 @@
-"""The state array of a crane: what is in it, and how it is filled."""
+"""State array of a crane: joints, then the tip that they put somewhere."""
 
 import math
 from collections.abc import Sequence
@@ -7,23 +7,14 @@ from struct import Struct
 
 import numpy as np
 
-from labcrane import FloatArray, Machine, Signal
-
-
-def crane_signals(machine: Machine) -> tuple[Signal, ...]:
-    """Return what a crane's state holds, in order."""
-    return (
-        Signal("joint.angle", "rad", machine.names),
-        Signal("joint.velocity", "rad/s", machine.names),
-        Signal("tip.position", "m", ("x", "y", "z")),
-        Signal("tip.velocity", "m/s", ("x", "y", "z")),
-    )
+from labcrane.machines.machine import Machine
+from labcrane.types import FloatArray
 
 
 class CraneState:
     """One array that is filled anew on every tick.
 
-    The tip's motion is scalar: with PyBullet it costs less than asking the engine for it, and
+    The tip's motion is scalar: that costs less than asking an engine for it, and
     is the tip of the joint angles in the same array to the last digit.
 
     Attributes

@@ -1,9 +1,10 @@
-"""Settings of either crane."""
+"""Settings of cranes: how their drives follow, and what hangs on the tip."""
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from labcrane import Settings
-from labcrane.machines import ACTUATOR_PRESETS, ActuatorSettings
+from labcrane.core.settings import Names, Settings
+from labcrane.machines.actuator import ACTUATOR_PRESETS, ActuatorSettings
+from labcrane.machines.machine import Machine
 
 
 class CraneSettings(Settings):
@@ -11,6 +12,9 @@ class CraneSettings(Settings):
 
     actuator: ActuatorSettings = ACTUATOR_PRESETS["ideal"]
     """Delay between command and motion: ideal, electric, hydraulic, sluggish, or written out."""
+
+    def provides(self, machine: Machine) -> Names:
+        return {"object": ()}
 
 
 class GrappleSettings(Settings):
@@ -29,7 +33,7 @@ class GrappleSettings(Settings):
     """Of either swing, in N m s/rad."""
 
 
-class BulletSettings(CraneSettings):
+class LoadedCraneSettings(CraneSettings):
     """How the crane follows its commands, and what hangs on it."""
 
     payload_kg: NonNegativeFloat = Field(default=0.0, le=1e5)
@@ -38,7 +42,15 @@ class BulletSettings(CraneSettings):
     grapple: GrappleSettings | None = None
     """None by default. ``{}`` is one with the values above."""
 
+    def provides(self, machine: Machine) -> Names:
+        return {"object": ("grapple", "grapple rod") if self.grapple else ()}
+
     @property
     def loaded(self) -> bool:
         """Whether anything hangs on the crane."""
         return self.grapple is not None or self.payload_kg > 0.0
+
+    @property
+    def hanging_kg(self) -> float:
+        """Mass of grapple and payload, in kg."""
+        return self.payload_kg + (self.grapple.mass_kg if self.grapple else 0.0)

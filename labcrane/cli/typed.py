@@ -1,0 +1,123 @@
+"""Typing of the person at a terminal, and lines of a pipe, as each system lets them be waited for.
+
+Whoever waits looks now and then whether it is over: nothing here waits in a call that only another
+key can end, or, where there is no other way, a thread does that holds nobody up.
+"""
+
+import codecs
+import os
+import queue
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+POLL_S = 0.1
+
+
+def lines(over: threading.Event) -> Iterator[str]:
+    """Yield the lines of the standard input, without blanks around them, until its end."""
+    text = b""
+    # Read past sys.stdin, whose buffer would keep the second of two lines from being seen.
+    for more in _chunks(sys.stdin.fileno(), over):
+        *whole, text = (text + more).split(b"\n")
+        for line in whole:
+            yield line.decode(errors="replace").strip()
+    if not over.is_set():
+        yield text.decode(errors="replace").strip()  # the last one may have no end
+
+
+def chunks_by_thread(descriptor: int, over: threading.Event) -> Iterator[bytes]:
+    """Yield what comes, until the end or until it is over; a thread waits for it.
+
+    The thread is left to wait when it is over, and ends with the process at the latest: what comes
+    then is lost, so it is for systems only that cannot ask a pipe whether something is there.
+    """
+    found: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+
+    def read() -> None:
+        with suppress(OSError):
+            while more := os.read(descriptor, 4096):
+                found.put(more)
+        found.put(b"")
+
+    threading.Thread(target=read, name="standard input", daemon=True).start()
+    while not over.is_set():
+        with suppress(queue.Empty):
+            if not (more := found.get(timeout=POLL_S)):
+                return
+            yield more
+
+
+if sys.platform == "win32":
+    import _thread
+    import msvcrt
+
+    _chunks = chunks_by_thread
+
+    PREFIXES = ("\0", "\xe0")
+    """What comes before the number of a key that is no letter: an arrow, F1."""
+
+    INTERRUPT = "\x03"
+
+    @contextmanager
+    def single_keys() -> Iterator[None]:
+        """Let the terminal give every key at once: a Windows console does, to who asks for keys."""
+        yield
+
+    def next_key(over: threading.Event) -> str:
+        """Wait for a key; nothing when it is over."""
+        while not over.is_set():
+            if not msvcrt.kbhit():
+                over.wait(POLL_S)
+                continue
+            key = msvcrt.getwch()
+            if key in PREFIXES and msvcrt.kbhit():  # 0xe0 alone is the letter à
+                msvcrt.getwch()
+            elif key == INTERRUPT:
+                _thread.interrupt_main()
+            elif "\ud800" <= key < "\udc00":  # the first half of a letter of two
+                both = (key + msvcrt.getwch()).encode("utf-16-le", "surrogatepass")
+                return both.decode("utf-16-le", "replace")
+            else:
+                return key
+        return ""
+
+else:
+    import select
+    import termios
+    import tty
+
+    def _chunks(descriptor: int, over: threading.Event) -> Iterator[bytes]:
+        """Yield what comes, until the end or until it is over."""
+        while not over.is_set():
+            if select.select([descriptor], [], [], POLL_S)[0]:
+                if not (more := os.read(descriptor, 4096)):
+                    return
+                yield more
+
+    @contextmanager
+    def single_keys() -> Iterator[None]:
+        """Let the terminal give every key at once, and put it back afterwards."""
+        before = termios.tcgetattr(sys.stdin)
+        try:
+            tty.setcbreak(sys.stdin)
+            yield
+        finally:
+            with suppress(termios.error):
+                termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+
+    def next_key(over: threading.Event) -> str:
+        """Wait for a key; nothing when it is over, or nobody is there any more.
+
+        Read past the buffer of sys.stdin: what that holds back, select does not see.
+        """
+        letters = codecs.getincrementaldecoder("utf-8")(errors="replace")
+        key = ""
+        while not key and not over.is_set():
+            if select.select([sys.stdin], [], [], POLL_S)[0]:
+                byte = os.read(sys.stdin.fileno(), 1)
+                if not byte:
+                    return ""
+                key = letters.decode(byte)  # nothing while the rest of a letter is to come
+        return key

@@ -1,0 +1,172 @@
+"""References: what a field of a component's settings names, and what components give names to.
+
+A plugin annotates the field, and the core looks the name up once every component of the protocol is
+known; the message has the line, what there is, and the nearest name::
+
+    trigger: ButtonName = "right.trigger"
+    map: Annotated[dict[JointName, AxisName], Covers("joint"), Once()]
+
+This is names only, so that a protocol is checked without loading what works with them.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from pydantic import BaseModel, Field
+
+Place = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """A mark on a field's type: its text is the name of something.
+
+    Attributes
+    ----------
+    kind
+        What it names; the names of every kind are what :meth:`Settings.provides` says.
+    signed
+        Whether a leading minus is allowed, and means the same thing turned round.
+    own
+        Whether it must be among what the component itself provides.
+    """
+
+    kind: str
+    signed: bool = False
+    own: bool = False
+
+    def bare(self, name: str) -> str:
+        """Return a written name without its sign."""
+        return name.removeprefix("-") if self.signed else name
+
+
+@dataclass(frozen=True, slots=True)
+class Covers:
+    """A mark on a mapping's type: its keys name everything of a kind that there is."""
+
+    kind: str
+
+
+@dataclass(frozen=True, slots=True)
+class Once:
+    """A mark on a mapping's or a list's type: no two of its values name the same."""
+
+
+Mark = Reference | Covers | Once
+
+AxisName = Annotated[str, Field(pattern=r"^-?[a-z][a-z0-9_.]*$"), Reference("axis", signed=True)]
+"""An axis of the input, ``right.y``; a leading minus turns it round."""
+
+ButtonName = Annotated[str, Reference("axis")]
+"""A button, which is an axis of the input without a sign: ``right.trigger``."""
+
+JointName = Annotated[str, Reference("joint")]
+"""A joint of the machine."""
+
+LinkName = Annotated[str, Reference("link")]
+"""A link of the machine; each has the name of the joint before it."""
+
+SignalName = Annotated[str, Reference("signal")]
+"""A number of the machine's state, the scheme's command or the task: ``joint.angle.slew``."""
+
+EventName = Annotated[str, Reference("event")]
+"""An event of the session or of a task: ``trial.start``."""
+
+SceneObject = Annotated[str, Reference("object")]
+"""What is to be seen: the tip, a link, a target, the shape of a cue, a thing of a scene."""
+
+ViewName = Annotated[str, Reference("view")]
+"""A view of the protocol."""
+
+CameraName = Annotated[str, Reference("camera", own=True)]
+"""A camera of the view itself."""
+
+EVENTS = (
+    "block.end", "block.start", "break.end", "break.start", "consent.asked", "consent.given",
+    "feedback.lost", "feedback.ready", "feedback.setting", "instructions.shown", "pause.end",
+    "pause.start", "practice.end", "questionnaire.answer", "questionnaire.end",
+    "questionnaire.start", "session.end", "session.resumed", "session.start", "signal.bad",
+    "signal.good", "step.end", "step.start", "stream.back", "stream.lost", "trial.end",
+    "trial.start",
+)  # fmt: skip
+"""What every session can tell, whatever its task."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mentioned:
+    """A mark, and what stands at its place.
+
+    Attributes
+    ----------
+    place
+        The keys and indices below the component's settings; with ``key`` the key itself is meant.
+    """
+
+    mark: Mark
+    place: Place
+    value: Any
+    key: bool = False
+
+
+def mentioned(settings: BaseModel) -> Iterator[Mentioned]:
+    """Yield every mark on what a protocol wrote, with its place and its value.
+
+    Defaults are left out: what a component needs without being told, it says by
+    :meth:`Settings.needs`.
+    """
+    for name, field in type(settings).model_fields.items():
+        if name in settings.model_fields_set:
+            value, key = getattr(settings, name), field.alias or name
+            yield from _marked(field.metadata, (key,), value)
+            yield from _within(field.annotation, (key,), value)
+
+
+def _marked(metadata: list[Any], place: Place, value: Any, *, key: bool = False) -> Iterator[Any]:
+    for mark in metadata:
+        if isinstance(mark, Mark) and value is not None:
+            yield Mentioned(mark, place, value, key)
+
+
+def _within(annotation: Any, place: Place, value: Any, *, key: bool = False) -> Iterator[Any]:
+    """Yield what is marked inside a type: behind Annotated, in unions, mappings and lists."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if isinstance(value, BaseModel):
+        for each in mentioned(value):
+            yield Mentioned(each.mark, (*place, *each.place), each.value, each.key)
+    elif origin is Annotated:
+        yield from _marked(list(annotation.__metadata__), place, value, key=key)
+        yield from _within(arguments[0], place, value, key=key)
+    elif origin in {Union, UnionType}:
+        for one in arguments:
+            if _fits(one, value):
+                yield from _within(one, place, value, key=key)
+    elif arguments:
+        yield from _items(arguments, place, value)
+
+
+def _items(arguments: tuple[Any, ...], place: Place, value: Any) -> Iterator[Any]:
+    """Yield what is marked in a mapping's keys and values, and in a list's items."""
+    if isinstance(value, Mapping):
+        kind_of_key, kind = arguments
+        for name, item in value.items():
+            yield from _within(kind_of_key, (*place, name), name, key=True)
+            yield from _within(kind, (*place, name), item)
+    elif isinstance(value, list | tuple):
+        for number, (each, item) in enumerate(zip(_types(arguments, value), value, strict=True)):
+            yield from _within(each, (*place, number), item)
+
+
+def _types(arguments: tuple[Any, ...], value: Sequence[Any]) -> Sequence[Any]:
+    """Return the type of each item of a list, or of a tuple of any length or a fixed one."""
+    fixed = len(arguments) == len(value) and Ellipsis not in arguments
+    return arguments if fixed else (arguments[:1] or (Any,)) * len(value)
+
+
+def _fits(annotation: Any, value: Any) -> bool:
+    """Whether a member of a union can be what a value was read as."""
+    while get_origin(annotation) is Annotated:
+        annotation = get_args(annotation)[0]
+    kind = get_origin(annotation) or annotation
+    return isinstance(kind, type) and isinstance(value, kind)

@@ -1,0 +1,27 @@
+"""Systems' differences in files: what Linux, macOS and Windows each do in their own way."""
+
+import os
+import shutil
+import sys
+from pathlib import Path
+
+BINARY: int = getattr(os, "O_BINARY", 0)
+"""Flag of ``os.open``, without which Windows writes two bytes for each byte 10."""
+
+PRIVATE_MODES = sys.platform != "win32"
+"""Whether permissions of a file keep others from reading it.
+
+Windows knows one of them, whether it may be written. There the folder's access list decides, which
+new files and folders take over: of a folder in the user's profile nobody else has one.
+"""
+
+
+def free_bytes(path: Path) -> int:
+    """Return the bytes free to this user on the disk that holds ``path``."""
+    return shutil.disk_usage(path).free
+
+
+def sync(fd: int) -> None:
+    """Bring a file that is open for writing to the disk, with all that is needed to read it."""
+    # Looked up at each call: macOS and Windows have no fdatasync.
+    getattr(os, "fdatasync", os.fsync)(fd)

@@ -1,0 +1,85 @@
+"""A crane with something on its tip: a payload, or a grapple that swings."""
+
+from collections.abc import Mapping, Sequence
+
+import mujoco
+import numpy as np
+
+from labcrane import FloatArray, Machine, Run
+from labcrane.core import HangingLoad, LoadedCraneSettings, Value
+from labcrane.machines import Body, urdf_of
+from labcrane_mujoco.mujoco_crane import MujocoCrane
+
+
+class LoadedCrane(MujocoCrane):
+    """The crane's state with the load of every joint, and where the grapple is."""
+
+    def __init__(self, settings: LoadedCraneSettings, machine: Machine) -> None:
+        super().__init__(settings, machine)
+        self._loaded = settings
+        self._load = HangingLoad(machine, settings, self.signals)
+        self.signals = self._load.signals
+
+    def state(self) -> FloatArray:
+        return self._load.values
+
+    def reset(self, pose: Sequence[float]) -> None:
+        super().reset(pose)
+        self._load.fill(self._state.values, [0.0] * self._joints)
+
+    def bodies(self) -> Sequence[Body]:
+        return (*super().bodies(), *self._load.bodies())
+
+    def metadata(self) -> Mapping[str, Value]:
+        return {**super().metadata(), "hanging.mass_kg": self._loaded.hanging_kg}
+
+    def _urdf(self) -> str:
+        return urdf_of(self._machine, beyond=self._load.urdf())
+
+    def _move(self, speeds: Sequence[float]) -> FloatArray:
+        joints = self._joints
+        torques = self._push(speeds)
+        angles, turning = self._angles, self._speeds
+        crane = self._state.fill(angles[:joints], turning[:joints])
+        loads = [torque / effort for torque, effort in zip(torques, self._efforts, strict=True)]
+        return self._load.fill(crane, loads, angles[joints:] or None, turning[joints:])
+
+
+class GrappleCrane(LoadedCrane):
+    """Drives that also bear what a swinging grapple does to the joints."""
+
+    def open(self, run: Run) -> None:
+        self._unit: FloatArray = np.zeros((2, len(self._machine.joints) + 2))
+        self._unit[:, -2:] = np.eye(2)
+        self._columns: FloatArray = np.zeros_like(self._unit)
+        super().open(run)
+
+    def _place(self, angles: Sequence[float]) -> None:
+        assert self._loaded.grapple is not None  # noqa: S101 - this crane is built for one
+        self._model.dof_damping[self._joints :] = self._loaded.grapple.damping
+        super()._place(angles)
+        self._positions[self._joints] = -self._load.pitch(angles)
+        self._begin()
+
+    def _torques(self) -> list[float]:
+        """Solve for what the hinges, which nothing drives, do meanwhile.
+
+        With M the mass matrix, b the bias and p the passive forces, split into joints j and hinges
+        f: M_ff a_f = p_f - b_f - M_fj a_j, and then the torques are M_jj a_j + M_jf a_f + b_j. The
+        engine's Euler step takes damping implicitly, which adds dt times damping to M_ff.
+        """
+        joints, model, data = self._joints, self._model, self._data
+        for unit, column in zip(self._unit, self._columns, strict=True):
+            mujoco.mj_mulM(model, data, column, unit)
+        needed = self._needed.tolist()
+        passive = data.qfrc_passive.tolist()
+        first, second = self._columns.tolist()
+        stiff = self._dt * float(model.dof_damping[joints])
+        a, b, d = first[joints] + stiff, first[joints + 1], second[joints + 1] + stiff
+        one, two = (passive[hinge] - needed[hinge] for hinge in (joints, joints + 1))
+        whole = a * d - b * b
+        swivel, across = (one * d - two * b) / whole, (two * a - one * b) / whole
+        return [
+            needed[joint] + first[joint] * swivel + second[joint] * across
+            for joint in range(joints)
+        ]

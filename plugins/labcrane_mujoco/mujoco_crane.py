@@ -1,0 +1,113 @@
+"""A crane moved by MuJoCo, with the torques that give the speeds asked for."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from importlib.metadata import version
+from struct import Struct
+
+import mujoco
+import numpy as np
+
+from labcrane import FloatArray, Machine, Run
+from labcrane.core import Crane, CraneSettings, Value
+from labcrane.machines import urdf_of
+
+GRAVITY = 9.81
+"""In m/s²."""
+
+LIMIT_STEPS = 2.0
+"""Time constant of a joint's limit, in ticks: the least for which the engine promises stability.
+With its own 20 ms a joint of a stretched arm goes 0.28 degrees beyond at full speed (ch8, 240 Hz;
+ch8_cranelike 1.08), so 0.105 (0.36)."""
+
+
+class MujocoCrane(Crane):
+    """Drives that give each joint its speed at the end of the tick, up to its effort.
+
+    The engine's mass matrix and bias forces say which torques that takes, as in
+    docs/decisions/0090-torques-before-passes.md; a larger torque than a drive has is cut off, and
+    the joint takes more ticks. The engine's own velocity servos cannot hold a crane at 240 Hz.
+
+    No joint is asked to go beyond its limit. One that its drive cannot stop in time is stopped by
+    the engine's limit, which is soft: it lets a joint through by some tenths of a degree at most.
+    """
+
+    def __init__(self, settings: CraneSettings, machine: Machine) -> None:
+        super().__init__(settings, machine)
+        self._joints = len(machine.joints)
+        self._limits = machine.limits
+        self._efforts = tuple(joint.effort for joint in machine.joints)
+
+    def open(self, run: Run) -> None:
+        self._model = model = mujoco.MjModel.from_xml_string(self._urdf())
+        model.opt.timestep = 1.0 / run.rate_hz
+        model.opt.gravity[:] = (0.0, 0.0, -GRAVITY)
+        model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
+        # What the engine cannot compute must reach the loop, not begin anew with a warning.
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT  # nothing here has a shape
+        model.jnt_solref[:] = (LIMIT_STEPS / run.rate_hz, 1.0)
+        self._data = data = mujoco.MjData(model)
+        # Views: asking the engine's structure for them costs more than using them.
+        self._positions, self._velocities = data.qpos, data.qvel
+        self._wanted: FloatArray = np.zeros(model.nv)
+        self._inertial: FloatArray = np.zeros(model.nv)
+        self._needed: FloatArray = np.zeros(model.nv)
+        self._prepare = partial(mujoco.mj_step1, model, data)
+        self._integrate = partial(mujoco.mj_step2, model, data)
+        self._multiply = partial(mujoco.mj_mulM, model, data, self._inertial, self._wanted)
+        self._add = partial(np.add, self._inertial, data.qfrc_bias, self._needed)
+        # Packing numbers into an array costs half of assigning them.
+        pack = Struct(f"{self._joints}d").pack_into
+        self._want = partial(pack, self._wanted.data, 0)
+        self._apply = partial(pack, data.qfrc_applied.data, 0)
+        super().open(run)
+
+    def metadata(self) -> Mapping[str, Value]:
+        return {**super().metadata(), "engine": f"mujoco {version('mujoco')}"}
+
+    def _urdf(self) -> str:
+        return urdf_of(self._machine)
+
+    def _place(self, angles: Sequence[float]) -> None:
+        mujoco.mj_resetData(self._model, self._data)
+        self._positions[: self._joints] = angles
+        self._begin()
+
+    def _begin(self) -> None:
+        """Work out what the next tick's torques depend on."""
+        self._prepare()
+        self._angles: list[float] = self._positions.tolist()
+        self._speeds: list[float] = self._velocities.tolist()
+
+    def _move(self, speeds: Sequence[float]) -> FloatArray:
+        self._push(speeds)
+        return self._state.fill(self._angles, self._speeds)
+
+    def _push(self, speeds: Sequence[float]) -> list[float]:
+        """Make a tick at ``speeds`` in rad/s; return the torques in N m."""
+        dt = self._dt
+        accelerations = [
+            (speed - was) / dt
+            if lowest <= angle + speed * dt <= highest
+            else (((lowest if angle + speed * dt < lowest else highest) - angle) / dt - was) / dt
+            for speed, was, angle, (lowest, highest) in zip(
+                speeds, self._speeds, self._angles, self._limits, strict=False
+            )
+        ]
+        self._want(*accelerations)
+        self._multiply()
+        self._add()
+        torques = [
+            effort if torque > effort else -effort if torque < -effort else torque
+            for torque, effort in zip(self._torques(), self._efforts, strict=False)
+        ]
+        self._apply(*torques)
+        self._integrate()
+        self._begin()
+        return torques
+
+    def _torques(self) -> list[float]:
+        """Return in N m what gives the joints the accelerations wanted."""
+        torques: list[float] = self._needed.tolist()
+        return torques

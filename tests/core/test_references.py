@@ -1,0 +1,276 @@
+"""What a protocol's components refer to: looked up by the core, told with place and remedy."""
+
+# ruff: noqa: E501 - a message is one line, as the researcher sees it
+
+import random
+import re
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from io import StringIO
+from pathlib import Path
+from typing import Annotated, Any
+
+import pytest
+from ruamel.yaml import YAML
+
+from labcrane import ProtocolError, Settings
+from labcrane.core import ButtonName, Covers, JointName, Layout, Once
+from labcrane.core.references import EVENTS, Mentioned, Reference, mentioned
+from labcrane.core.roles import InputDevice
+from labcrane.machines import load_machine
+from labcrane.protocol.protocol import Participants
+from labcrane.protocol.study import Study, load
+from labcrane.registry.registry import Registry, discover
+
+PROTOCOLS = Path(__file__).parents[2] / "protocols"
+
+AIMING = (PROTOCOLS / "aiming" / "protocol.yaml").read_text()
+RETRIEVAL = (PROTOCOLS / "retrieval" / "protocol.yaml").read_text()
+
+
+@pytest.fixture(scope="module")
+def registry() -> Registry:
+    return discover()
+
+
+@pytest.fixture
+def told(tmp_path: Path, registry: Registry):
+    """Return what is said of a protocol beside the files of the shipped one, its name left out."""
+
+    def tell(study: str, text: str) -> list[str]:
+        folder = tmp_path / study
+        if not folder.exists():
+            shutil.copytree(PROTOCOLS / study, folder)
+        path = folder / "protocol.yaml"
+        path.write_text(text, encoding="utf-8")
+        try:
+            load(path, registry)
+        except ProtocolError as error:
+            return str(error).replace(f"{path}:", "").splitlines()
+        return []
+
+    return tell
+
+
+@pytest.mark.parametrize(
+    ("study", "old", "new", "said"),
+    [
+        ("aiming", "right.x", "right.z", "14:45: scheme.map.wrist is 'right.z', and there is no such axis; did you mean"),
+        ("aiming", ", wrist: right.x", "", "14:8: scheme.map has nothing for the joint 'wrist'; it needs one for each of slew, shoulder, elbow, wrist"),
+        ("aiming", "elbow: left.y", "boom: left.y", "14:23: scheme.map.boom is 'boom', and there is no such joint; the machine has elbow, shoulder, slew, wrist"),
+        ("retrieval", "proportional: [base]", "proportional: [foo]", "17:18: dynamics.proportional[1] is 'foo', and there is no such joint; the machine has arm, base, boom, jaws"),
+        ("retrieval", "boom: 3", "bom: 3", "11:72: input.valves.bom is 'bom', and there is no such joint; did you mean 'boom'?"),
+        ("retrieval", "boom: 3, ", "", "13:9: scheme needs the axis 'valve.boom', and there is no such axis"),
+        ("retrieval", "fov_deg: 60}", "fov_deg: 60, on: bom}", "36:89: views.operator.camera.on is 'bom', and there is no such link; did you mean 'boom'?"),
+        ("aiming", "end: rest_inside", "trigger: left.knob", "20:85: tasks.aiming.trigger is 'left.knob', and there is no such axis;"),
+        ("aiming", "camera: cab_left", "areas: [targt]", "27:33: views.operator.areas[1] is 'targt', and there is no such object; did you mean 'target'?"),
+        ("aiming", "camera: cab_left", "patch: {on: [trial.strat]}", "27:38: views.operator.patch.on[1] is 'trial.strat', and there is no such event; did you mean 'trial.start'?"),
+        ("aiming", "camera: cab_left", "supervisor: {cameras: [moon]}", "27:48: views.operator.supervisor.cameras[1] is 'moon', and there is no such camera;"),
+        ("aiming", "wrist: right.x", "wrist: -left.y", "14:45: scheme.map has 'left.y' for both 'elbow' and 'wrist'; give each its own"),
+        ("aiming", "width: 0.5", "width: 50", "20: tasks.aiming.width: a circle 50 m wide holds the middle of its partner 2 m away; write less than 2"),
+        ("aiming", "width: 0.5", "width: 1e300", "20: tasks.aiming.width: a circle 1e+300 m wide"),
+        ("aiming", "width: 0.5", "width: 2", "20: tasks.aiming.width: a circle 2 m wide"),
+        ("aiming", "[2, 3, 4, 6]", "[1,5, 2,5, 4]", "20: tasks.aiming.distances: 5 m is there twice; write each distance once, and decimals with a point: [1.5, 2.5, 4]"),
+        ("aiming", "[2, 3, 4, 6]", "2 m", "20: tasks.aiming.distances is '2 m'; it must be a list: [.., ..]"),
+        ("aiming", "feedback: group", "feedback: grup", "38: sessions[1].steps[2].block.feedback is 'grup'; it must be 'all', 'none' or 'group', or a list: [.., ..]"),
+        ("aiming", "on_fault", "  - {name: acquisition, steps: [consent]}\non_fault", "40:12: two sessions are called 'acquisition'; give each a name of its own"),
+        ("aiming", "pattern: 'P\\d{3}'", "pattern: 'P\\d{3}$1'", "7:25: participants.pattern 'P\\d{3}$1' is matched by nobody; "),
+        ("aiming", "  map:", "\tmap:", "14: there is a tab, which YAML does not take for indentation; write spaces"),
+    ],
+)  # fmt: skip
+def test_a_name_of_nothing_is_told_where_it_stands(
+    told, study: str, old: str, new: str, said: str
+) -> None:
+    text = AIMING if study == "aiming" else RETRIEVAL
+    assert old in text
+    lines = told(study, text.replace(old, new, 1))
+    assert [line for line in lines if line.startswith(said)], lines
+    assert {line.split(":")[0] for line in lines} <= {said.split(":", maxsplit=1)[0], "13", "15"}, (
+        lines
+    )
+
+
+def test_a_session_without_steps_is_told(told) -> None:
+    text = AIMING[: AIMING.index("    steps:")] + "    steps: []\n"
+    assert any(
+        line.endswith("sessions[1].steps is []; it needs at least 1")
+        for line in told("aiming", text)
+    )
+
+
+def test_all_wrong_names_are_told_at_once(told) -> None:
+    text = AIMING.replace("left.x", "left.q").replace("cab_left", "cab_left, areas: [tipp]")
+    assert [line.split(":")[0] for line in told("aiming", text)] == ["14", "27"]
+
+
+def test_a_file_in_another_encoding_is_told_to_be_saved_as_utf_8(
+    tmp_path: Path, registry: Registry
+) -> None:
+    path = tmp_path / "study.yaml"
+    path.write_bytes("labcrane: 1\ntitle: Übung\n".encode("latin-1"))
+    with pytest.raises(ProtocolError, match=r"study\.yaml:2: byte 0xDC is no UTF-8; .* save it as"):
+        load(path, registry)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "ends_early"),
+    [
+        (r"P\d{3}$", False),
+        (r"^P\d{3}$", False),
+        (r"(?:^P)\d+", False),
+        (r"P$x|P\d{3}", False),
+        (r"P\$1", False),
+        (r"[$^]P", False),
+        (r"P$\d*", False),
+        (r"P\d{3}$1", True),
+        (r"P^\d{3}", True),
+    ],
+)
+def test_a_pattern_with_something_behind_its_end_is_told_from_one_without(
+    pattern: str, ends_early: object
+) -> None:
+    assert Participants(pattern=pattern).ends_early is ends_early
+    if ends_early:
+        assert not any(
+            re.fullmatch(pattern, f"P{n:03}{tail}") for n in range(1000) for tail in ("", "1")
+        )
+
+
+class Finger(Settings):
+    """A part of the settings below."""
+
+    button: ButtonName = "left.trigger"
+
+
+class Hand(Settings):
+    """What a plugin's author might write."""
+
+    fingers: tuple[Finger, ...] = ()
+    pair: tuple[ButtonName, JointName] | None = None
+    map: Annotated[dict[JointName, float], Covers("joint"), Once()] | None = None
+    maybe: ButtonName | None = None
+
+
+def test_a_marked_name_is_found_however_deep_it_stands_and_a_default_is_left_out() -> None:
+    hand = Hand.model_validate(
+        {"fingers": [{}, {"button": "a"}], "pair": ["b", "slew"], "map": {"boom": 1}}
+    )
+    axis, joint = Reference("axis"), Reference("joint")
+    assert list(mentioned(hand)) == [
+        Mentioned(axis, ("fingers", 1, "button"), "a"),
+        Mentioned(axis, ("pair", 0), "b"),
+        Mentioned(joint, ("pair", 1), "slew"),
+        Mentioned(Covers("joint"), ("map",), {"boom": 1.0}),
+        Mentioned(Once(), ("map",), {"boom": 1.0}),
+        Mentioned(joint, ("map", "boom"), "boom", key=True),
+    ]
+
+
+INPUTS: Mapping[str, dict[str, Any]] = {
+    "dual_joystick": {},
+    "simulated_operator": {},
+    "scenario_operator": {},
+    "gateway": {},
+    "keyboard": {"view": "v", "axes": {"slew": ["a", "d"]}},
+    "can": {"bus": "socketcan:can0", "valves": {"arm": 1, "boom": 2}},
+}
+
+
+@pytest.mark.parametrize("name", INPUTS)
+def test_an_input_declares_the_axes_that_it_has(registry: Registry, name: str) -> None:
+    offer = registry.find(InputDevice, name)
+    machine = load_machine(str(PROTOCOLS / "retrieval" / "ied_arm.yaml"), PROTOCOLS)
+    settings = offer.settings.model_validate(INPUTS[name])
+    built = offer.build(settings, machine)
+    assert tuple(settings.provides(machine)["axis"]) == Layout("the input", built.signals).columns
+
+
+Step = str | int
+Place = tuple[Step, ...]
+
+
+def references_of(study: Study) -> Iterator[tuple[Place, Mentioned]]:
+    """Yield every reference of a shipped protocol with its place in the file."""
+    single = ("input", "operator", "scheme", "dynamics")
+    for part in single:
+        for each in mentioned(getattr(study, part).settings):
+            yield (part, *each.place), each
+    for part, choices in (
+        ("tasks", study.task_choices),
+        ("feedback", study.cues | study.sounds),
+        ("views", study.views),
+    ):
+        for name, choice in choices.items():
+            for each in mentioned(choice.settings):
+                yield (part, name, *each.place), each
+
+
+def broken(rng: random.Random, text: str, place: Place, *, key: bool) -> tuple[str, str]:
+    """Return the protocol with one reference misspelt, removed or of the wrong kind, and which."""
+    yaml = YAML()
+    data = yaml.load(text)
+    holder: Any = data
+    for step in place[:-1]:
+        holder = holder[step]
+    last = place[-1]
+    fault = rng.choice(("misspelt", "removed", "of the wrong kind"))
+    name = str(last if key else holder[last])
+    if fault == "misspelt":
+        at = rng.randrange(len(name))
+        wrong: object = name[:at] + rng.choice("qz7") + name[at + 1 :]
+    else:
+        wrong = rng.choice((5, [1, 2], {"a": 1}, True))
+    if fault == "removed":
+        del holder[last]
+    elif key:
+        wrong = str(wrong) if not isinstance(wrong, str) else wrong
+        holder.insert(list(holder).index(last), wrong, holder.pop(last))
+    else:
+        holder[last] = wrong
+    out = StringIO()
+    yaml.width = 10_000
+    yaml.dump(data, out)
+    return out.getvalue(), fault
+
+
+REMEDY = re.compile(r"there is no such \w+; .*has |it needs one for each of |must be |needs the ")
+
+
+def line_of(text: str, place: Sequence[Step]) -> int:
+    """Return the line of what holds a place, by the YAML library itself."""
+    node, line = YAML().load(text), 1
+    for step in place:
+        try:
+            line = (node.lc.item(step) if isinstance(step, int) else node.lc.key(step))[0] + 1
+            node = node[step]
+        except (KeyError, IndexError, TypeError, AttributeError):
+            break
+    return line
+
+
+@pytest.mark.parametrize("study", ["aiming", "retrieval"])
+@pytest.mark.parametrize("seed", range(12))
+def test_a_reference_broken_at_random_is_told_with_its_line_and_the_remedy(
+    told, registry: Registry, study: str, seed: int
+) -> None:
+    rng = random.Random(f"{study} {seed}")
+    shipped = load(PROTOCOLS / study / "protocol.yaml", registry)
+    every = [
+        (place, each) for place, each in references_of(shipped) if isinstance(each.mark, Reference)
+    ]
+    place, each = rng.choice(every)
+    text, fault = broken(
+        rng, (PROTOCOLS / study / "protocol.yaml").read_text(), place, key=each.key
+    )
+    lines = told(study, text)
+    context = (fault, place, lines)
+    assert lines, context
+    at = line_of(text, place)
+    assert any(line.startswith(f"{at}:") for line in lines) or fault == "removed", context
+    assert all(REMEDY.search(line) for line in lines), context
+
+
+def test_the_events_of_every_session_are_those_that_its_code_tells() -> None:
+    source = Path(__file__).parents[2] / "labcrane"
+    said = "\n".join(path.read_text() for path in source.rglob("*.py") if path.stem != "references")
+    assert [event for event in EVENTS if f'"{event}"' not in said] == []
