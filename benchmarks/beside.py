@@ -68,7 +68,8 @@ def clients(folder: Path) -> list[Row]:
         wait_for(lambda: room.process("pages"))
         session = room.process("session")
         cookie = cookie_of(room, "supervisor")
-        words = [socket_request(cookie).decode(), cookie, str(RECONNECTS // SPELLS), str(SPELL_S)]
+        request = socket_request(room, cookie).decode()
+        words = [request, cookie, str(RECONNECTS // SPELLS), str(SPELL_S)]
         program = [sys.executable, str(TESTS / "pages" / "rude.py"), str(room.port), *words]
         with subprocess.Popen(
             program, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True

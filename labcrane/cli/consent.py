@@ -87,11 +87,11 @@ def await_consent(visit: "Visit", console: QueueConsole, say: Callable[[str], No
     if (missing := missing_consent(visit)) is None:
         return
     file, version = missing.text
-    say(f"waiting for {visit.participant}'s consent to {file} (version {version}) on the page")
     needed = {"file": file, "version": version, "text": _words(missing.lock)}
-    console.report(Event("consent.needed", time.perf_counter(), needed))
     kept: list[Command] = []  # what is not for us is for the session
     with suppress(KeyboardInterrupt):  # which ends the run, as it ends a session
+        say(f"waiting for {visit.participant}'s consent to {file} (version {version}) on the page")
+        console.report(Event("consent.needed", time.perf_counter(), needed))
         while (by := _given(console, version, kept)) is None:
             time.sleep(LOOK_S)
         if by is not NOBODY:

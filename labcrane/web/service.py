@@ -31,6 +31,10 @@ NICENESS = 5
 """The loop's process comes first when the computer is busy, whatever browsers ask for; at 15
 the pages could not be reached for more than a minute."""
 
+AWAY_S = 30.0
+"""How long a browser may be without connection, as a tablet or a laptop that sleeps, and find its
+page as it was. After that the page is loaded anew, without what was half written."""
+
 MOST_HEAD = 16_384
 """Bytes of a request's line and headers."""
 
@@ -165,11 +169,11 @@ def _routes(app: Any, desk: PageContext) -> None:
     from labcrane.web.examiner_page import supervisor_page  # noqa: PLC0415
     from labcrane.web.participant_page import participant_page  # noqa: PLC0415
 
-    @ui.page("/supervisor")
+    @ui.page("/supervisor", reconnect_timeout=AWAY_S)
     def supervisor() -> None:
         supervisor_page(desk)
 
-    @ui.page("/participant")
+    @ui.page("/participant", reconnect_timeout=AWAY_S)
     def participant() -> None:
         participant_page(desk)
 

@@ -136,10 +136,13 @@ def a_browser(profile: Path) -> Iterator[webdriver.Chrome]:
         browser.quit()
 
 
+TEXT = "return (document.getElementById(arguments[0])?.innerText ?? '').trim();"
+"""What an element shows: found and read at once, as the page may replace it in between."""
+
+
 def text(browser: webdriver.Chrome, ident: str) -> str:
     """Return what an element shows; empty while the page has none such."""
-    found = browser.find_elements(By.ID, ident)
-    return found[0].text if found else ""
+    return str(browser.execute_script(TEXT, ident))
 
 
 STILL = """

@@ -10,7 +10,9 @@ from selenium import webdriver
 
 from labcrane import open_recording
 from labcrane.approval.lock import read_lock
+from labcrane.cli.consent import await_consent
 from labcrane.participants.register import read
+from labcrane.session.commands import QueueConsole
 
 FETCH = "const done = arguments[0]; fetch('/consent').then(r => r.text()).then(done);"
 
@@ -53,4 +55,20 @@ def test_a_run_that_is_ended_instead_leaves_nobody_in_the_register(tmp_path: Pat
         room.launcher.send_signal(signal.SIGINT)
         assert room.launcher.wait(240) == 2
         wait_for(lambda: "P001 has not consented to consent_v2.txt" in "".join(room.said))
+    assert not lab.places.register.exists()
+
+
+def test_an_interrupt_that_comes_while_consent_is_being_asked_for_ends_the_asking(
+    tmp_path: Path,
+) -> None:
+    lab = Lab(tmp_path)
+    lab.approve()
+
+    def interrupted(words: str) -> None:
+        asked.append(words)
+        raise KeyboardInterrupt
+
+    asked: list[str] = []
+    await_consent(lab.visit("P001"), QueueConsole(), interrupted)
+    assert len(asked) == 1
     assert not lab.places.register.exists()

@@ -107,6 +107,30 @@ def test_the_supervisors_page_is_reached_by_keyboard_and_readable(
     shown(browser, "events", '"text": "hello"')
 
 
+AWAY = """
+const [away_ms, done] = arguments;
+window.stays = true;
+window.socket.disconnect();
+setTimeout(() => { window.socket.connect(); }, away_ms);
+window.socket.once('connect', () => setTimeout(() => done(window.socket.connected), 1000));
+"""
+"""Loses the connection for a while, and waits until it has been taken up again for a second."""
+
+
+def test_what_is_half_written_outlives_a_connection_that_was_lost(
+    room: Room, browser: webdriver.Chrome
+) -> None:
+    browser.get(room.links()["supervisor"])
+    shown(browser, "stage", "questionnaire: Zu Ihrer Person")
+    go_to(browser, "note-field")
+    type_in(browser, "half a ")
+    browser.set_script_timeout(240)
+    assert browser.execute_async_script(AWAY, 5000)
+    assert browser.execute_script("return window.stays")
+    type_in(browser, "note", Keys.ENTER)
+    shown(browser, "events", '"text": "half a note"')
+
+
 def test_a_questionnaire_is_answered_in_german_and_by_keyboard_alone(
     room: Room, browser: webdriver.Chrome
 ) -> None:

@@ -41,10 +41,11 @@ def cookie_of(room: Room, page: str) -> str:
     return cookie
 
 
-def socket_request(cookie: str, path: str = "/_nicegui_ws/socket.io/") -> bytes:
+def socket_request(room: Room, cookie: str) -> bytes:
+    """Return how a browser asks for a socket; it names the port with the host."""
     lines = [
-        f"GET {path}?EIO=4&transport=websocket HTTP/1.1",
-        "Host: 127.0.0.1",
+        "GET /_nicegui_ws/socket.io/?EIO=4&transport=websocket HTTP/1.1",
+        f"Host: 127.0.0.1:{room.port}",
         "Upgrade: websocket",
         "Connection: Upgrade",
         "Sec-WebSocket-Version: 13",
@@ -57,7 +58,7 @@ def socket_request(cookie: str, path: str = "/_nicegui_ws/socket.io/") -> bytes:
 def let_loose(room: Room, cookie: str) -> int:
     """Let a rude client loose; return how often it got in."""
     program = [sys.executable, str(Path(__file__).with_name("rude.py")), str(room.port)]
-    arguments = [socket_request(cookie).decode(), cookie, str(RECONNECTS), "0"]
+    arguments = [socket_request(room, cookie).decode(), cookie, str(RECONNECTS), "0"]
     done = subprocess.run(
         [*program, *arguments], input="go\n", capture_output=True, text=True, check=True
     )
@@ -101,7 +102,7 @@ def visited(tmp_path_factory: pytest.TempPathFactory):
             )
         opened = let_loose(room, supervisor)
         with socket.create_connection(("127.0.0.1", room.port)) as link:
-            link.sendall(socket_request("labcrane-supervisor=guess"))
+            link.sendall(socket_request(room, "labcrane-supervisor=guess"))
             answers["a socket without token"] = (int(link.recv(64).split()[1]), "", "")
         assert ask(room, "POST", "/orders/end", supervisor)[0] == 202
         room.ended()
