@@ -133,9 +133,13 @@ class Form:
         field = ui.input(hint, value=shown).classes("w-full")
         field.props(f'outlined for="{item.name}-field"')
 
+        sent = [shown]
+
         def save() -> None:
+            # A field that is left after Enter, or because the form goes, says nothing new.
             text = str(field.value or "").strip()
-            if text:
+            if text and text != sent[0]:
+                sent[0] = text
                 self._answer(name, item, text if item.kind == "text" else _number(text))
 
         field.on("blur", save)
