@@ -42,7 +42,7 @@ study: another
 title: Touch something
 participants: {{pattern: 'P\\d{{3}}', planned: 1}}
 machine: ied_arm.yaml
-input: {{use: dual_joystick}}
+input: {{use: gateway}}
 operator: {{use: scenario_operator}}
 scheme: {{use: valve}}
 dynamics:
