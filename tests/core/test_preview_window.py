@@ -58,7 +58,7 @@ def test_a_movement_is_played_in_real_time_in_a_window(tmp_path: Path) -> None:
             player.kill()
             player.wait()
     assert player.returncode == 0, said
-    assert "tone: the jack sound system does not take" in said
+    assert "tone failed: the jack sound system does not take" in said
     assert "start a JACK server first; it is left out" in said
     assert not (tmp_path / "preview").exists()
     shown = dict(zip(labels, np.array(rows).T, strict=True))
