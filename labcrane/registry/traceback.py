@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from traceback import walk_tb
 
-CORE = Path(__file__).parent
+CORE = Path(__file__).parents[1]
 
 
 def place(error: BaseException, module: Path | None = None) -> str:
