@@ -136,7 +136,7 @@ class Camera:
         return past
 
     def aim(self, poses: FloatArray) -> Projection:
-        """Look from where it is now: ``poses`` as of :func:`labcrane.frames`."""
+        """Look from where it is now: ``poses`` as of :func:`labcrane.machines.link_frames`."""
         eye, look = (
             self._in_base(point, poses) for point in (self.settings.eye, self.settings.look)
         )

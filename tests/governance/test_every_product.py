@@ -105,7 +105,7 @@ def test_an_erasure_killed_at_random_writes_is_finished_by_the_next_call(made: S
     assert killed >= 2
 
 
-@pytest.mark.long
+@pytest.mark.soak
 def test_an_erasure_killed_at_very_many_writes_is_finished_by_the_next_call(
     made: Snapshot,
 ) -> None:

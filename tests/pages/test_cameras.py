@@ -76,7 +76,7 @@ def seen(browser: webdriver.Chrome, ident: str) -> np.ndarray:
 
 def view_process(room: Room) -> psutil.Process:
     children = psutil.Process(room.launcher.pid).children()
-    (host,) = (each for each in children if "labcrane.feedback_host" in each.cmdline())
+    (host,) = (each for each in children if "labcrane.feedback.process" in each.cmdline())
     return host
 
 

@@ -72,7 +72,7 @@ def test_joints_objects_and_bodies_are_recorded_tick_by_tick(session) -> None:
         assert all(len(column) == rows and np.isfinite(column).all() for column in columns)
         assert set(state[f"joint.end.{joint}"]) <= {-1.0, 0.0, 1.0}
     for scene in SCENES.values():
-        for thing in labcrane.place(scene, 1):
+        for thing in labcrane.machines.place_objects(scene, 1):
             names = {part.name for part in thing.parts}
             for part in names if thing.kind != "obstacle" else ():
                 assert f"scene.{thing.name}.force.{part}" in state
