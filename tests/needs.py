@@ -91,6 +91,10 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
         lambda: shutil.which("bids-validator-deno", path=Path(sys.executable).parent) is not None,
         "pip install bids-validator-deno",
     ),
+    "alsa.conf": (
+        lambda: Path("/usr/share/alsa/alsa.conf").exists(),
+        "apt install libasound2-data: PortAudio ends the process without it",
+    ),
     "no sound card": (lambda: not Path("/dev/snd").exists(), "this computer has one"),
 }
 """Whatever else there may be: how it is found, and what to do where it is not."""

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from needs import GRAPHICS, needs
 from rehearsal import SHORT, a_study
 
 from labcrane.cli.app import main
@@ -131,7 +132,10 @@ def a_sensor(kind: str, name: str, column: str, level: str, delay_s: float) -> I
 
 @pytest.mark.parametrize(
     ("kind", "name", "column", "level"),
-    [("display", "window", "flip.time", "patch"), ("audio", "tone", "", "level")],
+    [
+        pytest.param("display", "window", "flip.time", "patch", marks=needs(*GRAPHICS)),
+        ("audio", "tone", "", "level"),
+    ],
 )
 def test_the_doctor_measures_the_delay_of_a_sensor(
     kind: str, name: str, column: str, level: str, protocol: Path, capsys: pytest.CaptureFixture

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from core.fed_study import FED
+from needs import GRAPHICS, needs
 from rehearsal import ScriptedConsole, a_study
 
 import labcrane
@@ -19,6 +20,7 @@ PREVIEWED = FED.replace("distances: [2]", "distances: [2], limit_s: 1") + (
 )
 
 
+@needs(*GRAPHICS)
 def test_a_preview_has_pictures_and_sound_of_a_movement(tmp_path: Path) -> None:
     import wave
 
@@ -35,6 +37,7 @@ def test_a_preview_has_pictures_and_sound_of_a_movement(tmp_path: Path) -> None:
     assert np.abs(samples).max() > 1000
 
 
+@needs(*GRAPHICS)
 def test_a_preview_shows_a_recorded_trial(tmp_path: Path) -> None:
     study = a_study(tmp_path, PREVIEWED)
     visit = Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=True)

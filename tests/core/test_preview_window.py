@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pylsl
 import pytest
+from needs import GRAPHICS, needs
 from rehearsal import SHORT
 from windows import an_x_server
 
@@ -71,6 +72,7 @@ def test_a_movement_is_played_in_real_time_in_a_window(tmp_path: Path) -> None:
     assert np.isfinite(shown["cue.ball.radius"][moving]).all()
 
 
+@needs(*GRAPHICS)
 def test_without_a_display_it_is_written_to_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:

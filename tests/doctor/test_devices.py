@@ -47,6 +47,7 @@ class TestView(ExaminationContract):
         return ViewSettings(display="hidden", size=(64, 48))
 
 
+@needs("alsa.conf")
 class TestSound(ExaminationContract):
     @pytest.fixture
     def offered(self) -> Offer:
@@ -175,7 +176,7 @@ def null_device(folder: Path) -> str:
     return str(config)
 
 
-@needs("no sound card")
+@needs("alsa.conf", "no sound card")
 def test_a_computer_without_sound_fails_and_does_not_crash() -> None:
     assert in_a_process("labcrane_sonification").startswith(
         "FAIL there is no sound output device connect one"

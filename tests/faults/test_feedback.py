@@ -8,6 +8,7 @@ import numpy as np
 import psutil
 import pytest
 from faults.sessions import unique, wait_for
+from needs import GRAPHICS, needs
 from simple_crane import FORM
 
 import labcrane as lab
@@ -123,6 +124,7 @@ class Told:
         return {name for name, ready in lost.items() if ready}
 
 
+@needs(*GRAPHICS)
 def test_killed_hanging_and_raising_feedback_leave_the_session_as_it_is(
     protocol: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -16,6 +16,7 @@ from governance.every_product import (
 )
 from governance.kept_people import REASON
 from governed import TODAY, Lab
+from needs import needs
 
 from labcrane.cli.app import main
 from labcrane.participants import recovery
@@ -80,6 +81,7 @@ def test_nothing_of_an_erased_person_is_left_and_nothing_of_others_is_touched(
     assert len(done.reach.again) == 2  # report and workbook
 
 
+@needs("Rscript")
 def test_the_shared_files_that_stay_work(made: Snapshot) -> None:
     lab = made.put_back()
     recovery.erase(lab.places, "P001", REASON, TODAY)

@@ -227,7 +227,7 @@ def refusal(driver: str = "portaudio", device: int | None = None, **env: str) ->
     return done.stdout
 
 
-@needs("no sound card")
+@needs("alsa.conf", "no sound card")
 def test_a_computer_without_sound_is_told_so() -> None:
     said = refusal()
     assert said.startswith("there is no sound output device; connect one, use driver: jack, or")
