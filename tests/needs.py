@@ -93,7 +93,7 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
     ),
     "alsa.conf": (
         lambda: Path("/usr/share/alsa/alsa.conf").exists(),
-        "apt install libasound2-data: PortAudio ends the process without it",
+        "apt install libasound2-data",  # PortAudio ends the process without it
     ),
     "no sound card": (lambda: not Path("/dev/snd").exists(), "this computer has one"),
 }
