@@ -1,6 +1,6 @@
 """Correction of XDF files of any recorder, certified, and compared with pyxdf."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -87,7 +87,7 @@ def _raw(recorded: RecordedStream) -> RawStream:
         return raw
     column = recorded.header.labels.index(label)
     index = unwrapped(np.asarray(recorded.data[:, column], np.float64))
-    return RawStream(raw.stamps, raw.probes, raw.arrivals, raw.resets, index)
+    return replace(raw, index=index)
 
 
 def _compared(

@@ -78,12 +78,12 @@ def follow_sample_clock(times: FloatArray, index: FloatArray) -> tuple[FloatArra
     rest = np.array([float((times[block] - due[block]).mean()) for block in blocks])
     change = np.abs(np.diff(rest)) / np.sqrt(2.0)
     # Means of late stamps have a long tail, which the median does not see and a mean does.
-    scatter = max(1.4826 * float(np.median(change)), 0.8 * float(np.std(change) * 1.66)) + 1e-6
+    scatter = max(1.4826 * float(np.median(change)), float(np.sqrt(np.mean(change**2)))) + 1e-6
     followed = smooth(
         middle,
         rest,
         np.zeros(len(rest)),
-        scatter_s=(0.5 * scatter, scatter, 2.0 * scatter),
+        scatter_s=(scatter, 2.0 * scatter),
         usual_walk=CRYSTAL_WALK,
     )
     offset, deviation = followed.at(due)
