@@ -32,7 +32,7 @@ for _library in ("OMP", "OPENBLAS", "MKL"):
 # tests interrupt programs as a person does.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-WAITING = 1
+WAITING = 2
 """Processes beyond one a core: many tests wait, for a session in real time or for a device."""
 
 TURNS = "LABCRANE_TEST_TURNS"
