@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labcrane import FloatArray
-from labcrane_dmd.speeds import SpeedCurve
+from labcrane_dmd.fit.speeds import SpeedCurve
 
 FOLDS = 8
 BLOCK = 3

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from labcrane import FloatArray, RecordingError
-from labcrane_dmd.fitting import LAGS, curve_at
-from labcrane_dmd.model import Model, Segment
-from labcrane_dmd.output import written
-from labcrane_dmd.recordings import SegmentRecording
+from labcrane_dmd.fit.fitting import LAGS, curve_at
+from labcrane_dmd.fit.recordings import SegmentRecording
+from labcrane_dmd.model.model import Model, Segment
+from labcrane_dmd.model.output import written
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,11 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from labcrane import FloatArray, RecordingError
+from labcrane_dmd.model.interpolation import FULL
 
 COLUMNS = ("run", "time_s", "signal", "angle_deg")
 SUFFIXES = (".csv", ".csv.gz")
-FULL = 250.0
-"""Signal for full flow: 100 % in steps of 0.4 %."""
 
 FASTEST_S, SLOWEST_S = 0.0002, 0.2
 """Sampling intervals that make sense, in seconds."""

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from labcrane import FloatArray
-from labcrane_dmd.model import Direction
-from labcrane_dmd.recordings import JointRun
-from labcrane_dmd.settings import Between
+from labcrane_dmd.fit.recordings import JointRun
+from labcrane_dmd.model.model import Direction
+from labcrane_dmd.model.settings import Between
 
 WATCHED_S = 1.5
 """Time after the step that is compared with the recording."""

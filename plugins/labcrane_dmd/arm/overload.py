@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from labcrane_dmd.arm_settings import OverloadSettings
+from labcrane_dmd.arm.settings import OverloadSettings
 
 
 class Overload:

@@ -3,8 +3,8 @@
 from collections import deque
 from collections.abc import Mapping, Sequence
 
-from labcrane_dmd.engine import pybullet
-from labcrane_dmd.scene_bodies import Standing
+from labcrane_dmd.arm.engine import pybullet
+from labcrane_dmd.arm.scene_bodies import Standing
 
 Key = tuple[str, str]
 """A thing and one of its parts."""

@@ -10,7 +10,7 @@ from labcrane import FloatArray, Machine, Signal
 from labcrane.machines import Arm, Scene, place_objects
 
 if TYPE_CHECKING:
-    from labcrane_dmd.world import World
+    from labcrane_dmd.arm.world import World
 
 Parts = Mapping[str, tuple[str, ...]]
 """The parts of every thing that can move, by its name."""

@@ -6,15 +6,15 @@ from importlib.metadata import version
 from labcrane import Dynamics, FloatArray, Machine, PluginError, ProtocolError, Run, Trial
 from labcrane.core import Value
 from labcrane.machines import Body, PlacedObject, load_scene, place_objects
-from labcrane_dmd.arm_settings import ArmSettings
-from labcrane_dmd.arm_state import ArmState, arm_signals, scene_parts
-from labcrane_dmd.contacts import Window
-from labcrane_dmd.drive import drives
-from labcrane_dmd.model_file import load
-from labcrane_dmd.overload import overloads
-from labcrane_dmd.recordings import FULL
-from labcrane_dmd.visual import boxes
-from labcrane_dmd.world import World
+from labcrane_dmd.arm.contacts import Window
+from labcrane_dmd.arm.drive import drives
+from labcrane_dmd.arm.overload import overloads
+from labcrane_dmd.arm.settings import ArmSettings
+from labcrane_dmd.arm.state import ArmState, arm_signals, scene_parts
+from labcrane_dmd.arm.visual import boxes
+from labcrane_dmd.arm.world import World
+from labcrane_dmd.model.interpolation import FULL
+from labcrane_dmd.model.model_file import load
 
 ROUNDING_S = 1e-9
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from labcrane import Machine, ProtocolError
 from labcrane.machines import Joint
-from labcrane_dmd.model import Model, Segment
-from labcrane_dmd.recordings import FULL
+from labcrane_dmd.model.interpolation import FULL
+from labcrane_dmd.model.model import Model, Segment
 
 SHUT = 0.25
 """Opening, in steps of 0.4 %, that is none: a lag never quite gets there."""

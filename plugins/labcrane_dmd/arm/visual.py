@@ -2,8 +2,8 @@
 
 from labcrane import Machine, ProtocolError
 from labcrane.machines import Body, link_boxes
-from labcrane_dmd.arm_settings import JawsSettings
-from labcrane_dmd.urdf import BEYOND
+from labcrane_dmd.arm.settings import JawsSettings
+from labcrane_dmd.arm.urdf import BEYOND
 
 
 def boxes(machine: Machine, jaws: JawsSettings | None) -> tuple[Body, ...]:

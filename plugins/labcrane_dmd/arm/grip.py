@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from labcrane_dmd.contacts import LINK_B, Contacts, Window
-from labcrane_dmd.engine import pybullet
-from labcrane_dmd.scene_bodies import Standing
+from labcrane_dmd.arm.contacts import LINK_B, Contacts, Window
+from labcrane_dmd.arm.engine import pybullet
+from labcrane_dmd.arm.scene_bodies import Standing
 
 
 @dataclass

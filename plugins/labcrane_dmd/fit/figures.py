@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane_dmd.model import Model, Segment
-from labcrane_dmd.output import written
-from labcrane_dmd.recordings import FULL
-from labcrane_dmd.validation import Level
+from labcrane_dmd.fit.validation import Level
+from labcrane_dmd.model.interpolation import FULL
+from labcrane_dmd.model.model import Model, Segment
+from labcrane_dmd.model.output import written
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

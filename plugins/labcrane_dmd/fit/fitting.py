@@ -7,13 +7,13 @@ from importlib.metadata import version
 import numpy as np
 
 from labcrane import RecordingError
-from labcrane_dmd.interpolation import Layer
-from labcrane_dmd.model import Direction, Model, Segment, Source
-from labcrane_dmd.polynomial import fit
-from labcrane_dmd.recordings import JointRun, SegmentRecording
-from labcrane_dmd.settings import FitSettings
-from labcrane_dmd.speeds import SpeedCurve, moves, speed_curve
-from labcrane_dmd.step_response import identify
+from labcrane_dmd.fit.polynomial import fit
+from labcrane_dmd.fit.recordings import JointRun, SegmentRecording
+from labcrane_dmd.fit.speeds import SpeedCurve, moves, speed_curve
+from labcrane_dmd.fit.step_response import identify
+from labcrane_dmd.model.interpolation import Layer
+from labcrane_dmd.model.model import Direction, Model, Segment, Source
+from labcrane_dmd.model.settings import FitSettings
 
 FIRST_RUN_UP_S = 0.8
 """Cut in the first pass, before dead time and lag are known."""

@@ -6,9 +6,9 @@ import numpy.typing as npt
 from labcrane import Controller, FloatArray, Machine, ProtocolError, Run, Signal
 from labcrane.core import Layout
 from labcrane.machines import Arm
-from labcrane_dmd.arm_settings import ValveSettings
-from labcrane_dmd.model import Model
-from labcrane_dmd.recordings import FULL
+from labcrane_dmd.arm.settings import ValveSettings
+from labcrane_dmd.model.interpolation import FULL
+from labcrane_dmd.model.model import Model
 
 DAMPING_M = 0.05
 """Beside metre-long links: keeps a practised hand calm where the arm is stretched out."""
@@ -122,7 +122,7 @@ class Valve(Controller):
 def _model(settings: ValveSettings) -> Model | None:
     if settings.model is None:
         return None
-    from labcrane_dmd.model_file import load  # noqa: PLC0415 - only with a model
+    from labcrane_dmd.model.model_file import load  # noqa: PLC0415 - only with a model
 
     return load(settings.model)
 

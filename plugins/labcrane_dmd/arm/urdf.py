@@ -6,7 +6,7 @@ Nothing of the arm touches anything else of the arm.
 from labcrane import Machine
 from labcrane.machines import Joint, urdf_joint, urdf_link
 from labcrane.machines import urdf_of as machine_urdf
-from labcrane_dmd.arm_settings import JawsSettings
+from labcrane_dmd.arm.settings import JawsSettings
 
 BEYOND = 1.25
 """Length of a jaw, in distances from its hinge to the point between the jaws."""

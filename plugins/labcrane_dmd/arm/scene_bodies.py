@@ -7,7 +7,7 @@ from typing import Any
 
 from labcrane import ProtocolError
 from labcrane.machines import PlacedObject, ShapeKind
-from labcrane_dmd.engine import pybullet
+from labcrane_dmd.arm.engine import pybullet
 
 OVERLAP_M = 0.002
 """Depth, in metres, to which two things may stand in each other at the start."""

@@ -4,9 +4,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from labcrane import ProtocolError
-from labcrane_dmd.interpolation import Layer, is_signal, linear, pchip
-from labcrane_dmd.recordings import FULL
-from labcrane_dmd.settings import Between, FitSettings
+from labcrane_dmd.model.interpolation import FULL, Layer, is_signal, linear, pchip
+from labcrane_dmd.model.settings import Between, FitSettings
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labcrane import FloatArray
-from labcrane_dmd.recordings import JointRun
+from labcrane_dmd.fit.recordings import JointRun
 
 STILL_RAD = float(np.radians(0.5))
 """A joint that moves less in a run has not moved: 25 times the sensor's noise."""

@@ -4,6 +4,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+FULL = 250.0
+"""Signal for full flow: 100 % in steps of 0.4 %."""
+
 
 @dataclass(frozen=True, slots=True)
 class Layer:

@@ -7,12 +7,12 @@ from pathlib import Path
 
 from labcrane import Machine, PluginError
 from labcrane.machines import PlacedObject
-from labcrane_dmd.arm_settings import ArmSettings
-from labcrane_dmd.contacts import Contacts
-from labcrane_dmd.engine import pybullet
-from labcrane_dmd.grip import Grip
-from labcrane_dmd.scene_bodies import add, add_ground, check_apart
-from labcrane_dmd.urdf import urdf_of
+from labcrane_dmd.arm.contacts import Contacts
+from labcrane_dmd.arm.engine import pybullet
+from labcrane_dmd.arm.grip import Grip
+from labcrane_dmd.arm.scene_bodies import add, add_ground, check_apart
+from labcrane_dmd.arm.settings import ArmSettings
+from labcrane_dmd.arm.urdf import urdf_of
 
 GRAVITY = 9.81
 """In m/s²."""

@@ -11,11 +11,10 @@ from ruamel.yaml import YAML
 
 from labcrane import ProtocolError, Settings
 from labcrane.core import read_yaml
-from labcrane_dmd.interpolation import Layer
-from labcrane_dmd.model import Direction, Model, Segment, Source
-from labcrane_dmd.output import written
-from labcrane_dmd.recordings import FULL
-from labcrane_dmd.settings import Between, FitSettings
+from labcrane_dmd.model.interpolation import FULL, Layer
+from labcrane_dmd.model.model import Direction, Model, Segment, Source
+from labcrane_dmd.model.output import written
+from labcrane_dmd.model.settings import Between, FitSettings
 
 HEADER = """\
 # Dynamic Model Description: how fast each segment moves at which valve signal and angle.
