@@ -6,8 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from labcrane.machines import Geom, PlacedObject, ShapeKind
-from labcrane_view.mesh import Mesh, bevelled_box, cone, joined, sphere
-from labcrane_view.mesh_reader import painted, read_mesh
+from labcrane_view.scene.mesh import Mesh, bevelled_box, cone, joined, sphere
+from labcrane_view.scene.mesh_reader import painted, read_mesh
 
 Colour = tuple[float, float, float, float]
 

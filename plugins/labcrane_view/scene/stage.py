@@ -10,11 +10,11 @@ from panda3d import core
 from labcrane import FloatArray, Run, Sphere
 from labcrane.core import Shape
 from labcrane.machines import Body, read_placed
-from labcrane_view import shader
-from labcrane_view.forest import forest
-from labcrane_view.mesh import Mesh, bevelled_box, cone, sphere
-from labcrane_view.mesh_reader import painted, read_mesh
-from labcrane_view.things import pieces
+from labcrane_view.scene import shader
+from labcrane_view.scene.forest import forest
+from labcrane_view.scene.mesh import Mesh, bevelled_box, cone, sphere
+from labcrane_view.scene.mesh_reader import painted, read_mesh
+from labcrane_view.scene.things import pieces
 
 HAZE = (0.66, 0.75, 0.82)
 THICKNESS = 0.0125

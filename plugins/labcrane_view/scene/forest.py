@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labcrane import FloatArray
-from labcrane_view.mesh import Mesh, cone, joined
+from labcrane_view.scene.mesh import Mesh, cone, joined
 
 SEED = 5
 CLEARING = 15.0

@@ -6,9 +6,9 @@ import numpy as np
 
 from labcrane import FloatArray
 from labcrane.machines import Body, PlacedObject
-from labcrane_view.mesh import bevelled_box
-from labcrane_view.mesh_reader import read_mesh
-from labcrane_view.things import pieces
+from labcrane_view.scene.mesh import bevelled_box
+from labcrane_view.scene.mesh_reader import read_mesh
+from labcrane_view.scene.things import pieces
 
 DIRECTIONS = 1024
 """In which the outermost point is kept: no point that is left out sticks out by more than a

@@ -7,7 +7,7 @@ from panda3d import core
 
 from labcrane import DeviceError, FloatArray
 from labcrane.machines import MeshFile
-from labcrane_view.mesh import Faces, Mesh, flat, joined
+from labcrane_view.scene.mesh import Faces, Mesh, flat, joined
 
 ROUGH = 1e-6
 
