@@ -38,7 +38,7 @@ from labcrane.session.eligibility import check_eligibility
 from labcrane.session.session import finish, outlook, recording, running
 from labcrane.session.visit import Visit
 from labcrane.streams.recorder.handle import RecorderHandle
-from labcrane.streams.sync.sync_report import SyncReport
+from labcrane.streams.sync.report.sync_report import SyncReport
 
 if TYPE_CHECKING:
     from multiprocessing.context import SpawnProcess

@@ -19,8 +19,8 @@ from labcrane.processes.pipe import PipeEnd
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
-from labcrane.web.access import SCOPE, SUPERVISOR, Gate, Keys
-from labcrane.web.denials import Denials
+from labcrane.web.door.access import SCOPE, SUPERVISOR, Gate, Keys
+from labcrane.web.door.denials import Denials
 from labcrane.web.live import Live
 from labcrane.web.page import PageContext
 from labcrane.web.pictures import Pictures
@@ -98,7 +98,7 @@ def serve(order: PageConfig, pipe: PipeEnd) -> None:
     from fastapi import FastAPI  # noqa: PLC0415
     from nicegui import ui  # noqa: PLC0415 - loads for a second
 
-    from labcrane.web.guard import BoundedProtocol, Guard  # noqa: PLC0415
+    from labcrane.web.door.guard import BoundedProtocol, Guard  # noqa: PLC0415
 
     study = load(order.protocol, discover(study=order.protocol))
     plan = plan_session(study, order.participant, order.session)

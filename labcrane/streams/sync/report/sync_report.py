@@ -11,8 +11,8 @@ import numpy as np
 
 from labcrane.core.findings import Finding, Verdict, worst
 from labcrane.recording.journal import finite
-from labcrane.streams.sync.limits import Limits
-from labcrane.streams.sync.stream_report import StreamReport
+from labcrane.streams.sync.report.limits import Limits
+from labcrane.streams.sync.report.stream_report import StreamReport
 from labcrane.types import FloatArray
 
 COLUMNS = (

@@ -8,9 +8,15 @@ import numpy as np
 
 from labcrane.core.findings import Finding, Verdict, worst
 from labcrane.recording.foreign_streams import COUNTER_GAP, RESET, RecordedStream
-from labcrane.streams.sync.certificate import CONGESTED_S, carries, corrections, faults, unknowable
-from labcrane.streams.sync.limits import Limits
 from labcrane.streams.sync.quality import Quality
+from labcrane.streams.sync.report.certificate import (
+    CONGESTED_S,
+    carries,
+    corrections,
+    faults,
+    unknowable,
+)
+from labcrane.streams.sync.report.limits import Limits
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,12 +12,12 @@ from labcrane.recording.participant_file.columns import node_names, write_attrib
 from labcrane.recording.participant_file.stream_group import TIME_COLUMNS
 from labcrane.streams.recorder.health import counter_label
 from labcrane.streams.sync.correction import Corrected, correct
-from labcrane.streams.sync.limits import Limits
 from labcrane.streams.sync.pool import pooled
 from labcrane.streams.sync.raw import RawStream, raw_of, unwrapped
+from labcrane.streams.sync.report.limits import Limits
+from labcrane.streams.sync.report.stream_report import judge_stream
+from labcrane.streams.sync.report.sync_report import SyncReport
 from labcrane.streams.sync.resync import columns_of, quality_of, treatment_of
-from labcrane.streams.sync.stream_report import judge_stream
-from labcrane.streams.sync.sync_report import SyncReport
 from labcrane.types import FloatArray
 
 

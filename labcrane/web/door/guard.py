@@ -1,7 +1,7 @@
 """Guard of the pages' door: who speaks to whom, how much and how often, before anything is read.
 
-It stands before :class:`labcrane.web.access.Gate`, which asks for cookies. Nothing of a body is
-kept beyond its limit, and nobody waits longer than :data:`PATIENCE_S` for a slow one.
+It stands before :class:`labcrane.web.door.access.Gate`, which asks for cookies. Nothing of a body
+is kept beyond its limit, and nobody waits longer than :data:`PATIENCE_S` for a slow one.
 """
 
 import asyncio
@@ -13,7 +13,7 @@ from weakref import WeakSet
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from labcrane.limits import LIMITS
-from labcrane.web.denials import Bucket
+from labcrane.web.door.denials import Bucket
 
 PATIENCE_S = 10.0
 """How long a request, and its body, may take to come."""
