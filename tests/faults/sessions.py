@@ -62,7 +62,7 @@ def session_process(launcher: "subprocess.Popen[str]") -> psutil.Process | None:
     """Return the session process of a launcher, while there is one."""
     for child in _children(launcher):
         try:
-            if any("spawn_main" in part for part in child.cmdline()) and child.is_running():
+            if "labcrane.launcher.session_process" in child.cmdline() and child.is_running():
                 return child
         except psutil.NoSuchProcess:
             continue

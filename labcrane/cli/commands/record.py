@@ -238,7 +238,7 @@ def resync(
 
 def _resync_xdf(file: Path) -> None:
     from labcrane.cli.sync import print_report
-    from labcrane.session.resync_xdf import resync_xdf
+    from labcrane.clocks.xdf import resync_xdf
 
     done = resync_xdf(file)
     print_report(done.report)
