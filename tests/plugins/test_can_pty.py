@@ -49,7 +49,7 @@ def panel(request, tmp_path: Path) -> Iterator[tuple[Path, int, subprocess.Popen
     process = subprocess.Popen(
         [sys.executable, str(program), str(link), "100", *map(str, request.param)],
         stdout=subprocess.PIPE,
-        text=True,
+        encoding="utf-8",
     )
     try:
         assert process.stdout
@@ -78,8 +78,10 @@ def session(folder: Path, controls: str, panel: subprocess.Popen[str]) -> list:
     """Run a session in real time; return when ticks woke, commands, pauses and events."""
     scene = RETRIEVAL / "scenes" / "touch.yaml"
     text = PROTOCOL.format(input=controls, folder=RETRIEVAL, machine="ied_arm.yaml", scene=scene)
-    (folder / "study.yaml").write_text(text)
-    (folder / "ied_arm.yaml").write_text((RETRIEVAL / "ied_arm.yaml").read_text())
+    (folder / "study.yaml").write_text(text, encoding="utf-8")
+    (folder / "ied_arm.yaml").write_text(
+        (RETRIEVAL / "ied_arm.yaml").read_text(encoding="utf-8"), encoding="utf-8"
+    )
     study = load(folder / "study.yaml", discover())
     plan = plan_session(study, "P001", 1)
     rig = Rig.build(study, simulated=False)
@@ -145,7 +147,7 @@ def test_the_gateway_bridges_a_panel_to_a_session_over_lsl_and_the_flow_back(
     for valve in ("jaws=4", "base=1", "boom=3", "arm=2"):  # in no order of the machine
         words += ["--valve", valve]
     words += ["--name", "bridged.command", "--seconds", str(seconds + 2)]
-    bridge = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    bridge = subprocess.Popen(words, stdout=subprocess.PIPE, encoding="utf-8")
     try:
         assert process.stdout.readline() == "open\n"
         frames = session(tmp_path, "{use: gateway, stream: bridged.command}", process)

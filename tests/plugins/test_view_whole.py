@@ -32,7 +32,7 @@ def moving(display: str, renderer: str, name: str) -> Iterator[dict[str, int]]:
         env={**os.environ, "DISPLAY": display, "PYTHONPATH": tests},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        text=True,
+        encoding="utf-8",
     )
     assert process.stdin is not None
     assert process.stdout is not None
@@ -50,7 +50,7 @@ def windows(display: str) -> dict[str, tuple[int, int]]:
         ["xwininfo", "-root", "-tree"],
         env={**os.environ, "DISPLAY": display},
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=True,
     )
     found = {}
@@ -160,10 +160,10 @@ def test_check_warns_of_an_error_that_every_group_is_shown(
     from labcrane.cli.app import main
 
     path = tmp_path / "study.yaml"
-    path.write_text(SHORT + "views: {cab: {use: view, hud: [trial, distance]}}\n")
+    path.write_text(SHORT + "views: {cab: {use: view, hud: [trial, distance]}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0
     said = capsys.readouterr()
     assert "warning: views.cab: hud: distance tells the operator the task's error" in said.err
-    path.write_text(SHORT + "views: {cab: {use: view}}\n")
+    path.write_text(SHORT + "views: {cab: {use: view}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0
     assert capsys.readouterr().err == ""
