@@ -166,7 +166,7 @@ def test_a_load_too_heavy_for_the_drives_sinks_to_the_limits(settings: dict[str,
     assert states[-1, 10] < states[0, 10] - 1.0, "the tip is down"
     lowest, highest = np.degrees(np.array(MACHINE.limits).T)
     beyond = np.maximum(np.degrees(states[:, :4]) - highest, lowest - np.degrees(states[:, :4]))
-    assert beyond.max() < 2.0
+    assert beyond.max() < 1e-9
 
 
 @engines
