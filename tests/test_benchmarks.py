@@ -11,7 +11,8 @@ from needs import needs
 
 from labcrane_bullet.bullet_crane import BulletCrane
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+# At the end: processes that a test starts import labcrane from where this one did.
+sys.path.append(str(Path(__file__).parents[1]))
 
 SUBJECTS = {"fine": 1.0, "slow": 2.1}
 

@@ -128,6 +128,8 @@ def a_witness(study: str, into: Path) -> Iterator[None]:
         process = subprocess.Popen(program, stdout=file)
         try:
             yield
+            process.terminate()  # it takes what is still under way
+            assert process.wait(timeout=120) == 0
         finally:
             process.kill()
             process.wait()
