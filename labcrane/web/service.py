@@ -66,6 +66,7 @@ class PageConfig:
     certificate: Path | None = None
     key: Path | None = None
     keys: Keys = field(default_factory=Keys)
+    recorded: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +101,7 @@ def serve(order: PageConfig, pipe: PipeEnd) -> None:
 
     from labcrane.web.guard import BoundedProtocol, Guard  # noqa: PLC0415
 
-    study = load(order.protocol, discover(study=order.protocol))
+    study = load(order.protocol, discover(study=order.protocol), recorded=order.recorded)
     plan = plan_session(study, order.participant, order.session)
     lock = threading.Lock()
 
