@@ -32,7 +32,7 @@ for _library in ("OMP", "OPENBLAS", "MKL"):
 # tests interrupt programs as a person does.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-WAITING = 1
+WAITING = 2
 """Processes beyond one a core: many tests wait, for a session in real time or for a device."""
 
 TURNS = "LABCRANE_TEST_TURNS"
@@ -49,6 +49,7 @@ def pytest_xdist_auto_num_workers() -> int:
     return len(os.sched_getaffinity(0)) + WAITING
 
 
+@pytest.hookimpl(tryfirst=True)  # before xdist reads the marks
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Keep the tests of a file in one process, which makes their fixtures once."""
     for item in items:

@@ -26,6 +26,14 @@ class Settings(StrictModel):
         """Return what is allowed but should be known beforehand; ``labcrane check`` says it."""
         return ()
 
+    def reveals(self) -> str:
+        """Return what whoever sees or hears the component learns of the task's error.
+
+        Nothing by default. What reveals something is feedback, and belongs to the design:
+        ``labcrane check`` warns of it where it is always there, in every group.
+        """
+        return ""
+
     def provides(self, machine: Machine) -> Names:
         """Return the names that a component with these settings gives others to refer to, by kind.
 

@@ -102,6 +102,27 @@ class Study:
         for part, choice in self.choices.items():
             for warning in choice.settings.warnings():
                 yield f"{part}: {warning}"
+        for name, choice in self.views.items():
+            if told := choice.settings.reveals():
+                yield (
+                    f"views.{name}: {choice.name} tells {told}, in every group and block; put it "
+                    "under feedback, where the design says who is given it"
+                )
+        yield from self._unsaid()
+
+    def _unsaid(self) -> Iterator[str]:
+        """Yield where every group is given all feedback because a block says nothing of it."""
+        if not (self.protocol.design.groups and self.protocol.feedback):
+            return
+        all_of_it = ", ".join(self.protocol.feedback)
+        for session in self.protocol.sessions:
+            for number, step in enumerate(session.steps, start=1):
+                if step.block is not None and "feedback" not in step.block.model_fields_set:
+                    yield (
+                        f"sessions: step {number} of {session.name!r} does not say which feedback "
+                        f"it has, so that every group is given {all_of_it}; write feedback: group, "
+                        "none, all or a list of names"
+                    )
 
     def check_installed(self, *, simulated: bool = False, feedback: bool = True) -> None:
         """Raise :class:`ProtocolError` unless all that a run of the study needs is installed.

@@ -63,7 +63,7 @@ def session_process(launcher: "subprocess.Popen[str]") -> psutil.Process | None:
     """Return the session process of a launcher, while there is one."""
     for child in _children(launcher):
         try:
-            if any("spawn_main" in part for part in child.cmdline()) and child.is_running():
+            if "labcrane.launcher.session_process" in child.cmdline() and child.is_running():
                 return child
         except psutil.NoSuchProcess:
             continue
@@ -129,6 +129,8 @@ def a_witness(study: str, into: Path) -> Iterator[None]:
         process = subprocess.Popen(program, stdout=file)
         try:
             yield
+            process.terminate()  # it takes what is still under way
+            assert process.wait(timeout=120) == 0
         finally:
             process.kill()
             process.wait()

@@ -148,7 +148,7 @@ def find(launcher: psutil.Process, folder: Path) -> dict[str, psutil.Process]:
             found["session"] = child
         elif "labcrane.feedback" in said:
             found["feedback"] = child
-        elif "spawn_main" in said or "labcrane.web" in said:
+        elif "labcrane.web" in said:
             found["page"] = child
     return found
 
