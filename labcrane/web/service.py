@@ -67,6 +67,7 @@ class PageConfig:
     certificate: Path | None = None
     key: Path | None = None
     keys: Keys = field(default_factory=Keys)
+    recorded: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +112,7 @@ def serve(order: PageConfig, parent: Parent) -> None:
 
     from labcrane.web.door.guard import BoundedProtocol, Guard  # noqa: PLC0415
 
-    study = load(order.protocol, discover(study=order.protocol))
+    study = load(order.protocol, discover(study=order.protocol), recorded=order.recorded)
     plan = plan_session(study, order.participant, order.session)
     denials = Denials(lambda why: parent.tell(Command(Order.DENIED, why, "page")))
     live, pictures = Live(order.source), Pictures(order.source, order.cameras)
