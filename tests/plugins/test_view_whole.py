@@ -164,7 +164,8 @@ def test_check_warns_of_an_error_that_every_group_is_shown(
     assert main(["check", str(path)]) == 0
     said = capsys.readouterr()
     assert "warning: views.cab: hud: distance tells the operator the task's error" in said.err
-    path.write_text(SHORT + "views: {cab: {use: view, patch: {on: [target.entered]}}}\n", encoding="utf-8")
+    always = "views: {cab: {use: view, patch: {on: [target.entered]}}}\n"
+    path.write_text(SHORT + always, encoding="utf-8")
     assert main(["check", str(path)]) == 0
     assert "patch: target.entered tells the operator, in every group" in capsys.readouterr().err
     path.write_text(SHORT + "views: {hum: {use: sonification}}\n", encoding="utf-8")
