@@ -10,7 +10,7 @@ from labcrane import Dynamics, PlannedTrial, Signal
 from labcrane.machines.library import load_machine
 from labcrane.testing import RATE_HZ, make_run, make_trial
 from labcrane_dmd import labcrane_dynamics
-from labcrane_dmd.arm_settings import ArmSettings, JawsSettings
+from labcrane_dmd.arm.settings import ArmSettings, JawsSettings
 
 RETRIEVAL = Path(__file__).parents[1] / "protocols" / "retrieval"
 MODEL = RETRIEVAL / "arm.dmd.yaml"
@@ -29,7 +29,7 @@ def standing(scene: str | None = None, folder: Path | None = None, **settings) -
     """Yield an open arm in a scene, and what finds things in its state."""
     machine = load_machine("ied_arm.yaml", RETRIEVAL)
     if scene is not None and folder is not None:
-        (folder / "scene.yaml").write_text(scene)
+        (folder / "scene.yaml").write_text(scene, encoding="utf-8")
         settings["scenes"] = (folder / "scene.yaml",)
     arm = build(machine, **settings)
     signal = Signal("valve.signal", "1", machine.names)

@@ -54,7 +54,6 @@ def killed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
             launcher = run_second(protocol, data)
             victim = _kill(STAGES[number % len(STAGES)], launcher, data, whole, chance)
             runs.append((data, victim, began, time.perf_counter()))
-        time.sleep(0.5)  # what is under way to the witness
     lines = (folder / "seen.jsonl").read_text().splitlines()
     samples = [json.loads(line) for line in lines if line.startswith("[") and line.endswith("]")]
     return prepared, runs, dict(samples)

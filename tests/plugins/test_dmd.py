@@ -12,13 +12,13 @@ from dmd_machine import LEVELS, record, true_speed
 import labcrane_dmd
 from labcrane import ProtocolError, RecordingError
 from labcrane.cli.app import main
-from labcrane_dmd.fitting import fit_model, fit_segment
-from labcrane_dmd.interpolation import linear, pchip
-from labcrane_dmd.model import Model
-from labcrane_dmd.model_file import save
-from labcrane_dmd.recordings import read_recordings
-from labcrane_dmd.settings import FitSettings
-from labcrane_dmd.validation import validate
+from labcrane_dmd.fit.fitting import fit_model, fit_segment
+from labcrane_dmd.fit.recordings import read_recordings
+from labcrane_dmd.fit.validation import validate
+from labcrane_dmd.model.interpolation import linear, pchip
+from labcrane_dmd.model.model import Model
+from labcrane_dmd.model.model_file import save
+from labcrane_dmd.model.settings import FitSettings
 
 FOLDER = Path(__file__).parents[2] / "protocols" / "retrieval" / "hydraulic_arm"
 PCHIP = FitSettings(between="pchip")
@@ -95,7 +95,9 @@ def test_a_refit_gives_the_same_file_and_the_file_the_same_speeds(
 
 def test_the_file_beside_the_protocol_is_the_fit_of_its_recordings(model, tmp_path: Path) -> None:
     save(model, tmp_path / "arm.yaml")
-    assert (tmp_path / "arm.yaml").read_text() == (FOLDER.parent / "arm.dmd.yaml").read_text()
+    assert (tmp_path / "arm.yaml").read_text(encoding="utf-8") == (
+        FOLDER.parent / "arm.dmd.yaml"
+    ).read_text(encoding="utf-8")
 
 
 def test_level_zero_and_the_dead_band_stand_still_and_speed_rises_from_its_edge(model) -> None:

@@ -33,7 +33,7 @@ def labcrane(*arguments: object, columns: int = 200) -> subprocess.CompletedProc
     return subprocess.run(
         [sys.executable, "-m", "labcrane", *map(str, arguments)],
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
         env={**os.environ, "COLUMNS": str(columns)},
     )
@@ -79,6 +79,29 @@ def test_streams_are_recorded_without_an_experiment(recorded: Path) -> None:
     assert len(stream.time) > 100
     assert stream.attrs["corrected"]
     np.testing.assert_array_equal(np.diff(stream.data["Counter"]), 1.0)
+
+
+def test_the_seconds_are_counted_from_when_the_stream_is_there(tmp_path: Path) -> None:
+    source = f"late-{os.getpid()}-{time.monotonic_ns()}"
+    words = ["record", tmp_path / "late", "--stream", f"source_id={source}", "--seconds", 2]
+    recorder = subprocess.Popen(
+        [sys.executable, "-m", "labcrane", *map(str, words)],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert recorder.stdout is not None
+    said = ""
+    while "is not on the network" not in said:
+        said += recorder.stdout.readline()
+    with pytest.raises(subprocess.TimeoutExpired):
+        recorder.wait(3)  # longer than it was told to record
+    arguments = ["Late", "EEG", source, "100", "0"]
+    with subprocess.Popen([sys.executable, str(SENDER), *arguments]) as sender:
+        recorder.communicate()
+        sender.kill()
+    assert recorder.returncode == 0
+    stream = open_recording(tmp_path / "late" / "late.h5").session(1).streams["Late"]
+    assert np.ptp(stream.time) > 1.5
 
 
 def test_a_recording_is_never_written_over(recorded: Path, source: str) -> None:

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from labcrane.streams.sync.certificate import Fault
 from labcrane.streams.sync.correction import Treatment
 from labcrane.streams.sync.raw import RawStream
+from labcrane.streams.sync.report.certificate import Fault
 
 
 @dataclass(frozen=True)

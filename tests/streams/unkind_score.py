@@ -7,10 +7,10 @@ from streams.unkind import Drawn
 from streams.unkinder import ALL
 
 from labcrane.core.findings import Verdict, worst
-from labcrane.streams.sync.certificate import Fault, faults
 from labcrane.streams.sync.correction import correct
-from labcrane.streams.sync.limits import Limits
-from labcrane.streams.sync.stream_report import judge_quality
+from labcrane.streams.sync.report.certificate import Fault, faults
+from labcrane.streams.sync.report.limits import Limits
+from labcrane.streams.sync.report.stream_report import judge_quality
 
 
 @dataclass(frozen=True)

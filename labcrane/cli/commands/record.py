@@ -1,8 +1,9 @@
 """Commands about streams and recordings: streams, record, recover, resync."""
 
 import time
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -121,7 +122,8 @@ def record(
         typer.Option(help="what to record: type=EEG, name=Gaze or source_id=...; may be repeated"),
     ],
     seconds: Annotated[
-        float | None, typer.Option(help="how long; until Ctrl-C by default", min=0.1)
+        float | None,
+        typer.Option(help="how long, once all of them flow; until Ctrl-C by default", min=0.1),
     ] = None,
     local: Local = False,
 ) -> None:
@@ -157,11 +159,13 @@ def _wanted(text: str) -> "StreamRequest":
 def _wait(keeper: "RecorderHandle", seconds: float | None) -> None:
     from labcrane.launcher.signal_reporter import SignalReporter
 
-    ends = None if seconds is None else time.monotonic() + seconds
+    ends: float | None = None
     told: list[str] = []
     reporter = SignalReporter(lambda line: out.print(line, markup=False))
     try:
         while ends is None or time.monotonic() < ends:
+            if ends is None and seconds is not None and _flows(keeper.status):
+                ends = time.monotonic() + seconds
             if keeper.watch():
                 out.print("the recorder died and was started again")
             if keeper.status and keeper.complaints() != told:
@@ -172,6 +176,15 @@ def _wait(keeper: "RecorderHandle", seconds: float | None) -> None:
             time.sleep(0.1)
     except KeyboardInterrupt:
         return
+
+
+def _flows(status: Mapping[str, Any]) -> bool:
+    """Whether every stream that was asked for is recorded; a marker may not have come yet."""
+    streams = status.get("streams", ())
+    return bool(streams) and all(
+        one["condition"] == "flows" or (one["condition"] == "empty" and not one["nominal_hz"])
+        for one in streams
+    )
 
 
 def recover(
@@ -225,7 +238,7 @@ def resync(
 
 def _resync_xdf(file: Path) -> None:
     from labcrane.cli.sync import print_report
-    from labcrane.session.resync_xdf import resync_xdf
+    from labcrane.clocks.xdf import resync_xdf
 
     done = resync_xdf(file)
     print_report(done.report)
