@@ -18,9 +18,9 @@ from labcrane.types import FloatArray
 CRYSTAL_WALK = 1e-6
 """Variance by which a sampler's rate usually walks in a second, in ppm squared."""
 
-SURE_OF_ALL = 3.0
+SURE_OF_ALL = 3.5
 """A rate that is wrong is wrong for all samples at once. So many standard deviations about a line
-hold all of it with 99 % (Working and Hotelling 1929: the root of twice F with 2 degrees)."""
+hold all of it with 99.8 % (Working and Hotelling 1929: the root of twice F with 2 degrees)."""
 
 FEWEST = 50
 MOST_BLOCKS = 100
