@@ -66,9 +66,7 @@ class Recorder:
         self._since: dict[str, float] = {}
         self._fault: str | None = None
         self._feed = None if monitors is None else SignalFeed(monitors)
-        for info in map(known_stream, known):
-            if info is not None:
-                self._start(info)
+        self.know(known)
         self._own = self._writer.add_stream(OWN_CLOCK) if read_own_clock() is not None else None
         self._search = Search(forget_s=FORGET_S)
 
@@ -90,6 +88,13 @@ class Recorder:
         self._find_duplicates(found, now)
         if self._feed is not None:
             self._feed.look()
+
+    def know(self, descriptions: Sequence[str]) -> None:
+        """Start to record streams on this computer of which somebody tells, without a search."""
+        for info in map(known_stream, descriptions):
+            if info is not None:
+                self._latest[_key(info)] = info
+                self._start(info)
 
     def health(self) -> list[Health]:
         """Return how each stream is now, also those asked for that are not there."""
