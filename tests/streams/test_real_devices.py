@@ -14,6 +14,7 @@ from streams.emulation import Lab, Skew, build, stop, truth, until
 
 from labcrane.core.findings import Verdict
 from labcrane.streams.sync.correction import Treatment, correct
+from labcrane.streams.sync.dejitter import Dejitter
 from labcrane.streams.sync.raw import raw_of
 from labcrane.streams.sync.report.certificate import Fault, faults
 from labcrane.streams.sync.report.limits import Limits
@@ -27,6 +28,8 @@ TURN = 15.0
 
 ASLEEP_S = 6.0
 RATE = 250.0
+EXACT = Treatment(RATE)
+CHUNKS = Treatment(RATE, dejitter=Dejitter.ENVELOPE, transport_s=0.008)
 
 BY_LOAD = {Fault.CONGESTED, Fault.STALLED}
 """What the computer that emulates may do itself, and may be named everywhere."""
@@ -39,11 +42,11 @@ class Device:
     skew: Skew
     faults: frozenset[Fault] = frozenset()
     limit_ms: float | None = 0.1
-    latency_s: float = 0.0
+    treatment: Treatment = EXACT
 
 
-def a_device(mode="exact", *wrong, limit_ms=0.1, latency_s=0.0, **skew):
-    return Device(Skew(mode=mode, **skew), frozenset(wrong), limit_ms, latency_s)
+def a_device(mode="exact", *wrong, limit_ms=0.1, treatment=EXACT, **skew):
+    return Device(Skew(mode=mode, **skew), frozenset(wrong), limit_ms, treatment)
 
 
 DEVICES = {
@@ -59,10 +62,10 @@ DEVICES = {
     "stalling": a_device("stalling", Fault.STALLED),
     "out of order": a_device("shuffled", Fault.DISORDERED),
     "changing its rate": a_device("changing", Fault.CHANGED_RATE),
-    "with our clock": a_device("receiver", Fault.RECEIVER, limit_ms=None),
+    "with our clock": a_device("receiver", Fault.RECEIVER, limit_ms=None, offset=0.3),
     "with another clock": a_device("foreign", Fault.FOREIGN, limit_ms=None),
     "dying": a_device("dying", Fault.DIED),
-    "stamping when it sends": a_device("chunk", Fault.LATE_STAMPS, limit_ms=None, latency_s=0.012),
+    "stamping when it sends": a_device("chunk", Fault.LATE_STAMPS, limit_ms=None, treatment=CHUNKS),
 }
 
 
@@ -97,7 +100,7 @@ def judged(recorded, name):
     """Return a device's corrected times, its true ones, its faults and its verdict."""
     streams, ended = recorded
     device, stream = DEVICES[name], streams[name]
-    corrected = correct(raw_of(stream), Treatment(RATE, latency_s=device.latency_s), ended)
+    corrected = correct(raw_of(stream), device.treatment, ended)
     report = judge_stream(stream, corrected.quality, Limits())
     return corrected, truth(stream), faults(corrected.quality, RATE), report.verdict
 

@@ -21,7 +21,6 @@ MODES = (
     "exact", "chunk", "lost", "uneven", "stalling", "shuffled", "changing", "receiver", "foreign",
     "dying", "coarse",
 )  # fmt: skip
-OFF_S = 0.3
 FOREIGN_S = 77_777.0
 HELD_S = 2.5
 
@@ -130,7 +129,7 @@ def sampled(mode, times, turn, noise, rate):
 def stamped(mode, times):
     """Return how samples taken at these times are stamped."""
     if mode == "receiver":
-        return [t - OFF_S for t in times]
+        return list(times)
     stamps = [MAP(t) for t in times]
     if mode == "foreign":
         return [stamp + FOREIGN_S for stamp in stamps]
