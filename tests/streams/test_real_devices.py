@@ -20,7 +20,7 @@ from labcrane.streams.sync.report.certificate import Fault, faults
 from labcrane.streams.sync.report.limits import Limits
 from labcrane.streams.sync.report.stream_report import judge_stream
 
-pytestmark = [pytest.mark.long, pytest.mark.quiet, pytest.mark.xdist_group("real devices")]
+pytestmark = [pytest.mark.soak, pytest.mark.quiet, pytest.mark.xdist_group("real devices")]
 
 SECONDS = 52.0
 TURN = 15.0

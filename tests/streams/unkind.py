@@ -107,7 +107,7 @@ def regular(random, rate, low=200.0, high=500.0):
 def received(random, clock, times, rate, *, stamped=None, sent=None, index=None, **more):
     stamped = times if stamped is None else stamped
     sent = np.maximum(stamped, times) if sent is None else sent
-    keys = ("way", "congestion", "reply")
+    keys = ("way", "share", "congestion", "reply")
     how = {key: more.pop(key) for key in keys if key in more}
     way = how.setdefault("way", random.uniform(*WAY))
     share = how.setdefault("share", random.uniform(*SHARE))
