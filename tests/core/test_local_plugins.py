@@ -21,7 +21,8 @@ import os
 
 import numpy as np
 
-from labcrane import Sphere, Cue, Feedback, Settings, Signal, hookimpl, offer
+from labcrane import Cue, Feedback, Settings, Signal, hookimpl, offer
+from labcrane.core import Sphere
 
 labcrane_api = 1
 
