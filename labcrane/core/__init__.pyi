@@ -29,7 +29,7 @@ from .references import (
     SignalName,
     ViewName,
 )
-from .settings import Names, StudyPath, read_yaml
+from .settings import Names, StudyPath, read_yaml, was_run
 from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
 
 __all__ = [
@@ -76,4 +76,5 @@ __all__ = [
     "numeric_answers",
     "read_yaml",
     "signals_of",
+    "was_run",
 ]

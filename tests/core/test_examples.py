@@ -55,7 +55,9 @@ def test_the_lamp_is_told_over_its_line_what_the_record_says(
 
     device = LampDevice()
     protocol = projects["lamp"] / "protocol.yaml"
-    protocol.write_text(protocol.read_text().replace("/dev/ttyUSB0", device.port))
+    protocol.write_text(
+        protocol.read_text(encoding="utf-8").replace("/dev/ttyUSB0", device.port), encoding="utf-8"
+    )
     session = simulate(environment, protocol, tmp_path, "--feedback")
     shown = session.streams["labcrane.feedback.lamp"].data
     assert len(shown), session.events["data"].tolist()

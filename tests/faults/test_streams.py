@@ -142,6 +142,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
             recorder.kill()
         said.until("STREAM LOST", times=2)
         said.until(" is back", times=2)
+        wait_for(lambda: all_receive(process))
         said.order("note all is well again")
         said.order("end")
         yield folder / "data" / "P001-PILOT" / "P001-PILOT.h5", said.end()

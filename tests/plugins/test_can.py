@@ -240,7 +240,7 @@ def test_a_candump_log_of_a_live_bus_replays_what_the_panel_was_heard_to_say(
 
 
 def test_what_is_no_log_is_refused_in_words(tmp_path: Path) -> None:
-    (tmp_path / "empty.log").write_text("")
+    (tmp_path / "empty.log").write_text("", encoding="utf-8")
     with pytest.raises(ProtocolError, match=r"empty.log holds no frames, so there is nothing"):
         CanReplay(ReplaySettings(file=tmp_path / "empty.log", valves=VALVES), ch8())
     with pytest.raises(ProtocolError, match=r"no.asc cannot be read as a candump, asc or blf log"):

@@ -105,7 +105,7 @@ class Noted:
 
     def __init__(self, folder: Path, hang_s: float = 20.0) -> None:
         (folder / "plugins").mkdir()
-        (folder / "plugins" / "odd.py").write_text(PLUGIN)
+        (folder / "plugins" / "odd.py").write_text(PLUGIN, encoding="utf-8")
         config = {"protocol": str(folder / "study.yaml"), "use": [{"use": "odd"}]}
         self.feed = SignalFeed(config, hang_s)
         self.notes: list[dict[str, object]] = []

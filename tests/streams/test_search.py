@@ -42,7 +42,7 @@ time.sleep(float(sys.argv[2]))
 
 def sender(name: str, value: float) -> "subprocess.Popen[str]":
     process = subprocess.Popen(
-        [sys.executable, "-c", SENDS, name, str(value)], stdout=subprocess.PIPE, text=True
+        [sys.executable, "-c", SENDS, name, str(value)], stdout=subprocess.PIPE, encoding="utf-8"
     )
     assert process.stdout.readline() == "ready\n"
     return process
@@ -142,7 +142,7 @@ def test_a_process_that_loses_its_stream_ends_without_an_abort(number: int) -> N
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
-        text=True,
+        encoding="utf-8",
     )
     assert process.stdout.readline() == "ready\n"
     end(source)
