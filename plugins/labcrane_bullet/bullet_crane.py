@@ -6,8 +6,8 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
-from labcrane import FloatArray, Machine, Run
-from labcrane.core import Crane, CraneSettings, PluginError, Value
+from labcrane import FloatArray, Machine, PluginError, Run
+from labcrane.core import Crane, CraneSettings, Value
 from labcrane.machines import urdf_of
 from labcrane_bullet.engine import pybullet
 

@@ -3,7 +3,8 @@
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 
-from labcrane import Dynamics, FloatArray, Machine, PluginError, ProtocolError, Run, Trial, Value
+from labcrane import Dynamics, FloatArray, Machine, PluginError, ProtocolError, Run, Trial
+from labcrane.core import Value
 from labcrane.machines import Body, PlacedObject, load_scene, place_objects
 from labcrane_dmd.arm.contacts import Window
 from labcrane_dmd.arm.drive import drives
