@@ -121,11 +121,11 @@ def whole(study: Study, folder: Path, clock: Clock, count: int, *, lsl: bool) ->
         seen.append(frame)
 
     with rig.opened(study, plan.seed) as run:
-        course = Sequencer(study, plan, rig, waits=False)
+        sequencer = Sequencer(study, plan, rig, waits=False)
         path = folder / f"{time.perf_counter_ns()}.xdf"
         with SessionJournal(path, columns(run), run.rate_hz) as journal, outlets(run, lsl) as push:
             log, sinks = FrameLog(journal, run), (*push, end_of_tick)
-            loop.run(rig, run, course, clock, UntilTick(count), log, sinks)
+            loop.run(rig, run, sequencer, clock, UntilTick(count), log, sinks)
         path.unlink()
     return seen
 

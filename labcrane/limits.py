@@ -56,13 +56,13 @@ LIMITS: Mapping[str, Limit] = {
     ),
     "order": Limit(200, "characters", 0, TEXT, "web.page, session.commands", EVENT),
     "request body": Limit(
-        32_000, "bytes", 0, "any", "web.guard", "status 413 before it is buffered"
+        32_000, "bytes", 0, "any", "web.door.guard", "status 413 before it is buffered"
     ),
     "message of a page": Limit(
-        64_000, "bytes", 0, "any", "web.guard", "the socket is closed with 1009"
+        64_000, "bytes", 0, "any", "web.door.guard", "the socket is closed with 1009"
     ),
     "requests of one address": Limit(
-        200, "requests a second", 0, "any", "web.guard", "status 429; one event a second"
+        200, "requests a second", 0, "any", "web.door.guard", "status 429; one event a second"
     ),
     "orders of one page": Limit(
         20, "orders a second", 0, "any", "web.page", "refused; one event a second"

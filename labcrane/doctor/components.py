@@ -182,7 +182,7 @@ def _stuck(complaints: str) -> str:
     What hangs is most often a library; which call of the plugin's led there says more.
     """
     *_, main = complaints.rpartition("(most recent call first):")
-    calls = list(takewhile(lambda call: call["path"] != __file__, FRAME.finditer(main)))
+    calls = list(takewhile(lambda call: not _ours(call["path"]), FRAME.finditer(main)))
     if not calls:
         return ""
     inner, *outer = calls
@@ -193,6 +193,11 @@ def _stuck(complaints: str) -> str:
             place = f"{Path(call['path']).name}:{call['line']}"
             return f"{said}, called by {call['name']}() ({place})"
     return said
+
+
+def _ours(path: str) -> bool:
+    """Whether a file is this one, also when the process has imported it from another place."""
+    return Path(path).parts[-3:] == Path(__file__).parts[-3:]
 
 
 def main() -> int:

@@ -11,7 +11,8 @@ import pylsl
 import pytest
 from faults.sessions import unique, wait_for
 
-from labcrane import Event, Frame, Tick
+from labcrane import Frame, Tick
+from labcrane.core import Event
 from labcrane.feedback.config import FeedbackConfig, Part
 from labcrane.feedback.process import FeedbackProcess
 from labcrane.streams.context import CONTEXT, ContextOutlet

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 from weakref import WeakSet
 
+from starlette.responses import PlainTextResponse
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from labcrane.limits import LIMITS
@@ -81,13 +82,13 @@ class Guard:
             return
         headers = dict(scope["headers"])
         if (refused := self._refused(scope, headers)) is not None:
-            await self._refuse(scope, send, *refused)
+            await self._refuse(scope, receive, send, *refused)
             return
         if scope["type"] == "http":
             body = await self._body(headers, receive)
             if isinstance(body, int):
                 why = {413: f"more than {MOST_BODY} bytes", 408: "too slow"}[body]
-                await self._refuse(scope, send, body, why)
+                await self._refuse(scope, receive, send, body, why)
                 return
             receive = _given(body, receive)
         await self._inner(scope, receive, _with_headers(send))
@@ -132,15 +133,17 @@ class Guard:
             if not message.get("more_body", False):
                 return body
 
-    async def _refuse(self, scope: Mapping[str, Any], send: Any, status: int, why: str) -> None:
+    async def _refuse(
+        self, scope: Mapping[str, Any], receive: Any, send: Any, status: int, why: str
+    ) -> None:
         path = str(scope["path"])[:80]
         self._denied(f"{_address(scope)} asked for {path}: {why}")
         if scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
             return
-        head = [(b"content-type", b"text/plain; charset=utf-8"), (b"connection", b"close")]
-        await send({"type": "http.response.start", "status": status, "headers": [*head, *HEADERS]})
-        await send({"type": "http.response.body", "body": f"labcrane: {why}".encode()})
+        answer = PlainTextResponse(f"labcrane: {why}", status, {"connection": "close"})
+        answer.raw_headers.extend(HEADERS)
+        await answer(dict(scope), receive, send)
 
 
 def _address(scope: Mapping[str, Any]) -> str:
