@@ -243,7 +243,8 @@ class Stops(RuleBasedStateMachine):
                 streak = streak + 1 if results[number] == "success" else 0
                 if mine.until is not None and streak >= mine.until.successes:
                     enough = min(enough, done_at[number])
-            yield from (number for number in group if done_at.get(number, math.inf) <= enough)
+            over = enough < math.inf
+            yield from (n for n in group if not over or (n in results and done_at[n] <= enough))
             group = []
 
     def every_question_is_asked_to_its_end_once(self) -> None:
