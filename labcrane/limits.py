@@ -84,6 +84,14 @@ LIMITS: Mapping[str, Limit] = {
     "requests of one address": Limit(
         200, "requests a second", 0, "any", "web.door.guard", "status 429; one event a second"
     ),
+    "page loads of one address": Limit(
+        5,
+        "loads a second, 30 at once",
+        0,
+        "any",
+        "web.door.guard",
+        "status 429; one event a second",
+    ),
     "orders of one page": Limit(
         20, "orders a second", 0, "any", "web.page", "refused; one event a second"
     ),
