@@ -1,5 +1,6 @@
 """The page process: a web server, and messages from and to the launcher."""
 
+import importlib
 import mimetypes
 import os
 import signal
@@ -200,6 +201,5 @@ def _routes(app: Any, desk: PageContext) -> None:
 
 
 if __name__ == "__main__":
-    from labcrane.web import service  # noqa: PLW0406 - its records have this name
-
-    sys.exit(service.main())
+    # What it sends is unpickled by the name of this module, which is not __main__.
+    sys.exit(importlib.import_module("labcrane.web.service").main())
