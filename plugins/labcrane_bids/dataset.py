@@ -116,7 +116,11 @@ def _people(reader: "csv.DictReader[str]", path: Path) -> dict[str, dict[str, st
                 f"{path}, line {reader.line_num}: this row has more or fewer cells than the head "
                 "has columns; give it as many"
             )
-        people[row["participant"]] = {name: cell for name, cell in row.items() if cell}
+        if (name := row["participant"]) in people:
+            raise ProtocolError(
+                f"{path}, line {reader.line_num}: {name!r} is there twice; keep one row"
+            )
+        people[name] = {name: cell for name, cell in row.items() if cell}
     return people
 
 

@@ -21,6 +21,7 @@ MOST = LIMITS["CSV table"].most
         (b"participant,age\nP001,\0\n", "line 2 holds a NUL, which no table does"),
         (b"participant,age\nP001," + b"9" * 140_000, "field larger than field limit"),
         (b"participant,age\nP001,30,left\n", "line 2: this row has more or fewer cells"),
+        (b"participant,age\nP001,30\nP001,31\n", "line 3: 'P001' is there twice; keep one row"),
         (b"participant,age\nP001\n", "line 2: this row has more or fewer cells"),
         (gzip.compress(b"participant,age\n")[:-9], "it is gzipped, and damaged"),
     ],
