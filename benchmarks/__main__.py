@@ -23,7 +23,7 @@ from benchmarks.table import Row, missed
 
 SUBJECTS = (
     "tick", "oversight", "beside", "recording", "sync", "signals", "view", "sound", "analysis",
-    "cohort", "start_up",
+    "cohort", "start_up", "pages",
 )  # fmt: skip
 RESULTS = Path(__file__).with_name("RESULTS.md")
 HEAD = "| benchmark | figure | labcrane | reference | | ratio | at most | measured |"

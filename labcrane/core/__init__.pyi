@@ -29,7 +29,7 @@ from .references import (
     SignalName,
     ViewName,
 )
-from .settings import Names, StudyPath, read_yaml, was_run
+from .settings import Names, StudyPath, read_csv_text, read_yaml, was_run
 from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
 
 __all__ = [
@@ -74,6 +74,7 @@ __all__ = [
     "Verdict",
     "ViewName",
     "numeric_answers",
+    "read_csv_text",
     "read_yaml",
     "signals_of",
     "was_run",

@@ -19,12 +19,13 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.core.signals import SignalChannel, SignalStream
+from labcrane.limits import LIMITS
 from labcrane.recording.foreign_streams import MONITORS, SIGNAL
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.streams.request import OURS
 from labcrane.types import FloatArray
 
-MOST_BYTES = 64_000_000
+MOST_BYTES = LIMITS["signals waiting for monitors"].most
 """How much may wait for the monitors: two minutes of 64 channels at 1 kHz."""
 
 HANG_S = 20.0

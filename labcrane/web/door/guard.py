@@ -21,6 +21,12 @@ PATIENCE_S = 10.0
 
 MOST_BODY = LIMITS["request body"].most
 MOST_REQUESTS_S = LIMITS["requests of one address"].most
+MOST_LOADS_S = LIMITS["page loads of one address"].most
+LOADS_AT_ONCE = 30
+"""A page is put together for whoever loads it, which takes 30 ms: fifty a second would leave no
+time for anybody else's orders."""
+
+PAGES = frozenset({"/supervisor", "/participant"})
 MOST_SOCKETS = LIMITS["sockets"].most
 MOST_ADDRESSES = 1024
 
@@ -73,7 +79,7 @@ class Guard:
         usual, self._scheme = (443, "https") if secure else (80, "http")
         if port == usual:
             self._hosts |= names
-        self._buckets: dict[str, Bucket] = {}
+        self._buckets: dict[tuple[str, bool], Bucket] = {}
 
     async def __call__(self, scope: dict[str, Any], receive: Any, send: Any) -> None:
         """Let a request in, or refuse it."""
@@ -98,6 +104,8 @@ class Guard:
     ) -> tuple[int, str] | None:
         if not self._bucket(_address(scope)).take():
             return 429, f"more than {MOST_REQUESTS_S} requests a second"
+        if scope["path"] in PAGES and not self._bucket(_address(scope), loads=True).take():
+            return 429, f"more than {MOST_LOADS_S} pages a second"
         host = headers.get(b"host", b"").decode(errors="replace")
         if host not in self._hosts:
             return 421, f"of host {host[:60]!r}, which is not served here"
@@ -106,12 +114,17 @@ class Guard:
             return 403, f"from a page of {origin[:60].decode(errors='replace')!r}"
         return None
 
-    def _bucket(self, address: str) -> Bucket:
-        if address not in self._buckets:
+    def _bucket(self, address: str, *, loads: bool = False) -> Bucket:
+        key = address, loads
+        if key not in self._buckets:
             if len(self._buckets) >= MOST_ADDRESSES:
                 self._buckets.clear()
-            self._buckets[address] = Bucket(MOST_REQUESTS_S, 2 * MOST_REQUESTS_S)
-        return self._buckets[address]
+            self._buckets[key] = (
+                Bucket(MOST_LOADS_S, LOADS_AT_ONCE)
+                if loads
+                else Bucket(MOST_REQUESTS_S, 2 * MOST_REQUESTS_S)
+            )
+        return self._buckets[key]
 
     @staticmethod
     async def _body(headers: Mapping[bytes, bytes], receive: Any) -> bytes | int:
