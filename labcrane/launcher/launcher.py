@@ -216,6 +216,8 @@ class Launcher:
         recorder = self._recorder
         if recorder is None:
             return
+        if self._crew:
+            recorder.offer(self._crew.sends)
         if recorder.watch():
             self._say("a recorder died: the other one has all streams, and a new one was started")
         for news in self._signals.news(recorder):

@@ -241,6 +241,8 @@ def _resync_xdf(file: Path) -> None:
     from labcrane.clocks.xdf import resync_xdf
 
     done = resync_xdf(file)
+    for line in done.damage:
+        out.print(line, style="yellow", markup=False)
     print_report(done.report)
     for name, (usual, most) in done.against_pyxdf.items():
         out.print(
