@@ -106,8 +106,14 @@ def main() -> int:
 
 def unkind(draws: int) -> bool:
     """Print a line for each unkind device, the worst of its draws; whether all promises hold."""
-    from streams.unkind import ROWS  # noqa: PLC0415 - needs the path
-    from streams.unkind_score import coverage, misnamed, score, shortcomings  # noqa: PLC0415
+    from streams.unkind_score import (  # noqa: PLC0415 - needs the path
+        coverage,
+        misnamed,
+        score,
+        shortcomings,
+        worse_rows,
+    )
+    from streams.unkinder import ALL as ROWS  # noqa: PLC0415
 
     print(
         f"{f'unkind device, worst of {draws} draws, ms':38}| error 95 % (limit) | stated 95 % | "
@@ -134,6 +140,7 @@ def unkind(draws: int) -> bool:
     print(f"of all samples {100 * coverage(every):.2f} % are within what is stated")
     return (
         not any(shortcomings(one) for one in every)
+        and not worse_rows(every)
         and coverage(every) >= COVERED
         and all(min(each) >= NAMED for each in named.values())
     )

@@ -1,12 +1,14 @@
 """A control panel in a process of its own: frames over a pty, unplugged for a while on request.
 
-Run as: can_panel.py LINK RATE_HZ SECONDS UNPLUG_AT BACK_AT. Prints "open" when it is listened to,
-"unplugged TIME" and "back TIME" (perf_counter) as it does so, how many frames it sent, and the
-largest estimated flow of each valve, in percent, that it was told since it was plugged in last.
+Run as: can_panel.py LINK RATE_HZ AWAY_S. Its levers swing for as long as it is not told "end"; told
+"unplug", it is away for a while. Prints "open" when it is listened to, "unplugged TIME" and "back
+TIME" (perf_counter) as it does so, how many frames it sent, and the largest estimated flow of each
+valve, in percent, that it was told since it was plugged in last.
 """
 
 import math
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -15,34 +17,30 @@ from slcan_adapter import SlcanAdapter
 
 from labcrane_can.avc import encode
 
-link, rate, seconds, unplug_at, back_at = sys.argv[1], *map(float, sys.argv[2:6])
+link, rate, away_s = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
+words: list[str] = []
+reader = threading.Thread(target=lambda: words.extend(map(str.strip, sys.stdin)), daemon=True)
 adapter: SlcanAdapter | None = SlcanAdapter(link)
 print("ready", flush=True)
 while not adapter.opened:
     time.sleep(0.01)
 print("open", flush=True)
-began, sent = time.perf_counter(), 0
-for number in range(round(seconds * rate)):
-    due = began + number / rate
-    while time.perf_counter() < due:
-        time.sleep(0.0005)
-    at = number / rate
-    if adapter is not None and unplug_at <= at < back_at:
+reader.start()
+number, sent, returns = 0, 0, math.inf
+while "end" not in words:
+    time.sleep(1.0 / rate)
+    if adapter is not None and "unplug" in words and returns == math.inf:
         print("unplugged", time.perf_counter(), flush=True)
         adapter.unplug()
         Path(link).unlink()
-        adapter = None
-    elif adapter is None and at >= back_at:
+        adapter, returns = None, time.perf_counter() + away_s
+    elif adapter is None and time.perf_counter() >= returns:
         adapter = SlcanAdapter(link)
         print("back", time.perf_counter(), flush=True)
-    if adapter is not None:
-        if not adapter.opened:  # its time stands still until it is listened to again
-            waited = time.perf_counter()
-            while not adapter.opened:
-                time.sleep(0.0005)
-            began += time.perf_counter() - waited
+    if adapter is not None and adapter.opened:  # else its levers stand still
+        number += 1
         valve = 1 + number % 4
-        adapter.send(*encode(valve, round(200 / valve * math.sin(at)), 0x25))
+        adapter.send(*encode(valve, round(200 / valve * math.sin(number / rate)), 0x25))
         sent += 1
 told = dict.fromkeys(range(1, 5), 0)
 for identifier, data in adapter.sent if adapter else ():

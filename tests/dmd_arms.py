@@ -10,7 +10,7 @@ from labcrane import Dynamics, PlannedTrial, Signal
 from labcrane.machines.library import load_machine
 from labcrane.testing import RATE_HZ, make_run, make_trial
 from labcrane_dmd import labcrane_dynamics
-from labcrane_dmd.arm_settings import ArmSettings, JawsSettings
+from labcrane_dmd.arm.settings import ArmSettings, JawsSettings
 
 RETRIEVAL = Path(__file__).parents[1] / "protocols" / "retrieval"
 MODEL = RETRIEVAL / "arm.dmd.yaml"

@@ -1,6 +1,7 @@
 """Checks of the benchmarks: what is slower, larger or worse than promised makes them red."""
 
 import importlib
+import subprocess
 import sys
 import time
 import types
@@ -94,3 +95,38 @@ def test_memory_is_that_of_the_command_itself_and_not_of_who_started_it() -> Non
     ballast[::4096] = b"x" * len(ballast[::4096])
     assert own_process.used("--version").megabytes < 300
     del ballast
+
+
+PROGRAM = """
+from types import SimpleNamespace
+
+def rows(): return [SimpleNamespace(what={what!r}, ours={ours}), SimpleNamespace(what="b", ours=2)]
+"""
+
+
+def test_what_has_become_slower_since_a_commit_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    since = importlib.import_module("benchmarks.since")
+    monkeypatch.setattr(since, "ROOT", tmp_path)
+    program = tmp_path / "benchmarks" / "step.py"
+    program.parent.mkdir()
+    (program.parent / "__init__.py").touch()
+    program.write_text(PROGRAM.format(what="a", ours=10.0))
+    author = ["-c", "user.name=a", "-c", "user.email=a@b"]
+    for words in (["init", "-q"], ["add", "."], [*author, "commit", "-qm", "before"]):
+        subprocess.run(["git", *words], cwd=tmp_path, check=True)
+    program.write_text(PROGRAM.format(what="a", ours=10.4))
+    asked = ["HEAD", "--only", "step", "--rounds", "3", "--check"]
+    assert since.main(asked) == 1
+    said = capsys.readouterr().out
+    assert "step: a: 1.040 [1.040..1.040] in 3 rounds" in said
+    assert "step: b: 1.000" in said
+    assert said.endswith("MISSED step: a\n")
+    program.write_text(PROGRAM.format(what="a", ours=10.2))
+    assert since.main(asked) == 0
+    program.write_text(PROGRAM.format(what="c", ours=99.0))
+    assert since.main(asked) == 0
+    said = capsys.readouterr().out
+    assert "step: a: only before, not compared" in said
+    assert "step: c: only now, not compared" in said

@@ -11,7 +11,7 @@ import typer
 
 from labcrane.cli.commands.approval import today
 from labcrane.core.records import Event
-from labcrane.session.commands import Command, Order, QueueConsole
+from labcrane.session.commands import Command, Consent, Order, QueueConsole, read_request
 
 if TYPE_CHECKING:
     from labcrane.approval.lock import Lock
@@ -37,7 +37,7 @@ class Missing:
         """Put the consent into the register."""
         from labcrane.participants.enrolment import confirm_consent
         from labcrane.participants.folders import Places
-        from labcrane.web.access import PARTICIPANT
+        from labcrane.web.door.access import PARTICIPANT
 
         visit = self.visit
         who: Literal["participant", "examiner"] = "participant" if by == PARTICIPANT else "examiner"
@@ -108,7 +108,7 @@ def _given(console: QueueConsole, version: str, kept: list[Command]) -> str | No
     for command in console.commands():
         if command.order is Order.END:
             return NOBODY
-        if command.order is Order.CONSENT and command.text == version:
+        if read_request(command) == Consent(version):
             by = command.by
         else:
             kept.append(command)

@@ -6,7 +6,23 @@ from typing import Annotated
 import typer
 
 AsJson = Annotated[bool, typer.Option("--json", help="for programs")]
-ProtocolPath = Annotated[Path, typer.Argument(metavar="PROTOCOL", help="the study's YAML file")]
+PROTOCOL_FILE = "protocol.yaml"
+
+
+def _protocol_in(path: Path) -> Path:
+    """Return a study's file where its folder was given."""
+    inside = path / PROTOCOL_FILE
+    return inside if inside.is_file() else path
+
+
+ProtocolPath = Annotated[
+    Path,
+    typer.Argument(
+        metavar="PROTOCOL",
+        help=f"the study's YAML file, or a folder with {PROTOCOL_FILE}",
+        callback=_protocol_in,
+    ),
+]
 DataBeside = Annotated[
     Path | None, typer.Option(help="data folder; data/ beside the protocol by default")
 ]

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from labcrane.cli.output import out
 
 if TYPE_CHECKING:
-    from labcrane.streams.sync.sync_report import SyncReport
+    from labcrane.streams.sync.report.sync_report import SyncReport
 
 STYLES = {"PASS": "green", "WARN": "yellow", "FAIL": "red"}
 
@@ -14,7 +14,7 @@ def print_report(report: "SyncReport") -> None:
     """Print a sync report: a row per stream, the loop, and what to do."""
     from rich.table import Table
 
-    from labcrane.streams.sync.sync_report import COLUMNS
+    from labcrane.streams.sync.report.sync_report import COLUMNS
 
     verdict = report.verdict.value
     out.print(f"sync report: [{STYLES[verdict]}]{verdict}[/]")

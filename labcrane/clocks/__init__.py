@@ -1,4 +1,4 @@
-"""The correction of clocks for any recording, as a function of plain arrays.
+"""The correction of clocks for any recording: of plain arrays, and of any recorder's XDF file.
 
 In come stamps of another clock, and what is known of it; out go times on the receiver's clock, and
 how far each may be off.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import AfterValidator, ValidationInfo
 
 from labcrane.files.model import StrictModel
+from labcrane.files.model import was_run as was_run  # noqa: PLC0414 - public here
 from labcrane.files.yaml import read_yaml as read_yaml  # noqa: PLC0414 - public here
 
 if TYPE_CHECKING:
@@ -24,6 +25,14 @@ class Settings(StrictModel):
     def warnings(self) -> Sequence[str]:
         """Return what is allowed but should be known beforehand; ``labcrane check`` says it."""
         return ()
+
+    def reveals(self) -> str:
+        """Return what whoever sees or hears the component learns of the task's error.
+
+        Nothing by default. What reveals something is feedback, and belongs to the design:
+        ``labcrane check`` warns of it where it is always there, in every group.
+        """
+        return ""
 
     def provides(self, machine: Machine) -> Names:
         """Return the names that a component with these settings gives others to refer to, by kind.

@@ -4,11 +4,13 @@ Each look is made in a process of its own: a driver that crashes or hangs is a f
 """
 
 import faulthandler
-import multiprocessing
+import importlib
 import os
+import pickle
 import re
 import sys
 import tempfile
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import takewhile
@@ -18,10 +20,13 @@ from pydantic import ValidationError
 
 from labcrane.core.findings import Finding, Verdict
 from labcrane.core.settings import Settings
-from labcrane.processes.pipe import PipeEnd
+from labcrane.processes.handle import Patience, ProcessHandle
+from labcrane.processes.parent import Parent
 from labcrane.protocol.study import Study
 from labcrane.registry.hookspecs import ROLES
 from labcrane.registry.registry import Registry, discover
+
+MODULE = "labcrane.doctor.components"
 
 WAIT_S = 30.0
 """How long a look may take; with a person who moves things, ten times as long."""
@@ -56,6 +61,31 @@ class Look:
     name: str
     settings: Settings
     study: Path | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LookConfig:
+    """What the process of a look is told.
+
+    Attributes
+    ----------
+    look
+        Pickled: it can be read when the study's own plugins are there.
+    study
+        The protocol, beside which there may be plugins.
+    move
+        Whether a person is there to move things.
+    complaints
+        The file that takes what is written to the standard error.
+    wait_s
+        How long the look may take.
+    """
+
+    look: bytes
+    study: Path | None
+    move: bool
+    complaints: Path
+    wait_s: float
 
 
 def of_study(study: Study, registry: Registry) -> list[Look]:
@@ -102,33 +132,40 @@ def examine(look: Look, *, move: bool) -> Sequence[Finding]:
 
 
 def _examine(look: Look, complaints: Path, *, move: bool) -> Sequence[Finding]:
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe(duplex=False)
     wait_s = WAIT_S * (10.0 if move else 1.0)
-    arguments = (theirs, look, move, str(complaints), wait_s)
-    process = context.Process(target=_look, args=arguments, name=f"examine {look.name}")
-    process.start()
-    theirs.close()
+    process = ProcessHandle(MODULE, f"examine {look.name}", Patience(stop_s=1.0))
+    process.start(LookConfig(pickle.dumps(look), look.study, move, complaints, wait_s))
+    ends = time.monotonic() + wait_s + START_S
     try:
-        if not ours.poll(wait_s + START_S):
-            return [_fault(look, f"did not answer within {wait_s + START_S:g} s")]
-        found: Sequence[Finding] = ours.recv()
-    except EOFError:
-        process.join()
-        text = complaints.read_text(encoding="utf-8", errors="replace")
-        if TIMEOUT in text:
-            return [_fault(look, f"did not answer within {wait_s:g} s{_stuck(text)}")]
-        *_, last = ["", *text.splitlines()]
-        why = f"; the last it said was {last.strip()!r}" if last else ""
-        return [_fault(look, f"ended its process with exit code {process.exitcode}{why}")]
-    else:
-        return found
+        found = None
+        while found is None and not process.ended and time.monotonic() < ends:
+            process.wait(ends - time.monotonic())
+            found = _taken(process)
+        found = _taken(process) if found is None else found
+        code = process.exit_code
     finally:
-        ours.close()
-        process.join(1.0)
-        if process.is_alive():
-            process.kill()
-            process.join()
+        process.stop()
+    if found is not None:
+        return found
+    if code is None:
+        return [_fault(look, f"did not answer within {wait_s + START_S:g} s")]
+    text = complaints.read_text(encoding="utf-8", errors="replace")
+    if TIMEOUT in text:
+        return [_fault(look, f"did not answer within {wait_s:g} s{_stuck(text)}")]
+    *_, last = ["", *text.splitlines()]
+    why = f"; the last it said was {last.strip()!r}" if last else ""
+    return [_fault(look, f"ended its process with exit code {code}{why}")]
+
+
+def _taken(process: ProcessHandle) -> Sequence[Finding] | None:
+    """Show what is for the person who moves things; return the findings once they have come."""
+    found = None
+    for message in process.messages():
+        if isinstance(message, str):
+            print(f"  {message}", flush=True)  # noqa: T201 - to the person who moves things
+        else:
+            found = message
+    return found
 
 
 def _fault(look: Look, what: str) -> Finding:
@@ -158,28 +195,31 @@ def _stuck(complaints: str) -> str:
     return said
 
 
-def _look(
-    pipe: PipeEnd,
-    look: Look,
-    move: bool,  # noqa: FBT001
-    complaints: str,
-    wait_s: float,
-) -> None:
+def main() -> int:
+    """Look once; return the process's exit status."""
+    parent = Parent()
+    order: LookConfig | None = parent.order()
+    if order is None:
+        return 0
     # Sound libraries fill the terminal with what they did not find; it is kept for a crash.
-    with Path(complaints).open("a", encoding="utf-8") as file:
+    with order.complaints.open("a", encoding="utf-8") as file:
         os.dup2(file.fileno(), sys.stderr.fileno())
-    registry = discover(study=look.study)
+    registry = discover(study=order.study)
+    look: Look = pickle.loads(order.look)  # noqa: S301 - of whoever started this process
     (role,) = (role for role, entry in ROLES.items() if entry.word == look.role)
     examine = registry.offers[role][look.name].examine
     assert examine is not None  # noqa: S101 - why it is looked at
     # Even what hangs in C and lets no Python run is seen by this, and ended.
-    faulthandler.dump_traceback_later(wait_s, exit=True, file=sys.stderr)
+    faulthandler.dump_traceback_later(order.wait_s, exit=True, file=sys.stderr)
     try:
-        found = list(examine(look.settings, _say if move else None))
+        found = list(examine(look.settings, parent.tell if order.move else None))
     except Exception as error:  # noqa: BLE001 - a plugin's look can raise anything
         found = [_fault(look, f"raised {type(error).__name__}: {error}")]
-    pipe.send(found)
+    parent.tell(found)
+    parent.close()
+    return 0
 
 
-def _say(text: str) -> None:
-    print(f"  {text}", flush=True)  # noqa: T201 - to the person who moves things
+if __name__ == "__main__":
+    # What it sends is unpickled by the name of this module, which is not __main__.
+    sys.exit(importlib.import_module("labcrane.doctor.components").main())

@@ -13,7 +13,7 @@ from labcrane.core.findings import Finding, Verdict
 from labcrane.errors import RecordingError
 from labcrane.files.append import AppendFile
 from labcrane.files.system import PRIVATE_MODES
-from labcrane.streams.sync.limits import Limit
+from labcrane.streams.sync.report.limits import Limit
 
 NEEDED_BYTES = 1_000_000_000
 """Free space that is asked for where no protocol says how much a session takes."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from labcrane.core.clock import SystemClock, ticks
 from labcrane.core.findings import Finding, Verdict
-from labcrane.streams.sync.limits import LATE
+from labcrane.streams.sync.report.limits import LATE
 
 SECONDS = 2.0
 CPUS = Path("/sys/devices/system/cpu")

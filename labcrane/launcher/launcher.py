@@ -5,51 +5,38 @@ recorder is started again at once, and after the session's death everything reco
 the participant file, to be gone on with by ``labcrane resume``.
 """
 
-import multiprocessing
-import pickle
-import queue
-import threading
 import time
 from collections.abc import Callable, Iterable
-from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from labcrane.core.records import Event
 from labcrane.feedback.processes import FeedbackProcesses, log_requests
 from labcrane.launcher.hang_detector import HangDetector
-from labcrane.launcher.session_process import Ended, Offered, serve
+from labcrane.launcher.session_handle import SessionHandle
+from labcrane.launcher.session_process import Ended, Offered
 from labcrane.launcher.signal_reporter import SignalReporter, monitor_config
-from labcrane.processes.pipe import PipeEnd
 from labcrane.recording.crash_marker import read_whereabouts
 from labcrane.recording.paths import parts
 from labcrane.session.commands import (
     Command,
     LauncherGone,
     Message,
-    MessageError,
     Order,
     QueueConsole,
     StreamBack,
     StreamLost,
-    encode,
 )
 from labcrane.session.eligibility import check_eligibility
 from labcrane.session.session import finish, outlook, recording, running
 from labcrane.session.visit import Visit
 from labcrane.streams.recorder.handle import RecorderHandle
-from labcrane.streams.sync.sync_report import SyncReport
-
-if TYPE_CHECKING:
-    from multiprocessing.context import SpawnProcess
+from labcrane.streams.sync.report.sync_report import SyncReport
 
 LOOK_S = 0.05
 """How often the launcher looks after its processes: a dead recorder must be back in a second."""
 
 RECORDER = "recorder"
-
-MOST_WAITING = 1000
-"""So many messages may wait for a session that does not take them; it hangs, and is soon killed."""
 
 FOR_THE_RECORD = (Order.NOTE, Order.DENIED)
 """What is kept for the session when it is said while streams and feedback are waited for."""
@@ -75,81 +62,6 @@ class Outcome:
     where: str = ""
     sync_report: SyncReport | None = None
     owed: str = ""
-
-
-class MessageSender:
-    """Sends messages to the session from a thread of its own.
-
-    A session that hangs takes none, and whoever writes to its pipe waits: the launcher must not,
-    for it is the launcher that finds out.
-    """
-
-    def __init__(self, pipe: PipeEnd, say: Callable[[str], None]) -> None:
-        self._pipe = pipe
-        self._say = say
-        self._waiting: queue.Queue[bytes | None] = queue.Queue(MOST_WAITING)
-        self._thread = threading.Thread(target=self._send, name="to-session", daemon=True)
-        self._thread.start()
-
-    def send(self, message: Message) -> None:
-        """Have a message sent, without waiting; say so when it cannot be."""
-        try:
-            self._waiting.put_nowait(encode(message))
-        except MessageError as error:
-            self._say(str(error))
-        except queue.Full:
-            self._say(f"the session takes no messages; {MOST_WAITING} wait, and one was dropped")
-
-    def close(self) -> None:
-        """Send what waits, if the session still takes it."""
-        with suppress(queue.Full):
-            self._waiting.put_nowait(None)
-        self._thread.join(LOOK_S)
-
-    def _send(self) -> None:
-        while (line := self._waiting.get()) is not None:
-            try:
-                self._pipe.send_bytes(line)
-            except OSError:
-                return  # the session has ended this very moment
-
-
-class MessageReceiver:
-    """Receives what the session says, in a thread of its own.
-
-    A session that hangs may do so in the middle of a message, and whoever reads its pipe waits.
-
-    Attributes
-    ----------
-    over
-        Whether it will say no more, and all it said has been taken: it has ended or died.
-    """
-
-    def __init__(self, pipe: PipeEnd) -> None:
-        self.over = False
-        self._pipe = pipe
-        self._said: queue.SimpleQueue[Event | Offered | Ended | None] = queue.SimpleQueue()
-        threading.Thread(target=self._receive, name="from-session", daemon=True).start()
-
-    def wait(self, seconds: float) -> list[Event | Offered | Ended]:
-        """Return what was said, and wait so long for it."""
-        said: list[Event | Offered | Ended] = []
-        with suppress(queue.Empty):
-            message = self._said.get(timeout=seconds)
-            while message is not None:
-                said.append(message)
-                message = self._said.get_nowait()
-            self.over = True
-        return said
-
-    def _receive(self) -> None:
-        try:
-            while True:
-                self._said.put(self._pipe.recv())
-        except (EOFError, OSError):
-            pass  # it may have died in the middle of a message
-        finally:
-            self._said.put(None)
 
 
 class Launcher:
@@ -253,51 +165,39 @@ class Launcher:
         return False
 
     def _run(self) -> int | None:
-        context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
-        process = context.Process(
-            target=serve, args=(pickle.dumps(self._visit), theirs), name="session"
-        )
-        process.start()
-        theirs.close()
-        sender = MessageSender(ours, self._say)
-        said = MessageReceiver(ours)
+        session = SessionHandle(self._visit, self._say)
         try:
-            return self._watch(process, said, sender.send)
+            return self._watch(session)
         finally:
-            sender.send(LauncherGone())  # if it still runs, nobody looks after it any more
-            sender.close()
-            process.join()
-            ours.close()
+            session.send(LauncherGone())  # if it still runs, nobody looks after it any more
+            session.close()
 
-    def _watch(
-        self, process: "SpawnProcess", said: "MessageReceiver", send: Callable[[Message], None]
-    ) -> int | None:
+    def _watch(self, session: SessionHandle) -> int | None:
         """Return the exit code of a session that died, None of one that ended in order."""
         stillness = HangDetector(self._visit.whereabouts, self._say)
         while True:
+            over = session.ended  # asked first: what it said before is taken below
             try:
                 for command in (*self._kept, *self._console.commands()):
-                    send(command)
+                    session.send(command)
                 self._kept.clear()
-                messages = said.wait(LOOK_S)
+                messages = session.wait(0.0 if over else LOOK_S)
             except KeyboardInterrupt:
-                send(Command(Order.END))
+                session.send(Command(Order.END))
                 continue
             ended = self._pass_events(messages)
             if ended is not None:
                 if ended.error is not None:
                     raise ended.error
                 return None
-            if said.over:  # it has died, and what it said before has been heard
-                process.join()
-                return process.exitcode
+            if over:
+                return session.close()
             if stillness.hangs():
-                process.kill()  # its journal is whole; the exit code is passed on as any other
-            self._watch_streams(send)
+                session.kill()  # its journal is whole; the exit code is passed on as any other
+            self._watch_streams(session.send)
             if self._crew:
                 for news in self._crew.watch(self._say):
-                    send(news)
+                    session.send(news)
 
     def _pass_events(self, messages: Iterable[Event | Offered | Ended]) -> Ended | None:
         for message in messages:

@@ -1,21 +1,22 @@
-"""The session as a process of its own, talking to its launcher over one pipe.
+"""The session as a process of its own, which a launcher starts and hears.
 
-The pipe carries messages to the session, as JSON of a declared size, and events and how it ended
-from it, as pickled records.
+To the session go messages, each JSON of a declared size; from it come events and how it ended, as
+records.
 """
 
+import importlib
 import pickle
 import queue
 import signal
+import sys
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from labcrane.core.records import Event
 from labcrane.errors import LabcraneError
-from labcrane.processes.pipe import PipeEnd
+from labcrane.processes.parent import Parent
 from labcrane.session.commands import (
-    MOST_BYTES,
     Command,
     LauncherGone,
     Message,
@@ -43,20 +44,16 @@ class Offered:
     streams: Mapping[str, str]
 
 
-class PipeConsole:
-    """The launcher at the other end of a pipe.
+class ParentConsole:
+    """The launcher as the session knows it.
 
-    One thread sends and one receives, so that a launcher that does not read, or stops in the
-    middle of a message, never makes the loop wait. When the launcher is gone the session ends:
-    nobody could stop it any more.
+    Neither a launcher that does not read, nor one that stops in the middle of a message, makes the
+    loop wait. When the launcher is gone the session ends: nobody could stop it any more.
     """
 
-    def __init__(self, pipe: PipeEnd) -> None:
-        self._pipe = pipe
+    def __init__(self, parent: Parent) -> None:
+        self._parent = parent
         self._incoming: queue.SimpleQueue[Message] = queue.SimpleQueue()
-        self._outgoing: queue.SimpleQueue[Event | Offered | Ended] = queue.SimpleQueue()
-        self._sender = threading.Thread(target=self._send, name="to-launcher", daemon=True)
-        self._sender.start()
         threading.Thread(target=self._receive, name="from-launcher", daemon=True).start()
 
     def commands(self) -> list[Message]:
@@ -66,45 +63,37 @@ class PipeConsole:
         return given
 
     def report(self, event: Event) -> None:
-        self._outgoing.put(event)
+        self._parent.tell(event)
 
     def offer(self, streams: Mapping[str, str]) -> None:
         """Say which streams there are, so that nobody on this computer searches for them."""
-        self._outgoing.put(Offered(streams))
+        self._parent.tell(Offered(streams))
 
     def end(self, ended: Ended) -> None:
         """Say how the session ended, after everything else, and wait until it is sent."""
-        self._outgoing.put(ended)
-        self._sender.join()
+        self._parent.tell(ended)
+        self._parent.close(patience_s=None)
 
     def _receive(self) -> None:
-        while True:
+        for line in self._parent.incoming():
             try:
-                self._incoming.put(decode(self._pipe.recv_bytes(MOST_BYTES)))
+                self._incoming.put(decode(line))
             except MessageError as error:
                 self._incoming.put(Command(Order.DENIED, str(error)))
-            except (EOFError, OSError):
-                self._incoming.put(LauncherGone())
-                return
-
-    def _send(self) -> None:
-        while True:
-            message = self._outgoing.get()
-            try:
-                self._pipe.send(message)
-            except OSError:
-                return  # the launcher is gone; the record does not need it
-            if isinstance(message, Ended):
-                return
+        self._incoming.put(LauncherGone())
 
 
-def serve(visit: bytes, pipe: PipeEnd) -> None:
-    """Run a session; the process's main function. ``visit`` is pickled: it loads the study."""
-    # An interrupt from the keyboard reaches the launcher too, which ends the session in order.
+def main() -> int:
+    """Run one session; return the process's exit status."""
+    # An interrupt from the keyboard reaches the launcher, which ends the session in order.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    console = PipeConsole(pipe)
-    # Whoever wrote it is the launcher.
+    parent = Parent()
+    if (visit := parent.order()) is None:
+        return 0
+    console = ParentConsole(parent)
+    # Pickled by the launcher: it loads the study, here and not in a thread that reads.
     console.end(_ended(lambda: record(pickle.loads(visit), console, console.offer)))  # noqa: S301
+    return 0
 
 
 def _ended(run: Callable[[], None]) -> Ended:
@@ -113,3 +102,8 @@ def _ended(run: Callable[[], None]) -> Ended:
     except LabcraneError as error:
         return Ended(error)
     return Ended()
+
+
+if __name__ == "__main__":
+    # What it sends is unpickled by the name of this module, which is not __main__.
+    sys.exit(importlib.import_module("labcrane.launcher.session_process").main())

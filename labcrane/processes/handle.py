@@ -18,6 +18,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import IO, Any
 
+from labcrane.processes.messages import Inbox, received, send
+
 LAST_S = 1.0
 """How long the last words of a process that has ended may take to be read."""
 
@@ -95,8 +97,7 @@ class ProcessHandle:
         self._patience = patience
         self._take = take
         self._fruitless = 0
-        self._incoming: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._news = threading.Event()
+        self._inbox: Inbox[Any] = Inbox()
         self._life: _Life | None = None
 
     def start(self, order: object = None) -> None:
@@ -129,18 +130,23 @@ class ProcessHandle:
         """Tell the process something, without waiting for it; nobody hears it when it has died."""
         self._present.outgoing.put(pickle.dumps(message))
 
+    @property
+    def waiting(self) -> int:
+        """How many messages the process has not taken yet."""
+        return self._present.outgoing.qsize()
+
+    @property
+    def ended(self) -> bool:
+        """Whether the process has ended, and all that it has said is in :meth:`messages`."""
+        return not self._present.threads[0].is_alive()
+
     def messages(self) -> list[Any]:
         """Return what it has said since the last call."""
-        self._news.clear()
-        found = []
-        with suppress(queue.Empty):
-            while True:
-                found.append(self._incoming.get_nowait())
-        return found
+        return self._inbox.messages()
 
     def wait(self, seconds: float) -> bool:
         """Wait for a message or the process's end; whether there is one."""
-        return self._news.wait(seconds)
+        return self._inbox.wait(seconds)
 
     def worked(self) -> None:
         """Note that the present process did what it is for: restarts are counted anew."""
@@ -168,8 +174,9 @@ class ProcessHandle:
         """
         life = self._present
         life.outgoing.put(None)
+        patience_s = self._patience.stop_s if patience_s is None else patience_s
         try:
-            life.process.wait(self._patience.stop_s if patience_s is None else patience_s)
+            life.process.wait(patience_s if math.isfinite(patience_s) else None)
         except subprocess.TimeoutExpired:
             life.process.kill()
         return self._buried(life)
@@ -209,19 +216,12 @@ class ProcessHandle:
         return life
 
     def _hear(self, life: _Life) -> None:
-        while True:
-            try:
-                message = pickle.load(life.output)  # noqa: S301 - our own child
-            except (EOFError, pickle.UnpicklingError, OSError, ValueError):
-                break  # it ended, perhaps in the middle of a message
+        for message in received(life.output):
             life.heard = time.monotonic()
-            if self._take is not None:
-                self._take(message)
-            else:
-                self._incoming.put(message)
-            self._news.set()
+            (self._take or self._inbox.put)(message)
+            self._inbox.wake()
         life.process.wait()
-        self._news.set()
+        self._inbox.wake()
 
     @staticmethod
     def _buried(life: _Life) -> int:
@@ -234,10 +234,7 @@ class ProcessHandle:
 
 def _speak(life: _Life) -> None:
     """Write what there is to tell; after the last of it, or when nobody hears it, hang up."""
-    with suppress(OSError):
-        while (message := life.outgoing.get()) is not None:
-            life.input.write(message)
-            life.input.flush()
+    send(life.outgoing, life.input)
     with suppress(OSError):
         life.input.close()
 

@@ -1,17 +1,17 @@
 """Parent of a child process, as the child sees it: its order, what it says, whether it is there.
 
-What is printed in the child goes to the standard error: libraries for sound and graphics print,
-and the standard output is for messages to the parent.
+What is printed in the child goes to the standard error, for libraries for sound and graphics print,
+and what reads the standard input finds it at its end: both are for messages.
 """
 
 import os
 import pickle
 import queue
 import threading
-from contextlib import suppress
+from collections.abc import Iterator
 from typing import IO, Any
 
-LOOK_S = 0.25
+from labcrane.processes.messages import Inbox, received, send
 
 
 class Parent:
@@ -30,24 +30,21 @@ class Parent:
         self._input: IO[bytes] = os.fdopen(os.dup(0), "rb")
         self._output: IO[bytes] = os.fdopen(os.dup(1), "wb")
         os.dup2(2, 1)
+        nothing = os.open(os.devnull, os.O_RDONLY)
+        os.dup2(nothing, 0)
+        os.close(nothing)
         self.gone = threading.Event()
-        self._incoming: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._inbox: Inbox[Any] = Inbox()
         self._outgoing: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
-        self._news = threading.Event()
         self._closed = threading.Event()
         for work in (self._hear, self._speak):
             threading.Thread(target=work, name=f"parent {work.__name__}", daemon=True).start()
 
     def order(self) -> Any:
         """Wait for what it says first; None when it ends without a word."""
-        while not self.gone.is_set():
-            try:
-                return self._incoming.get(timeout=LOOK_S)
-            except queue.Empty:
-                continue
-        with suppress(queue.Empty):  # it may have said it and gone at once
-            return self._incoming.get_nowait()
-        return None
+        while (order := self._inbox.first()) is None and not self.gone.is_set():
+            self._inbox.wait()
+        return self._inbox.first() if order is None else order  # it may have said it and gone
 
     def tell(self, message: object) -> None:
         """Tell the parent something, without waiting for it."""
@@ -55,33 +52,30 @@ class Parent:
 
     def messages(self) -> list[Any]:
         """Return what the parent has said since the last call."""
-        self._news.clear()
-        found = []
-        with suppress(queue.Empty):
-            while True:
-                found.append(self._incoming.get_nowait())
-        return found
+        return self._inbox.messages()
 
-    def wait(self, seconds: float) -> bool:
+    def wait(self, seconds: float | None = None) -> bool:
         """Wait for a message or the parent's end; whether there is one."""
-        return self._news.wait(seconds) or self.gone.is_set()
+        return self._inbox.wait(seconds) or self.gone.is_set()
 
-    def close(self, patience_s: float = 5.0) -> None:
+    def incoming(self) -> Iterator[Any]:
+        """Yield what the parent says, as it comes, until it is gone; for a thread of its own."""
+        while not self.gone.is_set():
+            self._inbox.wait()
+            yield from self._inbox.messages()
+        yield from self._inbox.messages()
+
+    def close(self, patience_s: float | None = 5.0) -> None:
         """Wait until all that was told is on its way; call it last."""
         self._outgoing.put(None)
         self._closed.wait(patience_s)
 
     def _hear(self) -> None:
-        with suppress(EOFError, pickle.UnpicklingError, OSError):
-            while True:
-                self._incoming.put(pickle.load(self._input))  # noqa: S301 - our own parent
-                self._news.set()
+        for message in received(self._input):
+            self._inbox.put(message)
         self.gone.set()
-        self._news.set()
+        self._inbox.wake()
 
     def _speak(self) -> None:
-        with suppress(OSError):  # the parent is gone; its end of the input says so too
-            while (message := self._outgoing.get()) is not None:
-                self._output.write(message)
-                self._output.flush()
+        send(self._outgoing, self._output)  # it ends early when the parent is gone
         self._closed.set()

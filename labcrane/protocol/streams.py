@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Literal
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
 from labcrane.core.settings import Settings
-from labcrane.streams.sync.limits import Limit, Limits
+from labcrane.streams.sync.report.limits import Limit, Limits
 
 if TYPE_CHECKING:  # a protocol is checked without loading what corrects clocks
     from labcrane.recording.xdf.header import StreamHeader

@@ -1,7 +1,7 @@
 """Messages to a session: what people order, and what processes report; and what it tells them.
 
-A message crosses the pipe to the session's process as JSON of a declared size, and is read back by
-its types, so that nothing else can come out of the pipe.
+A message crosses to the session's process as JSON of a declared size, and is read back by its
+types, so that nothing else can come out there.
 """
 
 import queue
@@ -50,13 +50,119 @@ KINDS = {
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """One order, with its words if it has any."""
+    """One order as it was given, with its words if it has any; :func:`read_request` reads it."""
 
     order: Order
     text: str = ""
     by: str = ""  # which page; empty for the terminal
     at: str = ""  # the address from which a page asked
     kind: Literal["command"] = "command"
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """To start, pause, repeat, skip, end or override: no words are needed."""
+
+    order: Order
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """A note for the record, or a hint for the operator."""
+
+    order: Literal[Order.NOTE, Order.HINT]
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Completion:
+    """Whether the running trial was completed."""
+
+    completed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SettingChange:
+    """A setting of a cue or sound, and the value that it is to have, as it was written."""
+
+    feedback: str
+    key: str
+    written: str
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """An answer as JSON, which only the questionnaire that is asked can read."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Submission:
+    """The questionnaire that is asked is handed in."""
+
+
+@dataclass(frozen=True, slots=True)
+class Consent:
+    """Consent to a version of the text."""
+
+    version: str
+
+
+@dataclass(frozen=True, slots=True)
+class Denial:
+    """Somebody was refused something before it came here."""
+
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Malformed:
+    """An order whose words do not say what it needs."""
+
+    order: Order
+    why: str
+
+
+Request = (
+    Control
+    | Remark
+    | Completion
+    | SettingChange
+    | Answer
+    | Submission
+    | Consent
+    | Denial
+    | Malformed
+)
+"""What an order asks for, read from its words once."""
+
+
+def read_request(command: Command) -> Request:
+    """Return what an order asks for."""
+    order, text = command.order, command.text
+    match order:
+        case Order.NOTE | Order.HINT:
+            return Remark(order, text) if text else Malformed(order, f"a {order} needs words")
+        case Order.COMPLETION:
+            if text in {"0", "1"}:
+                return Completion(text == "1")
+            return Malformed(order, f"completion is 1 or 0, not {text!r}")
+        case Order.SETTING:
+            place, equals, written = text.partition("=")
+            feedback, dot, key = place.strip().partition(".")
+            if equals and dot:
+                return SettingChange(feedback, key, written)
+            return Malformed(order, f"a setting is written name.key=value, not {text!r}")
+        case Order.ANSWER:
+            return Answer(text)
+        case Order.SUBMIT:
+            return Submission()
+        case Order.CONSENT:
+            return Consent(text)
+        case Order.DENIED:
+            return Denial(text)
+    return Control(order)
 
 
 @dataclass(frozen=True, slots=True)

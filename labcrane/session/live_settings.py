@@ -10,6 +10,7 @@ from labcrane.core.settings import Settings
 from labcrane.errors import ProtocolError
 from labcrane.files.yaml import parse_yaml
 from labcrane.protocol.components import ComponentSpec
+from labcrane.session.commands import SettingChange
 
 
 class FeedbackSettings:
@@ -21,25 +22,22 @@ class FeedbackSettings:
     def __init__(self, choices: Mapping[str, ComponentSpec]) -> None:
         self._now: dict[str, Settings] = {name: each.settings for name, each in choices.items()}
 
-    def refusal(self, text: str) -> str | None:
+    def refusal(self, change: SettingChange) -> str | None:
         """Return why a change cannot be made, or None when it can."""
         try:
-            self._changed(text)
+            self._changed(change)
         except ValueError as error:
             return str(error)
         return None
 
-    def change(self, text: str) -> dict[str, Value]:
+    def change(self, change: SettingChange) -> dict[str, Value]:
         """Make a change that is not refused; return it as the data of an event."""
-        name, key, value, settings = self._changed(text)
-        self._now[name] = settings
-        return {"feedback": name, "key": key, "value": value}
+        value, settings = self._changed(change)
+        self._now[change.feedback] = settings
+        return {"feedback": change.feedback, "key": change.key, "value": value}
 
-    def _changed(self, text: str) -> tuple[str, str, Value, Settings]:
-        place, equals, written = text.partition("=")
-        name, dot, key = place.strip().partition(".")
-        if not (equals and dot):
-            raise ValueError(f"a setting is written name.key=value, not {text!r}")
+    def _changed(self, change: SettingChange) -> tuple[Value, Settings]:
+        name, key, written = change.feedback, change.key, change.written
         if name not in self._now:
             known = ", ".join(self._now) or "none"
             raise ValueError(f"there is no feedback {name!r}; there is {known}")
@@ -54,11 +52,11 @@ class FeedbackSettings:
                 f"{written!r} cannot be read as a value; write a number, a word, true or false"
             ) from None
         if not isinstance(value, float | int | str | bool | None):
-            message = f"{place.strip()} can be changed to a single value, not {written!r}"
+            message = f"{name}.{key} can be changed to a single value, not {written!r}"
             raise ValueError(message)  # noqa: TRY004 - what people wrote, like the rest
         asked: dict[str, Any] = {**before.model_dump(), key: value}
         try:
-            return name, key, value, type(before).model_validate(asked)
+            return value, type(before).model_validate(asked)
         except ValidationError as error:
             what = error.errors()[0]["msg"]
-            raise ValueError(f"{place.strip()} cannot be {value!r}: {what}") from None
+            raise ValueError(f"{name}.{key} cannot be {value!r}: {what}") from None

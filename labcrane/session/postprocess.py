@@ -16,12 +16,12 @@ from labcrane.recording.participant_file.session_group import write_sync_report
 from labcrane.recording.participant_file.stream_group import write_time, write_uncorrected
 from labcrane.streams.recorder.health import counter_label
 from labcrane.streams.sync.correction import Treatment, correct
-from labcrane.streams.sync.limits import Limits
 from labcrane.streams.sync.pool import pooled
 from labcrane.streams.sync.raw import RawStream, raw_of, unwrapped
+from labcrane.streams.sync.report.limits import Limits
+from labcrane.streams.sync.report.stream_report import StreamReport, judge_stream
+from labcrane.streams.sync.report.sync_report import LoopReport, SyncReport, judge_loop, never_came
 from labcrane.streams.sync.resync import columns_of, quality_of, treatment_of
-from labcrane.streams.sync.stream_report import StreamReport, judge_stream
-from labcrane.streams.sync.sync_report import LoopReport, SyncReport, judge_loop, never_came
 
 if TYPE_CHECKING:
     import h5py

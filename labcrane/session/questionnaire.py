@@ -15,7 +15,7 @@ from labcrane.limits import LimitError, read_json
 from labcrane.participants.personal_data import personal
 from labcrane.protocol.study import Study
 from labcrane.recording.participant_file.questionnaires import ANSWER, END, SCORE
-from labcrane.session.commands import Command, Order, by_whom, whence
+from labcrane.session.commands import Answer, Submission
 
 Said = tuple[str, dict[str, Value]]
 """Name and data of an event that follows."""
@@ -210,13 +210,17 @@ class QuestionnaireRun:
         if simulated:
             yield from self._inquiry.simulated(self._seed)
 
-    def handle(self, command: Command) -> Said:
-        """Take an answer, or hand the questionnaire in; return what is said of it."""
-        if command.order is Order.SUBMIT:
-            name, data = self._inquiry.hand_in(by_whom(command))
+    def handle(self, request: Answer | Submission, about: Mapping[str, Value]) -> Said:
+        """Take an answer, or hand the questionnaire in; return what is said of it.
+
+        ``about`` is by whom it was given, and from which address.
+        """
+        by = str(about["by"])
+        if isinstance(request, Answer):
+            name, data = self._inquiry.take(request.text, by)
         else:
-            name, data = self._inquiry.take(command.text, by_whom(command))
-        return name, {**data, **whence(command)}
+            name, data = self._inquiry.hand_in(by)
+        return name, {**data, **about}
 
     def end(self, *, skipped: bool) -> Iterator[Said]:
         """Yield what is said at its end: that it was left, and the stop rules that it meets.

@@ -12,11 +12,22 @@ from labcrane.participants.personal_data import personal
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.session.commands import (
+    Answer,
     Command,
+    Completion,
+    Consent,
+    Control,
+    Denial,
+    Malformed,
     Message,
     Order,
+    Remark,
+    Request,
+    SettingChange,
+    Submission,
     beyond_limits,
     by_whom,
+    read_request,
     whence,
 )
 from labcrane.session.live_settings import FeedbackSettings
@@ -29,11 +40,8 @@ from labcrane.session.trial import TrialRun
 Ticks = Generator[None, Frame, None]
 
 
-NOT_ASKED = {
-    Order.ANSWER: "no questionnaire is asked",
-    Order.SUBMIT: "no questionnaire is asked",
-    Order.CONSENT: "consent is given before the session begins",
-}
+STAGES = {"trial", "break", "questionnaire"}
+"""What can be skipped."""
 
 
 class Sequencer:
@@ -98,16 +106,8 @@ class Sequencer:
         for command in commands:
             if not isinstance(command, Command):
                 self._held.report(command)
-            elif command.order is Order.DENIED:
-                self._note("page.denied", why=command.text, by=by_whom(command), **whence(command))
-            elif (
-                (asking := self._asking) is not None
-                and not asking.over  # and not handed in twice in one tick
-                and command.order in {Order.ANSWER, Order.SUBMIT}
-            ):
-                self._say(*asking.handle(command))
             else:
-                self._obey(command)
+                self._take(command, read_request(command))
         self._held.watch(INPUT, lost_input)
         self._held.watch(DISK, disk_trouble)
 
@@ -189,11 +189,11 @@ class Sequencer:
         for owed in block.owed:
             yield from self._ask(owed.questionnaire, owed.answered, owed.after)
         for trial in block.trials:
+            if self._held.ending or (block.until and self._warm_up.over):
+                break  # also at once: it may have been begun for what was still to be asked
             yield from self._trial(block, trial)
             for name in block.ask if trial.planned.counted else ():
                 yield from self._ask(name, {}, trial)
-            if self._held.ending or (block.until and self._warm_up.over):
-                break
         self._note("block.end", **about)
         if not self._held.ending and (verdict := self._warm_up.verdict(block)) is not None:
             self._note("practice.end", **about, **verdict)
@@ -257,63 +257,73 @@ class Sequencer:
 
     # Orders
 
-    def _obey(self, command: Command) -> None:
-        # Every door has looked already; the loop must not fall when one has not.
-        beyond = beyond_limits(command)
-        refused = beyond or self._refusal(command)
-        # What names a person must not be in the record, not even as a refused note.
-        text = "" if beyond or personal(command.text) else command.text
-        about: dict[str, Value] = {
-            "refused": refused,
-            "by": by_whom(command),
-            **whence(command),
-        }
-        self._note(f"order.{command.order}", text=text, **about)
-        if refused is not None:
-            return
-        match command.order:
-            case Order.PAUSE:
+    def _take(self, command: Command, request: Request) -> None:
+        asking = self._asking
+        about: dict[str, Value] = {"by": by_whom(command), **whence(command)}
+        match request:
+            case Denial(why):
+                self._note("page.denied", why=why, **about)
+            case Answer() | Submission() if asking is not None and not asking.over:
+                self._say(*asking.handle(request, about))  # not handed in twice in one tick
+            case _:
+                # Every door has looked already; the loop must not fall when one has not.
+                beyond = beyond_limits(command)
+                refused = beyond or self._refusal(request)
+                # What names a person must not be in the record, not even as a refused note.
+                text = "" if beyond or personal(command.text) else command.text
+                self._note(f"order.{command.order}", text=text, refused=refused, **about)
+                if refused is None:
+                    self._obey(request)
+
+    def _obey(self, request: Request) -> None:
+        match request:
+            case Control(Order.PAUSE):
                 self._held.hold(EXAMINER)
-            case Order.START if EXAMINER in self._held or STOP in self._held:
+            case Control(Order.START) if self._paused:
                 self._held.release(EXAMINER)
                 self._held.release(STOP)
-            case Order.START | Order.SKIP | Order.REPEAT:
-                self._wishes.add(command.order)
-            case Order.END:
+            case Control(Order.END):
                 self._held.ending.append("by order")
-            case Order.OVERRIDE:
+            case Control(Order.OVERRIDE):
                 self._running().lift_limits()
-            case Order.COMPLETION:
-                self._running().completion = command.text == "1"
-            case Order.SETTING:
-                self._note("feedback.setting", **self._settings.change(command.text))
-            case Order.NOTE | Order.HINT:
-                pass  # the event is all there is to it
+            case Control(order):
+                self._wishes.add(order)
+            case Completion(completed):
+                self._running().completion = completed
+            case SettingChange():
+                self._note("feedback.setting", **self._settings.change(request))
+            case _:
+                pass  # of a note or hint the event is all there is
 
-    def _refusal(self, command: Command) -> str | None:
-        """Return why an order makes no sense now, or None when it does."""
-        match command.order:
-            case Order.REPEAT | Order.OVERRIDE | Order.COMPLETION if self._stage != "trial":
+    def _refusal(self, request: Request) -> str | None:
+        """Return why a request makes no sense now, or None when it does."""
+        match request:
+            case (
+                Control(Order.REPEAT | Order.OVERRIDE) | Completion() | Malformed(Order.COMPLETION)
+            ) if self._stage != "trial":
                 return "no trial is running"
-            case Order.SKIP if self._stage not in {"trial", "break", "questionnaire"}:
+            case Control(Order.SKIP) if self._stage not in STAGES:
                 return "no trial, break or questionnaire is running"
-            case Order.ANSWER | Order.SUBMIT | Order.CONSENT:
-                return NOT_ASKED[command.order]
-            case Order.START if self._stage != "waiting" and not (
-                EXAMINER in self._held or STOP in self._held
-            ):
+            case Control(Order.START) if self._stage != "waiting" and not self._paused:
                 return "nothing waits to start"
-            case Order.PAUSE if EXAMINER in self._held:
+            case Control(Order.PAUSE) if EXAMINER in self._held:
                 return "the session is paused already"
-            case Order.COMPLETION if command.text not in {"0", "1"}:
-                return f"completion is 1 or 0, not {command.text!r}"
-            case Order.NOTE | Order.HINT if not command.text:
-                return f"a {command.order} needs words"
-            case Order.NOTE | Order.HINT if found := personal(command.text):
-                return f"a {command.order} must not hold {found}; write it without"
-            case Order.SETTING:
-                return self._settings.refusal(command.text)
+            case Answer() | Submission():
+                return "no questionnaire is asked"
+            case Consent():
+                return "consent is given before the session begins"
+            case Remark(order, text) if found := personal(text):
+                return f"a {order} must not hold {found}; write it without"
+            case SettingChange():
+                return self._settings.refusal(request)
+            case Malformed(why=why):
+                return why
         return None
+
+    @property
+    def _paused(self) -> bool:
+        """Whether it waits for the examiner to let it go on."""
+        return EXAMINER in self._held or STOP in self._held
 
     def _running(self) -> TrialRun:
         if self._attempt is None:

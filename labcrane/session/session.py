@@ -38,7 +38,7 @@ from labcrane.session.resume import (
 )
 from labcrane.session.sequencer import Sequencer
 from labcrane.session.visit import Visit
-from labcrane.streams.sync.sync_report import SyncReport
+from labcrane.streams.sync.report.sync_report import SyncReport
 
 RESERVE_S = 60.0
 """Seconds of recording for which the disk must always have room; below it the session pauses."""

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 
 from labcrane.core.records import Event
 from labcrane.session.commands import Order
-from labcrane.web.access import SUPERVISOR
+from labcrane.web.door.access import SUPERVISOR
 from labcrane.web.form import ConsentCard, Form
 from labcrane.web.page import PRIMARY, PageContext
 from labcrane.web.panels import Cameras, Loads

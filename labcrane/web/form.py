@@ -12,7 +12,7 @@ from labcrane.web.page import PageContext
 if TYPE_CHECKING:
     from nicegui import ui
 
-from labcrane.web.access import PARTICIPANT
+from labcrane.web.door.access import PARTICIPANT
 
 MOST_TICKS = 21
 """A scale with more steps is a field to write into."""

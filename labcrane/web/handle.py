@@ -1,18 +1,17 @@
 """The launcher's side of the pages: starts their process, starts it again, passes on."""
 
-import multiprocessing
-import queue
 import socket
 import threading
 from collections.abc import Callable
-from multiprocessing.connection import wait
 from typing import Any
 
 from labcrane.core.records import Event
 from labcrane.errors import DeviceError
-from labcrane.processes.pipe import PipeEnd
+from labcrane.processes.handle import Patience, ProcessHandle
 from labcrane.session.commands import Command
-from labcrane.web.service import PageConfig, Report, Streams, Used, serve
+from labcrane.web.service import PageConfig, Report, Streams, Used
+
+MODULE = "labcrane.web.service"
 
 LOOK_S = 0.2
 MOST_RESTARTS = 5
@@ -26,8 +25,8 @@ LAST_LOOK_S = 0.5
 class PageHandle:
     """Keeps the page process running for as long as the run lasts.
 
-    Its own threads talk to the page, so a page that hangs never makes the launcher wait. Events are
-    kept: a page that is started again is told all of them.
+    A page that hangs never makes the launcher wait. Events are kept: a page that is started again
+    is told all of them.
 
     Parameters
     ----------
@@ -46,17 +45,23 @@ class PageHandle:
         say: Callable[[str], None],
         streams: Callable[[], dict[str, Any]],
     ) -> None:
-        self.restarts = 0
         self._order = order
         self._give = give
         self._say = say
         self._streams = streams
         self._told: list[Event] = []
         self._over = threading.Event()
-        self._news: queue.SimpleQueue[Event | Streams | Report | None] = queue.SimpleQueue()
         self._lock = threading.Lock()
+        patience = Patience(stop_s=END_S, restarts=MOST_RESTARTS)
+        self._process = ProcessHandle(MODULE, "pages", patience, self._take)
+        self._process.start(order)
         self._watcher = threading.Thread(target=self._watch, name="pages")
         self._watcher.start()
+
+    @property
+    def restarts(self) -> int:
+        """How often the pages were started again."""
+        return self._process.restarts
 
     def links(self) -> dict[str, str]:
         """Return the one-time link to each page."""
@@ -71,68 +76,38 @@ class PageHandle:
         """Tell the pages of an event, without waiting for them."""
         with self._lock:
             self._told.append(event)
-            self._news.put(event)
+            self._process.tell(event)
 
     def close(self, report: list[str]) -> None:
         """Show the end, and end the process."""
-        self._news.put(Report(report))
+        self._process.tell(Report(report))
         self._over.wait(LAST_LOOK_S)
         self._over.set()
-        self._news.put(None)
         self._watcher.join()
+        self._process.stop()
 
     def _watch(self) -> None:
-        while not self._over.is_set():
-            context = multiprocessing.get_context("spawn")
-            ours, theirs = context.Pipe()
-            process = context.Process(target=serve, args=(self._order, theirs), name="pages")
-            process.start()
-            theirs.close()
-            sender = threading.Thread(target=self._send, args=(ours,), daemon=True)
-            with self._lock:
-                self._news.put(None)  # for the sender of a process that died
-                self._news = queue.SimpleQueue()
-                for event in self._told:
-                    self._news.put(event)
-            sender.start()
-            self._receive(ours, process.sentinel)
-            ours.close()  # which the process takes for the end
-            process.join(END_S)  # a killed one leaves semaphores, and Python complains of them
-            process.kill()
-            process.join()
-            if self._over.is_set():
-                return
-            if self.restarts == MOST_RESTARTS:
+        while not self._over.wait(LOOK_S):
+            if self._process.exit_code is not None and not self._restart():
                 self._say("the page keeps dying; the run goes on without it")
                 return
-            self.restarts += 1
-            self._say("the page died and is started again")
+            if not self._process.waiting:  # the newest status, when all before it has gone
+                self._process.tell(Streams(self._streams()))
 
-    def _receive(self, pipe: PipeEnd, sentinel: int) -> None:
-        while not self._over.is_set():
-            ready = wait([pipe, sentinel], LOOK_S)
-            self._news.put(Streams(self._streams()))
-            try:
-                while pipe.poll():
-                    self._heed(pipe.recv())
-            except (EOFError, OSError):
-                return
-            if sentinel in ready:
-                return
+    def _restart(self) -> bool:
+        with self._lock:
+            if not self._process.restart(self._order):
+                return False
+            for event in self._told:
+                self._process.tell(event)
+        self._say("the page died and is started again")
+        return True
 
-    def _heed(self, message: Command | Used) -> None:
+    def _take(self, message: Command | Used) -> None:
         if isinstance(message, Used):
             self._order.keys.tokens.pop(message.page, None)
         else:
             self._give(message)
-
-    def _send(self, pipe: PipeEnd) -> None:
-        news = self._news
-        while (message := news.get()) is not None:
-            try:
-                pipe.send(message)
-            except OSError:
-                return
 
 
 def free_port(host: str, wanted: int) -> int:

@@ -7,8 +7,8 @@ from labcrane.design.plan import SessionPlan
 from labcrane.limits import LIMITS
 from labcrane.protocol.study import Study
 from labcrane.session.commands import Command, Order, beyond_limits
-from labcrane.web.access import PARTICIPANT, RIGHTS
-from labcrane.web.denials import Bucket
+from labcrane.web.door.access import PARTICIPANT, RIGHTS
+from labcrane.web.door.denials import Bucket
 from labcrane.web.live import Live
 from labcrane.web.pictures import Pictures
 from labcrane.web.state import SessionView

@@ -1,6 +1,6 @@
 """The participant's page: consent, the questionnaire that is asked, and nothing else."""
 
-from labcrane.web.access import PARTICIPANT
+from labcrane.web.door.access import PARTICIPANT
 from labcrane.web.form import ConsentCard, Form
 from labcrane.web.page import PRIMARY, PageContext
 

@@ -1,8 +1,10 @@
-"""The page process: a web server, and one pipe to the launcher."""
+"""The page process: a web server, and messages from and to the launcher."""
 
+import importlib
 import mimetypes
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
@@ -15,12 +17,12 @@ from labcrane.approval.lock import read_lock
 from labcrane.core.records import Event
 from labcrane.design.plan import plan_session
 from labcrane.limits import LIMITS
-from labcrane.processes.pipe import PipeEnd
+from labcrane.processes.parent import Parent
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
-from labcrane.web.access import SCOPE, SUPERVISOR, Gate, Keys
-from labcrane.web.denials import Denials
+from labcrane.web.door.access import SCOPE, SUPERVISOR, Gate, Keys
+from labcrane.web.door.denials import Denials
 from labcrane.web.live import Live
 from labcrane.web.page import PageContext
 from labcrane.web.pictures import Pictures
@@ -66,6 +68,7 @@ class PageConfig:
     certificate: Path | None = None
     key: Path | None = None
     keys: Keys = field(default_factory=Keys)
+    recorded: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,8 +92,18 @@ class Report:
     lines: list[str]
 
 
-def serve(order: PageConfig, pipe: PipeEnd) -> None:
-    """Serve both pages until the launcher closes the pipe; the process's main function."""
+def main() -> int:
+    """Serve the pages of one run; return the process's exit status."""
+    parent = Parent()
+    if (order := parent.order()) is None:
+        return 0
+    serve(order, parent)
+    parent.close()
+    return 0
+
+
+def serve(order: PageConfig, parent: Parent) -> None:
+    """Serve both pages until the launcher says that it is over, or has died."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the launcher says when it is over
     if hasattr(os, "nice"):
         os.nice(NICENESS)
@@ -98,27 +111,19 @@ def serve(order: PageConfig, pipe: PipeEnd) -> None:
     from fastapi import FastAPI  # noqa: PLC0415
     from nicegui import ui  # noqa: PLC0415 - loads for a second
 
-    from labcrane.web.guard import BoundedProtocol, Guard  # noqa: PLC0415
+    from labcrane.web.door.guard import BoundedProtocol, Guard  # noqa: PLC0415
 
-    study = load(order.protocol, discover(study=order.protocol))
+    study = load(order.protocol, discover(study=order.protocol), recorded=order.recorded)
     plan = plan_session(study, order.participant, order.session)
-    lock = threading.Lock()
-
-    def send(message: Command | Used) -> None:
-        with lock:
-            try:
-                pipe.send(message)
-            except OSError:
-                return  # the launcher is gone, and this process is about to end
-
-    denials = Denials(lambda why: send(Command(Order.DENIED, why, "page")))
+    denials = Denials(lambda why: parent.tell(Command(Order.DENIED, why, "page")))
     live, pictures = Live(order.source), Pictures(order.source, order.cameras)
-    desk = PageContext(study, plan, order.folder_name, SessionView(), live, pictures, send, denials)
+    view = SessionView()
+    desk = PageContext(study, plan, order.folder_name, view, live, pictures, parent.tell, denials)
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     _routes(app, desk)
     ui.run_with(app, title="labcrane", show_welcome_message=False)
     secure = order.certificate is not None
-    gate = Gate(app, order.keys, lambda page: send(Used(page)), denials, secure=secure)
+    gate = Gate(app, order.keys, lambda page: parent.tell(Used(page)), denials, secure=secure)
     config = uvicorn.Config(
         Guard(gate, order.host, order.port, denials, secure=secure),
         host=order.host,
@@ -135,7 +140,7 @@ def serve(order: PageConfig, pipe: PipeEnd) -> None:
     server = uvicorn.Server(config)
     threading.Thread(target=_count, args=(denials,), daemon=True).start()
     end = partial(setattr, server, "should_exit", True)  # noqa: FBT003 - the attribute's value
-    threading.Thread(target=_listen, args=(pipe, desk.board, end), daemon=True).start()
+    threading.Thread(target=_listen, args=(parent, view, end), daemon=True).start()
     server.run()
     pictures.close()
 
@@ -147,19 +152,15 @@ def _count(denials: Denials) -> None:
         denials.flush()
 
 
-def _listen(pipe: PipeEnd, board: SessionView, end: Callable[[], None]) -> None:
-    while True:
-        try:
-            message = pipe.recv()
-        except (EOFError, OSError):
-            end()
-            return
+def _listen(parent: Parent, view: SessionView, end: Callable[[], None]) -> None:
+    for message in parent.incoming():
         if isinstance(message, Event):
-            board.take(message)
+            view.take(message)
         elif isinstance(message, Streams):
-            board.streams = message.status
+            view.streams = message.status
         elif isinstance(message, Report):
-            board.sync_report = message.lines
+            view.sync_report = message.lines
+    end()
 
 
 def _routes(app: Any, desk: PageContext) -> None:
@@ -197,3 +198,8 @@ def _routes(app: Any, desk: PageContext) -> None:
         if why := desk.give(page, Order(word), text, request.client.host if request.client else ""):
             return Response(why, FORBIDDEN)
         return Response(status_code=202)
+
+
+if __name__ == "__main__":
+    # What it sends is unpickled by the name of this module, which is not __main__.
+    sys.exit(importlib.import_module("labcrane.web.service").main())

@@ -46,6 +46,8 @@ class Aiming(Task):
         Signal("reaction_time", "s"),  # from the trial's start to the movement's onset
         Signal("command_onset", "s"),  # from the trial's start to the first command
         Signal("movement_time", "s"),  # from onset to offset
+        Signal("circle_to_circle", "s"),  # from the trial's start, the end of the one before
+        Signal("between_circles", "s"),  # from leaving the one circle to entering the other
         Signal("first_entry", "s"),  # from the trial's start to the first time inside
         Signal("entries", "1"),  # times the tip came into the circle
         Signal("error", "m"),  # distance of tip and circle's centre at the offset

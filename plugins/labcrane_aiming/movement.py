@@ -122,8 +122,8 @@ class Movement:
     def measures(self, end: int | None) -> dict[str, Value]:
         """Return the results, ``end`` being the tick of the movement's offset.
 
-        Without an offset (a time-out) the errors are those of the last tick, and the movement
-        time is NaN.
+        Without an offset (a time-out) the errors are those of the last tick, and the times that
+        end with it are NaN.
         """
         onset = self.onset()
         last = len(self.elapsed) - 1 if end is None else end
@@ -136,6 +136,8 @@ class Movement:
             "reaction_time": began,
             "command_onset": self.command_onset,
             "movement_time": math.nan if end is None else self.elapsed[end] - began,
+            "circle_to_circle": math.nan if end is None else self.elapsed[end],
+            "between_circles": self.first_entry - self._left(),
             "first_entry": self.first_entry,
             "entries": self.entries,
             "error": self.distance[last],
@@ -145,6 +147,18 @@ class Movement:
             "path_length": float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()),
             "peak_speed": max(self.speed),
         }
+
+    def _left(self) -> float:
+        """Return when the tip left the circle it came from, in seconds since the trial's start.
+
+        The last time before it came into the other; NaN when it began outside, or never left.
+        """
+        away = np.linalg.norm(np.reshape(self.position, (-1, 3)) - self.start, axis=1)
+        before = np.asarray(self.elapsed) < self.first_entry
+        inside = (away <= self.settings.width / 2) & before
+        if not inside[0]:
+            return math.nan
+        return self.elapsed[int(np.flatnonzero(inside)[-1]) + 1]
 
     def _error(self, tip: FloatArray) -> tuple[float, float]:
         axis: FloatArray = np.subtract(self.target, self.start)

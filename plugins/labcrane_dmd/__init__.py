@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING
 
 from labcrane import Controller, Dynamics, Machine, Offer, hookimpl, offer
 from labcrane.registry import LAB, CommandOffer
-from labcrane_dmd.arm_settings import ArmSettings, ValveSettings
+from labcrane_dmd.arm.settings import ArmSettings, ValveSettings
 
 if TYPE_CHECKING:
-    from labcrane_dmd.model import Model
-    from labcrane_dmd.settings import Between
+    from labcrane_dmd.model.model import Model
+    from labcrane_dmd.model.settings import Between
 
 labcrane_api = 1
 
@@ -18,7 +18,7 @@ ENGINE = f"{LAB} on Python 3.11, where its wheels end"
 
 def load(path: Path | str, between: "Between | None" = None) -> "Model":
     """Read a model: ``load(path)["boom"].speed(signal, angle)`` in rad and rad/s."""
-    from labcrane_dmd.model_file import load as read
+    from labcrane_dmd.model.model_file import load as read
 
     return read(path, between)
 
@@ -37,7 +37,7 @@ def labcrane_commands() -> list[CommandOffer]:
 @hookimpl
 def labcrane_controllers() -> list[Offer[Controller]]:
     def valve(settings: ValveSettings, machine: Machine) -> Controller:
-        from labcrane_dmd.valve import Valve
+        from labcrane_dmd.arm.valve import Valve
 
         return Valve(settings, machine)
 
@@ -47,7 +47,7 @@ def labcrane_controllers() -> list[Offer[Controller]]:
 @hookimpl
 def labcrane_dynamics() -> list[Offer[Dynamics]]:
     def arm(settings: ArmSettings, machine: Machine) -> Dynamics:
-        from labcrane_dmd.arm import DmdArm
+        from labcrane_dmd.arm.arm import DmdArm
 
         return DmdArm(settings, machine)
 

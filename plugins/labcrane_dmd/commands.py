@@ -10,7 +10,7 @@ from rich.table import Table
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from labcrane_dmd.validation import Level
+    from labcrane_dmd.fit.validation import Level
 
 RecordingsPath = Annotated[
     Path, typer.Argument(metavar="RECORDINGS", help="a CSV file of a segment, or a folder of them")
@@ -39,10 +39,10 @@ def fit(
     ] = 9,
 ) -> None:
     """Make a Dynamic Model Description from recordings of joints."""
-    from labcrane_dmd.fitting import fit_model
-    from labcrane_dmd.model_file import save
-    from labcrane_dmd.recordings import read_recordings
-    from labcrane_dmd.settings import FitSettings
+    from labcrane_dmd.fit.fitting import fit_model
+    from labcrane_dmd.fit.recordings import read_recordings
+    from labcrane_dmd.model.model_file import save
+    from labcrane_dmd.model.settings import FitSettings
 
     settings = FitSettings(between=between, max_degree=max_degree)
     model = fit_model(read_recordings(recordings), settings)
@@ -76,12 +76,12 @@ def validate(
 
     Tables and figures for the other rule between layers are saved beside those of the model's own.
     """
-    from labcrane_dmd.figures import draw_validation
-    from labcrane_dmd.model_file import load
-    from labcrane_dmd.output import written
-    from labcrane_dmd.recordings import read_recordings
-    from labcrane_dmd.validation import summary, write_table
-    from labcrane_dmd.validation import validate as compare
+    from labcrane_dmd.fit.figures import draw_validation
+    from labcrane_dmd.fit.recordings import read_recordings
+    from labcrane_dmd.fit.validation import summary, write_table
+    from labcrane_dmd.fit.validation import validate as compare
+    from labcrane_dmd.model.model_file import load
+    from labcrane_dmd.model.output import written
 
     loaded = load(model, between)
     folder = to or model.with_suffix("").with_name(f"{model.stem}-validation")
@@ -100,7 +100,7 @@ def validate(
 
 
 def _print(levels: "Sequence[Level]", rule: str) -> None:
-    from labcrane_dmd.validation import summary
+    from labcrane_dmd.fit.validation import summary
 
     numbers = ("mean_speed", "mse", "rmse", "mae", "max_abs_error", "residual_variance")
     table = _table("segment", "signal", *numbers, "mean_error", "%", title=f"{rule}, deg/s")
@@ -128,8 +128,8 @@ def plot(
     ] = None,
 ) -> None:
     """Draw a model's layers."""
-    from labcrane_dmd.figures import draw_model
-    from labcrane_dmd.model_file import load
+    from labcrane_dmd.fit.figures import draw_model
+    from labcrane_dmd.model.model_file import load
 
     path = to or model.with_suffix(".png")
     draw_model(load(model), path)

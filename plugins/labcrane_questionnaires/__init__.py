@@ -6,6 +6,7 @@ lab's, and only the scoring is here.
 
 from labcrane import Machine, Offer, Questionnaire, hookimpl, offer
 from labcrane_questionnaires.settings import (
+    DemographicsSettings,
     FreeSettings,
     LabTextSettings,
     LanguageSettings,
@@ -36,7 +37,7 @@ def labcrane_questionnaires() -> list[Offer[Questionnaire]]:
 
         return offer(name, RatingSettings, build)
 
-    def demographics(settings: RatingSettings, machine: Machine) -> Questionnaire:
+    def demographics(settings: DemographicsSettings, machine: Machine) -> Questionnaire:
         from labcrane_questionnaires.demographics import Demographics
 
         return Demographics(settings)
@@ -51,7 +52,7 @@ def labcrane_questionnaires() -> list[Offer[Questionnaire]]:
         offer("sus", LanguageSettings, sus),
         rating("subjective_accuracy"),
         rating("situational_awareness"),
-        offer("demographics", RatingSettings, demographics),
+        offer("demographics", DemographicsSettings, demographics),
         offer("free", FreeSettings, free),
         *(_from_the_lab(name) for name in ("ssq", "sart", "borg_cr10", "borg_rpe", "kss")),
     ]

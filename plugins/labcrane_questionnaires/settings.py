@@ -1,7 +1,7 @@
 """Settings of the questionnaires."""
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
@@ -30,6 +30,30 @@ class RatingSettings(Settings):
 
     language: Literal["en", "de"] = "en"
     """The language in which it asks."""
+
+
+Asked = Literal["age", "gender", "sex", "handedness", "experience", "gaming"]
+"""What demographics can ask."""
+
+
+class DemographicsSettings(RatingSettings):
+    """Of what a study reports of its participants."""
+
+    ask: Annotated[tuple[Asked, ...], Field(min_length=1)] = (
+        "age",
+        "sex",
+        "handedness",
+        "experience",
+        "gaming",
+    )
+    """What is asked, in this order; ask no more than the study reports."""
+
+    @field_validator("ask")
+    @classmethod
+    def _each_is_one(cls, ask: tuple[Asked, ...]) -> tuple[Asked, ...]:
+        if twice := [each for each in ask if ask.count(each) > 1]:
+            raise ValueError(f"{twice[0]!r} is there twice; write each once")
+        return ask
 
 
 class LabText(Settings):

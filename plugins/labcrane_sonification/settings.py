@@ -55,6 +55,9 @@ class SonificationSettings(Settings):
     device: int | None = None
     """Number of the output device, as PortAudio counts; the system's default by default."""
 
+    def reveals(self) -> str:
+        return "how far the tip is from the target"
+
     def provides(self, machine: Machine) -> Names:
         return {"object": ()}
 

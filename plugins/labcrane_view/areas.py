@@ -8,7 +8,7 @@ import numpy as np
 from labcrane import FloatArray, Frame, Run, Sphere
 from labcrane.core import Shape
 from labcrane.machines import PlacedObject, read_placed
-from labcrane_view.outline import of_body, of_thing
+from labcrane_view.scene.outline import of_body, of_thing
 
 TIP = 0.12
 """Radius in metres of the tip's area of interest."""

@@ -11,8 +11,8 @@ from panda3d import core
 
 from labcrane import FloatArray, Frame, Machine, ProtocolError
 from labcrane_view.areas import Projection, axes_of
+from labcrane_view.scene.stage import Stage
 from labcrane_view.settings import CameraSettings
-from labcrane_view.stage import Stage
 from labcrane_view.window import SEEN, Window, hidden_picture
 
 NEAR, FAR = 0.15, 170.0

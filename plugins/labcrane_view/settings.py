@@ -82,10 +82,14 @@ Camera = Annotated[
 ]
 
 
+ENTERING = ("target.entered",)
+"""Events that tell whether the tip is where it should be."""
+
+
 class PatchSettings(Settings):
     """A square in a corner for a photodiode: it changes between black and white."""
 
-    on: tuple[EventName, ...] = ("trial.start", "trial.end", "target.entered")
+    on: tuple[EventName, ...] = ("trial.start", "trial.end")
     """Events at each of which it changes."""
 
     corner: Literal["bottom_left", "bottom_right", "top_left", "top_right"] = "bottom_left"
@@ -198,10 +202,18 @@ class ViewSettings(Settings):
         return ("block", "trial", "distance") if self.seen_by == "examiner" else ("block", "trial")
 
     def warnings(self) -> Sequence[str]:
-        if self.seen_by == "operator" and "distance" in self.hud_lines:
-            return (
+        if self.seen_by == "examiner":
+            return ()
+        found = []
+        if "distance" in self.hud_lines:
+            found.append(
                 "hud: distance tells the operator the task's error in every group, also in one "
                 "without feedback; leave it out, make it feedback of a group, or write seen_by: "
-                "examiner if the operator does not see this view",
+                "examiner if the operator does not see this view"
             )
-        return ()
+        if self.patch is not None and (told := [e for e in self.patch.on if e in ENTERING]):
+            found.append(
+                f"patch: {told[0]} tells the operator, in every group, when the target is reached; "
+                "cover the patch with the photodiode, or let it change on other events"
+            )
+        return tuple(found)

@@ -28,9 +28,9 @@ from labcrane_view.camera import Camera, Delay, Part
 from labcrane_view.hud import WORDS, Hud, notice
 from labcrane_view.keys import Keys
 from labcrane_view.overlay import Overlay
+from labcrane_view.scene.stage import HAZE, Stage
 from labcrane_view.settings import ViewSettings
 from labcrane_view.shots import Shots
-from labcrane_view.stage import HAZE, Stage
 from labcrane_view.window import TURNED, Window, font, hidden_picture, open_window
 
 BOX = ("left", "top", "right", "bottom")

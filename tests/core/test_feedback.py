@@ -49,6 +49,13 @@ def test_feedback_fades_part_by_part(count: int, shares: tuple[float, ...], expe
     assert "".join(str(int(on)) for on in faded(count, shares)) == expected
 
 
+def test_check_warns_of_a_block_that_gives_every_group_all_feedback_unsaid(tmp_path: Path) -> None:
+    (warning,) = a_study(tmp_path, blocks("pairs: 1", "pairs: 1, feedback: group")).warnings()
+    assert warning.startswith("sessions: step 1 of ")
+    assert "so that every group is given ball, tone; write feedback: group, none, all" in warning
+    assert not list(a_study(tmp_path, blocks("pairs: 1, feedback: all")).warnings())
+
+
 def test_a_block_says_what_is_switched_on(tmp_path: Path) -> None:
     study = a_study(
         tmp_path,

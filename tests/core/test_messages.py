@@ -1,17 +1,19 @@
 """Messages to a session: every one comes out as it went in, none is too large, nobody waits."""
 
-import multiprocessing
 import os
+import pickle
 import queue
-import struct
+import subprocess
+import sys
 import threading
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from labcrane.launcher.launcher import MOST_WAITING, MessageSender
-from labcrane.launcher.session_process import PipeConsole
+from labcrane.launcher import session_handle
+from labcrane.launcher.session_handle import MOST_WAITING, SessionHandle
 from labcrane.session.commands import (
     MOST_BYTES,
     Command,
@@ -56,38 +58,63 @@ def test_a_message_that_is_too_large_is_refused_by_whoever_says_it() -> None:
     assert decode(encode(largest)) == largest
 
 
-def test_a_session_that_takes_nothing_keeps_nobody_waiting() -> None:
-    ours, theirs = multiprocessing.Pipe()
+DEAF = "import time; time.sleep(600)"
+
+
+def test_a_session_that_takes_nothing_keeps_nobody_waiting(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "deaf_session.py").write_text(DEAF)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    monkeypatch.setattr(session_handle, "MODULE", "deaf_session")
     said: queue.SimpleQueue[str] = queue.SimpleQueue()
-    sender = MessageSender(ours, said.put)
+    session = SessionHandle("nobody reads it", said.put)
 
     def talk() -> None:
         for _ in range(2 * MOST_WAITING):  # 60 kB each, more than any pipe takes
-            sender.send(Command(Order.NOTE, "x" * 60_000))
+            session.send(Command(Order.NOTE, "x" * 60_000))
 
     talker = threading.Thread(target=talk, daemon=True)
     talker.start()
     talker.join(60.0)
     assert not talker.is_alive(), "whoever sends never waits for the session"
     assert said.get() == f"the session takes no messages; {MOST_WAITING} wait, and one was dropped"
-    theirs.close()
-    sender.close()
-    ours.close()
+    session.kill()
+    assert session.ended
+    assert session.close() == -9
+
+
+HALF = """
+import os, sys
+from labcrane.launcher.session_process import ParentConsole
+from labcrane.processes.parent import Parent
+
+console = ParentConsole(Parent())
+taken = []
+while not taken:
+    taken += console.commands()
+assert console.commands() == []  # it returns although half a message has come
+os.write(2, b"coughed")
+while len(taken) < 2:
+    taken += console.commands()
+print(taken, file=sys.stderr)
+"""
 
 
 def test_a_launcher_that_dies_in_the_middle_of_a_message_is_gone_and_nobody_waits() -> None:
-    ours, theirs = multiprocessing.Pipe()
-    console = PipeConsole(theirs)
-    ours.send_bytes(encode(Command(Order.NOTE, "coughs")))
-    whole = encode(Command(Order.NOTE, "x" * 30_000))
-    os.write(ours.fileno(), struct.pack("!i", len(whole)) + whole[:100])
-    taken = []
-    while not taken:
-        taken += console.commands()
-    assert taken == [Command(Order.NOTE, "coughs")]
-    assert console.commands() == []  # it returns although half a message has come
-    ours.close()
-    while len(taken) < 2:
-        taken += console.commands()
-    assert taken[1:] == [LauncherGone()]
-    theirs.close()
+    session = subprocess.Popen(
+        [sys.executable, "-c", HALF],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+    )
+    first = Command(Order.NOTE, "coughs")
+    whole = pickle.dumps(encode(Command(Order.NOTE, "x" * 30_000)))
+    session.stdin.write(pickle.dumps(encode(first)) + whole[:100])
+    session.stdin.flush()
+    assert session.stderr.read(len("coughed")) == b"coughed"
+    session.stdin.close()
+    *_, taken = session.stderr.read().decode().rpartition("coughed")
+    session.stderr.close()
+    assert session.wait() == 0
+    assert taken.strip() == repr([first, LauncherGone()])

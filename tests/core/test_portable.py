@@ -47,7 +47,6 @@ TWINS = {
         "os.geteuid", "os.sched_getaffinity", "resource",
     ),  # Linux's priorities; elsewhere nothing is said of them
     "labcrane/files/lock.py": ("fcntl",),  # msvcrt
-    "labcrane/processes/pipe.py": ("multiprocessing.connection.Connection",),  # PipeConnection
     "labcrane/web/service.py": ("os.nice",),  # where there is none the page has the same priority
     "plugins/labcrane_joystick/kernel.py": ("fcntl", "os.O_NONBLOCK"),  # "not read" elsewhere
     "plugins/labcrane_sonification/real_time.py": (

@@ -63,6 +63,7 @@ def lamp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> type[labcrane.Setti
     )
     (metadata / "entry_points.txt").write_text("[labcrane]\ndoctors_lamp = labcrane_doctors_lamp\n")
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))  # of the process that looks
     looks, _ = of_everything(discover())
     (found,) = [look for look in looks if look.name == "lamp"]
     return type(found.settings)

@@ -74,7 +74,7 @@ class Conversation:
             self.said.append(line.strip())
 
     def until(self, words: str, times: int = 1) -> None:
-        wait_for(lambda: sum(words in line for line in self.said) >= times, patience_s=40.0)
+        wait_for(lambda: sum(words in line for line in self.said) >= times)
 
     def order(self, words: str) -> None:
         self.process.stdin.write(words + "\n")
@@ -142,6 +142,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
             recorder.kill()
         said.until("STREAM LOST", times=2)
         said.until(" is back", times=2)
+        wait_for(lambda: all_receive(process))
         said.order("note all is well again")
         said.order("end")
         yield folder / "data" / "P001-PILOT" / "P001-PILOT.h5", said.end()

@@ -7,7 +7,7 @@ import subprocess
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import psutil
@@ -18,6 +18,9 @@ from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from simple_crane import FORM
+
+from labcrane.launcher import session_process
+from labcrane.web import service
 
 STUDY = (
     """\
@@ -66,20 +69,19 @@ class Room:
         return dict(found)
 
     def process(self, word: str) -> psutil.Process | None:
-        """Return the session's or the pages' process, by what it has open."""
+        """Return the session's process, or that of the pages once it serves them."""
+        module = {"session": session_process.__name__, "pages": service.__name__}[word]
         for child in psutil.Process(self.launcher.pid).children():
-            try:
-                if "spawn_main" not in " ".join(child.cmdline()):
-                    continue
-                serves = any(
-                    c.status == "LISTEN" and c.laddr.port == self.port
-                    for c in child.net_connections()
-                )
-            except psutil.NoSuchProcess:  # it is ending this very moment
-                continue
-            if serves == (word == "pages"):
-                return child
+            with suppress(psutil.NoSuchProcess):  # it is ending this very moment
+                if module in child.cmdline() and (word == "session" or self._serves(child)):
+                    return child
         return None
+
+    def _serves(self, child: psutil.Process) -> bool:
+        return any(
+            each.status == "LISTEN" and each.laddr.port == self.port
+            for each in child.net_connections()
+        )
 
     @property
     def port(self) -> int:

@@ -15,7 +15,7 @@ from labcrane.cli.app import main
 
 STEPS = """\
       - questionnaire: [demographics, subjective_accuracy]
-      - block: {task: aiming, pairs: 1}
+      - block: {task: aiming, pairs: 1, repeat: 20}
 """
 
 

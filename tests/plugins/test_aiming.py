@@ -156,6 +156,26 @@ def test_the_signed_error_is_positive_beyond_the_centre(over: float) -> None:
     assert results["error_bound"] == 0.25
 
 
+def test_times_from_circle_to_circle_include_what_onset_and_rest_leave_out() -> None:
+    seconds, distance, radius = 2.0, 2.0, 0.25
+    results = Path().play(minimum_jerk(seconds))[-1].results
+    whole = results["reaction_time"] + results["movement_time"]
+    assert results["circle_to_circle"] == pytest.approx(whole, rel=1e-12)
+
+    def after(fraction: float) -> float:
+        s = np.linspace(0.0, 1.0, 100_001)
+        return seconds * float(s[np.searchsorted(10 * s**3 - 15 * s**4 + 6 * s**5, fraction)])
+
+    between = after(1.0 - radius / distance) - after(radius / distance)
+    assert results["between_circles"] == pytest.approx(between, abs=2.5 / RATE_HZ)
+
+
+def test_who_never_enters_the_circle_has_no_time_between_circles_and_no_whole_one() -> None:
+    results = Path(limit_s=2.0).play(minimum_jerk(2.0, end=0.8))[-1].results
+    assert math.isnan(results["between_circles"])
+    assert math.isnan(results["circle_to_circle"])
+
+
 def test_a_straight_path_is_as_long_as_the_way() -> None:
     results = Path().play(minimum_jerk(2.0))[-1].results
     assert results["path_length"] == pytest.approx(2.0, abs=0.01)

@@ -12,13 +12,13 @@ from dmd_machine import LEVELS, record, true_speed
 import labcrane_dmd
 from labcrane import ProtocolError, RecordingError
 from labcrane.cli.app import main
-from labcrane_dmd.fitting import fit_model, fit_segment
-from labcrane_dmd.interpolation import linear, pchip
-from labcrane_dmd.model import Model
-from labcrane_dmd.model_file import save
-from labcrane_dmd.recordings import read_recordings
-from labcrane_dmd.settings import FitSettings
-from labcrane_dmd.validation import validate
+from labcrane_dmd.fit.fitting import fit_model, fit_segment
+from labcrane_dmd.fit.recordings import read_recordings
+from labcrane_dmd.fit.validation import validate
+from labcrane_dmd.model.interpolation import linear, pchip
+from labcrane_dmd.model.model import Model
+from labcrane_dmd.model.model_file import save
+from labcrane_dmd.model.settings import FitSettings
 
 FOLDER = Path(__file__).parents[2] / "protocols" / "retrieval" / "hydraulic_arm"
 PCHIP = FitSettings(between="pchip")

@@ -21,10 +21,10 @@ from labcrane.testing import (
 )
 from labcrane.testing.commands import CommandContract
 from labcrane_dmd import labcrane_commands
-from labcrane_dmd.arm_settings import OverloadSettings, ValveSettings
-from labcrane_dmd.overload import Overload
-from labcrane_dmd.recordings import read_recordings
-from labcrane_dmd.valve import Valve
+from labcrane_dmd.arm.overload import Overload
+from labcrane_dmd.arm.settings import OverloadSettings, ValveSettings
+from labcrane_dmd.arm.valve import Valve
+from labcrane_dmd.fit.recordings import read_recordings
 
 pytestmark = needs_bullet
 

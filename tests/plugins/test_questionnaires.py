@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 
 import pytest
+from pydantic import ValidationError
 from rehearsal import SHORT, ScriptedConsole, a_study
 
 from labcrane import ProtocolError, Questionnaire
@@ -18,6 +19,7 @@ from labcrane_questionnaires.licensed_scales import SLOTS
 from labcrane_questionnaires.rating import Rating
 from labcrane_questionnaires.sart import Sart
 from labcrane_questionnaires.settings import (
+    DemographicsSettings,
     FreeSettings,
     LabText,
     RatingSettings,
@@ -40,7 +42,7 @@ BUILT = {
     "sart": Sart(a_lab_text(10)),
     "subjective_accuracy": Rating("subjective_accuracy", RatingSettings()),
     "situational_awareness": Rating("situational_awareness", RatingSettings(language="de")),
-    "demographics": Demographics(RatingSettings()),
+    "demographics": Demographics(DemographicsSettings()),
     "free": Free(
         FreeSettings.model_validate(
             {
@@ -64,6 +66,16 @@ class TestBundled(QuestionnaireContract):
 
 
 RATINGS = dict(zip(SCALES, (70.0, 30.0, 55.0, 20.0, 65.0, 40.0), strict=True))
+
+
+def test_demographics_ask_what_the_study_says_in_its_order() -> None:
+    asked = Demographics(DemographicsSettings(ask=("gender", "age"), language="de")).items()
+    assert [(item.name, item.labels[:2]) for item in asked] == [
+        ("gender", ("weiblich", "männlich")),
+        ("age", ()),
+    ]
+    with pytest.raises(ValidationError, match="'age' is there twice; write each once"):
+        DemographicsSettings(ask=("age", "age"))
 
 
 def test_raw_tlx_is_the_mean_of_the_six() -> None:

@@ -15,7 +15,7 @@ from windows import MACHINE, SIZE, a_scene, make_frame, projected
 from labcrane import Frame, Signal
 from labcrane.core import Layout, SessionState
 from labcrane.machines import Body, Geom, MeshFile, PlacedObject, ShapeKind, write_placed
-from labcrane_view.outline import outermost
+from labcrane_view.scene.outline import outermost
 from labcrane_view.settings import CAMERAS, ViewSettings
 from labcrane_view.view import View
 

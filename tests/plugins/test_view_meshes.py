@@ -20,7 +20,7 @@ from labcrane.machines import MeshFile, link_boxes, link_frames, read_placed, ur
 from labcrane.machines.scene import load_scene, place_objects
 from labcrane.recording.run_codec import read_run, write_run
 from labcrane.testing import TARGETS, crane_state, make_run
-from labcrane_view.mesh_reader import read_mesh
+from labcrane_view.scene.mesh_reader import read_mesh
 from labcrane_view.settings import CameraSettings, ViewSettings
 from labcrane_view.view import View
 

@@ -32,7 +32,7 @@ def moving(display: str, renderer: str, name: str) -> Iterator[dict[str, int]]:
         env={**os.environ, "DISPLAY": display, "PYTHONPATH": tests},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        encoding="utf-8",
+        text=True,
     )
     assert process.stdin is not None
     assert process.stdout is not None
@@ -50,7 +50,7 @@ def windows(display: str) -> dict[str, tuple[int, int]]:
         ["xwininfo", "-root", "-tree"],
         env={**os.environ, "DISPLAY": display},
         capture_output=True,
-        encoding="utf-8",
+        text=True,
         check=True,
     )
     found = {}
@@ -164,6 +164,16 @@ def test_check_warns_of_an_error_that_every_group_is_shown(
     assert main(["check", str(path)]) == 0
     said = capsys.readouterr()
     assert "warning: views.cab: hud: distance tells the operator the task's error" in said.err
-    path.write_text(SHORT + "views: {cab: {use: view}}\n", encoding="utf-8")
+    always = "views: {cab: {use: view, patch: {on: [target.entered]}}}\n"
+    path.write_text(SHORT + always, encoding="utf-8")
+    assert main(["check", str(path)]) == 0
+    assert "patch: target.entered tells the operator, in every group" in capsys.readouterr().err
+    path.write_text(SHORT + "views: {hum: {use: sonification}}\n", encoding="utf-8")
+    assert main(["check", str(path)]) == 0
+    assert (
+        "warning: views.hum: sonification tells how far the tip is from the target, in every group "
+        "and block; put it under feedback, where the design says who is given it"
+    ) in capsys.readouterr().err
+    path.write_text(SHORT + "views: {cab: {use: view, patch: {}}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0
     assert capsys.readouterr().err == ""

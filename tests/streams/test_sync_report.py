@@ -12,11 +12,11 @@ from labcrane.core.findings import Verdict
 from labcrane.errors import RecordingError
 from labcrane.recording.foreign_streams import Note, RecordedStream
 from labcrane.recording.xdf.header import Channel, StreamHeader
-from labcrane.streams.sync.limits import Limit, Limits
 from labcrane.streams.sync.quality import Quality
+from labcrane.streams.sync.report.limits import Limit, Limits
+from labcrane.streams.sync.report.stream_report import judge_stream
+from labcrane.streams.sync.report.sync_report import COLUMNS, SyncReport, judge_loop, never_came
 from labcrane.streams.sync.resync import columns_of, quality_of, resync, treatment_of
-from labcrane.streams.sync.stream_report import judge_stream
-from labcrane.streams.sync.sync_report import COLUMNS, SyncReport, judge_loop, never_came
 
 EEG = StreamHeader("EEG", "EEG", (Channel("Cz", "microvolts"),), rate_hz=500.0, source_id="amp-1")
 

@@ -1,20 +1,22 @@
 """Devices and clocks that are unkind, drawn at random, with known truth."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from labcrane.streams.sync.certificate import Fault
 from labcrane.streams.sync.correction import Treatment
 from labcrane.streams.sync.raw import RawStream
+from labcrane.streams.sync.report.certificate import Fault
 
 
 @dataclass(frozen=True)
 class Drawn:
     """A stream as received, when its samples were really taken, and what is wrong with it.
 
-    ``known_error_s`` says beyond which error the truth cannot be had by anybody.
+    ``hidden_s`` is by how much the two ways of all probes differ for good, halved: with the same
+    probes nobody can know it. ``apart_ms`` limits the error beside it.
+    ``perhaps`` is what may be named or not: a step of a millisecond, say, is a slew as well.
     """
 
     raw: RawStream
@@ -24,6 +26,9 @@ class Drawn:
     end: float | None = None
     clean: bool = True
     limit_ms: float = 0.1
+    perhaps: frozenset[Fault] = frozenset()
+    hidden_s: float = 0.0
+    apart_ms: float = np.inf
 
 
 @dataclass
@@ -57,14 +62,18 @@ class Clock:
         self.changes.append(lambda t: size * np.sin(2 * np.pi * t / period + phase))
 
 
-def probes(clock, start, stop, random, *, way=None, congestion=None, reply=0.0):
+WAY, SHARE = (3e-5, 1.5e-4), (0.3, 0.7)
+
+
+def probes(clock, start, stop, random, *, way=None, share=None, congestion=None, reply=0.0):
     """Probe as liblsl does: of eight exchanges, the one with the shortest round trip.
 
-    ``congestion`` gives the delays there and back that are added at times.
+    ``share`` of the shortest round trip lies on the way there; ``congestion`` gives the delays
+    there and back that are added at times.
     """
     every = random.uniform(1.0, 2.0)
-    way = random.uniform(3e-5, 1.5e-4) if way is None else way
-    share = random.uniform(0.3, 0.7)  # of the shortest round trip that lies on the way there
+    way = random.uniform(*WAY) if way is None else way
+    share = random.uniform(*SHARE) if share is None else share
     rows = []
     for begin in np.arange(start, stop, every):
         sent = begin + 0.064 * np.arange(8)
@@ -100,16 +109,18 @@ def received(random, clock, times, rate, *, stamped=None, sent=None, index=None,
     sent = np.maximum(stamped, times) if sent is None else sent
     keys = ("way", "congestion", "reply")
     how = {key: more.pop(key) for key in keys if key in more}
+    way = how.setdefault("way", random.uniform(*WAY))
+    share = how.setdefault("share", random.uniform(*SHARE))
     shown = probes(clock, sent[0] + 0.4, sent[-1] + 0.5, random, **how)
     treatment = more.pop("treatment", Treatment(rate_hz=rate))
     raw = RawStream.of(clock(stamped), shown, arrivals(sent), index=index)
-    return Drawn(raw, times, treatment, **more)
+    return Drawn(raw, times, treatment, hidden_s=way * (1.0 - 2.0 * share), **more)
 
 
 def steady(random):
     clock = Clock(random, 0.0)
     clock.ppm = random.uniform(-400, 400)
-    return received(random, clock, regular(random, 250.0), 250.0, limit_ms=0.1)
+    return received(random, clock, regular(random, 250.0), 250.0, apart_ms=0.02)
 
 
 def lost(random, rate, share, most):
@@ -289,7 +300,7 @@ def sleeping(random):
     local = drawn.raw.probes[:, 3]
     awake = (local < at) | (local > at + length + 1.5)
     raw = RawStream.of(drawn.raw.stamps, drawn.raw.probes[awake], drawn.raw.arrivals)
-    return Drawn(raw, times, drawn.treatment, drawn.faults)
+    return replace(drawn, raw=raw)
 
 
 def jumping(random):
@@ -338,7 +349,7 @@ def unprobed_minutes(random):
     local = drawn.raw.probes[:, 3]
     kept = (local < begin) | (local > begin + random.uniform(120, 300))
     raw = RawStream.of(drawn.raw.stamps, drawn.raw.probes[kept], drawn.raw.arrivals)
-    return Drawn(raw, drawn.truth, drawn.treatment, frozenset({Fault.PROBES_MISSING}), clean=False)
+    return replace(drawn, raw=raw, faults=frozenset({Fault.PROBES_MISSING}), clean=False)
 
 
 def wireless(random):
@@ -354,10 +365,7 @@ def coarse(random):
     times = regular(random, 128.0)
     drawn = received(random, clock, times, 128.0, faults=frozenset({Fault.NOISY}))
     stamps = np.round(drawn.raw.stamps, 3)
-    return Drawn(
-        RawStream.of(stamps, drawn.raw.probes, drawn.raw.arrivals),
-        times, drawn.treatment, drawn.faults,
-    )  # fmt: skip
+    return replace(drawn, raw=RawStream.of(stamps, drawn.raw.probes, drawn.raw.arrivals))
 
 
 def noisy(random):

@@ -102,6 +102,9 @@ def resume(
         policy=policy,
         feedback=shown,
     )
+    if visit.study.outdated:
+        out.print("gone on with as it was begun; a new session would be refused:", markup=False)
+        out.print(visit.study.outdated, markup=False)
     _launch(visit, page=not simulate if page is None else page)
 
 

@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from labcrane.errors import StreamError
+from labcrane.processes.messages import Inbox
 from labcrane.processes.parent import Parent
 from labcrane.streams.outlets import check_clock
 from labcrane.streams.recorder.recorder import Recorder
@@ -165,23 +166,17 @@ class _Terminal:
 
     def __init__(self) -> None:
         self.gone = threading.Event()
-        self._news = threading.Event()
-        self._incoming: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._inbox: Inbox[str] = Inbox()
         self._outgoing: queue.Queue[bytes] = queue.Queue(1)
         self._speaker = threading.Thread(target=self._speak, daemon=True)
         self._speaker.start()
         threading.Thread(target=self._hear, daemon=True).start()
 
     def messages(self) -> list[str]:
-        self._news.clear()
-        found = []
-        with suppress(queue.Empty):
-            while True:
-                found.append(self._incoming.get_nowait())
-        return found
+        return self._inbox.messages()
 
     def wait(self, seconds: float) -> bool:
-        return self._news.wait(seconds)
+        return self._inbox.wait(seconds)
 
     def tell(self, message: Mapping[str, Any]) -> None:
         with suppress(queue.Full):
@@ -197,10 +192,9 @@ class _Terminal:
         while text := os.read(0, 4096):
             *lines, rest = (rest + text).split(b"\n")
             for line in lines:
-                self._incoming.put(line.decode(errors="replace").strip())
-            self._news.set()
+                self._inbox.put(line.decode(errors="replace").strip())
         self.gone.set()
-        self._news.set()
+        self._inbox.wake()
 
     def _speak(self) -> None:
         with suppress(OSError):

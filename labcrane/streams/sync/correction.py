@@ -36,7 +36,7 @@ from labcrane.streams.sync.quality import (
     worst_second,
 )
 from labcrane.streams.sync.raw import RawStream
-from labcrane.streams.sync.sampling import Sampling, examine
+from labcrane.streams.sync.sampling import RATE_CHANGE, Sampling, examine
 from labcrane.types import FloatArray
 
 
@@ -73,6 +73,9 @@ class Treatment:
 
 
 PAUSE_S = 0.5
+
+ENOUGH = 2000
+"""So many samples tell a rate well enough to see it change from one clock to the next."""
 
 _Sampled = tuple[Segment, Sampling]
 
@@ -178,6 +181,21 @@ def _evened(
     return time, error
 
 
+def _rates(each: list[Sampling]) -> tuple[float, float]:
+    """Return the rates at first and at last, if it changed within a clock or from one to the next.
+
+    How often a clock changed is nothing that the sampler knows of.
+    """
+    known = [one for one in each if len(one.index) >= ENOUGH and not one.late_stamps]
+    ends = [one.rates_hz or (one.rate_hz, one.rate_hz) for one in known]
+    if not any(one.rates_hz for one in each) and not any(
+        abs(after[0] / before[1] - 1.0) > RATE_CHANGE for before, after in itertools.pairwise(ends)
+    ):
+        return np.nan, np.nan
+    ends = ends or [one.rates_hz for one in each if one.rates_hz]
+    return float(ends[0][0]), float(ends[-1][1])
+
+
 def _trips(raw: RawStream) -> dict[str, Any]:
     trips = raw.probes[:, RTT]
     p50, p95 = np.quantile(trips, (0.5, 0.95)) if len(trips) else (np.nan, np.nan)
@@ -247,7 +265,7 @@ def _flow(placed: Placement, sampled: list[_Sampled]) -> dict[str, Any]:
         return {"rate_hz": (len(known) - 1) / span if span > 0.0 else np.nan}
     each = [sampling for _, sampling in sampled]
     _, most = max(sampled, key=lambda pair: pair[0].stop - pair[0].start)
-    first, last = most.rates_hz or (np.nan, np.nan)
+    first, last = _rates(each)
     pauses = [
         float(placed.time[after.start] - placed.time[before.stop - 1])
         for before, after in itertools.pairwise(placed.segments)

@@ -12,12 +12,15 @@ from enum import StrEnum
 
 import numpy as np
 
-from labcrane.streams.sync.offset import SURE
 from labcrane.streams.sync.smoother import smooth
 from labcrane.types import FloatArray
 
 CRYSTAL_WALK = 1e-6
 """Variance by which a sampler's rate usually walks in a second, in ppm squared."""
+
+SURE_OF_ALL = 3.0
+"""A rate that is wrong is wrong for all samples at once. So many standard deviations about a line
+hold all of it with 99 % (Working and Hotelling 1929: the root of twice F with 2 degrees)."""
 
 FEWEST = 50
 MOST_BLOCKS = 100
@@ -84,7 +87,7 @@ def follow_sample_clock(times: FloatArray, index: FloatArray) -> tuple[FloatArra
         usual_walk=CRYSTAL_WALK,
     )
     offset, deviation = followed.at(due)
-    return due + offset, SURE * deviation
+    return due + offset, SURE_OF_ALL * deviation
 
 
 def runs(times: FloatArray, index: FloatArray) -> list[tuple[int, int]]:

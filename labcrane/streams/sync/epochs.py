@@ -16,6 +16,11 @@ from labcrane.types import FloatArray
 JUMP_S = 0.002
 """Offsets that differ by more than this, and more than probes can err, are two clocks."""
 
+SMALL_S = 0.0003
+WALK = 1e-4
+ALONE = 0.3
+"""Or by these, if the offset goes on before and after as if nothing had been."""
+
 FASTEST_DRIFT = 500e-6
 """No crystal in a computer drifts faster, in seconds per second."""
 
@@ -44,6 +49,8 @@ class Epoch:
         By how much the offset differs from the clock before; 0 where either was not probed.
     told
         Whether liblsl told that the source is another process.
+    unheard_s
+        For how long its clock was not probed before; 0 where it never was.
     """
 
     start: int
@@ -52,6 +59,7 @@ class Epoch:
     unsure: int = 0
     step_s: float = 0.0
     told: bool = False
+    unheard_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,13 +87,15 @@ def epochs(raw: RawStream, *, regular: bool) -> list[Epoch]:
     for this, following in itertools.pairwise(bounds):
         mine = probes[this.probe : following.probe]
         if following.sample > this.sample:
-            step = _change_of_offset(probes, this.probe) if len(mine) else 0.0
-            found.append(Epoch(this.sample, following.sample, mine, this.unsure, step, this.told))
+            step = _change(probes, this.probe, OFFSET) if len(mine) else 0.0
+            unheard = _change(probes, this.probe, LOCAL) if len(mine) else 0.0
+            where = this.sample, following.sample
+            found.append(Epoch(*where, mine, this.unsure, step, this.told, unheard))
     return found
 
 
-def _change_of_offset(probes: FloatArray, k: int) -> float:
-    return float(probes[k, OFFSET] - probes[k - 1, OFFSET]) if k else 0.0
+def _change(probes: FloatArray, k: int, what: int) -> float:
+    return float(probes[k, what] - probes[k - 1, what]) if k else 0.0
 
 
 def in_order(probes: FloatArray) -> FloatArray:
@@ -110,7 +120,21 @@ def _jumps(probes: FloatArray) -> list[int]:
     change = np.diff(probes[:, OFFSET])
     far = np.abs(change) > JUMP_S + drift + doubt
     far &= ~_slewed(change, np.abs(np.diff(measured)), doubt)
+    far |= _alone(change, np.abs(np.diff(measured)), probes[:, RTT])
     return [int(k) + 1 for k in np.flatnonzero(far)]
+
+
+def _alone(change: FloatArray, step: FloatArray, trips: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return which changes stand alone: small steps, which no clock drifts or is slewed by."""
+    if len(change) < 3:  # noqa: PLR2004
+        return np.zeros(len(change), dtype=np.bool_)
+    usual = float(np.median(change / np.maximum(step, 1e-3)))
+    beyond = np.abs(change - usual * step)
+    excess = trips - trips.min()
+    near = np.pad(beyond, 1)
+    around = np.maximum(near[:-2], near[2:])
+    clear = beyond > SMALL_S + WALK * step + (excess[1:] + excess[:-1]) / 2.0
+    return np.asarray(clear & (around < ALONE * beyond), dtype=np.bool_)
 
 
 def _slewed(change: FloatArray, step: FloatArray, doubt: FloatArray) -> npt.NDArray[np.bool_]:

@@ -258,15 +258,17 @@ def _segment(
     start: int, stop: int, epoch: Epoch, curve: OffsetCurve | None, *, known: bool
 ) -> Segment:
     first = start == epoch.start
-    unsure, step = (epoch.unsure, epoch.step_s) if first else (0, 0.0)
+    unsure, step, unheard = (
+        (epoch.unsure, epoch.step_s, epoch.unheard_s) if first else (0, 0.0, 0.0)
+    )
     told = first and epoch.told
     if curve is None:
         basis = Basis.ARRIVALS if known else Basis.NOTHING
-        return Segment(start, stop, basis, unsure=unsure, step_s=step, told=told)
+        return Segment(start, stop, basis, unsure=unsure, step_s=step, told=told, unheard_s=unheard)
     drift = -curve.slope / (1.0 + curve.slope) * 1e6
     residual = 1.4826 * float(np.median(np.abs(curve.residuals)))
     probes = len(curve.probes)
-    return Segment(start, stop, Basis.PROBES, probes, unsure, drift, residual, step, told)
+    return Segment(start, stop, Basis.PROBES, probes, unsure, drift, residual, step, told, unheard)
 
 
 def _blur_steps(segments: tuple[Segment, ...], error: FloatArray) -> None:

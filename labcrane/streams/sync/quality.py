@@ -28,7 +28,8 @@ class Segment:
 
     ``unsure`` counts samples that may belong to the clock before. ``drift_ppm`` is positive for a
     source whose clock is fast. Residuals are the median deviation of probes from the curve.
-    ``step_s`` is by how much the offset changed at its start, ``told`` whether liblsl said why.
+    ``step_s`` is by how much the offset changed at its start, ``told`` whether liblsl said why,
+    ``unheard_s`` for how long its clock was not probed before.
     """
 
     start: int
@@ -40,6 +41,7 @@ class Segment:
     residual_s: float = 0.0
     step_s: float = 0.0
     told: bool = False
+    unheard_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,7 +160,8 @@ def probe_age(stamps: FloatArray, segments: Sequence[Segment], known: FloatArray
 def clock_changes(segments: Sequence[Segment], time: FloatArray) -> tuple[int, int, int]:
     """Return how often the clock stepped, its program began anew, its computer slept.
 
-    While a computer sleeps its clock stands still: it falls behind by as long as nothing comes.
+    While a computer sleeps its clock stands still: it falls behind by as long as nothing comes, be
+    it samples or answers to probes.
     """
     steps = restarts = sleeps = 0
     steps_s = np.diff(time)
@@ -169,7 +172,8 @@ def clock_changes(segments: Sequence[Segment], time: FloatArray) -> tuple[int, i
             restarts += 1
         elif segment.step_s and segment.start:
             pause = float(time[segment.start] - time[segment.start - 1])
-            if segment.step_s > ASLEEP_S and pause > max(segment.step_s - 0.5, LONG_PAUSE * usual):
+            quiet = min(pause, segment.unheard_s) > segment.step_s - 0.5
+            if segment.step_s > ASLEEP_S and quiet and pause > LONG_PAUSE * usual:
                 sleeps += 1
             else:
                 steps += 1

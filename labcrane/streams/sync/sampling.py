@@ -12,6 +12,10 @@ from labcrane.types import FloatArray
 
 FEW = 20
 BLOCKS = 200
+MANY = 400
+CLUMPED = 0.5
+"""Where the usual step is less than this part of the period, samples are stamped in bursts."""
+
 EXACT = 0.1
 """Stamps that scatter by less than this part of a period leave no doubt which are missing."""
 
@@ -145,6 +149,10 @@ class _Steps:
 def _steps(time: FloatArray, index: FloatArray, lattice: float, *, counted: bool) -> _Steps:
     steps, counts = np.diff(time), np.maximum(np.diff(index), 1.0)
     local = _local(steps / counts)
+    typical = _typical(time, index)
+    clumped = bool(np.median(local) < CLUMPED * typical)
+    if clumped:
+        local = np.full(len(steps), typical)
     whole = counts if counted else np.maximum(np.round(steps / local), 1.0)
     rest = steps - whole * local
     scatter = 1.4826 * float(np.median(np.abs(rest)))
@@ -157,9 +165,8 @@ def _steps(time: FloatArray, index: FloatArray, lattice: float, *, counted: bool
     # Steps of chunks stamped when sent differ by their delays, which do not add up.
     between = boundary / local[~same]
     fraction = np.abs(between - np.round(between)) > 0.05 if len(between) else np.zeros(0, bool)  # noqa: PLR2004
-    computed = not lattice and bool(
-        same.mean() > SAME and len(boundary) >= 5 and fraction.mean() > 0.5  # noqa: PLR2004
-    )
+    repeated = same.mean() > SAME and len(boundary) >= 5 and fraction.mean() > 0.5  # noqa: PLR2004
+    computed = clumped or (not lattice and bool(repeated))
     exact = exact and not computed
     if not counted and not exact:
         whole = np.where(steps > np.maximum(20.0 * local, 1.0), np.round(steps / local), 1.0)
@@ -168,13 +175,21 @@ def _steps(time: FloatArray, index: FloatArray, lattice: float, *, counted: bool
     position = index if counted else index[0] + np.r_[0.0, np.cumsum(whole)]
     span = float(position[-1] - position[0])
     mean, usual = _slope(position, time), float(np.median(local))
-    if computed and not counted and mean > usual * (1.0 + STEADY):
+    if computed and not clumped and not counted and mean > usual * (1.0 + STEADY):
         missing += max(round(span * (mean / usual - 1.0)), 1)
         mean = usual
     longest = float(steps[gaps].max(initial=0.0))
     return _Steps(
         time, mean, local, position, missing, int(gaps.sum()), longest, exact, computed, balance
     )  # fmt: skip
+
+
+def _typical(time: FloatArray, index: FloatArray) -> float:
+    """Return the usual period over many samples: those of a burst may all be stamped at once."""
+    most = min(MANY, len(time) - 1)
+    return float(
+        np.median((time[most:] - time[:-most]) / np.maximum(index[most:] - index[:-most], 1.0))
+    )
 
 
 def _slope(x: FloatArray, y: FloatArray) -> float:
@@ -214,7 +229,10 @@ def _rates(found: _Steps) -> tuple[float, ...]:
     ends = [float(np.median(part)) for part in (rate[:4], rate[-4:])]
     mean = float(np.median(rate))
     low, high = np.quantile(rate, (0.05, 0.95))
-    if high - low < max(RATE_CHANGE * mean, 8.0 * scatter):
+    # Where bursts are stamped at once, an edge may lie anywhere within one.
+    burst = float(np.quantile(np.diff(found.time), 0.99)) if found.computed else 0.0
+    blurred = 4.0 * burst * mean / float(np.diff(found.time[edges]).min())
+    if high - low < max(RATE_CHANGE * mean, 8.0 * scatter, blurred):
         return ()
     if found.exact or abs(ends[1] - ends[0]) > RATE_CHANGE * mean:
         return 1.0 / ends[0], 1.0 / ends[1]

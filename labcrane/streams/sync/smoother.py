@@ -29,14 +29,13 @@ WALK_DECADES = 2.0
 SCATTERS = (2.0, 10.0, 50.0, 250.0, 1250.0)
 """Standard deviation of probes beside what their round trips explain, in microseconds."""
 
-WHITE_SHARES = (0.03, 0.3)
-"""How much of an excess round trip lies on one way, from probe to probe."""
+SHARES = ((0.3, 1e2), (0.3, 1e4), (0.03, 1e2), (0.03, 1e4), (0.03, 1e6), (0.003, 1e4), (0.003, 1e6))
+"""How an excess round trip is shared by its ways: by how much the share differs from probe to probe
+(half would be all of it), and for how many seconds it else stays as it is. A congestion passes, a
+route does not."""
 
 LASTING_SHARE = 0.3
-"""The same, for as long as a congestion lasts: a half would be all of it."""
-
-CONGESTIONS_S = (100.0, 10_000.0)
-"""How long it stays as it is: a congestion passes, a route does not."""
+"""How much of an excess round trip lies on one way for as long as that lasts."""
 
 USUAL_SPREAD_PPM = 300.0
 FIRST_US = 2e4
@@ -127,7 +126,7 @@ def smooth(
     )
     series = _with_knees(series)
     scatters = SCATTERS if scatter_s is None else tuple(MICRO * s for s in scatter_s)
-    shares = list(itertools.product(WHITE_SHARES, CONGESTIONS_S)) if excess.any() else [(0.0, 1.0)]
+    shares = SHARES if excess.any() else ((0.0, 1.0),)
     grid = [(walk, s, *share) for walk, s, share in itertools.product(WALKS, scatters, shares)]
     models = _Models(*np.array(grid).T)
     likelihood, _ = _forwards(series, models, keep=False)

@@ -2,11 +2,14 @@
  *
  *     reads(t) = t + offset + ppm * 1e-6 * (t - ref) + wander * sin(2 pi (t - ref) / period)
  *                  + step, once t >= step_at
+ *                  + slew * (t - slew_at), for slew_s seconds, and what it has come to after that
  *
  * t is the true CLOCK_MONOTONIC, which stays reachable by a raw system call. Loaded by LD_PRELOAD,
  * set by the environment: SKEW_OFFSET, SKEW_PPM, SKEW_REF, SKEW_WANDER, SKEW_PERIOD, SKEW_STEP,
- * SKEW_STEP_AT and SKEW_REPLY in seconds (SKEW_REPLY is the mean of an exponential delay).
- * Deadlines on the clock are mapped back, so that sleeping takes as long as it should.
+ * SKEW_STEP_AT, SKEW_SLEW, SKEW_SLEW_AT, SKEW_SLEW_S and SKEW_REPLY in seconds (SKEW_REPLY is the
+ * mean of an exponential delay). Deadlines on the clock are mapped back to the first moment, from now
+ * on, at which the clock reads them: a reading that a step back lets come twice is due at its first
+ * time while that lies ahead, one that a step forward leaves out is due at the step.
  *
  *     gcc -O2 -fPIC -shared -o skew.so skew.c -ldl -lm
  */
@@ -23,6 +26,7 @@
 #include <unistd.h>
 
 static long double offset, rate, ref, wander, period, step, step_at, reply;
+static long double slew, slew_at, slew_s;
 static int ready;
 
 static long double setting(const char *name, long double otherwise) {
@@ -38,25 +42,41 @@ __attribute__((constructor)) static void read_settings(void) {
     period = setting("SKEW_PERIOD", 200);
     step = setting("SKEW_STEP", 0);
     step_at = setting("SKEW_STEP_AT", 1e18L);
+    slew = setting("SKEW_SLEW", 0);
+    slew_at = setting("SKEW_SLEW_AT", 1e18L);
+    slew_s = setting("SKEW_SLEW_S", 0);
     reply = setting("SKEW_REPLY", 0);
     srand48(getpid());
     ready = 1;
 }
 
 static long double smooth(long double t) {
-    return t + offset + rate * (t - ref) + wander * sinl(2 * M_PIl * (t - ref) / period);
+    long double turned = t - slew_at;
+    turned = turned < 0 ? 0 : turned > slew_s ? slew_s : turned;
+    return t + offset + rate * (t - ref) + wander * sinl(2 * M_PIl * (t - ref) / period)
+           + slew * turned;
 }
 
 static long double skewed(long double t) { return smooth(t) + (t >= step_at ? step : 0); }
 
-static long double unskewed(long double reading) {
-    if (reading >= smooth(step_at) + (step > 0 ? step : 0)) reading -= step;
+static long double when_smooth(long double reading) {
     long double t = (reading - offset + rate * ref) / (1 + rate);
-    for (int i = 0; i < 3; i++) t -= (smooth(t) - reading) / (1 + rate);
+    for (int i = 0; i < 12; i++) t -= (smooth(t) - reading) / (1 + rate);
     return t;
 }
 
+static long double due(long double reading, long double now) {
+    if (now < step_at) {
+        long double before = when_smooth(reading);
+        if (before < step_at) return before;
+        if (step > 0 && reading < smooth(step_at) + step) return step_at;
+    }
+    return when_smooth(reading - step);
+}
+
 double skew_map(double t) { return (double)skewed(t); }
+
+double skew_due(double reading, double now) { return (double)due(reading, now); }
 
 static long double seconds(const struct timespec *t) { return t->tv_sec + t->tv_nsec * 1e-9L; }
 
@@ -68,7 +88,9 @@ static struct timespec as_timespec(long double t) {
 }
 
 static struct timespec true_deadline(const struct timespec *deadline) {
-    return as_timespec(unskewed(seconds(deadline)));
+    struct timespec now;
+    syscall(SYS_clock_gettime, CLOCK_MONOTONIC, &now);
+    return as_timespec(due(seconds(deadline), seconds(&now)));
 }
 
 #define REAL(name) \

@@ -1,0 +1,113 @@
+"""Correction of XDF files of any recorder, certified, and compared with pyxdf."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from labcrane.errors import RecordingError
+from labcrane.files.atomic import replacing
+from labcrane.recording.foreign_streams import RecordedStream, read_streams
+from labcrane.recording.participant_file.columns import node_names, write_attributes, write_numbers
+from labcrane.recording.participant_file.stream_group import TIME_COLUMNS
+from labcrane.streams.recorder.health import counter_label
+from labcrane.streams.sync.correction import Corrected, correct
+from labcrane.streams.sync.pool import pooled
+from labcrane.streams.sync.raw import RawStream, raw_of, unwrapped
+from labcrane.streams.sync.report.limits import Limits
+from labcrane.streams.sync.report.stream_report import judge_stream
+from labcrane.streams.sync.report.sync_report import SyncReport
+from labcrane.streams.sync.resync import columns_of, quality_of, treatment_of
+from labcrane.types import FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Resynced:
+    """What became of an XDF file.
+
+    Attributes
+    ----------
+    path
+        The HDF5 file with corrected times, their errors and what they rest on, per stream.
+    report
+        How right they are.
+    against_pyxdf
+        By stream, the median and the largest distance of the times from pyxdf's, in seconds; empty
+        where pyxdf is not installed, or reads other samples.
+    """
+
+    path: Path
+    report: SyncReport
+    against_pyxdf: dict[str, tuple[float, float]]
+
+
+def resync_xdf(path: Path) -> Resynced:
+    """Correct the streams of an XDF file by the clock offsets in it, into a file beside it.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be read, holds no stream, or the file beside it cannot be written.
+    """
+    import h5py  # noqa: PLC0415 - loads for a second
+
+    if not path.is_file():
+        raise RecordingError(f"there is no XDF file {path}")
+    streams, _ = read_streams([path])
+    if not streams:
+        raise RecordingError(f"{path} holds no stream; is it whole?")
+    raws = pooled([_raw(one) for one in streams], [one.header.host for one in streams])
+    ends = [float(raw.probes[:, 3].max()) for raw in raws if len(raw.probes)]
+    corrected = []
+    for one, raw in zip(streams, raws, strict=True):
+        corrected.append(correct(raw, treatment_of(one.header), max(ends, default=None)))
+    report = SyncReport(
+        tuple(
+            judge_stream(one, each.quality, Limits())
+            for one, each in zip(streams, corrected, strict=True)
+        )
+    )
+    beside = path.with_name(f"{path.stem}_resync.h5")
+    with replacing(beside) as new, h5py.File(new, "w") as file:
+        names = node_names([one.header.name for one in streams])
+        for (_, name), one, each in zip(names, streams, corrected, strict=True):
+            group = file.create_group(name)
+            write_attributes(group, {"name": one.header.name, "source_id": one.header.source_id})
+            write_numbers(group, "time_raw", one.time_raw, "s")
+            for column, values in columns_of(each).items():
+                write_numbers(group, column, values, TIME_COLUMNS[column])
+            write_attributes(group["time"], quality_of(each, treatment_of(one.header)))
+    return Resynced(beside, report, _compared(path, streams, corrected))
+
+
+def _raw(recorded: RecordedStream) -> RawStream:
+    raw = raw_of(recorded)
+    label = counter_label(recorded.header, None)
+    if label is None or not len(recorded.data):
+        return raw
+    column = recorded.header.labels.index(label)
+    index = unwrapped(np.asarray(recorded.data[:, column], np.float64))
+    return RawStream(raw.stamps, raw.probes, raw.arrivals, raw.resets, index)
+
+
+def _compared(
+    path: Path, streams: list[RecordedStream], corrected: list[Corrected]
+) -> dict[str, tuple[float, float]]:
+    """Return how far pyxdf's times are from ours."""
+    try:
+        import pyxdf  # noqa: PLC0415 - not everybody has it
+    except ImportError:
+        return {}
+    theirs: dict[tuple[str, str], FloatArray] = {}
+    for stream in pyxdf.load_xdf(str(path))[0]:
+        info = stream["info"]
+        theirs[info["name"][0], info["source_id"][0] or ""] = np.asarray(stream["time_stamps"])
+    found = {}
+    for one, each in zip(streams, corrected, strict=True):
+        other = theirs.get((one.header.name, one.header.source_id))
+        if other is not None and len(other) == len(each.time) > 0:
+            apart = np.abs(other - each.time)
+            known = apart[np.isfinite(apart)]
+            if len(known):
+                found[one.header.name] = float(np.median(known)), float(known.max())
+    return found

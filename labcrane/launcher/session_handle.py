@@ -1,0 +1,64 @@
+"""Handle of the session's process: what it is told, and what it says."""
+
+import math
+import pickle
+from collections.abc import Callable
+
+from labcrane.core.records import Event
+from labcrane.launcher.session_process import Ended, Offered
+from labcrane.processes.handle import Patience, ProcessHandle
+from labcrane.session.commands import Message, MessageError, encode
+from labcrane.session.visit import Visit
+
+MODULE = "labcrane.launcher.session_process"
+
+MOST_WAITING = 1000
+"""So many messages may wait for a session that does not take them; it hangs, and is soon killed."""
+
+
+class SessionHandle:
+    """Starts the session of a visit; it is never started again, for it is gone on with.
+
+    A session that hangs takes no messages, and may hang in the middle of one: neither makes the
+    launcher wait, for it is the launcher that finds out.
+
+    Parameters
+    ----------
+    say
+        Is told what could not be sent.
+    """
+
+    def __init__(self, visit: Visit, say: Callable[[str], None]) -> None:
+        self._say = say
+        self._process = ProcessHandle(MODULE, "session", Patience(stop_s=math.inf))
+        self._process.start(pickle.dumps(visit))
+
+    def send(self, message: Message) -> None:
+        """Send a message, without waiting; say so when it cannot be sent."""
+        try:
+            line = encode(message)
+        except MessageError as error:
+            self._say(str(error))
+            return
+        if self._process.waiting >= MOST_WAITING:
+            self._say(f"the session takes no messages; {MOST_WAITING} wait, and one was dropped")
+            return
+        self._process.tell(line)
+
+    def wait(self, seconds: float) -> list[Event | Offered | Ended]:
+        """Return what it has said, and wait so long for it."""
+        self._process.wait(seconds)
+        return self._process.messages()
+
+    @property
+    def ended(self) -> bool:
+        """Whether it has ended or died, and :meth:`wait` returns nothing new but what is left."""
+        return self._process.ended
+
+    def kill(self) -> None:
+        """End it at once: its journal is whole, and what it has said can still be asked for."""
+        self._process.kill()
+
+    def close(self) -> int:
+        """Wait for its end; its exit code."""
+        return self._process.stop()

@@ -1,0 +1,67 @@
+"""Messages between processes: an inbox for what comes, and both ways through a pipe.
+
+Threads read and write the pipes, so that neither side ever waits for the other.
+"""
+
+import pickle
+import queue
+import threading
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import IO, Any, Generic, TypeVar
+
+MessageT = TypeVar("MessageT")
+
+
+class Inbox(Generic[MessageT]):
+    """What has come from a thread, until it is asked for."""
+
+    def __init__(self) -> None:
+        self._incoming: queue.SimpleQueue[MessageT] = queue.SimpleQueue()
+        self._news = threading.Event()
+
+    def put(self, message: MessageT) -> None:
+        """Put in a message; whoever waits wakes up."""
+        self._incoming.put(message)
+        self._news.set()
+
+    def wake(self) -> None:
+        """Wake up whoever waits, without a message."""
+        self._news.set()
+
+    def messages(self) -> list[MessageT]:
+        """Return what has come since the last call, without waiting."""
+        self._news.clear()
+        found = []
+        with suppress(queue.Empty):
+            while True:
+                found.append(self._incoming.get_nowait())
+        return found
+
+    def first(self) -> MessageT | None:
+        """Return the message that waits longest; None when none does."""
+        with suppress(queue.Empty):
+            return self._incoming.get_nowait()
+        return None
+
+    def wait(self, seconds: float | None = None) -> bool:
+        """Wait for a message, or to be woken up; whether there was either."""
+        return self._news.wait(seconds)
+
+
+def received(pipe: IO[bytes]) -> Iterator[Any]:
+    """Yield what is written at a pipe's other end, until that is closed or its process has died."""
+    while True:
+        try:
+            message = pickle.load(pipe)  # noqa: S301 - our own child, or our own parent
+        except (EOFError, pickle.UnpicklingError, OSError, ValueError):
+            return  # it ended, perhaps in the middle of a message
+        yield message
+
+
+def send(outgoing: "queue.SimpleQueue[bytes | None]", pipe: IO[bytes]) -> None:
+    """Write what is put into ``outgoing``, up to None, or until nobody hears it any more."""
+    with suppress(OSError):
+        while (message := outgoing.get()) is not None:
+            pipe.write(message)
+            pipe.flush()

@@ -1,0 +1,290 @@
+"""Report on one stream's time stamps, and what to do where they are not right."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from labcrane.core.findings import Finding, Verdict, worst
+from labcrane.recording.foreign_streams import COUNTER_GAP, RESET, RecordedStream
+from labcrane.streams.sync.quality import Quality
+from labcrane.streams.sync.report.certificate import (
+    CONGESTED_S,
+    carries,
+    corrections,
+    faults,
+    unknowable,
+)
+from labcrane.streams.sync.report.limits import Limits
+
+
+@dataclass(frozen=True, slots=True)
+class StreamReport:
+    """One stream. Times are seconds; NaN where it is not known.
+
+    Attributes
+    ----------
+    faults
+        What is wrong with its samples or clocks, by name, whether corrected or not.
+    corrected
+        What was done to its stamps, one sentence each.
+    unknown
+        What no software can know of them.
+    carries
+        Which analyses its stamps carry.
+    """
+
+    name: str
+    type: str
+    source_id: str
+    verdict: Verdict
+    samples: int
+    nominal_hz: float
+    quality: Quality
+    findings: tuple[Finding, ...] = ()
+    faults: tuple[str, ...] = ()
+    corrected: tuple[str, ...] = ()
+    unknown: str = ""
+    carries: str = ""
+
+
+def judge_stream(
+    recorded: RecordedStream, quality: Quality, limits: Limits, *, required: bool = True
+) -> StreamReport:
+    """Judge a corrected stream, with what the recorder noted beside it."""
+    quality = replace(quality, dropped=max(quality.dropped, _missing(recorded)))
+    samples = len(recorded.time_raw)
+    header = recorded.header
+    if samples == 0:
+        findings = [_empty(required=required)]
+    else:
+        findings = judge_quality(quality, header.rate_hz, samples, limits, required=required)
+    findings += _noted(recorded)
+    return StreamReport(
+        header.name,
+        header.type,
+        header.source_id,
+        worst(finding.verdict for finding in findings),
+        samples,
+        header.rate_hz,
+        quality,
+        tuple(findings),
+        tuple(sorted(faults(quality, header.rate_hz))) if samples else (),
+        tuple(corrections(quality)),
+        unknowable(quality),
+        carries(quality),
+    )
+
+
+def judge_quality(
+    quality: Quality, nominal: float, samples: int, limits: Limits, *, required: bool = True
+) -> list[Finding]:
+    """Judge corrected times by themselves."""
+    findings = _flow(nominal, samples, quality, limits)
+    if nominal > 0:
+        findings += _stamping(quality, limits)
+        if limits.silent_s.judge(quality.silent_s) is not Verdict.PASS:
+            findings.append(_died(quality, required=required))
+    findings += _clock(quality, limits) + _changes(quality) + _certainty(quality, limits)
+    return findings
+
+
+def _missing(recorded: RecordedStream) -> int:
+    """Return how many samples the source's own counter left out while it was recorded."""
+    gaps = [note.data for note in recorded.notes if note.data.get("event") == COUNTER_GAP]
+    return sum(int(gap["missing"]) for gap in gaps)
+
+
+def _empty(*, required: bool) -> Finding:
+    return Finding(
+        Verdict.FAIL if required else Verdict.WARN,
+        "no sample came",
+        "start the acquisition in its program first; check that TCP passes the firewall",
+    )
+
+
+def _flow(nominal: float, samples: int, quality: Quality, limits: Limits) -> list[Finding]:
+    """Judge whether all samples are there."""
+    found: list[Finding] = []
+    if nominal > 0:
+        off = abs(quality.rate_hz / nominal - 1.0)
+        _add(
+            found,
+            limits.rate.judge(off),
+            f"{quality.rate_hz:.2f} Hz instead of {nominal:g} Hz",
+            "check the rate set in the device's program, and whether it drops samples",
+        )
+        if not np.isnan(quality.first_rate_hz):
+            _add(
+                found,
+                Verdict.WARN,
+                f"its rate changed from {quality.first_rate_hz:.3f} to {quality.last_rate_hz:.3f} "
+                "Hz",
+                "its stamps were not made even; let the device warm up before you record",
+            )
+        _add(
+            found,
+            limits.gap_s.judge(quality.longest_gap_s),
+            f"{quality.gaps} gaps, the longest {quality.longest_gap_s:.3f} s",
+            "check the device's cable, radio link and battery; leave out the trials they touch",
+        )
+    _add(
+        found,
+        limits.missing.judge(quality.dropped / (samples + quality.dropped)),
+        f"{quality.dropped} samples are missing, by its counter or between its stamps",
+        "check the link between device and its program",
+    )
+    return found
+
+
+def _stamping(quality: Quality, limits: Limits) -> list[Finding]:
+    """Judge how samples were stamped and sent."""
+    found: list[Finding] = []
+    if quality.whose == "receiver":
+        text = "its stamps are of this computer's clock already, while its own was probed"
+        _add(found, Verdict.FAIL, text, "let its program push LSL's stamps as they are")
+    elif quality.whose == "foreign":
+        text = f"its stamps are of a clock that LSL does not know ({quality.lag_s:.3f} s off)"
+        _add(found, Verdict.FAIL, text, "its program must stamp with LSL's clock, not its own")
+    elif not np.isnan(quality.lag_s):
+        _add(
+            found,
+            limits.lag_s.judge(abs(quality.lag_s)),
+            f"its stamps lie {quality.lag_s:.3f} s before their arrival",
+            "its program may stamp with a clock of its own: let it use LSL's",
+        )
+    if quality.disordered:
+        text = f"{quality.disordered} samples came out of order"
+        _add(found, Verdict.WARN, text, "sort by time before you use them; look why they overtake")
+    if quality.stalls:
+        _add(
+            found,
+            Verdict.WARN,
+            f"{quality.stalls} times it stalled and sent late, by {quality.longest_stall_s:.1f} s "
+            "at most",
+            "its times are right; feedback that used it was late: look what kept its program",
+        )
+    if quality.late_stamps:
+        text = f"chunks are stamped when they are sent ({1e3 * quality.noise_s:.1f} ms of scatter)"
+        _add(found, Verdict.WARN, text, "measure the delay and give it as latency_s or min_delay_s")
+    elif quality.noise_s:
+        text = f"its stamps scatter by {1e3 * quality.noise_s:.2f} ms about its samples"
+        _add(found, Verdict.WARN, text, "let its program stamp with LSL's clock at full resolution")
+    return found
+
+
+def _died(quality: Quality, *, required: bool) -> Finding:
+    return Finding(
+        Verdict.FAIL if required else Verdict.WARN,
+        f"it died: no sample came in the last {quality.silent_s:.0f} s",
+        "leave out the trials after its last sample; look at its program and its battery",
+    )
+
+
+def _changes(quality: Quality) -> list[Finding]:
+    """Name what happened to its clock and on the way to it."""
+    found: list[Finding] = []
+    for count, what, advice in (
+        (quality.steps, "its clock jumped {} times", "look what sets its computer's clock"),
+        (quality.sleeps, "its computer slept {} times", "switch off its power saving"),
+        (quality.slews, "a clock was slewed {} times", "switch off NTP while you record"),
+    ):
+        if count:
+            _add(found, Verdict.WARN, what.format(count), f"corrected; {advice}")
+    if quality.congested_s > CONGESTED_S:
+        text = f"probes were held up for {quality.congested_s:.0f} s"
+        _add(found, Verdict.WARN, text, "trusted less by as much; keep the network for the study")
+    return found
+
+
+def _clock(quality: Quality, limits: Limits) -> list[Finding]:
+    """Judge the source's clock and the way to it."""
+    found: list[Finding] = []
+    if np.isnan(quality.rtt_p50_s):
+        text = "its clock was never probed"
+        _add(found, Verdict.FAIL, text, "let UDP pass the firewall of both computers")
+        return found
+    _add(
+        found,
+        limits.drift_ppm.judge(abs(quality.drift_ppm)),
+        f"its clock runs {quality.drift_ppm:+.0f} ppm off",
+        "corrected; but check that the computer's clock is not being adjusted meanwhile",
+    )
+    _add(
+        found,
+        limits.residual_s.judge(quality.residual_s),
+        f"its clock scatters by {1e3 * quality.residual_s:.3f} ms",
+        "use a cable instead of WiFi, and switch off power saving on its computer",
+    )
+    _add(
+        found,
+        limits.rtt_s.judge(quality.rtt_p95_s),
+        f"clock probes take {1e3 * quality.rtt_p95_s:.2f} ms, so that "
+        f"{500 * quality.rtt_p95_s:.2f} ms may be hidden",
+        "use a cable instead of WiFi, on the same switch",
+    )
+    _add(
+        found,
+        limits.probe_age_s.judge(quality.probe_age_s),
+        f"up to {quality.probe_age_s:.0f} s without a clock probe",
+        "check whether the network or the computer was interrupted",
+    )
+    return found
+
+
+def _certainty(quality: Quality, limits: Limits) -> list[Finding]:
+    """Judge how well every sample's time is known."""
+    found: list[Finding] = []
+    _add(
+        found,
+        limits.error_s.judge(quality.error_p95_s),
+        f"its times may be off by {1e3 * quality.error_p95_s:.2f} ms",
+        f"they carry {carries(quality)}",
+    )
+    if not quality.error_p95_s > limits.error_s.warn and quality.worst_s > limits.error_s.warn:
+        text = (
+            f"its times may be off by {1e3 * quality.worst_s:.2f} ms in the second from "
+            f"{quality.worst_at_s:.0f} s"
+        )
+        _add(found, Verdict.WARN, text, "leave out the trial it is in where milliseconds matter")
+    if quality.unprobed and not quality.whose:
+        _add(
+            found,
+            Verdict.FAIL,
+            f"{quality.unprobed} samples are of a clock that was never probed",
+            "leave them out where milliseconds matter: they are placed by their arrival",
+        )
+    if quality.unsure:
+        _add(
+            found,
+            Verdict.WARN,
+            f"{quality.unsure} samples are near a step of the clock and may be of either side",
+            "leave out the trial they are in where milliseconds matter",
+        )
+    return found
+
+
+def _noted(recorded: RecordedStream) -> list[Finding]:
+    """Return what the recorder noticed."""
+    found: list[Finding] = []
+    resets = sum(note.data.get("event") == RESET for note in recorded.notes)
+    if resets:
+        _add(
+            found,
+            Verdict.WARN,
+            f"its program was restarted {resets} times",
+            "corrected; look why it stopped",
+        )
+    for text in {str(note.data["text"]) for note in recorded.notes if _is_warning(note.data)}:
+        _add(found, Verdict.WARN, text.partition(": ")[0], text.partition(": ")[2] or "correct it")
+    return found
+
+
+def _is_warning(data: Mapping[str, Any]) -> bool:
+    return data.get("event") == "warning" and "text" in data
+
+
+def _add(found: list[Finding], verdict: Verdict, text: str, advice: str) -> None:
+    if verdict is not Verdict.PASS:
+        found.append(Finding(verdict, text, advice))

@@ -1,0 +1,127 @@
+"""The grip of the jaws on a thing."""
+
+from dataclasses import dataclass
+
+from labcrane_dmd.arm.contacts import LINK_B, Contacts, Window
+from labcrane_dmd.arm.engine import pybullet
+from labcrane_dmd.arm.scene_bodies import Standing
+
+
+@dataclass
+class Held:
+    """A thing in the grip: how it is fixed, how far the jaws were open, and what pulls at it."""
+
+    standing: Standing
+    constraint: int
+    opening: float
+    pull: Window
+
+
+class Grip:
+    """Forms when both jaws press on a thing, breaks when it is pulled out or let go.
+
+    Parameters
+    ----------
+    arm, jaws, client
+        Number of the arm, of its two jaws' links, and of the engine.
+    press
+        Force of each jaw, in N, above which a grip forms.
+    release
+        Opening of the jaws, in rad, that lets go.
+    ticks
+        Length of the window of the force.
+    """
+
+    def __init__(
+        self, arm: int, jaws: tuple[int, int], client: int, press: float, release: float, ticks: int
+    ) -> None:
+        self._arm, self._jaws, self._client = arm, jaws, client
+        self._press, self._release, self._ticks = press, release, ticks
+        self.held: Held | None = None
+        self.force = 0.0
+        self.drops = 0
+
+    def look(self, contacts: Contacts, things: list[Standing], opening: float) -> None:
+        """Form, keep or break the grip after a tick; ``opening`` is the jaws' angle in rad."""
+        if self.held is None:
+            for each in things:
+                pressed = [contacts.by_link.get((each.placed.name, jaw), 0.0) for jaw in self._jaws]
+                if each.placed.kind != "obstacle" and min(pressed) > self._press:
+                    self._take(each, opening)
+                    return
+            return
+        pulled = pybullet.getConstraintState(self.held.constraint, physicsClientId=self._client)
+        self.force = self.held.pull.add(sum(part * part for part in pulled[:3]) ** 0.5)
+        if self.force > self.held.standing.placed.slip:
+            self.drops += 1
+            self._let_go()
+        elif opening > self.held.opening + self._release:
+            self._let_go()
+
+    def _take(self, each: Standing, opening: float) -> None:
+        constraint = self._hold_limb(each) if each.placed.kind == "body" else self._hold(each)
+        # What is held is part of the hand: jaws that went on pressing would fight the constraint.
+        self._collide(each, touch=False)
+        self.held = Held(each, constraint, opening, Window(self._ticks))
+        self.force = 0.0
+
+    def _hold(self, each: Standing) -> int:
+        """Fix an object to the hand."""
+        client, hand = self._client, self._jaws[1]
+        state = pybullet.getLinkState(self._arm, hand, physicsClientId=client)
+        place = pybullet.getBasePositionAndOrientation(each.body, physicsClientId=client)
+        inverse = pybullet.invertTransform(*state[:2])  # the link's centre of mass, as bullet wants
+        offset = pybullet.multiplyTransforms(*inverse, *place)
+        constraint: int = pybullet.createConstraint(
+            self._arm,
+            hand,
+            each.body,
+            -1,
+            pybullet.JOINT_FIXED,
+            [0.0, 0.0, 0.0],
+            offset[0],
+            [0.0, 0.0, 0.0],
+            parentFrameOrientation=offset[1],
+            physicsClientId=client,
+        )
+        return constraint
+
+    def _hold_limb(self, each: Standing) -> int:
+        """Hold a body at one point: a limb turns in the hand that has hold of it."""
+        client, hand = self._client, self._jaws[1]
+        touching = pybullet.getContactPoints(self._arm, each.body, hand, physicsClientId=client)
+        link = touching[0][LINK_B] if touching else -1
+        grabbed = pybullet.getLinkState(self._arm, hand, physicsClientId=client)[0]
+        place = (
+            pybullet.getBasePositionAndOrientation(each.body, physicsClientId=client)
+            if link < 0
+            else pybullet.getLinkState(each.body, link, physicsClientId=client)[:2]
+        )
+        inverse = pybullet.invertTransform(*place)
+        point = pybullet.multiplyTransforms(*inverse, grabbed, [0.0, 0.0, 0.0, 1.0])[0]
+        constraint: int = pybullet.createConstraint(
+            self._arm,
+            hand,
+            each.body,
+            link,
+            pybullet.JOINT_POINT2POINT,
+            [0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0],
+            point,
+            physicsClientId=client,
+        )
+        return constraint
+
+    def _let_go(self) -> None:
+        if self.held is None:
+            return
+        pybullet.removeConstraint(self.held.constraint, physicsClientId=self._client)
+        self._collide(self.held.standing, touch=True)
+        self.held, self.force = None, 0.0
+
+    def _collide(self, each: Standing, *, touch: bool) -> None:
+        for jaw in self._jaws:
+            for link in each.parts:
+                pybullet.setCollisionFilterPair(
+                    self._arm, each.body, jaw, link, int(touch), physicsClientId=self._client
+                )

@@ -1,0 +1,287 @@
+"""The scene as the renderer knows it: forest, machine, targets and what cues draw."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from panda3d import core
+
+from labcrane import FloatArray, Run, Sphere
+from labcrane.core import Shape
+from labcrane.machines import Body, read_placed
+from labcrane_view.scene import shader
+from labcrane_view.scene.forest import forest
+from labcrane_view.scene.mesh import Mesh, bevelled_box, cone, sphere
+from labcrane_view.scene.mesh_reader import painted, read_mesh
+from labcrane_view.scene.things import pieces
+
+HAZE = (0.66, 0.75, 0.82)
+THICKNESS = 0.0125
+"""Of the haze, per metre."""
+
+SUN = (0.45, -0.38, 0.81)
+"""Direction to the sun."""
+
+SHADOWS = core.BitMask32.bit(5)
+"""Camera of the shadow map: does not see what glows or is transparent."""
+
+PAINT = ((0.13, 0.13, 0.14, 1.0), (0.90, 0.66, 0.07, 1.0), (0.12, 0.38, 0.17, 1.0))
+"""Colours of the frames: the foot, the column, and everything behind."""
+LAST = (0.90, 0.66, 0.07, 1.0)
+STEEL = (0.42, 0.44, 0.46, 1.0)
+
+
+class Stage:
+    """Everything that can be seen.
+
+    Parameters
+    ----------
+    shaders
+        Whether the renderer runs our shader.
+    shadow
+        Edge of the shadow map in pixels; 0 for none.
+    scenery
+        Whether there is anything but targets and cues.
+    """
+
+    def __init__(self, run: Run, *, shaders: bool, shadow: int, scenery: bool) -> None:
+        self.root = core.NodePath("stage")
+        self._shaders = shaders
+        self._ball = sphere()
+        self._bar = cone((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0))
+        self._parts: list[tuple[int, Any]] = []
+        self._shown: dict[str, Any] = {}
+        self._state = run.state
+        self._scene = ""
+        self._things: list[Any] = []
+        self._moving: list[tuple[Any, slice, slice]] = []
+        self._carried: list[tuple[Any, slice, slice]] = []
+        self._scenery = scenery
+        if shaders:
+            self._light(shadow)
+        else:
+            self._plain_light()
+        if scenery:
+            for thing in forest():
+                self._add(self.root, thing.name, thing.mesh, thing.colour, thing.grain)
+            self._add_machine(run.bodies)
+
+    def place(self, frames: FloatArray, scene: str, state: FloatArray) -> None:
+        """Set the machine's bodies and what stands around.
+
+        ``frames`` as of :func:`labcrane.machines.link_frames`, ``scene`` as of
+        :func:`labcrane.machines.read_placed`.
+        """
+        if self._scenery and scene != self._scene:
+            self._furnish(scene)
+        for node, position, orientation in (*self._carried, *self._moving):
+            x, y, z, w = state[orientation].tolist()
+            node.set_pos_quat(core.LPoint3(*state[position].tolist()), core.LQuaternion(w, x, y, z))
+        for number, node in self._parts:
+            node.set_mat(core.LMatrix4f(*frames[number].T.ravel().tolist()))
+
+    def _furnish(self, scene: str) -> None:
+        """Set up what stands around; what moves is placed by the state from then on."""
+        self._scene = scene
+        for node in self._things:
+            node.remove_node()
+        self._things, self._moving = [], []
+        for thing in read_placed(scene):
+            node = self.root.attach_new_node(thing.name)
+            node.set_pos(*thing.position)
+            node.set_h(math.degrees(thing.yaw))
+            for mesh, colour in pieces(thing):
+                self._add(node, thing.name, mesh, colour, 0.0)
+            self._things.append(node)
+            if f"scene.{thing.name}.position" in (signal.name for signal in self._state.signals):
+                self._moving.append((node, *self._places(f"scene.{thing.name}")))
+
+    def _places(self, name: str) -> tuple[slice, slice]:
+        """Return where the state holds a position and an orientation."""
+        return self._state.find(f"{name}.position"), self._state.find(f"{name}.orientation")
+
+    def show(self, shapes: Sequence[Shape]) -> None:
+        """Draw ``shapes`` instead of those drawn before."""
+        gone = set(self._shown) - {shape.name for shape in shapes}
+        for name in gone:
+            self._shown.pop(name).remove_node()
+        for shape in shapes:
+            node = self._shown.get(shape.name)
+            if node is None:
+                mesh = self._ball if isinstance(shape, Sphere) else self._bar
+                node = self._shown[shape.name] = self._add(self.root, shape.name, mesh, STEEL, 0.0)
+            self._colour(node, shape.colour)
+            if isinstance(shape, Sphere):
+                node.set_pos(*shape.centre)
+                node.set_scale(shape.radius)
+            else:
+                _stretch(node, np.array(shape.start), np.array(shape.end), shape.radius)
+
+    def look_from(self, camera: Any) -> None:
+        """Tell the shader where the eye is."""
+        if self._shaders:
+            self.root.set_shader_input("eye", camera.get_pos(self.root))
+
+    def see_depth(self, eye: Any, near: float, far: float) -> None:
+        """Make a camera see how far away what is solid is, from ``near`` to ``far`` metres."""
+        state = core.NodePath("depth picture")
+        made = core.Shader.make(core.Shader.SL_GLSL, shader.FAR_VERTEX, shader.FAR_FRAGMENT)
+        state.set_shader(made, 100)
+        state.set_shader_input("range", core.LVector2(near, far), 100)
+        eye.set_initial_state(state.get_state())
+        eye.set_camera_mask(SHADOWS)
+
+    def _add_machine(self, bodies: Sequence[Body]) -> None:
+        last = max((body.frame for body in bodies), default=0)
+        for body in bodies:
+            paint = (
+                LAST if body.frame == last or body.moves else PAINT[min(body.frame, len(PAINT) - 1)]
+            )
+            node = self.root.attach_new_node(body.name)
+            if body.mesh is not None:
+                mesh, paint = read_mesh(body.mesh), painted(body.mesh, paint)
+            else:
+                mesh = bevelled_box(body.size, body.centre)
+            self._add(node, body.name, mesh, paint, 0.0)
+            if body.moves:
+                self._carried.append((node, *self._places(body.moves)))
+                continue
+            if body.frame > 0 and body.mesh is None:
+                self._add_joint(node, body)
+            self._parts.append((body.frame, node))
+
+    def _add_joint(self, node: Any, body: Body) -> None:
+        """Add the pin at the inner end of a link, along the frame's z axis."""
+        long = max(range(3), key=lambda axis: body.size[axis])
+        if long == 0:  # along x: a link behind a pitch joint
+            thick = body.size[1]
+            inner = body.centre[0] - body.size[0] / 2.0
+            across, round_ = 0.5 * body.size[2] + 0.06, 0.62 * thick
+            pin = cone((inner, 0.0, -across), (inner, 0.0, across), (round_, round_), 20)
+            self._add(node, f"{body.name} pin", pin, STEEL, 0.0)
+            rod = cone(
+                (inner + 0.12 * body.size[0], -0.72 * thick, 0.0),
+                (inner + 0.55 * body.size[0], -0.66 * thick, 0.0),
+                (0.20 * thick, 0.20 * thick),
+                12,
+            )
+            self._add(node, f"{body.name} cylinder", rod, STEEL, 0.0)
+
+    def _add(
+        self, parent: Any, name: str, mesh: Mesh, colour: Sequence[float], grain: float
+    ) -> Any:
+        node = parent.attach_new_node(_geometry(name, mesh))
+        self._colour(node, colour)
+        if self._shaders:
+            node.set_shader_input("grain", grain)
+        return node
+
+    def _colour(self, node: Any, colour: Sequence[float]) -> None:
+        red, green, blue, opacity = colour
+        if self._shaders:
+            node.set_shader_input("rgba", core.LVector4(red, green, blue, opacity))
+        else:
+            node.set_color(red, green, blue, opacity)
+        if opacity < 1.0:
+            node.set_transparency(core.TransparencyAttrib.M_alpha)
+            node.set_depth_write(False)
+            node.set_bin("transparent", 10)
+            node.hide(SHADOWS)
+        else:
+            node.clear_transparency()
+            node.set_depth_write(True)
+            node.set_bin("opaque", 0)
+            node.show(SHADOWS)
+
+    def _light(self, shadow: int) -> None:
+        sun = core.DirectionalLight("sun")
+        node = self.root.attach_new_node(sun)
+        node.set_pos(*(4.0 * (axis == 0) + 40.0 * part for axis, part in enumerate(SUN)))
+        node.look_at(4.0, 0.0, 0.0)
+        if shadow:
+            sun.set_shadow_caster(caster=True, buffer_xsize=shadow, buffer_ysize=shadow)
+            lens = sun.get_lens()
+            lens.set_film_size(48.0, 48.0)
+            lens.set_near_far(5.0, 90.0)
+            sun.set_camera_mask(SHADOWS)
+            state = core.NodePath("depth only")
+            depth = core.Shader.make(
+                core.Shader.SL_GLSL, shader.DEPTH_VERTEX, shader.DEPTH_FRAGMENT
+            )
+            state.set_shader(depth, 100)
+            state.set_attrib(core.ColorWriteAttrib.make(core.ColorWriteAttrib.C_off), 100)
+            sun.set_initial_state(state.get_state())
+        self.root.set_light(node)
+        self.root.set_shader(core.Shader.make(core.Shader.SL_GLSL, shader.VERTEX, shader.FRAGMENT))
+        length = math.sqrt(sum(part * part for part in SUN))
+        self.root.set_shader_inputs(
+            sun=core.LVector3(*(part / length for part in SUN)),
+            eye=core.LVector3(0.0, 0.0, 0.0),
+            haze=core.LVector3(*HAZE),
+            thickness=THICKNESS,
+            shadows=int(shadow > 0),
+            glow=0.0,
+            grain=0.0,
+            rgba=core.LVector4(1.0, 1.0, 1.0, 1.0),
+            noise=_noise(),
+        )
+
+    def _plain_light(self) -> None:
+        sun = core.DirectionalLight("sun")
+        sun.set_color(core.LColor(1.0, 0.94, 0.84, 1.0))
+        sun.set_direction(core.LVector3(*(-part for part in SUN)))
+        sky = core.AmbientLight("sky")
+        sky.set_color(core.LColor(0.75, 0.78, 0.82, 1.0))
+        for light in (sun, sky):
+            self.root.set_light(self.root.attach_new_node(light))
+
+
+def _stretch(node: Any, start: FloatArray, end: FloatArray, radius: float) -> None:
+    """Set a bar of length and radius 1 along z to lie between two points."""
+    axis = end - start
+    length = float(np.linalg.norm(axis))
+    z = axis / length
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    x = x / np.linalg.norm(x)
+    rows = [*(radius * x), 0.0, *(radius * np.cross(z, x)), 0.0, *axis, 0.0, *start, 1.0]
+    node.set_mat(core.LMatrix4f(*(float(value) for value in rows)))
+
+
+def _geometry(name: str, mesh: Mesh) -> Any:
+    layout = core.GeomVertexFormat.get_v3n3()
+    table = core.GeomVertexData(name, layout, core.Geom.UH_static)
+    table.unclean_set_num_rows(len(mesh.points))
+    rows = np.hstack([mesh.points, mesh.normals]).astype(np.float32)
+    memoryview(table.modify_array(0)).cast("B")[:] = rows.tobytes()
+    triangles = core.GeomTriangles(core.Geom.UH_static)
+    triangles.set_index_type(core.Geom.NT_uint32)
+    corners = triangles.modify_vertices()
+    corners.unclean_set_num_rows(mesh.faces.size)
+    memoryview(corners).cast("B")[:] = mesh.faces.astype(np.uint32).tobytes()
+    geometry = core.Geom(table)
+    geometry.add_primitive(triangles)
+    node = core.GeomNode(name)
+    node.add_geom(geometry)
+    return node
+
+
+def _noise(edge: int = 256) -> Any:
+    """Return a texture of smooth noise that repeats without a seam."""
+    random = np.random.default_rng(7)
+    total = np.zeros((edge, edge))
+    for octave in range(2, 8):
+        cells = 2**octave
+        # A spectrum cut off at the octave's frequency repeats by itself.
+        waves = np.fft.fft2(random.normal(size=(edge, edge)))
+        rate = np.hypot(*np.meshgrid(np.fft.fftfreq(edge), np.fft.fftfreq(edge))) * edge
+        layer = np.fft.ifft2(waves * (rate < cells)).real
+        total += layer / layer.std() / octave
+    scaled = np.clip(0.5 + 0.18 * total / total.std(), 0.0, 1.0)
+    texture = core.Texture("noise")
+    texture.setup_2d_texture(edge, edge, core.Texture.T_unsigned_byte, core.Texture.F_luminance)
+    texture.set_ram_image((255.0 * scaled).astype(np.uint8).tobytes())
+    texture.set_minfilter(core.SamplerState.FT_linear_mipmap_linear)
+    texture.set_wrap_u(core.SamplerState.WM_repeat)
+    texture.set_wrap_v(core.SamplerState.WM_repeat)
+    return texture

@@ -1,0 +1,189 @@
+"""More unkind devices: what no report asked for, and faults that come together."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from streams.unkind import (
+    ROWS,
+    START,
+    Clock,
+    Drawn,
+    received,
+    regular,
+)
+
+from labcrane.streams.sync.correction import Treatment
+from labcrane.streams.sync.raw import RawStream
+from labcrane.streams.sync.report.certificate import Fault
+
+
+def clean_probes(random):
+    """Short ways of any asymmetry, as on one switch: little can hide."""
+    clock = Clock(random)
+    clock.ppm = random.uniform(-400, 400)
+    way = random.uniform(1.2e-5, 4e-5)
+    return received(random, clock, regular(random, 250.0), 250.0, way=way, limit_ms=0.02)
+
+
+def one_by_one(random):
+    """Samples that come in bursts, each stamped when its program gets it."""
+    rate = float(random.choice([100.0, 250.0, 256.0]))
+    times = regular(random, rate)
+    size = int(random.integers(4, 40))
+    times = times[: len(times) // size * size]
+    last = times.reshape(-1, size)[:, -1]
+    sent = last + 0.005 + random.exponential(random.uniform(1e-3, 5e-3), len(last))
+    sent = np.maximum.accumulate(sent)
+    each = random.uniform(0.0, 2e-4)  # none where a whole chunk has one stamp
+    stamped = (sent[:, None] + each * np.arange(size)).ravel()
+    mean = float(np.mean(stamped - times))
+    return received(
+        random, Clock(random), times, rate, stamped=stamped, sent=stamped,
+        treatment=Treatment(rate, latency_s=mean),
+        faults=frozenset({Fault.LATE_STAMPS}), clean=False,
+    )  # fmt: skip
+
+
+def wrong_rate(random):
+    told = float(random.choice([100.0, 250.0, 500.0]))
+    real = told * (1 + random.choice([-1, 1]) * random.uniform(0.004, 0.08))
+    return received(
+        random, Clock(random), regular(random, real), told, faults=frozenset({Fault.WRONG_RATE})
+    )
+
+
+def slow_way(random):
+    times = regular(random, 250.0)
+    return received(
+        random, Clock(random), times, 250.0, sent=times + random.uniform(0.08, 0.9),
+        faults=frozenset({Fault.SLOW}), clean=False,
+    )  # fmt: skip
+
+
+def never_probed(random):
+    drawn = received(random, Clock(random), regular(random, 250.0), 250.0)
+    raw = RawStream.of(drawn.raw.stamps, None, drawn.raw.arrivals)
+    return Drawn(raw, drawn.truth, drawn.treatment, frozenset({Fault.UNPROBED}), clean=False)
+
+
+def stepping(random, low, high, most, **more):
+    clock = Clock(random)
+    times = regular(random, 250.0)
+    for at in np.linspace(times[0] + 20.0, times[-1] - 20.0, int(random.integers(1, most + 1))):
+        size = np.exp(random.uniform(np.log(low), np.log(high)))
+        clock.step(random.choice([-1, 1]) * size, at + random.uniform(-8.0, 8.0))
+    return received(random, clock, times, 250.0, **more)
+
+
+def brief(random):
+    return received(random, Clock(random), regular(random, 250.0, 6.0, 40.0), 250.0)
+
+
+def long(random):
+    clock = Clock(random)
+    clock.wander(random.uniform(1e-3, 6e-3), random.uniform(500, 2000))
+    return received(random, clock, regular(random, 50.0, 7000, 7400), 50.0)
+
+
+def few_probes(random):
+    drawn = received(random, Clock(random), regular(random, 250.0), 250.0)
+    kept = random.random(len(drawn.raw.probes)) < random.uniform(0.2, 0.5)
+    kept[[0, -1]] = True
+    raw = RawStream.of(drawn.raw.stamps, drawn.raw.probes[kept], drawn.raw.arrivals)
+    gap = np.diff(raw.probes[:, 0]).max() / 2.0
+    faults = frozenset({Fault.PROBES_MISSING} if gap > 30.0 else ())
+    return replace(drawn, raw=raw, faults=faults)
+
+
+def restarting_untold(random):
+    """Another process takes its place, and liblsl does not say so."""
+    drawn = ROWS["restarts with another clock"](random)
+    raw = RawStream.of(drawn.raw.stamps, drawn.raw.probes, drawn.raw.arrivals)
+    return Drawn(raw, drawn.truth, drawn.treatment, frozenset({Fault.STEPPED, Fault.INTERRUPTED}))
+
+
+def bad_wireless(random):
+    """Delays on both ways that hold on for seconds and come back."""
+    size, swing, phase = random.uniform(1e-3, 6e-3), random.uniform(3, 40), random.uniform(0, 6.3)
+    lean = random.uniform(0.0, 1.0)
+
+    def congestion(t, random):
+        level = size * max(np.sin(2 * np.pi * t / swing + phase), 0.0) + random.exponential(1e-3)
+        return level * lean, level * (1.0 - lean)
+
+    return received(
+        random, Clock(random), regular(random, 250.0), 250.0, way=random.uniform(3e-4, 1e-3),
+        reply=random.uniform(1e-3, 8e-3), congestion=congestion, clean=False,
+        perhaps=frozenset({Fault.CONGESTED}),
+    )  # fmt: skip
+
+
+def together(random):
+    """A fault of the clock, one of the samples and one of the way, each there or not."""
+    clock, faults = Clock(random), set()
+    rate = float(random.choice([60.0, 100.0, 250.0, 500.0]))
+    times = regular(random, rate)
+    match random.integers(4):
+        case 0:
+            clock.step(
+                random.choice([-1, 1]) * random.uniform(0.05, 10), START + random.uniform(50, 150)
+            )
+            faults.add(Fault.STEPPED)
+        case 1:
+            begin = START + random.uniform(50, 100)
+            clock.slew(
+                random.choice([-1, 1]) * random.uniform(300e-6, 700e-6),
+                begin, begin + random.uniform(30, 60),
+            )  # fmt: skip
+            faults.add(Fault.SLEWED)
+        case 2:
+            clock.wander(random.uniform(1e-3, 3e-3), random.uniform(50, 80))
+    match random.integers(4):
+        case 0:
+            kept = random.random(len(times)) > random.uniform(0.001, 0.003)
+            kept[:50], kept[120] = True, False
+            times = times[kept]
+            faults.add(Fault.LOST)
+        case 1:
+            times = np.sort(times + random.normal(0.0, 0.2 / rate, len(times)))
+        case 2:
+            at = int(random.uniform(0.3, 0.7) * len(times))
+            times[at:] = times[at] + (times[at:] - times[at]) / random.uniform(1.003, 1.01)
+            faults.add(Fault.CHANGED_RATE)
+    sent = times.copy()
+    if random.integers(2):
+        for _ in range(int(random.integers(2, 10))):
+            begin, length = random.uniform(times[0] + 5, times[-1] - 20), random.uniform(1.5, 5.0)
+            held = (times >= begin) & (times < begin + length)
+            sent[held] = np.maximum(sent[held], begin + length)
+        faults.add(Fault.STALLED)
+    reply = random.uniform(1e-4, 2e-3) if random.integers(2) else 0.0
+    perhaps = faults & {Fault.SLEWED} if reply else set()  # scattered probes show no knee
+    return received(
+        random, clock, times, rate, sent=sent, reply=reply,
+        faults=frozenset(faults - perhaps), perhaps=frozenset(perhaps), clean=False,
+    )  # fmt: skip
+
+
+STEPPED = frozenset({Fault.STEPPED})
+EITHER = frozenset({Fault.STEPPED, Fault.SLEWED})
+
+MORE: dict[str, Callable] = {
+    "samples of bursts stamped one by one": one_by_one,
+    "two or three faults at once": together,
+    "wireless that comes and goes": bad_wireless,
+    "small steps of its clock": lambda r: stepping(r, 5e-3, 5e-2, 1, faults=STEPPED),
+    "steps too small to tell": lambda r: stepping(r, 5e-4, 5e-3, 3, clean=False, perhaps=EITHER),
+    "steps again and again": lambda r: stepping(r, 0.05, 5.0, 8, faults=STEPPED),
+    "another process, untold": restarting_untold,
+    "never probed": never_probed,
+    "most probes lost": few_probes,
+    "wrong nominal rate": wrong_rate,
+    "sent long after they were stamped": slow_way,
+    "seconds only": brief,
+    "two hours, wandering": long,
+    "steady, clean probes": clean_probes,
+}
+
+ALL = {**ROWS, **MORE}
