@@ -5,10 +5,10 @@ of the computer in turn: see ``needs`` and ``pytest_runtest_protocol``.
 """
 
 import atexit
-import fcntl
 import os
 import shutil
 import signal
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,7 +22,9 @@ from labcrane.streams.network import LOOPBACK
 _FOLDER = Path(tempfile.mkdtemp(prefix="labcrane-tests-"))
 atexit.register(shutil.rmtree, _FOLDER, ignore_errors=True)
 _CONFIG = _FOLDER / "lsl_api.cfg"
-_CONFIG.write_text(LOOPBACK.replace("[lab]", f"[lab]\nSessionID = labcrane-tests-{os.getpid()}"))
+_CONFIG.write_text(
+    LOOPBACK.replace("[lab]", f"[lab]\nSessionID = labcrane-tests-{os.getpid()}"), encoding="utf-8"
+)
 os.environ["LSLAPICFG"] = str(_CONFIG)
 # One thread each: the processes would take the cores from each other.
 for _library in ("OMP", "OPENBLAS", "MKL"):
@@ -46,6 +48,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_xdist_auto_num_workers() -> int:
     """Return how many processes ``-n auto`` starts."""
+    if sys.platform == "win32":
+        return os.cpu_count() or 1
     return len(os.sched_getaffinity(0)) + WAITING
 
 
@@ -70,17 +74,25 @@ def _shares(item: pytest.Item) -> bool:
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     """Let a test that is ``quiet`` run while no other process of this run has one."""
     quiet = item.get_closest_marker("quiet") is not None
-    with _turn(fcntl.LOCK_EX if quiet else fcntl.LOCK_SH):
+    with _turn(alone=quiet):
         return (yield)
 
 
 @contextmanager
-def _turn(how: int) -> Iterator[None]:
+def _turn(*, alone: bool) -> Iterator[None]:
+    if sys.platform == "win32":  # its locks are not shared; such tests are Unix's, or by themselves
+        yield
+        return
+    import fcntl
+
     folder = Path(os.environ[TURNS])
-    with (folder / "queue").open("w") as queue, (folder / "computer").open("w") as computer:
+    with (
+        (folder / "queue").open("w", encoding="utf-8") as queue,
+        (folder / "computer").open("w", encoding="utf-8") as computer,
+    ):
         # Whoever wants the computer alone waits in the queue; nobody overtakes.
         fcntl.flock(queue, fcntl.LOCK_EX)
-        fcntl.flock(computer, how)
+        fcntl.flock(computer, fcntl.LOCK_EX if alone else fcntl.LOCK_SH)
         fcntl.flock(queue, fcntl.LOCK_UN)
         yield
 

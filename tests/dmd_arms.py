@@ -29,7 +29,7 @@ def standing(scene: str | None = None, folder: Path | None = None, **settings) -
     """Yield an open arm in a scene, and what finds things in its state."""
     machine = load_machine("ied_arm.yaml", RETRIEVAL)
     if scene is not None and folder is not None:
-        (folder / "scene.yaml").write_text(scene)
+        (folder / "scene.yaml").write_text(scene, encoding="utf-8")
         settings["scenes"] = (folder / "scene.yaml",)
     arm = build(machine, **settings)
     signal = Signal("valve.signal", "1", machine.names)

@@ -15,7 +15,7 @@ def run(*command: object, cwd: Path | None = None) -> "subprocess.CompletedProce
         cwd=cwd,
         env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1", "PIP_DISABLE_PIP_VERSION_CHECK": "1"},
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
     )
 
@@ -37,9 +37,9 @@ def environment(folder: Path) -> Path:
     outer = [path for path in sys.path if path.endswith("site-packages")]
     # addsitedir also reads the .pth files of what is installed as editable.
     lines = [f"import site; site.addsitedir({path!r})\n" for path in outer]
-    (here / "outer.pth").write_text("".join(lines))
+    (here / "outer.pth").write_text("".join(lines), encoding="utf-8")
     for program in ("labcrane", "pytest"):
         path = folder / "bin" / program
-        path.write_text(f'#!/bin/sh\nexec "{python}" -m {program} "$@"\n')
+        path.write_text(f'#!/bin/sh\nexec "{python}" -m {program} "$@"\n', encoding="utf-8")
         path.chmod(0o755)
     return python

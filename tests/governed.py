@@ -37,8 +37,10 @@ class Lab:
 
     def __post_init__(self) -> None:
         self.protocol = self.folder / "study.yaml"
-        self.protocol.write_text(self.text)
-        (self.folder / "consent_v2.txt").write_text("I take part.\nI can stop at any time.\n")
+        self.protocol.write_text(self.text, encoding="utf-8")
+        (self.folder / "consent_v2.txt").write_text(
+            "I take part.\nI can stop at any time.\n", encoding="utf-8"
+        )
         self.places = Places(self.folder / "data")
 
     @property
@@ -70,9 +72,9 @@ class Lab:
 
 def edit(path: Path, old: str, new: str) -> None:
     """Change what a file says in one place."""
-    text = path.read_text()
+    text = path.read_text(encoding="utf-8")
     assert old in text
-    path.write_text(text.replace(old, new, 1))
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
 
 
 class Willing(ScriptedConsole):

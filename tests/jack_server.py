@@ -20,7 +20,7 @@ def a_jack_server(folder: Path, *, real_time: bool = False) -> Iterator[tuple[st
         if real_time
         else ["--no-realtime"]
     )
-    with log.open("w") as file:
+    with log.open("w", encoding="utf-8") as file:
         server = subprocess.Popen(["jackd", "-n", name, *how, *driver], stdout=file, stderr=file)
         try:
             waiting = ["jack_wait", "-s", name, "-w", "-t", "20"]
@@ -33,4 +33,4 @@ def a_jack_server(folder: Path, *, real_time: bool = False) -> Iterator[tuple[st
 
 def underruns(log: Path) -> list[str]:
     """Return what a JACK server has to say of blocks that were not there in time."""
-    return [line for line in log.read_text().splitlines() if "XRun" in line]
+    return [line for line in log.read_text(encoding="utf-8").splitlines() if "XRun" in line]

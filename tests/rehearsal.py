@@ -38,7 +38,7 @@ sessions:
 
 def a_study(folder: Path, text: str = SHORT) -> Study:
     path = folder / "study.yaml"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     return load(path, discover())
 
 

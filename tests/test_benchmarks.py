@@ -47,7 +47,7 @@ def test_a_ratio_above_its_limit_is_named_and_fails_the_check(
 
 def test_the_table_is_what_was_measured_with_every_limit(benchmarks: types.ModuleType) -> None:
     benchmarks.main([])
-    *_, fine, slow = benchmarks.RESULTS.read_text().splitlines()
+    *_, fine, slow = benchmarks.RESULTS.read_text(encoding="utf-8").splitlines()
     assert fine.startswith("| fine | a step, us | 3 | a bare one | 3 | 1.00 | 2.00 | 20")
     assert slow.startswith("| slow | a step, us | 6.3 | a bare one | 3 | 2.10 | 2.00 | 20")
 

@@ -26,7 +26,7 @@ joints:
 
 def complaint(folder: Path, text: str) -> str:
     """Return what is said of a machine file with ``text``, with the file's name alone."""
-    (folder / "digger.yaml").write_text(text)
+    (folder / "digger.yaml").write_text(text, encoding="utf-8")
     with pytest.raises(ProtocolError) as refusal:
         load_machine("digger.yaml", folder)
     return str(refusal.value).replace(f"{folder}/", "")
@@ -69,7 +69,7 @@ def test_every_bundled_machine_can_be_read() -> None:
 
 
 def test_a_machine_beside_the_study_is_read_in_degrees_and_gives_radians(tmp_path: Path) -> None:
-    (tmp_path / "digger.yaml").write_text(GOOD)
+    (tmp_path / "digger.yaml").write_text(GOOD, encoding="utf-8")
     machine = load_machine("digger.yaml", tmp_path)
     assert machine.names == ("slew", "boom", "stick")
     assert machine.speeds[0] == pytest.approx(math.pi / 9)

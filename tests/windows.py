@@ -97,7 +97,7 @@ def an_x_server(*more: str) -> Iterator[str]:
     ]
     server = subprocess.Popen(arguments, pass_fds=[write], stderr=subprocess.DEVNULL)
     os.close(write)
-    with os.fdopen(read) as numbers:
+    with os.fdopen(read, encoding="utf-8") as numbers:
         number = numbers.readline().strip()
     try:
         yield f":{number}"

@@ -266,7 +266,7 @@ def _unfinished(session: SessionRecord) -> str | None:
 
 def _planned(protocol: str) -> int:
     """Return how many sessions a protocol has."""
-    content = parse_yaml(protocol, "the recorded protocol")
+    content = parse_yaml(protocol, "the recorded protocol", recorded=True)
     sessions = content.get("sessions") if isinstance(content, dict) else None
     if not isinstance(sessions, list):
         raise RecordingError("the recorded protocol has no sessions: the file was changed")

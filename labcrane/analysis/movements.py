@@ -88,7 +88,8 @@ def groups(session: SessionRecord) -> dict[str, "pd.DataFrame"]:
 
 def machine_of(session: SessionRecord) -> Machine:
     """Return the machine that was operated."""
-    return Machine.model_validate(parse_yaml(session.context["machine"], "the recorded machine"))
+    text = session.context["machine"]
+    return Machine.model_validate(parse_yaml(text, "the recorded machine", recorded=True))
 
 
 def movements_of(session: SessionRecord) -> Iterator[Movement]:

@@ -21,7 +21,7 @@ from .references import (
     SignalName,
     ViewName,
 )
-from .settings import Names, StudyPath, read_yaml
+from .settings import Names, StudyPath, read_yaml, was_run
 from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
 
 __all__ = [
@@ -62,4 +62,5 @@ __all__ = [
     "numeric_answers",
     "read_yaml",
     "signals_of",
+    "was_run",
 ]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import AfterValidator, ValidationInfo
 
 from labcrane.files.model import StrictModel
+from labcrane.files.model import was_run as was_run  # noqa: PLC0414 - public here
 from labcrane.files.yaml import read_yaml as read_yaml  # noqa: PLC0414 - public here
 
 if TYPE_CHECKING:

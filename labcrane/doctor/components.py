@@ -4,6 +4,7 @@ Each look is made in a process of its own: a driver that crashes or hangs is a f
 """
 
 import faulthandler
+import importlib
 import os
 import pickle
 import re
@@ -220,6 +221,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    from labcrane.doctor import components  # noqa: PLW0406 - its records have this name
-
-    sys.exit(components.main())
+    # What it sends is unpickled by the name of this module, which is not __main__.
+    sys.exit(importlib.import_module("labcrane.doctor.components").main())

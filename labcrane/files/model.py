@@ -4,7 +4,7 @@ import ast
 import inspect
 from textwrap import dedent
 
-from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
@@ -30,6 +30,28 @@ class StrictModel(BaseModel):
             if key in keys:
                 keys[key].setdefault("description", words)
         return written
+
+
+def was_run(info: ValidationInfo) -> bool:
+    """Return whether what is validated is the record of a session that was run.
+
+    A validator that only judges, and changes nothing, asks this first and lets a record pass: it
+    was accepted by the rules of its day, and by rules that came later it would be lost to replay
+    and to whoever goes on with the session.
+
+    Examples
+    --------
+    >>> class Lamp(Settings):
+    ...     colours: tuple[str, ...]
+    ...
+    ...     @field_validator("colours")
+    ...     @classmethod
+    ...     def _differ(cls, colours: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+    ...         if not was_run(info) and len(set(colours)) < len(colours):
+    ...             raise ValueError("a colour is there twice")
+    ...         return colours
+    """
+    return bool(info.context and info.context.get("recorded"))
 
 
 def descriptions(model: type[BaseModel]) -> dict[str, str]:

@@ -50,6 +50,8 @@ class YamlFile:
     ----------
     path
         As the user wrote it.
+    recorded
+        Whether it was run, and is a record: rules that only judge do not hold for it.
     text
         The file, as it is.
     data
@@ -61,13 +63,15 @@ class YamlFile:
     data: Any
     _marked: Any = None
     _problems: list[tuple[int, int, str]] = field(default_factory=list)
+    recorded: bool = False
 
     @classmethod
-    def read(cls, path: Path) -> "YamlFile":
+    def read(cls, path: Path, *, recorded: bool = False) -> "YamlFile":
         """Read ``path``; a file that is missing or no YAML raises :class:`ProtocolError`."""
         text = read_text(path)
-        marked = _load(text, str(path))
-        return cls(path, text, _plain(marked, str(path)), marked)
+        marked = _load(text, str(path), recorded=recorded)
+        data = _plain(marked, str(path), recorded=recorded)
+        return cls(path, text, data, marked, recorded=recorded)
 
     def line(self, place: Place) -> int:
         """Return the line, counted from 1, of the key or list item at ``place``.
@@ -130,7 +134,8 @@ class YamlFile:
             self.problem(place, f"{_name(place)} must be a mapping of keys, but is {value!r}")
             return None
         try:
-            return model.model_validate(value, context={"folder": self.path.parent})
+            context = {"folder": self.path.parent, "recorded": self.recorded}
+            return model.model_validate(value, context=context)
         except ValidationError as error:
             for at, message in _told(error.errors(), place, model):
                 self.problem((*place, *_inside(value, at)), message)
@@ -330,28 +335,31 @@ def read_yaml(path: Path) -> Any:
     return parse_yaml(read_text(path), str(path))
 
 
-def parse_yaml(text: str, name: str) -> Any:
+def parse_yaml(text: str, name: str, *, recorded: bool = False) -> Any:
     """Return the content of a text of YAML as plain values, dates as dates.
 
     Parameters
     ----------
     name
         What the text is, for the message when it is none.
+    recorded
+        Whether it is part of a record: characters that are no writing, and anchors given twice,
+        were once let in.
 
     Raises
     ------
     ProtocolError
         It is no YAML, or longer, deeper or larger behind its aliases than may be.
     """
-    return _plain(_load(text, name), name)
+    return _plain(_load(text, name, recorded=recorded), name, recorded=recorded)
 
 
-def _scalar(node: Any, name: str) -> Any:
+def _scalar(node: Any, name: str, *, recorded: bool) -> Any:
     if node is None or isinstance(node, bool | date | bytes):
         return node
     if isinstance(node, int) and node.bit_length() > MOST_BITS:
         raise ProtocolError(f"{name} holds a whole number of {node.bit_length()} bits; write less")
-    if isinstance(node, str) and (sign := foreign(node)) is not None:
+    if isinstance(node, str) and not recorded and (sign := foreign(node)) is not None:
         raise ProtocolError(
             f"{name} holds the character U+{ord(sign):04X} in {str(node)[:40]!r}, which is no "
             "writing; leave it out"
@@ -362,7 +370,7 @@ def _scalar(node: Any, name: str) -> Any:
     raise ProtocolError(f"{name} holds {str(node)[:40]!r} with a tag; write plain values")
 
 
-def _load(text: str, name: str) -> Any:
+def _load(text: str, name: str, *, recorded: bool = False) -> Any:
     try:
         check_size(len(text), "YAML file", "it")
     except LimitError as error:
@@ -377,7 +385,7 @@ def _load(text: str, name: str) -> Any:
     try:
         # Also where no line is asked for: the plain loader copies each merge into the next.
         with warnings.catch_warnings():
-            warnings.simplefilter("error", ReusedAnchorWarning)
+            warnings.simplefilter("ignore" if recorded else "error", ReusedAnchorWarning)
             return YAML(typ="rt", pure=True).load(text)
     except ReusedAnchorWarning as error:
         raise ProtocolError(
@@ -428,7 +436,7 @@ def _too_deep(text: str) -> int | None:
     return None
 
 
-def _plain(node: Any, name: str) -> Any:
+def _plain(node: Any, name: str, *, recorded: bool = False) -> Any:
     """Return a node as plain values; what aliases repeat is counted as often as it is there."""
     left = [MOST_VALUES]
 
@@ -443,6 +451,6 @@ def _plain(node: Any, name: str) -> Any:
             return {str(key): plain(value, depth + 1) for key, value in node.items()}
         if isinstance(node, list | tuple | Set):
             return [plain(value, depth + 1) for value in node]
-        return _scalar(node, name)
+        return _scalar(node, name, recorded=recorded)
 
     return plain(node, 0)

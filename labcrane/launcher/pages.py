@@ -45,6 +45,7 @@ def pages(
         free_port(where.host, where.port),
         cameras_of(visit.study) if feedback else {},
         *_tls(visit.study.path, where),
+        recorded=visit.study.recorded,
     )
     if where.host not in LOOPBACK and order.certificate is None:
         say(

@@ -4,6 +4,7 @@ To the session go messages, each JSON of a declared size; from it come events an
 records.
 """
 
+import importlib
 import pickle
 import queue
 import signal
@@ -104,6 +105,5 @@ def _ended(run: Callable[[], None]) -> Ended:
 
 
 if __name__ == "__main__":
-    from labcrane.launcher import session_process  # noqa: PLW0406 - its records have this name
-
-    sys.exit(session_process.main())
+    # What it sends is unpickled by the name of this module, which is not __main__.
+    sys.exit(importlib.import_module("labcrane.launcher.session_process").main())

@@ -31,12 +31,12 @@ def find_machine(name: str, beside: Path | None = None) -> Path:
     )
 
 
-def load_machine(name: str, beside: Path | None = None) -> Machine:
-    """Read machine ``name``.
+def load_machine(name: str, beside: Path | None = None, *, recorded: bool = False) -> Machine:
+    """Read machine ``name``; ``recorded`` is whether it is of a session that was run.
 
     Raises
     ------
     ProtocolError
         The machine does not exist, or its file is wrong; the message names file and line.
     """
-    return YamlFile.read(find_machine(name, beside)).checked(Machine)
+    return YamlFile.read(find_machine(name, beside), recorded=recorded).checked(Machine)

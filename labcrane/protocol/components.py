@@ -172,7 +172,7 @@ class ComponentResolver:
         if not isinstance(name, str):
             return None
         try:
-            machine = load_machine(name, folder)
+            machine = load_machine(name, folder, recorded=self._source.recorded)
             return machine, find_machine(name, folder).read_text(encoding="utf-8")
         except ProtocolError as error:
             self._source.problem(("machine",), str(error))

@@ -11,11 +11,13 @@ from pydantic import (
     Field,
     PositiveFloat,
     PositiveInt,
+    ValidationInfo,
     create_model,
     field_validator,
 )
 
 from labcrane.analysis.indicator_settings import IndicatorSettings
+from labcrane.files.model import was_run
 from labcrane.files.names import misfit
 from labcrane.files.yaml import YamlFile
 from labcrane.protocol.design import Design
@@ -26,8 +28,8 @@ from labcrane.protocol.streams import StreamNeed, TimeLimits
 from labcrane.registry.hookspecs import ROLES
 
 
-def _names_a_folder(name: str) -> str:
-    if why := misfit(name, person=False):
+def _names_a_folder(name: str, info: ValidationInfo) -> str:
+    if not was_run(info) and (why := misfit(name, person=False)):
         raise ValueError(f"{name!r} {why}")
     return name
 
@@ -189,15 +191,17 @@ def protocol_model() -> type[Protocol]:
     return create_model("Protocol", __base__=Protocol, **more) if more else Protocol
 
 
-def read(path: Path) -> tuple[Protocol | None, YamlFile]:
+def read(path: Path, *, recorded: bool = False) -> tuple[Protocol | None, YamlFile]:
     """Read a protocol file; mistakes are noted in the file that is returned.
+
+    ``recorded`` is whether it has been run, and is not judged again.
 
     Raises
     ------
     ProtocolError
         The file does not exist or is no YAML.
     """
-    source = YamlFile.read(path)
+    source = YamlFile.read(path, recorded=recorded)
     if not isinstance(source.data, dict):
         source.problem((), "a protocol is a mapping of keys, beginning with 'labcrane: 1'")
         return None, source

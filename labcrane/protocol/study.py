@@ -46,6 +46,10 @@ class Study:
         Components of roles that have no place of their own here, by the part they play.
     oversight
         Watches over all components that are built.
+    recorded
+        Whether it was read as the record of what was run.
+    outdated
+        What would be refused of it today, where it is gone on with as it was begun.
     """
 
     path: Path
@@ -67,6 +71,8 @@ class Study:
     monitors: dict[str, ComponentSpec] | None = None
     others: Mapping[str, ComponentSpec] = field(default_factory=dict)
     oversight: CallMonitor = field(default_factory=CallMonitor)
+    recorded: bool = False
+    outdated: str = ""
 
     @property
     def sha256(self) -> str:
@@ -145,7 +151,8 @@ class Study:
                 f"participant {participant!r} does not match the protocol's pattern '{pattern}'; "
                 "give the pseudonym as it was handed out, or correct participants: pattern:"
             )
-        check_name(participant, "participant")
+        if not self.recorded:
+            check_name(participant, "participant")
 
     def check_session(self, number: int) -> None:
         """Raise :class:`ProtocolError` unless the protocol has session ``number``."""
@@ -165,6 +172,12 @@ class Checker:
     def check(self, tasks: Mapping[str, Task], asked: Mapping[str, Questionnaire]) -> None:
         """Note every such mistake, given the tasks and questionnaires that could be built."""
         self._check_feedback()
+        self._check_blocks(tasks)
+        if len(tasks) == len(self._protocol.tasks):
+            self._check_order(tasks)
+        self._check_stop_rules(asked)
+        if self._source.recorded:
+            return  # what follows changes nothing of what was run, and was once accepted
         self._check_names()
         if self._protocol.participants.ends_early:
             self._source.misnamed(
@@ -173,10 +186,6 @@ class Checker:
                 "nobody; ^ stands at a name's beginning only and $ at its end, and neither is "
                 "needed",
             )
-        self._check_blocks(tasks)
-        self._check_stop_rules(asked)
-        if len(tasks) == len(self._protocol.tasks):
-            self._check_order(tasks)
 
     def _check_names(self) -> None:
         """Note two sessions of one name."""
@@ -261,14 +270,15 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
     Parameters
     ----------
     recorded
-        Whether it has been run: what its components refer to was there, and is not looked up again.
+        Whether it has been run: it was accepted by the rules of its day, and rules that only judge
+        are not held against it; what its components refer to was there, and is not looked up again.
 
     Raises
     ------
     ProtocolError
         With one line for every mistake: file, line, what was written, what is possible.
     """
-    protocol, source = read(path)
+    protocol, source = read(path, recorded=recorded)
     chooser = ComponentResolver(source, registry)
     machine = chooser.machine()
     device = chooser.choose(InputDevice, ("input",))
@@ -321,4 +331,5 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
         monitors=monitors,
         others=others,
         oversight=chooser.oversight,
+        recorded=recorded,
     )

@@ -91,7 +91,8 @@ class DataFolder:
         RecordingError
             It cannot be written.
         """
-        check_name(self.participant, "participant")
+        if not self.path.is_dir():  # of a recording that was begun before there was a white list
+            check_name(self.participant, "participant")
         self._refuse_twin()
         if self.path.is_symlink():
             raise RecordingError(

@@ -28,7 +28,11 @@ def restore(
     """
     if protocol is not None and machine is None:
         return protocol
-    content = read_yaml(protocol) if protocol else parse_yaml(record.protocol, "the protocol")
+    content = (
+        read_yaml(protocol)
+        if protocol
+        else parse_yaml(record.protocol, "the protocol", recorded=True)
+    )
     described = machine.read_text(encoding="utf-8") if machine else record.context["machine"]
     (folder / "machine.yaml").write_text(described, encoding="utf-8")
     content["machine"] = "machine.yaml"
@@ -69,8 +73,8 @@ def differing_parts(record: SessionRecord, study: Study) -> tuple[str, ...]:
     """Return every part that matters and is not what it was, in words."""
     context = record.context
     found = list(_versions(context.get("versions", {})))
-    then = parse_yaml(context["machine"], "the machine as it was")
-    now = parse_yaml(study.machine_text, f"the machine of {study.path}")
+    then = parse_yaml(context["machine"], "the machine as it was", recorded=True)
+    now = parse_yaml(study.machine_text, f"the machine of {study.path}", recorded=True)
     found += _compared("machine", then, now)
     for part, choice in study.choices.items():
         if part.startswith(MOVING):

@@ -260,11 +260,10 @@ def remaining(study: Study, plan: SessionPlan, so_far: Progress, policy: Policy)
     when the policy is to redo the block; a trial that was cut off is redone unless the policy is to
     continue with the next one. What is run again is a new attempt.
     """
-    warm_up = WarmUp()
     steps = []
     for step in plan.steps:
         if step.block:
-            block = _rest(study, plan, step.block, so_far, policy, warm_up)
+            block = _rest(study, plan, step.block, so_far, policy)
             if block.trials or block.owed:
                 steps.append(replace(step, block=block))
         elif step.questionnaires:
@@ -289,21 +288,17 @@ def _rest(
     block: PlannedBlock,
     so_far: Progress,
     policy: Policy,
-    warm_up: WarmUp,
 ) -> PlannedBlock:
-    wanted = warm_up.begin(block)
-    before = warm_up.streak
-    for trial in block.trials:
-        if trial.planned.counted and trial.number in so_far.done:
-            warm_up.count(block, so_far.done[trial.number])
+    warm_up = _warm_up(plan, block, so_far)
     left: list[Trial] = []
-    if wanted and not warm_up.over:
+    if not warm_up.over:
         left = [trial for trial in block.trials if trial.number not in so_far.done]
     begun = [trial.number for trial in block.trials if trial.number in so_far.attempts]
     if policy == "redo_block" and left and begun:
         attempt = 1 + max(so_far.attempts[number] for number in begun)
         again = [next_attempt(study, plan, trial, attempt) for trial in block.trials]
-        return replace(block, trials=tuple(again), streak=before)
+        before = _warm_up(plan, block, so_far, but=block)
+        return replace(block, trials=tuple(again), streak=before.streak)
     if policy == "continue":
         cut_off = so_far.broken | ({so_far.interrupted["trial"]} if so_far.interrupted else set())
         left = [trial for trial in left if trial.number not in cut_off]
@@ -315,6 +310,42 @@ def _rest(
     ]
     owed = tuple(_owed(block, so_far))
     return replace(block, trials=tuple(again), owed=owed, streak=warm_up.streak)
+
+
+def _warm_up(
+    plan: SessionPlan, block: PlannedBlock, so_far: Progress, but: PlannedBlock | None = None
+) -> WarmUp:
+    """Return how far the practice has come that a block is a round of, leaving one round out.
+
+    Trials count in the order in which they were done, as they did when it ran: one that was passed
+    over may have been done after those that follow it.
+    """
+    warm_up = WarmUp()
+    if block.until is None:
+        return warm_up
+    counted = {
+        trial.number
+        for each in _rounds(plan, block)
+        if each is not but
+        for trial in each.trials
+        if trial.planned.counted
+    }
+    for number, outcome in so_far.done.items():
+        if number in counted:
+            warm_up.count(block, outcome)
+    return warm_up
+
+
+def _rounds(plan: SessionPlan, block: PlannedBlock) -> list[PlannedBlock]:
+    """Return all rounds of the practice that a block is one of."""
+    rounds: list[PlannedBlock] = []
+    for each in plan.blocks:
+        rounds.append(each)
+        if each.until is None or each.last:
+            if block in rounds:
+                return [one for one in rounds if one.until is not None]
+            rounds = []
+    return [block]
 
 
 def _owed(block: PlannedBlock, so_far: Progress) -> Iterator[Owed]:

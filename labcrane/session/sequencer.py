@@ -190,11 +190,11 @@ class Sequencer:
         for owed in block.owed:
             yield from self._ask(owed.questionnaire, owed.answered, owed.after)
         for trial in block.trials:
+            if self._held.ending or (block.until and self._warm_up.over):
+                break  # also at once: it may have been begun for what was still to be asked
             yield from self._trial(block, trial)
             for name in block.ask if trial.planned.counted else ():
                 yield from self._ask(name, {}, trial)
-            if self._held.ending or (block.until and self._warm_up.over):
-                break
         self._note("block.end", **about)
         if not self._held.ending and (verdict := self._warm_up.verdict(block)) is not None:
             self._note("practice.end", **about, **verdict)

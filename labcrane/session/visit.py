@@ -1,14 +1,18 @@
 """Visit of a participant: which session is to be run, of whom, how, and where it is recorded."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
+from labcrane.errors import ProtocolError
+from labcrane.files.yaml import read_text
 from labcrane.protocol.study import Study, load
 from labcrane.recording.crash_marker import whereabouts_path
 from labcrane.recording.data_folder import DataFolder
-from labcrane.recording.paths import journal_path
+from labcrane.recording.journal import START
+from labcrane.recording.journal_reader import read_journal
+from labcrane.recording.paths import journal_path, parts
 from labcrane.registry.registry import discover
 from labcrane.session.resume import Policy
 
@@ -76,20 +80,38 @@ class Visit:
     def __reduce__(self) -> tuple[Any, ...]:
         """Cross to another process by the names of things: the study is loaded again there."""
         rest = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "study"}
-        return _again, (self.study.path, rest)
+        return _again, (self.study.path, self.study.recorded, rest)
 
 
 def visit_of(protocol: Path, participant: str, session: int, data: Path, **options: Any) -> Visit:
     """Return a visit of the study in ``protocol``; ``options`` are the visit's other attributes.
+
+    A session that was begun can be gone on with as its protocol was then, whatever would be refused
+    of it today: :attr:`Study.outdated` says what.
 
     Raises
     ------
     ProtocolError
         The protocol is not as it should be.
     """
-    study = load(protocol, discover(study=protocol))
+    registry = discover(study=protocol)
+    try:
+        study = load(protocol, registry)
+    except ProtocolError as error:
+        who = {name: options.get(name, False) for name in ("pilot", "simulated")}
+        journal = journal_path(DataFolder(data, participant, **who).path, session, "run")
+        if not (options.get("resumed") and _was_begun_with(protocol, journal)):
+            raise
+        study = replace(load(protocol, registry, recorded=True), outdated=str(error))
     return Visit(study, participant, session, data, **options)
 
 
-def _again(protocol: Path, rest: Mapping[str, Any]) -> Visit:
-    return Visit(load(protocol, discover(study=protocol)), **rest)
+def _was_begun_with(protocol: Path, journal: Path) -> bool:
+    """Whether a session was begun with a protocol of just this text."""
+    log, _ = read_journal(parts(journal))
+    begun = [event.data.get("protocol") for event in log.events if event.name == START]
+    return read_text(protocol) in begun
+
+
+def _again(protocol: Path, recorded: bool, rest: Mapping[str, Any]) -> Visit:  # noqa: FBT001
+    return Visit(load(protocol, discover(study=protocol), recorded=recorded), **rest)

@@ -1,5 +1,6 @@
 """The page process: a web server, and messages from and to the launcher."""
 
+import importlib
 import mimetypes
 import os
 import signal
@@ -67,6 +68,7 @@ class PageConfig:
     certificate: Path | None = None
     key: Path | None = None
     keys: Keys = field(default_factory=Keys)
+    recorded: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +113,7 @@ def serve(order: PageConfig, parent: Parent) -> None:
 
     from labcrane.web.door.guard import BoundedProtocol, Guard  # noqa: PLC0415
 
-    study = load(order.protocol, discover(study=order.protocol))
+    study = load(order.protocol, discover(study=order.protocol), recorded=order.recorded)
     plan = plan_session(study, order.participant, order.session)
     denials = Denials(lambda why: parent.tell(Command(Order.DENIED, why, "page")))
     live, pictures = Live(order.source), Pictures(order.source, order.cameras)
@@ -199,6 +201,5 @@ def _routes(app: Any, desk: PageContext) -> None:
 
 
 if __name__ == "__main__":
-    from labcrane.web import service  # noqa: PLW0406 - its records have this name
-
-    sys.exit(service.main())
+    # What it sends is unpickled by the name of this module, which is not __main__.
+    sys.exit(importlib.import_module("labcrane.web.service").main())

@@ -13,7 +13,7 @@ from pydantic import (
 )
 
 from labcrane import Machine, Settings
-from labcrane.core import ButtonName, Names
+from labcrane.core import ButtonName, Names, was_run
 
 EVENTS = ("targets.shown", "target.entered", "command.onset", "movement.onset", "movement.offset")
 """What a movement tells beside its beginning and end."""
@@ -77,8 +77,9 @@ class AimingSettings(Settings):
 
     @field_validator("distances")
     @classmethod
-    def _each_is_one(cls, distances: tuple[float, ...]) -> tuple[float, ...]:
-        if twice := [each for each in distances if distances.count(each) > 1]:
+    def _each_is_one(cls, distances: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        twice = [each for each in distances if distances.count(each) > 1]
+        if twice and not was_run(info):
             raise ValueError(
                 f"{twice[0]:g} m is there twice; write each distance once, and decimals with a "
                 "point: [1.5, 2.5, 4]"
@@ -89,7 +90,7 @@ class AimingSettings(Settings):
     @classmethod
     def _circles_are_apart(cls, width: float, info: ValidationInfo) -> float:
         shortest = min(info.data.get("distances", ()), default=math.inf)
-        if width >= shortest:
+        if width >= shortest and not was_run(info):
             raise ValueError(
                 f"a circle {width:g} m wide holds the middle of its partner {shortest:g} m away; "
                 f"write less than {shortest:g}"

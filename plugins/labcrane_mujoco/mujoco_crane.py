@@ -11,14 +11,10 @@ import numpy as np
 from labcrane import FloatArray, Machine, Run
 from labcrane.core import Crane, CraneSettings, Value
 from labcrane.machines import urdf_of
+from labcrane_mujoco.end_stops import stop_forces
 
 GRAVITY = 9.81
 """In m/s²."""
-
-LIMIT_STEPS = 2.0
-"""Time constant of a joint's limit, in ticks: the least for which the engine promises stability.
-With its own 20 ms a joint of a stretched arm goes 0.28 degrees beyond at full speed (ch8, 240 Hz;
-ch8_cranelike 1.08), so 0.105 (0.36)."""
 
 
 class MujocoCrane(Crane):
@@ -29,7 +25,7 @@ class MujocoCrane(Crane):
     the joint takes more ticks. The engine's own velocity servos cannot hold a crane at 240 Hz.
 
     No joint is asked to go beyond its limit. One that its drive cannot stop in time is stopped by
-    the engine's limit, which is soft: it lets a joint through by some tenths of a degree at most.
+    an end stop of ours: the engine's own limits are soft, and let a joint through by 0.3 degrees.
     """
 
     def __init__(self, settings: CraneSettings, machine: Machine) -> None:
@@ -46,7 +42,8 @@ class MujocoCrane(Crane):
         # What the engine cannot compute must reach the loop, not begin anew with a warning.
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT  # nothing here has a shape
-        model.jnt_solref[:] = (LIMIT_STEPS / run.rate_hz, 1.0)
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_LIMIT
+        self._mass: FloatArray = np.zeros((model.nv, model.nv))
         self._data = data = mujoco.MjData(model)
         # Views: asking the engine's structure for them costs more than using them.
         self._positions, self._velocities = data.qpos, data.qvel
@@ -98,14 +95,28 @@ class MujocoCrane(Crane):
         self._want(*accelerations)
         self._multiply()
         self._add()
+        wanted = self._torques()
         torques = [
             effort if torque > effort else -effort if torque < -effort else torque
-            for torque, effort in zip(self._torques(), self._efforts, strict=False)
+            for torque, effort in zip(wanted, self._efforts, strict=False)
         ]
         self._apply(*torques)
+        if torques != wanted[: self._joints]:  # otherwise each joint goes where it was asked to
+            self._stop()
         self._integrate()
         self._begin()
         return torques
+
+    def _stop(self) -> None:
+        """Add what the end stops push with when the drives alone do not stop a joint in time."""
+        model, data = self._model, self._data
+        mujoco.mj_fullM(model, data, self._mass)
+        # The engine's Euler step takes damping implicitly.
+        np.einsum("ii->i", self._mass)[:] += self._dt * model.dof_damping
+        force = data.qfrc_applied + data.qfrc_passive - data.qfrc_bias
+        data.qfrc_applied[: self._joints] += stop_forces(
+            self._mass, force, self._angles, self._speeds, self._limits, self._dt
+        )
 
     def _torques(self) -> list[float]:
         """Return in N m what gives the joints the accelerations wanted."""

@@ -27,7 +27,7 @@ AIMING = str(ROOT / "protocols" / "aiming" / "protocol.yaml")
 def read_start(package: Path) -> str:
     """Return what stands in a package's first file; nothing for what is no package."""
     start = package / "__init__.py"
-    return start.read_text() if start.exists() else ""
+    return start.read_text(encoding="utf-8") if start.exists() else ""
 
 
 def imported_modules(source: str) -> set[str]:
@@ -65,7 +65,7 @@ def private_names(source: str) -> list[str]:
 @pytest.mark.parametrize("plugin", PLUGINS, ids=lambda path: path.name)
 def test_a_plugin_imports_public_names_only(plugin: Path) -> None:
     for module in plugin.rglob("*.py"):
-        source = module.read_text()
+        source = module.read_text(encoding="utf-8")
         assert not private_names(source), f"{module.relative_to(ROOT)} {private_names(source)}"
         others = {name for name in imported_modules(source) if name.startswith("labcrane_")}
         assert {name.split(".")[0] for name in others} <= {plugin.name}, module
@@ -77,7 +77,9 @@ TEMPLATES = ROOT / "labcrane" / "registry" / "templates"
 @pytest.mark.parametrize("path", sorted(TEMPLATES.rglob("*.py")), ids=str)
 def test_a_new_plugin_imports_public_names_only(path: Path) -> None:
     # What an exporter's or a command's own tests export is a recording of labcrane.testing.
-    private = [n for n in private_names(path.read_text()) if "testing.exporters" not in n]
+    private = [
+        n for n in private_names(path.read_text(encoding="utf-8")) if "testing.exporters" not in n
+    ]
     assert not private
 
 
@@ -87,7 +89,7 @@ def test_a_new_plugin_imports_public_names_only(path: Path) -> None:
     ids=lambda path: path.stem,
 )
 def test_documents_import_public_names_only(page: Path) -> None:
-    blocks = re.findall(r"```python\n(.*?)```", page.read_text(), re.S)
+    blocks = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.S)
     private = [n for block in blocks for n in private_names(block)]
     assert not [n for n in private if "testing.exporters" not in n]
 
@@ -105,7 +107,7 @@ def test_there_are_few_names_at_the_top_and_none_twice() -> None:
 
 def test_core_never_imports_a_plugin() -> None:
     for module in (ROOT / "labcrane").rglob("*.py"):
-        names = imported_modules(module.read_text())
+        names = imported_modules(module.read_text(encoding="utf-8"))
         assert not {name for name in names if name.startswith("labcrane_")}, module.name
 
 
@@ -120,7 +122,7 @@ def loaded_by(*arguments: str) -> tuple[set[str], list[str]]:
     done = subprocess.run(
         [sys.executable, "-c", program, json.dumps(arguments)],
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=True,
     )
     status, modules, sources = json.loads(done.stdout.splitlines()[-1])
@@ -205,12 +207,22 @@ def test_no_import_goes_round_in_a_circle() -> None:
     order.prepare()  # raises CycleError, which names the circle
 
 
+def test_only_the_search_asks_liblsl_who_is_there() -> None:
+    asking = [
+        path.relative_to(ROOT).as_posix()
+        for folder in ("labcrane", "plugins")
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        if re.search(r"pylsl\.\w*[Rr]esolve|lsl_resolve", path.read_text(encoding="utf-8"))
+    ]
+    assert asking == ["labcrane/streams/search.py"]
+
+
 ASKED_FOR_BY_OTHERS = {"get_code", "format_commands"}  # by Python's import, and by click
 
 
 def defined(module: Path) -> Iterator[str]:
     """Yield what a module defines, but for what a decorator hands to somebody else."""
-    for node in ast.walk(ast.parse(module.read_text())):
+    for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             given = [ast.unparse(decorator) for decorator in node.decorator_list]
             if all("property" in name or "contextmanager" in name for name in given):
@@ -230,7 +242,9 @@ def defined(module: Path) -> Iterator[str]:
 def test_nothing_is_defined_that_only_tests_use() -> None:
     places = (("labcrane", "*.py*"), ("plugins", "*.py"), ("docs", "*.md"), ("benchmarks", "*.py"))
     users = [path for folder, what in places for path in (ROOT / folder).rglob(what)]
-    texts = [path.read_text() for path in users if path.suffix in {".py", ".pyi", ".md"}]
+    texts = [
+        path.read_text(encoding="utf-8") for path in users if path.suffix in {".py", ".pyi", ".md"}
+    ]
     used = Counter(word for text in texts for word in re.findall(r"\w+", text))
     idle = {
         f"{module.relative_to(ROOT)}: {name}"

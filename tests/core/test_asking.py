@@ -127,7 +127,7 @@ def test_answers_of_a_simulation_are_replayed(
     tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
     study = tmp_path / "study.yaml"
-    study.write_text(f"{HEAD}{RATINGS}")
+    study.write_text(f"{HEAD}{RATINGS}", encoding="utf-8")
     run = ["run", str(study), "--participant", "P001", "--simulate", "--fast"]
     assert main([*run, "--data", str(tmp_path)]) == 0
     file = tmp_path / "P001-SIMULATED" / "P001-SIMULATED.h5"

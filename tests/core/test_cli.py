@@ -5,10 +5,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from needs import needs
 from rehearsal import SHORT
 
 import labcrane
 from labcrane.cli.app import main
+from labcrane.registry import LAB
 
 ROOT = Path(__file__).parents[2]
 AIMING = ROOT / "protocols" / "aiming" / "protocol.yaml"
@@ -22,7 +24,7 @@ def labcrane_command(
         cwd=cwd,
         input=said,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
     )
 
@@ -37,6 +39,35 @@ def test_the_demo_names_a_participant_file_and_a_picture_that_exist(tmp_path: Pa
     assert done.stderr == ""
 
 
+@pytest.mark.parametrize(
+    ("without", "engine"),
+    [
+        pytest.param(["pybullet"], "mujoco_crane", marks=needs("mujoco")),
+        (["pybullet", "mujoco"], "kinematic_crane"),
+    ],
+)
+def test_the_demo_takes_the_best_engine_there_is_and_its_recording_is_replayed_on_it(
+    tmp_path: Path, without: list[str], engine: str
+) -> None:
+    said = command_without(without, "demo", cwd=tmp_path)
+    assert f"moved by:         {engine}\n" in said
+    assert f"without bullet_crane: it needs pybullet, which is not installed: {LAB}" in said
+    recording = next((tmp_path / "labcrane-demo").rglob("*.h5"))
+    assert engine in labcrane.open_recording(recording).session(1).context["protocol"]
+    replayed = command_without(without, "replay", str(recording), "--session", "1", cwd=tmp_path)
+    assert "every number the same bit for bit" in replayed
+
+
+def command_without(modules: list[str], *arguments: str, cwd: Path) -> str:
+    """Run a command where some modules are not installed; return what it says."""
+    hidden = f"import sys; sys.modules.update(dict.fromkeys({modules!r}))"
+    program = f"{hidden}; from labcrane.cli.app import main; sys.exit(main(sys.argv[1:]))"
+    command = [sys.executable, "-c", program, *arguments]
+    done = subprocess.run(command, cwd=cwd, capture_output=True, encoding="utf-8", check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
 def test_the_demo_can_be_run_again_and_overwrites_nothing(tmp_path: Path) -> None:
     for _ in range(2):
         assert labcrane_command("demo", cwd=tmp_path).returncode == 0
@@ -45,7 +76,7 @@ def test_the_demo_can_be_run_again_and_overwrites_nothing(tmp_path: Path) -> Non
 
 
 def test_a_mistake_ends_with_code_2_and_no_traceback(tmp_path: Path) -> None:
-    (tmp_path / "study.yaml").write_text(SHORT.replace("rate_hz", "rat_hz"))
+    (tmp_path / "study.yaml").write_text(SHORT.replace("rate_hz", "rat_hz"), encoding="utf-8")
     done = labcrane_command("check", "study.yaml", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr == (
@@ -54,7 +85,7 @@ def test_a_mistake_ends_with_code_2_and_no_traceback(tmp_path: Path) -> None:
 
 
 def test_a_real_session_without_joysticks_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "study.yaml").write_text(SHORT)
+    (tmp_path / "study.yaml").write_text(SHORT, encoding="utf-8")
     done = labcrane_command(
         "run", "study.yaml", "--participant", "P001", "--local", "--pilot", cwd=tmp_path
     )
@@ -67,7 +98,7 @@ def test_a_real_session_without_joysticks_is_refused(tmp_path: Path) -> None:
 def test_fast_without_simulate_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "study.yaml").write_text(SHORT)
+    (tmp_path / "study.yaml").write_text(SHORT, encoding="utf-8")
     path = str(tmp_path / "study.yaml")
     assert main(["run", path, "--participant", "P001", "--fast"]) == 2
     assert "--fast needs --simulate" in capsys.readouterr().err
@@ -103,11 +134,13 @@ def test_a_planned_order_is_the_one_that_is_run() -> None:
 
 def test_lines_of_a_pipe_are_orders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # A recorded operator needs no joystick, and is waited for like a person.
-    (tmp_path / "study.yaml").write_text(SHORT)
+    (tmp_path / "study.yaml").write_text(SHORT, encoding="utf-8")
     simulate = ["run", "study.yaml", "--participant", "P001", "--simulate", "--fast"]
     assert labcrane_command(*simulate, cwd=tmp_path).returncode == 0
     recorded = "{use: recorded, file: data/P001-SIMULATED/P001-SIMULATED.h5}"
-    (tmp_path / "again.yaml").write_text(SHORT.replace("{use: dual_joystick}", recorded))
+    (tmp_path / "again.yaml").write_text(
+        SHORT.replace("{use: dual_joystick}", recorded), encoding="utf-8"
+    )
     done = labcrane_command(
         "run", "again.yaml", "--participant", "P002", "--local", "--pilot",
         cwd=tmp_path, said="note hello there\nnonsense\nend",
@@ -161,8 +194,8 @@ def test_what_describes_a_group_is_read_without_running_it(
 
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "lamps").mkdir()
-    (tmp_path / "lamps" / "__init__.py").write_text("raise SystemExit")
+    (tmp_path / "lamps" / "__init__.py").write_text("raise SystemExit", encoding="utf-8")
     if source is not None:
-        (tmp_path / "lamps" / "group.py").write_text(source)
+        (tmp_path / "lamps" / "group.py").write_text(source, encoding="utf-8")
     assert description("lamps.group") == said
     assert "lamps" not in sys.modules

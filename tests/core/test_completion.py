@@ -17,6 +17,6 @@ def test_commands_are_completed_those_of_plugins_too(typed: str, completed: str)
     asked = {"_LABCRANE_COMPLETE": "complete_bash", "COMP_WORDS": typed}
     asked["COMP_CWORD"] = str(len(typed.split()) - 1)
     done = subprocess.run(
-        [program], env={**os.environ, **asked}, capture_output=True, text=True, check=True
+        [program], env={**os.environ, **asked}, capture_output=True, encoding="utf-8", check=True
     )
     assert done.stdout.split() == [completed]

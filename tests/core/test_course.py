@@ -151,7 +151,7 @@ def test_an_overridden_trial_outlasts_its_limit(tmp_path: Path) -> None:
 
 def test_people_are_waited_for(tmp_path: Path) -> None:
     text = SHORT.replace("- block:", "- instructions: hello.md\n      - block:")
-    (tmp_path / "hello.md").write_text("Welcome")
+    (tmp_path / "hello.md").write_text("Welcome", encoding="utf-8")
     study = a_study(tmp_path, text)
     seen = rehearse(study, {40: give(Order.START), 90: give(Order.START)}, waits=True)
     assert [e.data["what"] for e in seen.events("waiting")] == ["instructions", "aiming"]

@@ -106,11 +106,13 @@ def labcrane_feedback():
 @pytest.fixture
 def protocol(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A study with a view and a stand-in for a sound, whose plugin is installed."""
-    (tmp_path / "click_plugin.py").write_text(CLICK)
+    (tmp_path / "click_plugin.py").write_text(CLICK, encoding="utf-8")
     about = tmp_path / "click_plugin-1.dist-info"
     about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: click-plugin\nVersion: 1\n")
-    (about / "entry_points.txt").write_text("[labcrane]\nclick = click_plugin\n")
+    (about / "METADATA").write_text(
+        "Metadata-Version: 2.1\nName: click-plugin\nVersion: 1\n", encoding="utf-8"
+    )
+    (about / "entry_points.txt").write_text("[labcrane]\nclick = click_plugin\n", encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path))
     return a_study(tmp_path, STUDY).path
 
@@ -182,7 +184,7 @@ def test_without_a_sensor_delays_are_not_measured(
 
 
 def test_what_cannot_be_measured_is_said(protocol: Path) -> None:
-    text = protocol.read_text()
+    text = protocol.read_text(encoding="utf-8")
     study = a_study(protocol.parent, text)
     with pytest.raises(ProtocolError, match="there is no view or sound 'wall'; there is window, "):
         measure(study, "wall", "s", 2)
@@ -203,12 +205,14 @@ def test_a_delay_holds_for_what_was_measured_only(protocol: Path) -> None:
     one = {"mean_s": 0.03, "sd_s": 0.001, "least_s": 0.02, "most_s": 0.04}
     about = {"kind": "display", "date": "2026-03-01", "sensor": "diode"}
     found = {**about, "delay": {**one, "seen": 9, "asked": 9, "sensor_hz": 1e3}}
-    delay_path(protocol).write_text(json.dumps({"window": {**found, "facts": {"size": "1x1"}}}))
+    delay_path(protocol).write_text(
+        json.dumps({"window": {**found, "facts": {"size": "1x1"}}}), encoding="utf-8"
+    )
     measured = read_delays(protocol)["window"]
     here = {"size": "1x1", "delay": "not measured"}
     assert delay_in_words(measured, here) == "30.0 ms (sd 1.0 ms, 9 changes, 2026-03-01)"
     other = delay_in_words(measured, {"size": "2x2"})
     assert other == "not measured as it is now (size was '1x1', is '2x2')"
-    delay_path(protocol).write_text("{}}")
+    delay_path(protocol).write_text("{}}", encoding="utf-8")
     with pytest.raises(ProtocolError, match=r"is damaged .*; remove it and measure again with"):
         read_delays(protocol)

@@ -70,7 +70,7 @@ def test_a_model_whose_source_is_nowhere_has_a_schema_without_words() -> None:
         "print(Typed.model_json_schema()['properties'])\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+        [sys.executable, "-c", program], capture_output=True, encoding="utf-8", check=True
     )
     assert done.stdout.strip() == "{'length': {'title': 'Length', 'type': 'number'}}"
 

@@ -52,12 +52,12 @@ def test_a_recording_opens_with_numpy_h5py_and_pandas_alone(tmp_path: Path) -> N
 
 def study(folder: Path, **parts: str) -> Path:
     """Return a protocol that uses other parts."""
-    text = (BEFORE / "protocol.yaml").read_text()
+    text = (BEFORE / "protocol.yaml").read_text(encoding="utf-8")
     for key, part in parts.items():
         lines = [f"{key}: {part}" if x.startswith(f"{key}:") else x for x in text.splitlines()]
         text = "\n".join(lines)
     path = folder / "protocol.yaml"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     return path
 
 
@@ -75,7 +75,7 @@ def test_a_part_that_is_missing_is_named_with_its_line_and_the_extra(
 ) -> None:
     monkeypatch.setitem(sys.modules, module, None)
     path = study(tmp_path, **{key: part})
-    lines = path.read_text().splitlines()
+    lines = path.read_text(encoding="utf-8").splitlines()
     at = 1 + lines.index(f"{key}: {part}")
     chosen = load(path, discover(), recorded=True)  # whatever axes the scheme is mapped to
     with pytest.raises(labcrane.ProtocolError) as refused:
@@ -98,7 +98,8 @@ def test_every_module_of_a_laboratory_is_asked_for_by_the_offer_that_imports_it(
                 module
                 for path in folder.rglob("*.py")
                 for module in ("pygame", "mujoco", "pybullet", "pyo", "panda3d", "cantools")
-                if f"import {module}" in path.read_text() or f"from {module}" in path.read_text()
+                if f"import {module}" in path.read_text(encoding="utf-8")
+                or f"from {module}" in path.read_text(encoding="utf-8")
             }
             declared = {m for each in found.values() for m in each.needs} - lean
             every = {

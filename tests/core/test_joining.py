@@ -84,7 +84,7 @@ class Joined:
 
     def __init__(self, folder: Path) -> None:
         (folder / "plugins").mkdir()
-        (folder / "plugins" / "notes.py").write_text(PLUGIN)
+        (folder / "plugins" / "notes.py").write_text(PLUGIN, encoding="utf-8")
         self.source, self.notes = unique("joining"), folder / "notes.txt"
         self.session = Session(self.source)
         order = FeedbackConfig(
@@ -118,7 +118,7 @@ class Joined:
         """Send a frame and the context; return how many shapes each picture had."""
         self.session.context.push(self.session.frame())
         self.session.frames.push(self.session.frame())
-        return self.notes.read_text().split() if self.notes.exists() else []
+        return self.notes.read_text(encoding="utf-8").split() if self.notes.exists() else []
 
     def close(self) -> None:
         self._process.stop()

@@ -51,7 +51,9 @@ def test_a_note_that_is_given_while_streams_are_waited_for_is_in_the_record(
 ) -> None:
     monkeypatch.setattr(launcher_module, "RecorderHandle", LateRecorder)
     protocol = tmp_path / "study.yaml"
-    protocol.write_text(STUDY.format(study=unique("early")) + "streams: {eeg: {type: EEG}}\n")
+    protocol.write_text(
+        STUDY.format(study=unique("early")) + "streams: {eeg: {type: EEG}}\n", encoding="utf-8"
+    )
     console, said = QueueConsole(), []
     for command in (
         Command(Order.NOTE, "the participant is nervous", "supervisor"),
@@ -89,16 +91,19 @@ parent.close()
 def test_a_spare_recorder_that_hangs_keeps_no_recorder_from_closing_its_journal(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "hanging_spare.py").write_text(STOPS_BUT_HANGS_AS_A_SPARE)
+    (tmp_path / "hanging_spare.py").write_text(STOPS_BUT_HANGS_AS_A_SPARE, encoding="utf-8")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
     monkeypatch.setattr(recorder_handle, "MODULE", "hanging_spare")
     keeper = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
-    wait_for(lambda: keeper.ready, 60.0)
+    wait_for(lambda: keeper.ready)
     for _ in range(recorder_handle.SPARES):
         assert not keeper.watch()
     monkeypatch.setattr(recorder_handle, "PATIENCE_S", 3.0)
     keeper.stop()
-    assert [(tmp_path / f"heard-{part}").read_text() for part in (1, 2)] == ["stop", "stop"]
+    assert [(tmp_path / f"heard-{part}").read_text(encoding="utf-8") for part in (1, 2)] == [
+        "stop",
+        "stop",
+    ]
     assert [one.exit_code for one in keeper._recorders] == [0, 0]
     assert [one.exit_code for one in keeper._spares] == [-9, -9]
 

@@ -73,9 +73,9 @@ views: {count: {use: counter}}
 @pytest.fixture
 def protocol(tmp_path: Path) -> Path:
     (tmp_path / "plugins").mkdir()
-    (tmp_path / "plugins" / "arrow.py").write_text(ARROW)
+    (tmp_path / "plugins" / "arrow.py").write_text(ARROW, encoding="utf-8")
     path = tmp_path / "study.yaml"
-    path.write_text(STUDY.replace("rehearsal", unique("own")))
+    path.write_text(STUDY.replace("rehearsal", unique("own")), encoding="utf-8")
     return path
 
 
@@ -97,7 +97,7 @@ def test_what_is_in_the_file_is_what_runs(protocol: Path) -> None:
     source = protocol.parent / "plugins" / "arrow.py"
     stamps = source.stat()
     for radius in (0.3, 0.7):
-        source.write_text(ARROW.replace("0.1", str(radius)))
+        source.write_text(ARROW.replace("0.1", str(radius)), encoding="utf-8")
         os.utime(source, ns=(stamps.st_atime_ns, stamps.st_mtime_ns))
         offer = discover(study=protocol).find(Cue, "arrow")
         assert offer.settings().model_dump() == {"radius": radius}
@@ -107,7 +107,9 @@ def test_what_is_in_the_file_is_what_runs(protocol: Path) -> None:
 def test_two_studies_may_each_have_a_file_of_one_name(protocol: Path, tmp_path: Path) -> None:
     other = tmp_path / "other" / "study.yaml"
     (other.parent / "plugins").mkdir(parents=True)
-    (other.parent / "plugins" / "arrow.py").write_text(ARROW.replace("0.1", "0.9"))
+    (other.parent / "plugins" / "arrow.py").write_text(
+        ARROW.replace("0.1", "0.9"), encoding="utf-8"
+    )
     first, second = discover(study=protocol), discover(study=other)
     radii = [each.find(Cue, "arrow").settings().model_dump()["radius"] for each in (first, second)]
     assert radii == [0.1, 0.9]
@@ -117,7 +119,7 @@ def test_a_file_that_fails_is_named_with_its_line_when_it_is_missed(
     protocol: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     source = protocol.parent / "plugins" / "arrow.py"
-    source.write_text(ARROW.replace("labcrane_api = 1", "1 / 0"))
+    source.write_text(ARROW.replace("labcrane_api = 1", "1 / 0"), encoding="utf-8")
     assert main(["check", str(protocol)]) == 2
     said = capsys.readouterr().err
     assert "'arrow' is not installed" in said
@@ -129,7 +131,7 @@ def test_a_file_that_fails_is_named_with_its_line_when_it_is_missed(
 
 def test_a_file_may_not_offer_what_is_installed(protocol: Path) -> None:
     source = protocol.parent / "plugins" / "arrow.py"
-    source.write_text(ARROW.replace('offer("arrow"', 'offer("sphere"'))
+    source.write_text(ARROW.replace('offer("arrow"', 'offer("sphere"'), encoding="utf-8")
     with pytest.raises(PluginError, match=r"plugins 'sphere' and 'plugins/arrow.py' both offer"):
         discover(study=protocol)
 
@@ -137,13 +139,13 @@ def test_a_file_may_not_offer_what_is_installed(protocol: Path) -> None:
 def test_a_changed_file_is_not_what_was_approved(protocol: Path) -> None:
     today = date(2026, 3, 2)
     consent = protocol.parent / "consent.md"
-    consent.write_text("I take part.\n")
+    consent.write_text("I take part.\n", encoding="utf-8")
     grant = Grant("SessionView", "2026-1", date(2027, 3, 2), consent)
     approve(*loaded(protocol), grant, today)
     verify(*loaded(protocol), today)
 
     source = protocol.parent / "plugins" / "arrow.py"
-    source.write_text(ARROW + "# harmless\n")
+    source.write_text(ARROW + "# harmless\n", encoding="utf-8")
     with pytest.raises(
         ProtocolError,
         match=r"plugin plugins/arrow.py: the source of plugins/arrow.py has changed",
@@ -152,7 +154,7 @@ def test_a_changed_file_is_not_what_was_approved(protocol: Path) -> None:
     amend(*loaded(protocol), grant, "a comment", today)
     verify(*loaded(protocol), today)
 
-    (source.parent / "second.py").write_text("")
+    (source.parent / "second.py").write_text("", encoding="utf-8")
     with pytest.raises(ProtocolError, match=r"plugin plugins/second\.py is used now"):
         verify(*loaded(protocol), today)
 

@@ -81,7 +81,7 @@ def test_a_lock_names_its_process_and_dies_with_it(tmp_path: Path) -> None:
         [sys.executable, "-c", HOLDER, str(path)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        text=True,
+        encoding="utf-8",
     )
     assert process.stdout.readline() == "held\n"
     named = rf"^taken \(process {process.pid} holds .*a\.lock\)"

@@ -105,7 +105,11 @@ def imported(name: str, path: Path) -> ModuleType:
 
 def study(folder: Path, row: RoleEntry, use: str) -> Path:
     path = folder / "protocol.yaml"
-    path.write_text(STUDY.read_text() + f"lamps: {'{desk: ' + use + '}' if row.several else use}\n")
+    path.write_text(
+        STUDY.read_text(encoding="utf-8")
+        + f"lamps: {'{desk: ' + use + '}' if row.several else use}\n",
+        encoding="utf-8",
+    )
     return path
 
 
@@ -128,7 +132,9 @@ def test_mistakes_are_named_with_their_line(
     ):
         with pytest.raises(LabcraneError) as refused:
             load(study(tmp_path, row, use), registry)
-        assert f"protocol.yaml:{len(STUDY.read_text().splitlines()) + 1}: " in str(refused.value)
+        assert f"protocol.yaml:{len(STUDY.read_text(encoding='utf-8').splitlines()) + 1}: " in str(
+            refused.value
+        )
         assert words in str(refused.value)
 
 
@@ -192,4 +198,4 @@ def test_a_plugin_of_it_is_scaffolded(
         component.shine(1, [1.0])
     again = discover([EntryPoint("my_lamp", "labcrane_my_lamp", "labcrane")])
     assert list(again.offers[LampDriver]) == ["my_lamp"]
-    assert "lamps:" in (folder / "protocol.yaml").read_text()
+    assert "lamps:" in (folder / "protocol.yaml").read_text(encoding="utf-8")

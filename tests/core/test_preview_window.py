@@ -30,7 +30,7 @@ views:
 def a_protocol(folder: Path) -> tuple[Path, str]:
     view = f"window{os.getpid()}"
     path = folder / "study.yaml"
-    path.write_text(STUDY.replace("VIEW", view))
+    path.write_text(STUDY.replace("VIEW", view), encoding="utf-8")
     return path, view
 
 
@@ -45,7 +45,7 @@ def test_a_movement_is_played_in_real_time_in_a_window(tmp_path: Path) -> None:
             cwd=tmp_path,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
-            text=True,
+            encoding="utf-8",
         )
         try:
             (info,) = pylsl.resolve_byprop("name", log_name(view), timeout=60.0)
@@ -93,7 +93,7 @@ def test_where_nothing_can_be_shown_it_says_so(tmp_path: Path) -> None:
         [sys.executable, "-m", "labcrane", "feedback", "preview", str(protocol)],
         env={**os.environ, "DISPLAY": ":4711", "JACK_DEFAULT_SERVER": "nobody"},
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
     )
     assert done.returncode == 1

@@ -53,8 +53,8 @@ def complaint(tmp_path: Path, registry: Registry):
             assert old in text
             text = text.replace(old, new)
         path = tmp_path / "study.yaml"
-        path.write_text(text)
-        (tmp_path / "hello.md").write_text("Hello")
+        path.write_text(text, encoding="utf-8")
+        (tmp_path / "hello.md").write_text("Hello", encoding="utf-8")
         try:
             load(path, registry)
         except ProtocolError as error:
@@ -117,7 +117,7 @@ def test_a_target_out_of_reach_is_told_before_anything_runs(complaint) -> None:
 
 
 def test_a_mistake_in_the_machines_file_names_that_file(complaint, tmp_path: Path) -> None:
-    (tmp_path / "mine.yaml").write_text("title: mine\n")
+    (tmp_path / "mine.yaml").write_text("title: mine\n", encoding="utf-8")
     told = complaint(("machine: ch8", "machine: mine.yaml"))
     assert told[0].startswith("6: ")
     assert "mine.yaml:1: the file needs 'source'" in "\n".join(told)
@@ -144,7 +144,7 @@ def test_what_is_no_protocol_is_told(
     tmp_path: Path, registry: Registry, text: str, said: str
 ) -> None:
     path = tmp_path / "study.yaml"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     with pytest.raises(ProtocolError) as caught:
         load(path, registry)
     assert said in str(caught.value)

@@ -9,8 +9,10 @@ GREETING = 'import os\nos.write(2, b"hello from C\\n")\nplace = "here"\n'
 
 
 def said(program: str, folder: Path) -> "subprocess.CompletedProcess[str]":
-    (folder / "greeting.py").write_text(GREETING)
-    (folder / "broken.py").write_text(GREETING + 'raise OSError("no such engine")\n')
+    (folder / "greeting.py").write_text(GREETING, encoding="utf-8")
+    (folder / "broken.py").write_text(
+        GREETING + 'raise OSError("no such engine")\n', encoding="utf-8"
+    )
     return subprocess.run(
         [
             sys.executable,
@@ -19,7 +21,7 @@ def said(program: str, folder: Path) -> "subprocess.CompletedProcess[str]":
         ],
         env={**os.environ, "PYTHONPATH": str(folder)},
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
     )
 

@@ -24,8 +24,8 @@ from labcrane.registry.registry import Registry, discover
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 
-AIMING = (PROTOCOLS / "aiming" / "protocol.yaml").read_text()
-RETRIEVAL = (PROTOCOLS / "retrieval" / "protocol.yaml").read_text()
+AIMING = (PROTOCOLS / "aiming" / "protocol.yaml").read_text(encoding="utf-8")
+RETRIEVAL = (PROTOCOLS / "retrieval" / "protocol.yaml").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -260,7 +260,7 @@ def test_a_reference_broken_at_random_is_told_with_its_line_and_the_remedy(
     ]
     place, each = rng.choice(every)
     text, fault = broken(
-        rng, (PROTOCOLS / study / "protocol.yaml").read_text(), place, key=each.key
+        rng, (PROTOCOLS / study / "protocol.yaml").read_text(encoding="utf-8"), place, key=each.key
     )
     lines = told(study, text)
     context = (fault, place, lines)
@@ -272,5 +272,9 @@ def test_a_reference_broken_at_random_is_told_with_its_line_and_the_remedy(
 
 def test_the_events_of_every_session_are_those_that_its_code_tells() -> None:
     source = Path(__file__).parents[2] / "labcrane"
-    said = "\n".join(path.read_text() for path in source.rglob("*.py") if path.stem != "references")
+    said = "\n".join(
+        path.read_text(encoding="utf-8")
+        for path in source.rglob("*.py")
+        if path.stem != "references"
+    )
     assert [event for event in EVENTS if f'"{event}"' not in said] == []

@@ -38,7 +38,9 @@ def test_every_role_has_a_bundled_offer_and_a_contract_test() -> None:
 
 def test_every_bundled_offer_passes_its_contract() -> None:
     # A contract is passed by a test class that subclasses it and names the offer.
-    tests = "\n".join(path.read_text() for path in (ROOT / "tests" / "plugins").glob("test_*.py"))
+    tests = "\n".join(
+        path.read_text(encoding="utf-8") for path in (ROOT / "tests" / "plugins").glob("test_*.py")
+    )
     for role, offers in discover().offers.items():
         contract = role.__name__.replace("Device", "") + "Contract"
         assert contract in tests
@@ -76,7 +78,7 @@ def test_broken_plugin_is_named_only_when_it_could_have_helped() -> None:
 def test_a_plugin_that_raises_anything_on_import_is_noted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "raises_on_import.py").write_text("1 / 0\n")
+    (tmp_path / "raises_on_import.py").write_text("1 / 0\n", encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     registry = discover([point("zero", "raises_on_import")])
     where = tmp_path / "raises_on_import.py"
@@ -86,8 +88,8 @@ def test_a_plugin_that_raises_anything_on_import_is_noted(
 def test_two_plugins_may_not_offer_the_same_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    source = (ROOT / "plugins/labcrane_aiming/__init__.py").read_text()
-    (tmp_path / "copycat.py").write_text(source)
+    source = (ROOT / "plugins/labcrane_aiming/__init__.py").read_text(encoding="utf-8")
+    (tmp_path / "copycat.py").write_text(source, encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(
         PluginError, match="plugins 'a' and 'b' both offer the task 'aiming'; uninstall or rename"
@@ -154,15 +156,17 @@ def lamps(folder: Path, monkeypatch: pytest.MonkeyPatch, *, declared: bool) -> N
     for plugin, name in (("a", "blink"), ("b", "glow")):
         monkeypatch.delitem(sys.modules, f"lamp_{plugin}", raising=False)
         names = [name, f"undeclared_{plugin}"]
-        (folder / f"lamp_{plugin}.py").write_text(LAMP.replace("NAMES", repr(names)))
+        (folder / f"lamp_{plugin}.py").write_text(
+            LAMP.replace("NAMES", repr(names)), encoding="utf-8"
+        )
         info = folder / f"lamp_{plugin}-1.0.dist-info"
         info.mkdir()
         (info / "METADATA").write_text(
-            f"Metadata-Version: 2.1\nName: lamp_{plugin}\nVersion: 1.0\n"
+            f"Metadata-Version: 2.1\nName: lamp_{plugin}\nVersion: 1.0\n", encoding="utf-8"
         )
         lines = ["[labcrane]", f"lamp_{plugin} = lamp_{plugin}"]
         lines += ["[labcrane.offers]", f"{name} = lamp_{plugin}"] if declared else []
-        (info / "entry_points.txt").write_text("\n".join(lines))
+        (info / "entry_points.txt").write_text("\n".join(lines), encoding="utf-8")
 
 
 BROKEN = {
@@ -197,7 +201,7 @@ def test_a_plugin_that_does_not_fit_is_named_and_the_others_go_on(
 ) -> None:
     module = f"plugin_that_does_not_fit_{number}"
     path = tmp_path / f"{module}.py"
-    path.write_text(source)
+    path.write_text(source, encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     registry = discover([point("misfit", module), point("aiming", "labcrane_aiming")])
     why = BROKEN[source].replace("plugin_FILE", path.name).replace("FILE", str(path))
@@ -210,8 +214,8 @@ def test_the_line_of_a_plugin_is_told_though_a_library_raised(
 ) -> None:
     package = tmp_path / "in_two_files"
     package.mkdir()
-    (package / "__init__.py").write_text("import in_two_files.lamp\n")
-    (package / "lamp.py").write_text("import json\n\njson.loads('{')\n")
+    (package / "__init__.py").write_text("import in_two_files.lamp\n", encoding="utf-8")
+    (package / "lamp.py").write_text("import json\n\njson.loads('{')\n", encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
     (why,) = discover([point("lamp", "in_two_files")]).broken.values()
     assert why.startswith("JSONDecodeError: ")
@@ -232,7 +236,8 @@ def test_commands_that_cannot_be_offered_are_told_of_with_their_plugin(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, offers: str, complaint: str
 ) -> None:
     (tmp_path / "lifting.py").write_text(
-        f"import labcrane\n@labcrane.hookimpl\ndef labcrane_commands():\n    {offers}\n"
+        f"import labcrane\n@labcrane.hookimpl\ndef labcrane_commands():\n    {offers}\n",
+        encoding="utf-8",
     )
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "lifting", raising=False)

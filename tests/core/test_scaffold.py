@@ -36,7 +36,7 @@ def test_there_is_a_template_for_every_role() -> None:
 @pytest.mark.parametrize("role", kinds())
 def test_nothing_is_left_to_fill_in(role: str, projects: dict[str, Path]) -> None:
     for path in projects[role].iterdir():
-        text = path.read_text()
+        text = path.read_text(encoding="utf-8")
         for placeholder in ("my_part", "MyPart", "my_module", "my-project", "a_role"):
             assert placeholder not in text + path.name, path
     checked = run(
@@ -75,7 +75,10 @@ def test_it_does_its_part_in_a_run(
     name, protocol = NAMES[role], projects[role] / "protocol.yaml"
     how = "--feedback" if role == "feedback" else "--fast"
     if role == "feedback":  # which takes real time
-        protocol.write_text(protocol.read_text().replace("{task: work}", "{task: work, pairs: 1}"))
+        protocol.write_text(
+            protocol.read_text(encoding="utf-8").replace("{task: work}", "{task: work, pairs: 1}"),
+            encoding="utf-8",
+        )
     arguments = ["--participant", "P001", "--simulate", how, "--data", tmp_path / "data"]
     done = run(environment, "-m", "labcrane", "run", protocol, *arguments)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -88,9 +91,9 @@ def test_it_does_its_part_in_a_run(
             to = ["--to", name, "--include", "simulated", "--out", out]
             done = run(environment, "-m", "labcrane", "export", tmp_path / "data", *to)
             assert done.returncode == 0, done.stderr
-            assert (out / "P001-SIMULATED_ses-01.csv").read_text().count("\n") == 1 + len(
-                session.trials
-            )
+            assert (out / "P001-SIMULATED_ses-01.csv").read_text(encoding="utf-8").count(
+                "\n"
+            ) == 1 + len(session.trials)
         case "command":
             done = run(environment, "-m", "labcrane", name, "count", tmp_path / "data")
             assert done.stdout == f"P001-SIMULATED: {len(session.trials)}\n"

@@ -26,7 +26,7 @@ def schema() -> Draft202012Validator:
 
 
 def written(path: Path) -> dict:
-    return json.loads(json.dumps(YAML(typ="safe").load(path.read_text())))
+    return json.loads(json.dumps(YAML(typ="safe").load(path.read_text(encoding="utf-8"))))
 
 
 @pytest.mark.parametrize("path", PROTOCOLS, ids=lambda path: path.parent.name)
@@ -62,7 +62,7 @@ def test_a_mistake_does_not_validate(mistake: str, schema: Draft202012Validator)
 
 def test_schema_is_written_for_an_editor(tmp_path: Path) -> None:
     assert main(["schema", "--out", str(tmp_path / "protocol.schema.json")]) == 0
-    made = json.loads((tmp_path / "protocol.schema.json").read_text())
+    made = json.loads((tmp_path / "protocol.schema.json").read_text(encoding="utf-8"))
     far = made["properties"]["feedback"]["additionalProperties"]["allOf"]
     (sphere,) = (
         each["then"] for each in far if each["then"]["properties"]["use"] == {"const": "sphere"}
@@ -118,7 +118,10 @@ def test_lists_checks_and_plans_are_there_for_programs(
     assert json.loads(capsys.readouterr().out)["fine"] is True
     wrong = tmp_path / "protocol.yaml"
     wrong.write_text(
-        protocol.read_text().replace("sphere", "spere").replace("far: 4.0}", "fra: 4}")
+        protocol.read_text(encoding="utf-8")
+        .replace("sphere", "spere")
+        .replace("far: 4.0}", "fra: 4}"),
+        encoding="utf-8",
     )
     assert main(["check", str(wrong), "--json"]) == 2
     problems = json.loads(capsys.readouterr().out)["problems"]

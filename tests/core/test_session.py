@@ -118,7 +118,7 @@ def test_a_session_that_the_protocol_does_not_have_is_refused(visit: Visit) -> N
 
 
 def test_a_data_folder_that_cannot_be_written_is_refused(visit: Visit, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("in the way")
+    (tmp_path / "file").write_text("in the way", encoding="utf-8")
     with pytest.raises(
         RecordingError, match=r"data folder .* cannot be written: Not a directory; give another"
     ):
@@ -169,7 +169,7 @@ def labcrane_process(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-c", PROGRAM, json.dumps(arguments)],
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
     )
 
@@ -177,7 +177,7 @@ def labcrane_process(*arguments: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize("name", ENGINES)
 def test_two_fast_runs_in_two_processes_give_the_same_bits(name: str, tmp_path: Path) -> None:
     study = tmp_path / "study.yaml"
-    study.write_text(SHORT.replace("kinematic_crane", name))
+    study.write_text(SHORT.replace("kinematic_crane", name), encoding="utf-8")
     digests = []
     for data in ("one", "two"):
         arguments = ["run", str(study), "--participant", "P001", "--simulate", "--fast"]
@@ -200,7 +200,7 @@ def test_another_process_sees_the_streams_and_their_samples_are_the_files(tmp_pa
         part for name, count in counts.items() for part in (f"{source}/labcrane.{name}", str(count))
     ]
     consumer = [sys.executable, str(ROOT / "tests" / "streams" / "consumer.py"), *asked]
-    with subprocess.Popen(consumer, stdout=subprocess.PIPE, text=True) as heard_by:
+    with subprocess.Popen(consumer, stdout=subprocess.PIPE, encoding="utf-8") as heard_by:
         path = run(visit, ScriptedConsole())
         assert heard_by.stdout.readline() == "ready\n"
         heard = json.loads(heard_by.stdout.readline())

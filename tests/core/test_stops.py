@@ -1,6 +1,7 @@
 """Stops and resumptions of every kind against a model: what is owed is done, and done once."""
 
 import json
+import math
 import random
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -222,21 +223,28 @@ class Stops(RuleBasedStateMachine):
         assert sorted(results) == sorted(self.due(results))
 
     def due(self, results: Mapping[int, str]) -> Iterator[int]:
-        """Yield the counted trials that have to have a result: of practice, until it is enough."""
-        group, streak, over = None, 0, False
+        """Yield the counted trials that have to have a result: of practice, until it is enough.
+
+        Trials count in the order in which they were done; one that was passed over ('continue')
+        may come after those that follow it.
+        """
+        ends = [event.data["trial"] for event in self.events if event.name == "trial.end"]
+        done_at = {number: at for at, number in enumerate(ends)}
+        group: list[int] = []
         for step in self.whole.steps:
             mine = step.block
             if mine is None:
                 continue
-            if mine.until is None or group is None:
-                streak, over = 0, False
-            group = None if mine.until is None or mine.last else mine.number
-            for trial in mine.trials:
-                if over or not trial.planned.counted:
-                    continue
-                yield trial.number
-                streak = streak + 1 if results.get(trial.number) == "success" else 0
-                over = mine.until is not None and streak >= mine.until.successes
+            group += [trial.number for trial in mine.trials if trial.planned.counted]
+            if mine.until is not None and not mine.last:
+                continue
+            streak, enough = 0, math.inf
+            for number in sorted(set(group) & set(results), key=done_at.__getitem__):
+                streak = streak + 1 if results[number] == "success" else 0
+                if mine.until is not None and streak >= mine.until.successes:
+                    enough = min(enough, done_at[number])
+            yield from (number for number in group if done_at.get(number, math.inf) <= enough)
+            group = []
 
     def every_question_is_asked_to_its_end_once(self) -> None:
         ended = [event.data for event in self.events if event.name == "questionnaire.end"]

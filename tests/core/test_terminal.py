@@ -2,7 +2,6 @@
 
 import io
 import os
-import pty
 import subprocess
 import sys
 import threading
@@ -10,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from needs import needs
 from rehearsal import SHORT
 from rich.console import Console
 
@@ -22,6 +22,8 @@ class TerminalUser:
     """A person at a terminal: looks at what is printed, and presses keys."""
 
     def __init__(self, command: list[str], folder: Path) -> None:
+        import pty
+
         self._keys, terminal = pty.openpty()
         self.process = subprocess.Popen(
             command, cwd=folder, stdin=terminal, stdout=terminal, stderr=terminal
@@ -57,15 +59,18 @@ class TerminalUser:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A study whose operator is a recorded one, who is waited for like a person."""
-    (tmp_path / "first.yaml").write_text(SHORT)
+    (tmp_path / "first.yaml").write_text(SHORT, encoding="utf-8")
     simulate = ["run", "first.yaml", "--participant", "P001", "--simulate", "--fast"]
     command = [sys.executable, "-m", "labcrane", *simulate]
     subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
     recorded = "{use: recorded, file: data/P001-SIMULATED/P001-SIMULATED.h5}"
-    (tmp_path / "study.yaml").write_text(SHORT.replace("{use: dual_joystick}", recorded))
+    (tmp_path / "study.yaml").write_text(
+        SHORT.replace("{use: dual_joystick}", recorded), encoding="utf-8"
+    )
     return tmp_path
 
 
+@needs("terminals")
 def test_keys_start_pause_note_flag_and_end_a_session(folder: Path) -> None:
     command = [sys.executable, "-m", "labcrane", "run", "study.yaml"]
     user = TerminalUser([*command, "--participant", "P002", "--local", "--pilot"], folder)
@@ -96,6 +101,7 @@ def test_keys_start_pause_note_flag_and_end_a_session(folder: Path) -> None:
     }
 
 
+@needs("terminals")
 def test_an_interrupt_from_the_keyboard_ends_the_session_in_order(folder: Path) -> None:
     command = [sys.executable, "-m", "labcrane", "run", "study.yaml"]
     user = TerminalUser([*command, "--participant", "P002", "--local", "--pilot"], folder)
@@ -109,11 +115,12 @@ def test_an_interrupt_from_the_keyboard_ends_the_session_in_order(folder: Path) 
     assert session.events["data"].tolist()[-1]["reason"] == "by order"
 
 
+@needs("terminals")
 def test_a_questionnaire_is_filled_in_at_the_terminal(tmp_path: Path) -> None:
     steps = "- questionnaire: [subjective_accuracy, situational_awareness]"
     study = SHORT.replace("- block: {task: aiming, pairs: 1}", steps)
     study = study.replace("{use: dual_joystick}", "{use: simulated_operator}")
-    (tmp_path / "study.yaml").write_text(study)
+    (tmp_path / "study.yaml").write_text(study, encoding="utf-8")
     command = [sys.executable, "-m", "labcrane", "run", "study.yaml", "--no-page"]
     user = TerminalUser([*command, "--participant", "P002", "--local", "--pilot"], tmp_path)
     user.until("questionnaire: Accuracy")

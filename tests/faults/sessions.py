@@ -1,6 +1,7 @@
 """Short sessions in processes of their own, to be killed."""
 
 import hashlib
+import json
 import os
 import subprocess
 import sys
@@ -133,6 +134,31 @@ def a_witness(study: str, into: Path) -> Iterator[None]:
         finally:
             process.kill()
             process.wait()
+
+
+@contextmanager
+def program(name: str, *arguments: str, into: Path) -> Iterator[None]:
+    """Run a program of this folder that says when it is ready, and write down what it says."""
+    with into.open("w") as file:
+        process = subprocess.Popen(
+            [sys.executable, str(Path(__file__).with_name(name)), *arguments], stdout=file
+        )
+        try:
+            wait_for(lambda: into.read_text().startswith("ready"))
+            yield
+        finally:
+            process.kill()
+            process.wait()
+
+
+def witnessed(path: Path) -> dict[str, set[int]]:
+    """Return the counts that a witness of a device has seen, by stream."""
+    found: dict[str, set[int]] = {}
+    for line in path.read_text().splitlines()[1:]:
+        if line.endswith("]"):
+            name, counts = json.loads(line)
+            found.setdefault(name, set()).update(counts)
+    return found
 
 
 def contents(path: Path, group: str) -> dict[str, str]:

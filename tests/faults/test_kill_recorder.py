@@ -1,18 +1,14 @@
 """Recorders that are killed at random moments, alone or both at once, beside two LSL witnesses."""
 
-import json
 import random
-import subprocess
-import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import psutil
 import pytest
-from faults.sessions import unique, wait_for
+from faults.sessions import program, unique, witnessed
 
 from labcrane.processes.handle import ProcessHandle
 from labcrane.recording.foreign_streams import RecordedStream, read_streams
@@ -20,31 +16,9 @@ from labcrane.recording.paths import parts
 from labcrane.streams.recorder.handle import SPARES, RecorderHandle
 from labcrane.streams.request import StreamRequest
 
-HERE = Path(__file__).parent
 RATE_HZ = 500.0
 BOTH_S = 1.0
 """What the death of both recorders at once may cost, in seconds of samples."""
-
-
-@contextmanager
-def program(name: str, *arguments: str, into: Path) -> Iterator[None]:
-    with into.open("w") as file:
-        process = subprocess.Popen([sys.executable, str(HERE / name), *arguments], stdout=file)
-        try:
-            wait_for(lambda: into.read_text().startswith("ready"), 60.0)
-            yield
-        finally:
-            process.kill()
-            process.wait()
-
-
-def witnessed(path: Path) -> dict[str, set[int]]:
-    found: dict[str, set[int]] = {}
-    for line in path.read_text().splitlines()[1:]:
-        if line.endswith("]"):
-            name, counts = json.loads(line)
-            found.setdefault(name, set()).update(counts)
-    return found
 
 
 def counts_of(stream: RecordedStream) -> np.ndarray:

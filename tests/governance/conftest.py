@@ -19,11 +19,11 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Lab:
     tables = lab.places.exports / "tables"
     tables.mkdir(parents=True)
     rows = [["participant", "movement_time"], ["P001", "1.5"], ["P007", "2.5"], ["P002", "3.5"]]
-    with (tables / "trials.csv").open("w", newline="") as file:
+    with (tables / "trials.csv").open("w", newline="", encoding="utf-8") as file:
         csv.writer(file).writerows(rows)
-    (tables / "sub-P007_events.tsv").write_text("onset\tparticipant\n1.0\tP007\n")
+    (tables / "sub-P007_events.tsv").write_text("onset\tparticipant\n1.0\tP007\n", encoding="utf-8")
     (tables / "all.mat").write_bytes(b"binary\x00 P001 P007")
-    (tables / "P001.txt").write_text("P001 only")
+    (tables / "P001.txt").write_text("P001 only", encoding="utf-8")
     files = {
         Path("trials.csv"): ["P001", "P002", "P007"],
         Path("sub-P007_events.tsv"): ["P007"],

@@ -57,7 +57,9 @@ def everything(folder: Path) -> Lab:
         recording = data / name / f"{name}.h5"
         # Too short a session for labcrane operator fit, which writes in this way.
         with written_about(recording, "operator fit", elsewhere / f"fitted {name}.yaml") as path:
-            path.write_text(f"# Fitted to session 1 of {name}.h5\noperator: {{}}\n")
+            path.write_text(
+                f"# Fitted to session 1 of {name}.h5\noperator: {{}}\n", encoding="utf-8"
+            )
         command("replay", recording, "--measures", elsewhere / f"replay_{name}.csv")
     _workbook(lab, data / "evaluation.xlsx")
     command("transfer", folder / "store", "--data", data)

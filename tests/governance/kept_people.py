@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from governed import TODAY, Lab
+from needs import need
 
 from labcrane.participants import recovery as unfinished
 from labcrane.participants.folders import Places
@@ -50,7 +51,7 @@ def check_erased(lab: Lab) -> None:
             assert "P007" not in path.name
             if path.is_file() and path != lab.places.register:
                 assert b"P007" not in path.read_bytes(), path
-    text = lab.places.register.read_text()
+    text = lab.places.register.read_text(encoding="utf-8")
     assert text.count("P007") == 1
     (stone,) = read(lab.places).tombstones
     assert (stone.participant, stone.reason) == ("P007", REASON)
@@ -62,6 +63,7 @@ WRITES = frozenset({"os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.trunca
 
 def killed_at(number: int, work: Callable[[], object]) -> bool:
     """Do ``work`` in a process that is killed before its ``number``-th write; whether it was."""
+    need("fork")
     sys.stdout.flush()
     child = os.fork()
     if child == 0:

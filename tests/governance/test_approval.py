@@ -36,7 +36,7 @@ def test_a_lock_that_was_edited_by_hand_is_refused(lab: Lab) -> None:
         ProtocolError, match="was edited by hand or is damaged: its content does not match its seal"
     ):
         check_eligibility(lab.visit("P001"))
-    lock_path(lab.protocol).write_text("{")
+    lock_path(lab.protocol).write_text("{", encoding="utf-8")
     with pytest.raises(ProtocolError, match="was edited by hand or is damaged: it cannot be read"):
         check_eligibility(lab.visit("P001"))
 
@@ -84,7 +84,7 @@ def test_an_impossible_grant_is_refused(
 ) -> None:
     (tmp_path / "study").mkdir()
     lab = Lab(tmp_path / "study")
-    (tmp_path / "consent.txt").write_text("x")
+    (tmp_path / "consent.txt").write_text("x", encoding="utf-8")
     grant = Grant("B", "R", TODAY + timedelta(until), lab.folder / consent)
     with pytest.raises(ProtocolError, match=said):
         approve(lab.study, discover(), grant, TODAY)
@@ -103,7 +103,7 @@ def test_an_amendment_says_what_was_changed_and_keeps_the_history(lab: Lab) -> N
     assert entry["changes"][0] == "protocol: tasks.aiming.movements was 1, is 2"
     assert refusal(lab) == []
     kept = lab.folder / "study.lock.1.json"
-    assert json.loads(kept.read_text())["seal"] == first.seal
+    assert json.loads(kept.read_text(encoding="utf-8"))["seal"] == first.seal
     edit(lab.folder / "hello.md", "Hello", "Good morning")
     again = amend(lab.study, discover(), grant, "friendlier", TODAY)
     assert [entry["why"] for entry in again.amendments] == ["more movements", "friendlier"]

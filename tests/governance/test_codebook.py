@@ -82,7 +82,9 @@ def test_the_methods_paragraph_says_what_was_approved_and_done(tmp_path: Path) -
         lock.materials_sha256,
     ):
         assert words in said
-    (tmp_path / "study.yaml").write_text(text.replace("movements: 1", "movements: 2"))
+    (tmp_path / "study.yaml").write_text(
+        text.replace("movements: 1", "movements: 2"), encoding="utf-8"
+    )
     grant = Grant("Ethics board", "A1", lab.grant().valid_until, lock.consent)
     amended = methods(amend(lab.study, discover(), grant, "too easy", TODAY))
     assert f"and amended: A1 on {TODAY} (too easy)" in amended
@@ -95,7 +97,9 @@ def test_methods_writes_the_codebook_beside_the_protocol(
     lab.approve()
     assert main(["methods", str(lab.protocol)]) == 0
     assert "was approved by Ethics board" in capsys.readouterr().out
-    rows = list(csv.DictReader((tmp_path / "study.codebook.csv").read_text().splitlines()))
+    rows = list(
+        csv.DictReader((tmp_path / "study.codebook.csv").read_text(encoding="utf-8").splitlines())
+    )
     assert rows == read_lock(lab.protocol).content["codebook"]
 
 
@@ -141,7 +145,7 @@ def test_the_balance_of_36_participants_is_checked_and_exported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "study.yaml"
-    path.write_text(ordered("williams"))
+    path.write_text(ordered("williams"), encoding="utf-8")
     export = tmp_path / "plan.csv"
     assert main(["plan", str(path), "--participants", "36", "--export", str(export)]) == 0
     said = " ".join(capsys.readouterr().out.split())
@@ -151,7 +155,7 @@ def test_the_balance_of_36_participants_is_checked_and_exported(
         assert f"balanced: {where}: every level in every position 3 times" in said
         assert f"balanced: {where}: every level follows every other 3 times" in said
     assert "not balanced" not in said
-    rows = list(csv.DictReader(export.read_text().splitlines()))
+    rows = list(csv.DictReader(export.read_text(encoding="utf-8").splitlines()))
     assert len(rows) == 36
     study = labcrane_study(path)
     for row in (rows[0], rows[20]):

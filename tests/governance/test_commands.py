@@ -15,8 +15,8 @@ from labcrane.cli.app import main
 @pytest.fixture
 def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "study.yaml").write_text(GOVERNED)
-    (tmp_path / "consent.txt").write_text("I take part.\n")
+    (tmp_path / "study.yaml").write_text(GOVERNED, encoding="utf-8")
+    (tmp_path / "consent.txt").write_text("I take part.\n", encoding="utf-8")
     return tmp_path
 
 
@@ -39,7 +39,7 @@ def run_session(said: str) -> subprocess.CompletedProcess[str]:
         [sys.executable, "-m", "labcrane", *run],
         input=said,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
     )
 
@@ -66,7 +66,9 @@ def test_from_approval_to_erasure(study: Path, capsys: pytest.CaptureFixture[str
         capsys, "export", "data", "--to", "tables", "--out", "data/exports/tables",
         "--include", "half-finished",
     )  # fmt: skip
-    exported = "".join(path.read_text() for path in Path("data/exports/tables").rglob("*.csv"))
+    exported = "".join(
+        path.read_text(encoding="utf-8") for path in Path("data/exports/tables").rglob("*.csv")
+    )
     assert "P003" in exported
     said = say(capsys, "erase", "P003", "--reason", "withdrew")
     assert "P003 is erased. labcrane cannot reach backups" in said
@@ -81,7 +83,9 @@ def test_a_change_is_refused_in_words_and_amended(
 ) -> None:
     approve(capsys)
     say(capsys, "consent", "study.yaml", "P001")
-    Path("study.yaml").write_text(GOVERNED.replace("movements: 1", "movements: 3"))
+    Path("study.yaml").write_text(
+        GOVERNED.replace("movements: 1", "movements: 3"), encoding="utf-8"
+    )
     said = say(capsys, "consent", "study.yaml", "P002", status=2)
     assert "protocol: tasks.aiming.movements was 1, is 3" in said
     refused = run_session("")
@@ -91,7 +95,10 @@ def test_a_change_is_refused_in_words_and_amended(
     said = say(capsys, "amend", "study.yaml", "--why", "more", "--reference", "KB-1-A1")
     assert "amendment 1: protocol: tasks.aiming.movements was 1, is 3" in said
     assert "P002 has consented" in say(capsys, "consent", "study.yaml", "P002")
-    assert json.loads(Path("study.lock.json").read_text())["approval"]["board"] == "Ethics board"
+    assert (
+        json.loads(Path("study.lock.json").read_text(encoding="utf-8"))["approval"]["board"]
+        == "Ethics board"
+    )
 
 
 def test_a_date_that_is_none_is_told(study: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -29,7 +29,7 @@ def test_after_erasing_nothing_but_the_tombstone_is_left(lab: Lab) -> None:
     assert (others(lab.folder), others(store_of(lab))) == before
     assert done.mentions == []
     tables = lab.places.exports / "tables"
-    assert (tables / "trials.csv").read_text().splitlines() == [
+    assert (tables / "trials.csv").read_text(encoding="utf-8").splitlines() == [
         "participant,movement_time", "P001,1.5", "P002,3.5",
     ]  # fmt: skip
     assert sorted(path.name for path in tables.iterdir()) == ["P001.txt", "trials.csv"]
@@ -47,7 +47,7 @@ def test_erasing_frees_the_slot_and_the_pseudonym_never_comes_back(lab: Lab) -> 
 
 
 def test_what_people_wrote_themselves_is_named(lab: Lab) -> None:
-    (lab.places.root / "todo.txt").write_text("ask P007 about the second session")
+    (lab.places.root / "todo.txt").write_text("ask P007 about the second session", encoding="utf-8")
     done = unfinished.erase(lab.places, "P007", REASON, TODAY)
     assert done.mentions == [str(lab.places.root / "todo.txt")]
 
@@ -55,7 +55,7 @@ def test_what_people_wrote_themselves_is_named(lab: Lab) -> None:
 def test_pilots_and_simulations_under_the_pseudonym_go_too(lab: Lab) -> None:
     for name in ("P007-PILOT", "P007-SIMULATED"):
         (lab.places.root / name).mkdir()
-        (lab.places.root / name / f"{name}.h5").write_text("P007")
+        (lab.places.root / name / f"{name}.h5").write_text("P007", encoding="utf-8")
     unfinished.erase(lab.places, "P007", REASON, TODAY)
     check_erased(lab)
 
@@ -75,14 +75,14 @@ def test_an_export_on_another_disk_is_reached_later(lab: Lab, tmp_path: Path) ->
     disk = tmp_path / "disk"
     disk.mkdir()
     table = disk / "all.csv"
-    table.write_text("participant\nP001\nP007\n")
+    table.write_text("participant\nP001\nP007\n", encoding="utf-8")
     record_export(lab.places, "bids", disk, {Path("all.csv"): ["P001", "P007"]}, TODAY)
     disk.rename(tmp_path / "away")
     done = unfinished.erase(lab.places, "P007", REASON, TODAY)
     assert [owed.folder for owed in done.reach.owed] == [str(disk)]
     (tmp_path / "away").rename(disk)
     unfinished.move(lab.places, store_of(lab))
-    assert table.read_text() == "participant\nP001\n"
+    assert table.read_text(encoding="utf-8") == "participant\nP001\n"
     check_erased(lab)
 
 

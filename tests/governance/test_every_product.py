@@ -41,7 +41,7 @@ def erased(lab: Lab, name: str, before: dict[str, dict[str, str]]) -> None:
     assert len(left) > 60
     assert [path for path in left if path != lab.places.register and says(path, name)] == []
     assert not [path for path in root_of(lab).rglob("*") if path.is_dir() and says_name(path, name)]
-    assert lab.places.register.read_text().count(f'"{name}"') == 1  # the tombstone
+    assert lab.places.register.read_text(encoding="utf-8").count(f'"{name}"') == 1  # the tombstone
     for other in PEOPLE:
         if other != name:
             assert own(root_of(lab), other) == before[other]
@@ -89,7 +89,7 @@ def test_the_shared_files_that_stay_work(made: Snapshot) -> None:
     said = subprocess.run(
         ["Rscript", "-e", f"source('{tables}/read.R'); x <- read_labcrane('{tables}'); "
          "cat(sort(unique(as.character(x$trials$participant))))"],
-        capture_output=True, text=True, check=False,
+        capture_output=True, encoding="utf-8", check=False,
     )  # fmt: skip
     assert said.returncode == 0, said.stderr
     assert said.stdout.split() == ["P0011", "VP-001"]
@@ -182,6 +182,7 @@ def test_where_lists_every_file_that_holds_a_person(
     assert each.state == "tombstone: was erased"
 
 
+@needs("fork")
 def test_a_product_whose_writer_is_killed_is_known_and_erased(made: Snapshot) -> None:
     import os
     import signal
@@ -194,7 +195,7 @@ def test_a_product_whose_writer_is_killed_is_known_and_erased(made: Snapshot) ->
     if child == 0:
         try:
             with product(lab.places.root, "tables", out, PEOPLE, TODAY) as making:
-                (making.folder / "P001.csv").write_text("P001\n")
+                (making.folder / "P001.csv").write_text("P001\n", encoding="utf-8")
                 os.kill(os.getpid(), signal.SIGKILL)
         finally:
             os._exit(1)
@@ -229,7 +230,7 @@ def test_an_empty_mount_point_is_not_taken_for_the_disk(made: Snapshot) -> None:
 def test_files_of_others_in_the_same_folder_stay(made: Snapshot) -> None:
     lab = made.put_back()
     report = root_of(lab) / "elsewhere" / "report"
-    (report / "my notes.txt").write_text("nobody in particular")
+    (report / "my notes.txt").write_text("nobody in particular", encoding="utf-8")
     (report / "empty").mkdir()
     recovery.erase(lab.places, "P001", REASON, TODAY)
     assert files(report) == files(report) != {}

@@ -29,12 +29,14 @@ def rescue(tmp_path: Path) -> Lab:
     """Return the bundled rescue study with questionnaires of the lab's, approved."""
     folder = tmp_path / "rescue"
     shutil.copytree(RESCUE, folder, ignore=shutil.ignore_patterns("hydraulic_arm", "data"))
-    text = (folder / "protocol.yaml").read_text()
+    text = (folder / "protocol.yaml").read_text(encoding="utf-8")
     text = text.replace("    steps:\n", "    steps:\n      - questionnaire: [comfort, ssq]\n")
     (folder / "forms").mkdir()
     words = json.dumps([f"symptom {number}" for number in range(1, 17)])
-    (folder / "forms" / "ssq.yaml").write_text(f"rights: bought\nitems: {words}\n")
-    (folder / "forms" / "comfort.yaml").write_text(COMFORT)
+    (folder / "forms" / "ssq.yaml").write_text(
+        f"rights: bought\nitems: {words}\n", encoding="utf-8"
+    )
+    (folder / "forms" / "comfort.yaml").write_text(COMFORT, encoding="utf-8")
     lab = Lab(folder, text + ASKED)
     lab.approve()
     lab.consent("R001")
@@ -58,7 +60,7 @@ def test_labcrane_run_refuses_another_number_or_question_in_any_file_and_names_i
         edit(rescue.folder / name, old, new)
     done = subprocess.run(
         [sys.executable, "-m", "labcrane", "run", "study.yaml", "--participant", "R001"],
-        cwd=rescue.folder, capture_output=True, text=True, check=False,
+        cwd=rescue.folder, capture_output=True, encoding="utf-8", check=False,
     )  # fmt: skip
     assert done.returncode == 2
     for said in (

@@ -31,14 +31,14 @@ def test_the_approved_study_may_be_run(lab: Lab) -> None:
 
 
 def test_white_space_comments_and_line_ends_are_no_drift(lab: Lab) -> None:
-    text = lab.protocol.read_text()
+    text = lab.protocol.read_text(encoding="utf-8")
     lab.protocol.write_text(
-        "# a comment\n\n" + text.replace("rate_hz: 240", "rate_hz:    240.0 # x")
+        "# a comment\n\n" + text.replace("rate_hz: 240", "rate_hz:    240.0 # x"), encoding="utf-8"
     )
     hello = lab.folder / "hello.md"
     hello.write_bytes(hello.read_bytes().replace(b"\n", b"\r\n"))
     machine = lab.folder / "mine.yaml"
-    machine.write_text("# mine\n" + machine.read_text())
+    machine.write_text("# mine\n" + machine.read_text(encoding="utf-8"), encoding="utf-8")
     assert refusal(lab) == []
 
 
@@ -73,9 +73,9 @@ def test_another_line_of_the_instructions_is_refused(lab: Lab) -> None:
 
 def test_lines_that_come_or_go_are_told(lab: Lab) -> None:
     hello = lab.folder / "hello.md"
-    hello.write_text("Hello.\nPlease hold both sticks.\nThank you.\n")
+    hello.write_text("Hello.\nPlease hold both sticks.\nThank you.\n", encoding="utf-8")
     assert refusal(lab) == ["file hello.md: line 3 is new: 'Thank you.'"]
-    hello.write_text("Hello.\n")
+    hello.write_text("Hello.\n", encoding="utf-8")
     assert refusal(lab) == ["file hello.md: line 2 is gone; it was 'Please hold both sticks.'"]
 
 
@@ -88,7 +88,7 @@ def compared(lab: Lab, data: dict[str, object], change) -> list[str]:
     study = lab.study
     protocol = YamlFile.read(study.path).data
     named = {**protocol, **data}
-    study.path.write_text(json.dumps(named))
+    study.path.write_text(json.dumps(named), encoding="utf-8")
     before = materials(study, discover())
     change()
     return differences(before, materials(study, discover()))
@@ -97,8 +97,8 @@ def compared(lab: Lab, data: dict[str, object], change) -> list[str]:
 def test_one_item_of_a_questionnaire_is_told_also_when_another_file_names_it(lab: Lab) -> None:
     (lab.folder / "forms").mkdir()
     form = lab.folder / "forms" / "effort.yaml"
-    form.write_text("items:\n  - How hard was it?\n  - How tired are you?\n")
-    (lab.folder / "forms.yaml").write_text("after: forms/effort.yaml\n")
+    form.write_text("items:\n  - How hard was it?\n  - How tired are you?\n", encoding="utf-8")
+    (lab.folder / "forms.yaml").write_text("after: forms/effort.yaml\n", encoding="utf-8")
     told = compared(lab, {"questionnaires": "forms.yaml"}, lambda: edit(form, "hard", "very hard"))
     assert told == [
         "file forms/effort.yaml: items[1] was 'How hard was it?', is 'How very hard was it?'"
@@ -112,16 +112,16 @@ def test_a_folder_counts_with_all_that_is_in_it(lab: Lab) -> None:
 
     def change() -> None:
         (scene / "mesh.bin").write_bytes(b"\0\1\3")
-        (scene / "new.txt").write_text("more")
+        (scene / "new.txt").write_text("more", encoding="utf-8")
 
     told = compared(lab, {"scene": "scene/"}, change)
     assert told == ["file scene/mesh.bin has another content", "file scene/new.txt is new"]
 
 
 def test_nothing_outside_the_studys_folder_is_read(tmp_path: Path) -> None:
-    (tmp_path / "outside.txt").write_text("x")
+    (tmp_path / "outside.txt").write_text("x", encoding="utf-8")
     (tmp_path / "study").mkdir()
-    (tmp_path / "study" / "inside.txt").write_text("x")
+    (tmp_path / "study" / "inside.txt").write_text("x", encoding="utf-8")
     named = ["../outside.txt", str(tmp_path / "outside.txt"), "inside.txt", "words"]
     found = referred(named, tmp_path / "study")
     assert [path.name for path in found] == ["inside.txt"]
@@ -137,12 +137,14 @@ def third_party(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         plugins / "labcrane_aiming", package, ignore=shutil.ignore_patterns("__pycache__")
     )
     for module in package.glob("*.py"):
-        text = module.read_text().replace("labcrane_aiming", "labcrane_quay")
-        module.write_text(text.replace('"aiming"', '"quay"'))
+        text = module.read_text(encoding="utf-8").replace("labcrane_aiming", "labcrane_quay")
+        module.write_text(text.replace('"aiming"', '"quay"'), encoding="utf-8")
     about = site / "labcrane_quay-0.1.0.dist-info"
     about.mkdir()
-    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: labcrane-quay\nVersion: 0.1.0\n")
-    (about / "entry_points.txt").write_text("[labcrane]\nquay = labcrane_quay\n")
+    (about / "METADATA").write_text(
+        "Metadata-Version: 2.1\nName: labcrane-quay\nVersion: 0.1.0\n", encoding="utf-8"
+    )
+    (about / "entry_points.txt").write_text("[labcrane]\nquay = labcrane_quay\n", encoding="utf-8")
     monkeypatch.syspath_prepend(site)
     return package
 
@@ -150,7 +152,10 @@ def third_party(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_one_byte_of_a_plugins_source_is_refused_and_its_caches_do_not_count(
     lab: Lab, third_party: Path
 ) -> None:
-    lab.protocol.write_text(lab.protocol.read_text().replace("use: aiming", "use: quay"))
+    lab.protocol.write_text(
+        lab.protocol.read_text(encoding="utf-8").replace("use: aiming", "use: quay"),
+        encoding="utf-8",
+    )
     lock_path(lab.protocol).unlink()
     lab.approve()
     assert "quay" in read_lock(lab.protocol).content["materials"]["plugins"]
@@ -160,7 +165,7 @@ def test_one_byte_of_a_plugins_source_is_refused_and_its_caches_do_not_count(
     assert refusal(lab) == []
     pairs = third_party / "pairs.py"
     pairs.write_bytes(pairs.read_bytes() + b" ")
-    (third_party / "extra.py").write_text("")
+    (third_party / "extra.py").write_text("", encoding="utf-8")
     assert refusal(lab) == [
         "plugin quay: labcrane_quay/extra.py is new",
         "plugin quay: the source of labcrane_quay/pairs.py has changed",
@@ -214,11 +219,11 @@ def test_the_lock_holds_on_another_computer_under_another_path(lab: Lab, tmp_pat
     )
     done = subprocess.run(
         [sys.executable, "-c", program, str(copies), "study.yaml"],
-        cwd=elsewhere, capture_output=True, text=True, check=False,
+        cwd=elsewhere, capture_output=True, encoding="utf-8", check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == read_lock(lab.protocol).seal
-    assert str(tmp_path) not in lock_path(lab.protocol).read_text()
+    assert str(tmp_path) not in lock_path(lab.protocol).read_text(encoding="utf-8")
 
 
 def test_the_hash_of_a_study_does_not_depend_on_when_it_was_approved(lab: Lab) -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from governed import GOVERNED, GROUPED, TODAY, Lab, Willing
+from needs import needs
 
 import labcrane
 from labcrane import DeviceError, ProtocolError
@@ -60,6 +61,7 @@ def test_a_session_leaves_approval_consent_slot_and_group_in_the_file(tmp_path: 
     assert (sitting.session, sitting.lock, sitting.deviations) == (1, lock.seal, [])
 
 
+@needs("permissions")
 def test_everything_about_people_is_for_the_user_only(lab: Lab) -> None:
     lab.run("P001")
     assert stat.S_IMODE(lab.places.root.stat().st_mode) == 0o700
@@ -81,6 +83,7 @@ def test_what_did_not_go_as_planned_is_listed(lab: Lab) -> None:
     assert [deviation.what for deviation in sitting.deviations] == [what for what, _ in found]
 
 
+@needs("fork")
 def test_the_deviations_of_a_session_that_was_killed_come_from_its_journal(lab: Lab) -> None:
     lab.consent("P001")
     child = os.fork()
@@ -214,7 +217,7 @@ def test_a_note_that_leads_to_a_person_is_refused_everywhere(lab: Lab) -> None:
 
 def test_no_name_is_asked_for_or_kept(lab: Lab) -> None:
     lab.consent("P001")
-    register = json.loads(lab.places.register.read_text())
+    register = json.loads(lab.places.register.read_text(encoding="utf-8"))
     assert not {"name", "email", "phone"} & set(register["participants"]["P001"])
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from governed import GROUPED, Lab
+from needs import needs
 
 from labcrane import ProtocolError, RecordingError
 from labcrane.participants.folders import Places
@@ -35,7 +36,9 @@ def lab(tmp_path: Path) -> Lab:
 def test_a_register_edited_into_the_impossible_is_refused(lab: Lab, edit, said: str) -> None:
     for name in ("P001", "P002"):
         lab.consent(name)
-    lab.places.register.write_text(edit(lab.places.register.read_text()))
+    lab.places.register.write_text(
+        edit(lab.places.register.read_text(encoding="utf-8")), encoding="utf-8"
+    )
     with pytest.raises(RecordingError, match=said):
         check_eligibility(lab.visit("P001"))
 
@@ -58,6 +61,7 @@ def _enrol(folder: Path, names: list[str]) -> None:
         lab.consent(name)
 
 
+@needs("fork")
 def test_processes_that_write_at_once_lose_nothing_and_share_no_slot(tmp_path: Path) -> None:
     lab = Lab(tmp_path, GROUPED)
     lab.approve()
@@ -95,7 +99,9 @@ def test_a_kill_during_a_write_leaves_a_whole_register(tmp_path: Path) -> None:
     places, last = Places(tmp_path / "data"), 0
     for round_number in range(1, 6):
         child = subprocess.Popen(
-            [sys.executable, "-c", WRITER, str(places.root)], stdout=subprocess.PIPE, text=True
+            [sys.executable, "-c", WRITER, str(places.root)],
+            stdout=subprocess.PIPE,
+            encoding="utf-8",
         )
         with child:
             for _ in range(3):

@@ -84,8 +84,10 @@ def test_a_relabelled_file_is_what_recover_would_make_of_its_journals(lab: Lab) 
 def test_exports_are_relabelled_too(lab: Lab) -> None:
     relabel(lab)
     tables = lab.places.exports / "tables"
-    assert "P008,2.5" in (tables / "trials.csv").read_text()
-    assert (tables / "sub-P008_events.tsv").read_text() == "onset\tparticipant\n1.0\tP008\n"
+    assert "P008,2.5" in (tables / "trials.csv").read_text(encoding="utf-8")
+    assert (tables / "sub-P008_events.tsv").read_text(
+        encoding="utf-8"
+    ) == "onset\tparticipant\n1.0\tP008\n"
     (export,) = read(lab.places).exports
     assert export.files["trials.csv"] == ["P001", "P002", "P008"]
     assert not (tables / "all.mat").exists()

@@ -35,9 +35,9 @@ def test_transfer_copies_proves_and_lists_what_is_only_here(lab: Lab) -> None:
 def test_transfer_never_replaces_what_it_did_not_put_there(lab: Lab) -> None:
     foreign = store_of(lab) / "rehearsal" / "P001" / "P001.h5"
     foreign.parent.mkdir(parents=True)
-    foreign.write_text("somebody else's")
+    foreign.write_text("somebody else's", encoding="utf-8")
     done = unfinished.move(lab.places, store_of(lab))
-    assert foreign.read_text() == "somebody else's"
+    assert foreign.read_text(encoding="utf-8") == "somebody else's"
     assert done.only_here == [
         f"P001/P001.h5: the store has another file {foreign}, not from labcrane"
     ]

@@ -43,7 +43,7 @@ class Engine:
         from labcrane.machines import urdf_of
 
         self.bullet = pybullet
-        (self.folder / "crane.urdf").write_text(urdf_of(machine))
+        (self.folder / "crane.urdf").write_text(urdf_of(machine), encoding="utf-8")
         self.client = pybullet.connect(pybullet.DIRECT)
         try:
             self.body = pybullet.loadURDF(
@@ -203,7 +203,7 @@ def digest_of_another_process(name: str, actuator: str) -> str:
         [sys.executable, "-c", PROGRAM, name, actuator],
         check=True,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
     )
     (line,) = (line for line in finished.stdout.splitlines() if line.startswith("states"))
     return line.split()[1]

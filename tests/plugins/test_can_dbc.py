@@ -19,7 +19,7 @@ LEVERS = (
 
 @pytest.fixture
 def panel(tmp_path: Path) -> Path:
-    (tmp_path / "panel.dbc").write_text(LEVERS)
+    (tmp_path / "panel.dbc").write_text(LEVERS, encoding="utf-8")
     return tmp_path / "panel.dbc"
 
 
@@ -49,7 +49,7 @@ def test_a_dbc_file_alone_maps_its_signals_by_their_names(panel: Path, capsys) -
 
 def test_two_signals_of_one_name_and_no_map_at_all_are_refused(panel: Path, capsys) -> None:
     twice = LEVERS[LEVERS.index("BO_ 256") :].replace("BO_ 256 Levers", "BO_ 257 Others")
-    panel.write_text(LEVERS + "\n" + twice)
+    panel.write_text(LEVERS + "\n" + twice, encoding="utf-8")
     assert main([*BRIDGE, "--map", str(panel)]) == 2
     assert "has two signals 'boom', Levers.Boom and Others.Boom; say which moves the joint" in (
         capsys.readouterr().err

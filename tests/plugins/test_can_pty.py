@@ -1,5 +1,6 @@
 """A panel process on the other side of a pty: straight into a session, and through the gateway."""
 
+import shutil
 import signal
 import subprocess
 import sys
@@ -63,7 +64,7 @@ class Panel:
             [sys.executable, str(program), str(link), "100", str(away_s)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            text=True,
+            encoding="utf-8",
         )
         self._swung_s = swung_s
         self._words = ["unplug", "end"]
@@ -126,8 +127,8 @@ def session(folder: Path, controls: str, panel: Panel) -> list:
     """Run a session in real time; return when ticks woke, commands, pauses and events."""
     scene = RETRIEVAL / "scenes" / "touch.yaml"
     text = PROTOCOL.format(input=controls, folder=RETRIEVAL, machine="ied_arm.yaml", scene=scene)
-    (folder / "study.yaml").write_text(text)
-    (folder / "ied_arm.yaml").write_text((RETRIEVAL / "ied_arm.yaml").read_text())
+    (folder / "study.yaml").write_text(text, encoding="utf-8")
+    shutil.copy(RETRIEVAL / "ied_arm.yaml", folder)
     study = load(folder / "study.yaml", discover())
     plan = plan_session(study, "P001", 1)
     rig = Rig.build(study, simulated=False)
@@ -186,7 +187,7 @@ def test_the_gateway_bridges_a_panel_to_a_session_over_lsl_and_the_flow_back(
     for valve in ("jaws=4", "base=1", "boom=3", "arm=2"):  # in no order of the machine
         words += ["--valve", valve]
     words += ["--name", "bridged.command"]
-    bridge = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    bridge = subprocess.Popen(words, stdout=subprocess.PIPE, encoding="utf-8")
     try:
         assert panel.process.stdout
         assert panel.process.stdout.readline() == "open\n"

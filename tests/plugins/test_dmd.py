@@ -95,7 +95,9 @@ def test_a_refit_gives_the_same_file_and_the_file_the_same_speeds(
 
 def test_the_file_beside_the_protocol_is_the_fit_of_its_recordings(model, tmp_path: Path) -> None:
     save(model, tmp_path / "arm.yaml")
-    assert (tmp_path / "arm.yaml").read_text() == (FOLDER.parent / "arm.dmd.yaml").read_text()
+    assert (tmp_path / "arm.yaml").read_text(encoding="utf-8") == (
+        FOLDER.parent / "arm.dmd.yaml"
+    ).read_text(encoding="utf-8")
 
 
 def test_level_zero_and_the_dead_band_stand_still_and_speed_rises_from_its_edge(model) -> None:

@@ -131,8 +131,10 @@ def run_of(
     folder: Path, hand: Hand, things: str, orders: Mapping[int, list[Command]] | None = None
 ) -> Rehearsal:
     height = 0.15 if things is BLOCK else 0.27
-    (folder / "scene.yaml").write_text(SCENE.format(things=things, start=start_at(height)))
-    (folder / "study.yaml").write_text(STUDY.format(folder=RETRIEVAL))
+    (folder / "scene.yaml").write_text(
+        SCENE.format(things=things, start=start_at(height)), encoding="utf-8"
+    )
+    (folder / "study.yaml").write_text(STUDY.format(folder=RETRIEVAL), encoding="utf-8")
     study = load(folder / "study.yaml", discover())
     return rehearse(study, orders, rig=replace(Rig.build(study, simulated=True), input=hand))
 

@@ -55,13 +55,17 @@ sessions: [{{name: only, steps: [{{block: {{task: reach}}}}]}}]
 
 @needs_bullet
 def test_a_program_written_from_the_documentation_drives_the_arm(tmp_path: Path) -> None:
-    (tmp_path / "study.yaml").write_text(STUDY.format(RETRIEVAL))
-    (tmp_path / "ied_arm.yaml").write_text((RETRIEVAL / "ied_arm.yaml").read_text())
+    (tmp_path / "study.yaml").write_text(STUDY.format(RETRIEVAL), encoding="utf-8")
+    (tmp_path / "ied_arm.yaml").write_text(
+        (RETRIEVAL / "ied_arm.yaml").read_text(encoding="utf-8"), encoding="utf-8"
+    )
     study = load(tmp_path / "study.yaml", discover())
     plan = plan_session(study, "P001", 1)
     rig = Rig.build(study, simulated=False)
     program = subprocess.Popen(
-        [sys.executable, str(TESTS / "gateway_program.py"), "7"], stdout=subprocess.PIPE, text=True
+        [sys.executable, str(TESTS / "gateway_program.py"), "7"],
+        stdout=subprocess.PIPE,
+        encoding="utf-8",
     )
     seen = []
     try:

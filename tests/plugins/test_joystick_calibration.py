@@ -63,7 +63,8 @@ def test_each_side_of_an_axis_is_linear_to_its_own_end():
 def test_a_range_that_does_not_ascend_is_an_error_with_the_file(config):
     config.write_text(
         f"{MODEL}: {{date: '2025-01-31', left: {{port: a, x: {{minimum: 5, maximum: 3}}}}, "
-        "right: {port: b}}\n"
+        "right: {port: b}}\n",
+        encoding="utf-8",
     )
     with pytest.raises(DeviceError, match="must ascend, but are 5, 0 and 3") as refused:
         load(config, MODEL)
@@ -72,7 +73,7 @@ def test_a_range_that_does_not_ascend_is_an_error_with_the_file(config):
 
 @pytest.mark.parametrize("text", ["[1", "- a\n", "\x00"])
 def test_a_file_that_cannot_be_read_is_an_error_with_its_path(config, text):
-    config.write_text(text)
+    config.write_text(text, encoding="utf-8")
     with pytest.raises(DeviceError, match="remove it and run 'python -m labcrane_joystick'") as bad:
         load(config, MODEL)
     assert str(config) in str(bad.value)

@@ -108,7 +108,7 @@ def run_python(code: str, **environment: str) -> subprocess.CompletedProcess[str
         [sys.executable, "-W", "error", "-c", code],
         env=inherited | environment,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
         timeout=240,
     )
@@ -154,7 +154,7 @@ def test_the_program_without_sticks_ends_with_the_error_and_no_traceback():
     done = subprocess.run(
         [sys.executable, "-m", "labcrane_joystick", "--stick", "ffff:fffe"],
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
         timeout=240,
     )

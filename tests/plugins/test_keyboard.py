@@ -80,7 +80,7 @@ def a_view_that_sends(
     desk = Desk(view, **settings)
     try:
         keys = desk.keyboard._keys
-        wait_for(lambda: keys.connected or keys.complaint, patience_s=10.0)
+        wait_for(lambda: keys.connected or keys.complaint)
         yield desk, outlet
     finally:
         desk.keyboard.close()
@@ -175,7 +175,7 @@ def a_window(view: str, display: str) -> Iterator["subprocess.Popen[str]"]:
         env={**os.environ, "DISPLAY": display},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        text=True,
+        encoding="utf-8",
     )
     try:
         assert process.stdout.readline() == "ready\n"
@@ -194,7 +194,7 @@ def test_real_keys_in_a_real_window_move_the_axes() -> None:
     def tell(*what: str) -> str:
         environment = {**os.environ, "DISPLAY": display}
         done = subprocess.run(
-            ["xdotool", *what], env=environment, check=True, capture_output=True, text=True
+            ["xdotool", *what], env=environment, check=True, capture_output=True, encoding="utf-8"
         )
         return done.stdout.strip()
 

@@ -194,10 +194,12 @@ def test_text_that_may_not_be_shipped_is_asked_of_the_lab(tmp_path: Path) -> Non
     more = "questionnaires: {ssq: {use: ssq, file: ssq.yaml}}\n"
     step = "      - questionnaire: ssq\n"
     assert "ssq.yaml' cannot be read" in refusal(tmp_path, step, more)
-    (tmp_path / "ssq.yaml").write_text("rights: bought\nitems: [one, two]\n")
+    (tmp_path / "ssq.yaml").write_text("rights: bought\nitems: [one, two]\n", encoding="utf-8")
     said = refusal(tmp_path, step, more)
     assert "Simulator sickness questionnaire has 16 items, and the lab's file has 2" in said
-    (tmp_path / "ssq.yaml").write_text(f"rights: bought\nitems: {[f'w{n}' for n in range(16)]}\n")
+    (tmp_path / "ssq.yaml").write_text(
+        f"rights: bought\nitems: {[f'w{n}' for n in range(16)]}\n", encoding="utf-8"
+    )
     study = a_study(tmp_path, a_protocol(step, more))
     assert study.questionnaires["ssq"].items()[15].text == "w15"
     assert study.questionnaires["ssq"].rights == "bought"
@@ -233,12 +235,12 @@ BY_FILE = "questionnaires: {comfort: {use: free, file: comfort.yaml}}\n"
 
 def test_the_labs_own_questions_may_stand_in_a_file_of_their_own(tmp_path: Path) -> None:
     file = tmp_path / "comfort.yaml"
-    file.write_text(json.dumps(COMFORT))
+    file.write_text(json.dumps(COMFORT), encoding="utf-8")
     study = a_study(tmp_path, a_protocol(ASK_COMFORT, BY_FILE))
     assert [item.text for item in study.questionnaires["comfort"].items()] == ["Too hot?"]
     twice = BY_FILE.replace("comfort.yaml", "comfort.yaml, title: Warmth")
     assert "title is said in 'comfort.yaml' and in" in refusal(tmp_path, ASK_COMFORT, twice)
-    file.write_text("Too hot?")
+    file.write_text("Too hot?", encoding="utf-8")
     assert "holds 'Too hot?'; it must hold keys" in refusal(tmp_path, ASK_COMFORT, BY_FILE)
     file.unlink()
     assert "comfort.yaml' cannot be read" in refusal(tmp_path, ASK_COMFORT, BY_FILE)
@@ -246,7 +248,7 @@ def test_the_labs_own_questions_may_stand_in_a_file_of_their_own(tmp_path: Path)
 
 def test_a_session_is_replayed_without_the_file_of_its_questions(tmp_path: Path) -> None:
     file = tmp_path / "comfort.yaml"
-    file.write_text(json.dumps(COMFORT))
+    file.write_text(json.dumps(COMFORT), encoding="utf-8")
     study = a_study(tmp_path, a_protocol(ASK_COMFORT, BY_FILE))
     path = run(
         Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=True), ScriptedConsole()

@@ -24,7 +24,10 @@ JOINTS = load_machine("ied_arm.yaml", RETRIEVAL).names
 
 def labcrane_command(*words: str) -> str:
     done = subprocess.run(
-        [sys.executable, "-m", "labcrane", *words], capture_output=True, text=True, check=False
+        [sys.executable, "-m", "labcrane", *words],
+        capture_output=True,
+        encoding="utf-8",
+        check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout

@@ -37,7 +37,7 @@ class TestScenario(TaskContract):  # "scenario"
 
     @pytest.fixture
     def task(self, tmp_path: Path) -> Task:
-        (tmp_path / "free.yaml").write_text(FREE)
+        (tmp_path / "free.yaml").write_text(FREE, encoding="utf-8")
         return Scenario(ScenarioSettings(scenes=(tmp_path / "free.yaml",)), ch8())
 
 
@@ -67,7 +67,7 @@ FORCE = "scene.block.force.block"
 
 def judged(tmp_path: Path, pushes: list[float], *, lift_limits: bool = False):
     """Return the task's judgements of a force on the block, tick by tick."""
-    (tmp_path / "block.yaml").write_text(BLOCK)
+    (tmp_path / "block.yaml").write_text(BLOCK, encoding="utf-8")
     task = Scenario(ScenarioSettings(scenes=(tmp_path / "block.yaml",), mistakes=4), ch8())
     state = (
         *crane_state(ch8()).signals,
@@ -150,7 +150,7 @@ def test_impossible_scenes_are_refused_with_their_line(
     change: tuple[str, str], message: str, tmp_path: Path
 ) -> None:
     path = tmp_path / "block.yaml"
-    path.write_text(BLOCK.replace(*change))
+    path.write_text(BLOCK.replace(*change), encoding="utf-8")
     with pytest.raises(ProtocolError, match=message):
         load_scene(path)
 
@@ -184,7 +184,7 @@ def test_a_deformity_is_found_by_the_operators_button_or_the_supervisors_note(
     by: str | None,
     tmp_path: Path,
 ) -> None:
-    (tmp_path / "lying.yaml").write_text(LYING)
+    (tmp_path / "lying.yaml").write_text(LYING, encoding="utf-8")
     settings = ScenarioSettings(scenes=(tmp_path / "lying.yaml",), find_axis="button", limit_s=0.1)
     task = Scenario(settings, ch8())
     state = (

@@ -24,12 +24,12 @@ def recorded(tmp_path: Path) -> Path:
     """Run one scenario of a study that lies somewhere and is gone afterwards."""
     study = tmp_path / "somewhere" / "study"
     shutil.copytree(RETRIEVAL, study)
-    text = (study / "protocol.yaml").read_text()
+    text = (study / "protocol.yaml").read_text(encoding="utf-8")
     for line in text.splitlines():
         stage = "- reference:" in line or "- practice:" in line
         if (line.startswith("    - scenes/") and "touch" not in line) or stage:
             text = text.replace(line + "\n", "")
-    (study / "protocol.yaml").write_text(text)
+    (study / "protocol.yaml").write_text(text, encoding="utf-8")
     visit = Visit(
         load(study / "protocol.yaml", discover()),
         "R001",
@@ -46,7 +46,7 @@ def recorded(tmp_path: Path) -> Path:
 def test_a_scenario_is_replayed_bit_for_bit_from_its_record_alone(recorded: Path) -> None:
     context = open_recording(recorded).session(1).context
     scene = "scenes/touch.yaml"
-    assert context["files"][scene]["text"] == (RETRIEVAL / scene).read_text()
+    assert context["files"][scene]["text"] == (RETRIEVAL / scene).read_text(encoding="utf-8")
     assert context["components"]["dynamics"]["settings"]["scenes"] == [scene]
     assert "somewhere" not in json.dumps(context)
     again = replay_session(recorded, 1)

@@ -220,7 +220,7 @@ def refusal(driver: str = "portaudio", device: int | None = None, **env: str) ->
         [sys.executable, "-c", NO_DEVICE.format(driver=driver, device=device)],
         env={**os.environ, "JACK_DEFAULT_SERVER": "nobody", **env},
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
     )
     assert done.returncode == 0, done.stderr  # pyo itself would end with a segmentation fault
@@ -236,7 +236,7 @@ def test_a_computer_without_sound_is_told_so() -> None:
 def null_device(folder: Path) -> str:
     """Return an ALSA configuration whose only device takes everything and sounds nothing."""
     config = folder / "asoundrc"
-    config.write_text("pcm.!default { type null }\nctl.!default { type null }\n")
+    config.write_text("pcm.!default { type null }\nctl.!default { type null }\n", encoding="utf-8")
     return str(config)
 
 

@@ -66,7 +66,7 @@ def played(folder: Path, seconds: float, *how: str, real_time: bool) -> dict[str
             [sys.executable, str(program), str(seconds), *how],
             env={**os.environ, "JACK_DEFAULT_SERVER": name},
             capture_output=True,
-            text=True,
+            encoding="utf-8",
             check=False,
         )
     assert done.returncode == 0, done.stderr
@@ -121,7 +121,7 @@ def test_the_doctor_says_whether_jack_runs_in_real_time(tmp_path: Path, how: str
             [sys.executable, "-c", LOOK],
             env={**os.environ, "JACK_DEFAULT_SERVER": name},
             capture_output=True,
-            text=True,
+            encoding="utf-8",
             check=False,
         )
     assert done.returncode == 0, done.stderr

@@ -248,7 +248,7 @@ def test_a_window_shows_the_newest_frame_and_is_never_late(x_server: str) -> Non
         [sys.executable, str(program)],
         env={**os.environ, "DISPLAY": x_server},
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
     )
     assert done.returncode == 0, done.stderr

@@ -136,10 +136,10 @@ CRANE = Path(__file__).parents[2] / "labcrane" / "machines" / "data" / "ch8.yaml
 def a_machine_study(folder: Path, mesh: str) -> Path:
     """Write a study whose machine, in a folder of its own, has a mesh on its last link."""
     (folder / "cranes").mkdir(exist_ok=True)
-    lines = CRANE.read_text().rstrip().splitlines()
+    lines = CRANE.read_text(encoding="utf-8").rstrip().splitlines()
     assert "name: wrist" in lines[-1]
     lines[-1] = lines[-1].rstrip("}") + f", mesh: {mesh}}}"
-    (folder / "cranes" / "mine.yaml").write_text("\n".join(lines) + "\n")
+    (folder / "cranes" / "mine.yaml").write_text("\n".join(lines) + "\n", encoding="utf-8")
     text = SHORT.replace("machine: ch8", "machine: cranes/mine.yaml")
     return a_study(folder, text).path
 
@@ -164,7 +164,7 @@ def test_a_protocol_with_a_wrong_mesh_is_refused(mesh: str, why: str, tmp_path: 
 
 def test_meshes_are_part_of_what_is_approved(tmp_path: Path) -> None:
     (tmp_path / "cranes").mkdir()
-    (tmp_path / "cranes" / "x.gltf").write_text(json.dumps(gltf(uri="x.bin")))
+    (tmp_path / "cranes" / "x.gltf").write_text(json.dumps(gltf(uri="x.bin")), encoding="utf-8")
     (tmp_path / "cranes" / "x.bin").write_bytes(NUMBERS)
     protocol = a_machine_study(tmp_path, "{file: x.gltf, scale: 0.5}")
     named = referred({"machine": "cranes/mine.yaml"}, protocol.parent)
@@ -230,7 +230,7 @@ CAMERA = {"name": "c", "eye": (0.5, 0.0, 2.5), "look": (5.0, 0.0, 0.5)}
 def a_scene_file(folder: Path) -> Path:
     written(folder, "a.stl")
     path = folder / "scene.yaml"
-    path.write_text(SCENE)
+    path.write_text(SCENE, encoding="utf-8")
     return path
 
 

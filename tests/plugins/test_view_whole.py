@@ -160,19 +160,20 @@ def test_check_warns_of_an_error_that_every_group_is_shown(
     from labcrane.cli.app import main
 
     path = tmp_path / "study.yaml"
-    path.write_text(SHORT + "views: {cab: {use: view, hud: [trial, distance]}}\n")
+    path.write_text(SHORT + "views: {cab: {use: view, hud: [trial, distance]}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0
     said = capsys.readouterr()
     assert "warning: views.cab: hud: distance tells the operator the task's error" in said.err
-    path.write_text(SHORT + "views: {cab: {use: view, patch: {on: [target.entered]}}}\n")
+    always = "views: {cab: {use: view, patch: {on: [target.entered]}}}\n"
+    path.write_text(SHORT + always, encoding="utf-8")
     assert main(["check", str(path)]) == 0
     assert "patch: target.entered tells the operator, in every group" in capsys.readouterr().err
-    path.write_text(SHORT + "views: {hum: {use: sonification}}\n")
+    path.write_text(SHORT + "views: {hum: {use: sonification}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0
     assert (
         "warning: views.hum: sonification tells how far the tip is from the target, in every group "
         "and block; put it under feedback, where the design says who is given it"
     ) in capsys.readouterr().err
-    path.write_text(SHORT + "views: {cab: {use: view, patch: {}}}\n")
+    path.write_text(SHORT + "views: {cab: {use: view, patch: {}}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0
     assert capsys.readouterr().err == ""

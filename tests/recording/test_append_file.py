@@ -1,7 +1,6 @@
 """A disk that takes no more, a disk that cannot sync: refused by the real kernel."""
 
 import os
-import resource
 import signal
 import time
 from collections.abc import Iterator
@@ -9,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from needs import need
 
 from labcrane import RecordingError
 from labcrane.files.append import AppendFile
@@ -20,6 +20,9 @@ def limited() -> Iterator[None]:
 
     Within a test's body only: pytest itself writes, perhaps to a longer file, right after it.
     """
+    need("limits of files")
+    import resource
+
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))

@@ -34,7 +34,7 @@ def labcrane_command(*arguments: str | Path) -> str:
         [sys.executable, "-m", "labcrane", *map(str, arguments)],
         check=False,
         capture_output=True,
-        text=True,
+        encoding="utf-8",
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
@@ -161,7 +161,7 @@ def test_every_dataset_of_before_reads_as_it_stands(before: Path) -> None:
             read.add(path)
     groups = {*session.streams, *tables}
     assert read == {path for path in stored if path.split("/")[1] in groups}
-    assert session.protocol == (BEFORE / "protocol.yaml").read_text()
+    assert session.protocol == (BEFORE / "protocol.yaml").read_text(encoding="utf-8")
 
 
 def test_a_replay_of_before_gives_every_number(before: Path) -> None:

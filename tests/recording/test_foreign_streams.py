@@ -1,5 +1,4 @@
 import errno
-import fcntl
 import json
 import os
 import threading
@@ -13,6 +12,7 @@ import pyxdf
 from recording.journals import write
 
 from labcrane import RecordingError
+from labcrane.files.lock import alone_in
 from labcrane.recording.foreign_streams import (
     RecordedStream,
     companion_headers,
@@ -178,12 +178,10 @@ def test_correcting_again_waits_for_whoever_writes_the_participant_file(folder: 
     def conclude(group: h5py.Group) -> None:
         entered.set()
 
-    held = os.open(folder, os.O_RDONLY)
-    fcntl.flock(held, fcntl.LOCK_EX)
     again = threading.Thread(target=recorrect, args=(path, conclude))
-    again.start()
-    assert not entered.wait(0.5)
-    os.close(held)
+    with alone_in(folder):
+        again.start()
+        assert not entered.wait(0.5)
     again.join(240)
     assert entered.is_set()
 

@@ -48,7 +48,7 @@ def in_namespace(mount: str, script: str, folder: Path) -> subprocess.CompletedP
     return subprocess.run(
         [*UNSHARE, "sh", "-c", command, str(folder), sys.executable, "-c", script, str(folder)],
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
     )

@@ -3,7 +3,6 @@
 import json
 import os
 import random
-import signal
 import subprocess
 import sys
 import time
@@ -29,13 +28,13 @@ def killed_writer(path: Path, after_s: float, pause: float) -> list[int]:
     process = subprocess.Popen(
         [sys.executable, journals.__file__, str(path), str(pause)],
         stdout=subprocess.PIPE,
-        text=True,
+        encoding="utf-8",
         env=ENVIRONMENT,
     )
     assert process.stdout is not None
     told = [process.stdout.readline()]
     time.sleep(after_s)  # the moment of death, not a wait for something
-    process.send_signal(signal.SIGKILL)
+    process.kill()
     told += process.stdout.readlines()
     process.wait()
     process.stdout.close()
@@ -87,7 +86,9 @@ print("done", flush=True)
 def how_long_recover_takes(folder: Path, file: Path, before: bytes) -> float:
     """Let it run to its end, as nobody kills it, and undo what it has done; return the seconds."""
     program = [sys.executable, "-c", RECOVER, str(folder)]
-    with subprocess.Popen(program, stdout=subprocess.PIPE, text=True, env=ENVIRONMENT) as process:
+    with subprocess.Popen(
+        program, stdout=subprocess.PIPE, encoding="utf-8", env=ENVIRONMENT
+    ) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "go\n"
         began = time.perf_counter()
@@ -119,13 +120,13 @@ def test_recover_may_be_killed_at_any_moment_and_repeated(tmp_path: Path, kills:
         process = subprocess.Popen(
             [sys.executable, "-c", RECOVER, str(tmp_path)],
             stdout=subprocess.PIPE,
-            text=True,
+            encoding="utf-8",
             env=ENVIRONMENT,
         )
         assert process.stdout is not None
         assert process.stdout.readline() == "go\n"
         time.sleep(random.Random(moment).uniform(0.0, whole))  # the moment of death
-        process.send_signal(signal.SIGKILL)
+        process.kill()
         killed += process.stdout.read() == ""
         process.wait()
         process.stdout.close()

@@ -281,5 +281,7 @@ def test_importing_the_reader_loads_neither_pandas_nor_h5py() -> None:
         "import sys, json, labcrane.recording.participant_file.recover;"
         "print(json.dumps([m for m in ('pandas', 'h5py') if m in sys.modules]))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, check=True, encoding="utf-8"
+    )
     assert json.loads(done.stdout) == []

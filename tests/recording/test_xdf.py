@@ -120,10 +120,10 @@ def test_header_says_labels_units_and_types_where_the_conventions_have_them(tmp_
 
 def test_an_existing_file_is_never_written_to(tmp_path: Path) -> None:
     path = tmp_path / "ses-01_run.xdf"
-    path.write_text("somebody's data")
+    path.write_text("somebody's data", encoding="utf-8")
     with pytest.raises(RecordingError, match="exists already"):
         XdfWriter(path)
-    assert path.read_text() == "somebody's data"
+    assert path.read_text(encoding="utf-8") == "somebody's data"
 
 
 def test_parts_are_numbered_by_the_process_that_goes_on(tmp_path: Path) -> None:

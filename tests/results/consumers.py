@@ -22,7 +22,9 @@ def octave(script: str, argument: object) -> str:
 
 def _run(command: list[str]) -> str:
     environment = os.environ | {"LC_ALL": "C.UTF-8"}
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    done = subprocess.run(
+        command, capture_output=True, encoding="utf-8", check=False, env=environment
+    )
     assert done.returncode == 0, done.stderr + done.stdout
     return done.stdout
 

@@ -30,11 +30,13 @@ MOTION = f"sub-P001/ses-01/motion/{NAME}"
 def folder(cohort: Cohort, tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("bids")
     people = root / "people.csv"
-    people.write_text("participant,age,sex,handedness\nP001,24,F,R\n")
+    people.write_text("participant,age,sex,handedness\nP001,24,F,R\n", encoding="utf-8")
     (root / "asked").mkdir()
-    (root / "asked" / "tlx.csv").write_text("participant,mental\nP001,35\nP002,40\n")
+    (root / "asked" / "tlx.csv").write_text(
+        "participant,mental\nP001,35\nP002,40\n", encoding="utf-8"
+    )
     about = {"MeasurementToolMetadata": {"Description": "NASA-TLX"}, "mental": {"Units": "1"}}
-    (root / "asked" / "tlx.json").write_text(json.dumps(about))
+    (root / "asked" / "tlx.json").write_text(json.dumps(about), encoding="utf-8")
     settings = BidsSettings(
         ethics=("Ethics board, 2026-17",),
         authors=("A. Researcher",),
@@ -50,7 +52,7 @@ def folder(cohort: Cohort, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def errors(folder: Path) -> list[str]:
     done = subprocess.run(
-        [str(VALIDATOR), "--json", str(folder)], capture_output=True, text=True, check=False
+        [str(VALIDATOR), "--json", str(folder)], capture_output=True, encoding="utf-8", check=False
     )
     issues = json.loads(done.stdout)["issues"]["issues"]
     return [f"{i['code']} {i.get('location')}" for i in issues if i["severity"] == "error"]
@@ -70,7 +72,10 @@ def test_the_validator_does_find_errors(folder: Path, tmp_path: Path) -> None:
     shutil.copytree(folder, broken)
     (broken / f"{MOTION}_tracksys-crane_motion.json").unlink()
     events = broken / f"{MOTION}_events.tsv"
-    events.write_text(events.read_text().replace("Experiment-structure", "No-such-tag"))
+    events.write_text(
+        events.read_text(encoding="utf-8").replace("Experiment-structure", "No-such-tag"),
+        encoding="utf-8",
+    )
     found = " ".join(errors(broken))
     assert "SIDECAR" in found or "MISSING" in found
     assert "HED_ERROR" in found
@@ -81,12 +86,14 @@ def test_what_the_validator_misses(folder: Path, cohort: Cohort, system: str) ->
     channels = pd.read_csv(folder / f"{MOTION}_tracksys-{system}_channels.tsv", sep="\t")
     required = ["name", "component", "type", "tracked_point", "units"]
     assert list(channels) == required
-    motion = (folder / f"{MOTION}_tracksys-{system}_motion.tsv").read_text()
+    motion = (folder / f"{MOTION}_tracksys-{system}_motion.tsv").read_text(encoding="utf-8")
     first = motion.splitlines()[0].split("\t")
     assert len(first) == len(channels)
     assert all(np.isfinite(float(value)) for value in first)  # no header row
     samples = np.loadtxt(io.StringIO(motion))
-    about = json.loads((folder / f"{MOTION}_tracksys-{system}_motion.json").read_text())
+    about = json.loads(
+        (folder / f"{MOTION}_tracksys-{system}_motion.json").read_text(encoding="utf-8")
+    )
     assert about["MotionChannelCount"] == samples.shape[1]
     counted = {kind: about[f"{kind}ChannelCount"] for kind in set(channels["type"])}
     assert counted == channels["type"].value_counts().to_dict()
@@ -126,13 +133,15 @@ def test_dates_move_and_intervals_stay(folder: Path, cohort: Cohort, tmp_path: P
     kept = pd.read_csv(tmp_path / "sub-P001" / "ses-01" / "sub-P001_ses-01_scans.tsv", sep="\t")
     started = cohort.included[0].context["started"]
     assert kept["acq_time"][0][:23] == started[:23]
-    about = json.loads((tmp_path / f"{MOTION}_tracksys-crane_motion.json").read_text())
+    about = json.loads(
+        (tmp_path / f"{MOTION}_tracksys-crane_motion.json").read_text(encoding="utf-8")
+    )
     assert about["SamplingFrequency"] == 40.0
 
 
 def test_eye_tracking_is_physio_with_its_columns_described(folder: Path, cohort: Cohort) -> None:
     path = folder / "sub-P001" / "ses-01" / "beh" / f"{NAME}_recording-eye1_physio"
-    about = json.loads(path.with_name(f"{path.name}.json").read_text())
+    about = json.loads(path.with_name(f"{path.name}.json").read_text(encoding="utf-8"))
     assert about["PhysioType"] == "eyetrack"
     assert about["Columns"] == ["timestamp", "x_coordinate", "y_coordinate", "aoi"]
     assert set(about["Columns"]) <= set(about)
@@ -149,10 +158,10 @@ def test_people_ethics_and_questionnaires_are_where_bids_wants_them(folder: Path
     people = pd.read_csv(folder / "participants.tsv", sep="\t", keep_default_na=False)
     assert people.iloc[0].tolist() == ["sub-P001", "24", "F", "R", "n/a", "complete"]
     assert people.iloc[1].tolist() == ["sub-P002", "n/a", "n/a", "n/a", "n/a", "complete"]
-    about = json.loads((folder / "dataset_description.json").read_text())
+    about = json.loads((folder / "dataset_description.json").read_text(encoding="utf-8"))
     assert about["EthicsApprovals"] == ["Ethics board, 2026-17"]
     assert about["BIDSVersion"] == "1.11.1"
-    tlx = (folder / "phenotype" / "tlx.tsv").read_text()
+    tlx = (folder / "phenotype" / "tlx.tsv").read_text(encoding="utf-8")
     assert tlx.splitlines()[1] == "sub-P001\t35"
     assert "phenotype/tlx.json" in under(folder)
 
@@ -181,14 +190,14 @@ def test_questionnaires_that_cannot_be_taken_over_are_refused_in_words(
     asked, out = tmp_path / "asked", tmp_path / "out"
     asked.mkdir()
     out.mkdir()
-    (asked / "tlx.csv").write_text(table)
-    (asked / "tlx.json").write_text(description)
+    (asked / "tlx.csv").write_text(table, encoding="utf-8")
+    (asked / "tlx.json").write_text(description, encoding="utf-8")
     with pytest.raises(ProtocolError, match=words):
         Bids(BidsSettings(phenotype=asked), ch8()).export([], out)
 
 
 def test_a_table_of_people_without_pseudonyms_is_refused_in_words(tmp_path: Path) -> None:
-    (tmp_path / "people.csv").write_text("")
+    (tmp_path / "people.csv").write_text("", encoding="utf-8")
     people = BidsSettings(people=tmp_path / "people.csv")
     with pytest.raises(ProtocolError, match="has no column 'participant'; its columns are none"):
         Bids(people, ch8()).export([], tmp_path)

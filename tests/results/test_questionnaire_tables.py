@@ -179,7 +179,9 @@ def test_every_question_is_in_the_codebook_and_every_column_in_psych_ds(exports:
         columns = pd.read_csv(exports / "tables" / f"{name}.csv").columns
         assert set(columns) <= set(book.loc[name].index)
     assert book.loc[("questionnaires.item", "comfort_heat"), "description"] == "Too hot?"
-    about = json.loads((exports / "psychds" / "dataset_description.json").read_text())
+    about = json.loads(
+        (exports / "psychds" / "dataset_description.json").read_text(encoding="utf-8")
+    )
     described = {each["name"] for each in about["variableMeasured"]}
     for path in (exports / "psychds" / "data").glob("*.csv"):
         assert set(pd.read_csv(path).columns) <= described
@@ -218,7 +220,7 @@ def test_phenotype_comes_from_the_recording_and_is_described(exports: Path) -> N
     assert comfort["why"].tolist()[1] == 'a "quote", and a line'
     assert comfort["hand"].tolist() == ["left", "right"]
     assert comfort["missing"].tolist() == ["why: not answered", "heat: declined"]
-    about = json.loads((folder / "comfort.json").read_text())
+    about = json.loads((folder / "comfort.json").read_text(encoding="utf-8"))
     assert about["MeasurementToolMetadata"]["Description"] == "Comfort"
     assert about["heat"]["Description"] == "Too hot?"
     assert set(about["hand"]["Levels"]) == {"left", "right"}
@@ -231,7 +233,7 @@ def test_phenotype_comes_from_the_recording_and_is_described(exports: Path) -> N
 def test_the_bids_validator_finds_no_error_in_phenotype(exports: Path) -> None:
     done = subprocess.run(
         [Path(sys.executable).with_name("bids-validator-deno"), exports / "bids", "--json"],
-        capture_output=True, text=True, check=False,
+        capture_output=True, encoding="utf-8", check=False,
     )  # fmt: skip
     issues = json.loads(done.stdout)["issues"]["issues"]
     assert [issue for issue in issues if issue["severity"] == "error"] == []

@@ -27,14 +27,17 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def changed_machine(folder: Path) -> Path:
     path = folder / "faster.yaml"
-    path.write_text(CH8.read_text().replace("speed_deg_s: 26,", "speed_deg_s: 26.5,"))
+    path.write_text(
+        CH8.read_text(encoding="utf-8").replace("speed_deg_s: 26,", "speed_deg_s: 26.5,"),
+        encoding="utf-8",
+    )
     return path
 
 
 def test_a_whole_session_on_the_engine_is_bit_identical(tmp_path: Path) -> None:
     """The aiming study itself: 32 movements on PyBullet."""
-    text = (ROOT / "protocols" / "aiming" / "protocol.yaml").read_text()
-    (tmp_path / "instructions.md").write_text("Move.")
+    text = (ROOT / "protocols" / "aiming" / "protocol.yaml").read_text(encoding="utf-8")
+    (tmp_path / "instructions.md").write_text("Move.", encoding="utf-8")
     quick = "{use: simulated_operator, fitts_a_s: 0.3, fitts_b_s: 0.8, look_s: 0.1}"
     text = text.replace("scheme:", f"operator: {quick}\nscheme:", 1)
     path = record(a_study(tmp_path, text), tmp_path / "data", "P001", simulated=True)
@@ -66,7 +69,9 @@ def test_a_changed_machine_is_named_with_the_first_tick_that_differs(
 
 def test_a_changed_setting_is_named(path: Path, tmp_path: Path) -> None:
     other = tmp_path / "study.yaml"
-    other.write_text(STUDY.replace("joint_velocity\n", "joint_velocity\n  dead_zone: 0.2\n"))
+    other.write_text(
+        STUDY.replace("joint_velocity\n", "joint_velocity\n  dead_zone: 0.2\n"), encoding="utf-8"
+    )
     again = replay_session(path, 1, protocol=other)
     assert any(part.startswith("scheme.settings.dead_zone: recorded") for part in again.parts)
     assert again.difference is not None
@@ -136,7 +141,7 @@ def test_the_command_says_what_came_of_it(
     assert main(["replay", str(path), "--session", "1", "--measures", str(table)]) == 0
     said = capsys.readouterr().out
     assert "every number the same bit for bit" in said
-    assert table.read_text().count("\n") == 9
+    assert table.read_text(encoding="utf-8").count("\n") == 9
     machine = str(changed_machine(tmp_path))
     assert main(["replay", str(path), "--machine", machine]) == 1
     out, err = capsys.readouterr()

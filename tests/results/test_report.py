@@ -42,7 +42,7 @@ def test_every_link_of_every_page_leads_somewhere(folder: Path) -> None:
     pages = [folder / "report.html", *sorted((folder / "participants").iterdir())]
     assert len(pages) == 5
     for page in pages:
-        text = page.read_text()
+        text = page.read_text(encoding="utf-8")
         targets = [
             part.split('"')[0] for key in ('href="', 'src="') for part in text.split(key)[1:]
         ]
@@ -51,7 +51,7 @@ def test_every_link_of_every_page_leads_somewhere(folder: Path) -> None:
 
 
 def test_the_report_says_who_is_in_it_and_who_is_not(folder: Path) -> None:
-    page = (folder / "report.html").read_text()
+    page = (folder / "report.html").read_text(encoding="utf-8")
     assert "1 of 4 participants here are simulated." in page
     assert "1 of 4 participants here are half-finished." in page
     who = pd.read_csv(folder / "tables" / "participants.csv").set_index("participant")
@@ -111,7 +111,7 @@ def test_export_writes_what_is_asked_for_and_who_was_left_out(
     said = capsys.readouterr().out
     assert "left out: P003, half-finished: session 1 ended by order" in said
     assert "2/2" in said
-    about = json.loads((out / ".labcrane" / "labcrane_export.json").read_text())
+    about = json.loads((out / ".labcrane" / "labcrane_export.json").read_text(encoding="utf-8"))
     assert about["format"] == to
     assert sum(person["included"] == "yes" for person in about["participants"]) == 2
     assert main(["export", str(data), "--to", to, "--out", str(out)]) == 2

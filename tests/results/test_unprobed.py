@@ -30,6 +30,8 @@ def test_an_export_refuses_streams_never_probed_unless_told_and_says_so(
     assert "--accept-unprobed" in said
     assert not (tmp_path / "no").exists()
     assert main([*export, "--out", str(tmp_path / "yes"), "--accept-unprobed"]) == 0
-    manifest = json.loads((tmp_path / "yes" / ".labcrane" / "labcrane_export.json").read_text())
+    manifest = json.loads(
+        (tmp_path / "yes" / ".labcrane" / "labcrane_export.json").read_text(encoding="utf-8")
+    )
     (noted,) = manifest["unprobed"]
     assert noted.startswith("eyes of P001, session 1 (12 of")

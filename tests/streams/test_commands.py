@@ -33,7 +33,7 @@ def labcrane(*arguments: object, columns: int = 200) -> subprocess.CompletedProc
     return subprocess.run(
         [sys.executable, "-m", "labcrane", *map(str, arguments)],
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
         env={**os.environ, "COLUMNS": str(columns)},
     )

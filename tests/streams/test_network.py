@@ -13,7 +13,7 @@ from labcrane.streams.network import LOOPBACK, VARIABLE, describe, use_loopback
 def python(code, **env):
     """Run code in a fresh interpreter."""
     return subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, env=env, check=False
+        [sys.executable, "-c", code], capture_output=True, encoding="utf-8", env=env, check=False
     )
 
 
@@ -45,7 +45,7 @@ def test_use_loopback_refuses_when_pylsl_is_loaded_already():
 
 def test_a_configuration_of_the_user_holds(tmp_path, monkeypatch):
     config = tmp_path / "lab.cfg"
-    config.write_text("[lab]\nKnownPeers = {10.0.0.7}\n")
+    config.write_text("[lab]\nKnownPeers = {10.0.0.7}\n", encoding="utf-8")
     monkeypatch.setenv(VARIABLE, str(config))
     network = use_loopback()
     assert network.config == config
@@ -64,10 +64,10 @@ def test_a_configuration_of_the_user_holds(tmp_path, monkeypatch):
 )
 def test_one_address_beyond_this_computer_is_not_loopback(tmp_path, monkeypatch, old, new):
     config = tmp_path / "almost.cfg"
-    config.write_text(LOOPBACK)
+    config.write_text(LOOPBACK, encoding="utf-8")
     monkeypatch.setenv(VARIABLE, str(config))
     assert describe().loopback
-    config.write_text(LOOPBACK.replace(old, new))
+    config.write_text(LOOPBACK.replace(old, new), encoding="utf-8")
     assert not describe().loopback
 
 

@@ -36,7 +36,7 @@ def received(run):
     counts = dict(zip(ids, (200, 200, 2, 2), strict=True))
     arguments = [str(part) for pair in counts.items() for part in pair]
     command = [sys.executable, str(Path(__file__).with_name("consumer.py")), *arguments]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as consumer:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, encoding="utf-8") as consumer:
         assert consumer.stdout.readline() == "ready\n"
         frames = list(a_few_frames(run, 200))
         for frame in frames:

@@ -165,7 +165,7 @@ def test_a_recorder_that_is_told_nonsense_says_what_it_understands():
     done = subprocess.run(
         [sys.executable, "-m", "labcrane.streams.recorder.process", orders],
         capture_output=True,
-        text=True,
+        encoding="utf-8",
         check=False,
     )
     assert "cannot be told colour" in done.stderr

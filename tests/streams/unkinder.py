@@ -13,9 +13,9 @@ from streams.unkind import (
     regular,
 )
 
-from labcrane.streams.sync.certificate import Fault
 from labcrane.streams.sync.correction import Treatment
 from labcrane.streams.sync.raw import RawStream
+from labcrane.streams.sync.report.certificate import Fault
 
 
 def clean_probes(random):

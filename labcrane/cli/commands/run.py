@@ -102,23 +102,31 @@ def resume(
         policy=policy,
         feedback=shown,
     )
+    if visit.study.outdated:
+        out.print("gone on with as it was begun; a new session would be refused:", markup=False)
+        out.print(visit.study.outdated, markup=False)
     _launch(visit, page=not simulate if page is None else page)
+
+
+ENGINES = ("bullet_crane", "mujoco_crane", "kinematic_crane")
+"""What can move the demo's crane, the best one first. The last needs nothing but labcrane."""
 
 
 def demo(
     data: Annotated[Path, typer.Option(help="where the recording goes")] = Path("labcrane-demo"),
 ) -> None:
-    """Run a shortened aiming study with a simulated operator."""
+    """Run a shortened aiming study with a simulated operator, on the best engine there is."""
     stay_on_this_computer()
-    from importlib.resources import files
+    from tempfile import TemporaryDirectory
 
     from labcrane.analysis.report.session_figure import draw
     from labcrane.recording.participant_file.reader import open_recording
     from labcrane.session.visit import visit_of
 
-    visit = visit_of(
-        Path(str(files("labcrane.cli") / "demo.yaml")), "P001", 1, data, simulated=True
-    )
+    engine, lacking = _best_engine()
+    with TemporaryDirectory() as folder:
+        study = _demo_on(engine, Path(folder))
+        visit = visit_of(study, "P001", 1, data, simulated=True)
     number = 1
     while visit.folder.path.exists():  # a demo can be run again; nothing is overwritten
         number += 1
@@ -126,8 +134,35 @@ def demo(
     path = _run_fast(visit)
     picture = path.with_suffix(".png")
     draw(open_recording(path).session(1), picture)
+    for name, what in lacking.items():
+        out.print(f"without {name}: it {what}", markup=False)
+    out.print(f"moved by:         {engine}", markup=False)
     out.print(f"participant file: {path}", markup=False)
     out.print(f"the movements:    {picture}", markup=False)
+
+
+def _best_engine() -> tuple[str, dict[str, str]]:
+    """Return the best engine that is installed, and what each of the better ones lacks."""
+    from labcrane.core.roles import Dynamics
+    from labcrane.registry.registry import discover
+
+    registry = discover()
+    lacking: dict[str, str] = {}
+    for name in ENGINES:
+        if not (what := registry.find(Dynamics, name).missing):
+            return name, lacking
+        lacking[name] = what
+    raise PluginError("no engine for the demo is installed: " + "; ".join(lacking.values()))
+
+
+def _demo_on(engine: str, folder: Path) -> Path:
+    """Write the demo's protocol with this engine: a recording tells which one it was made with."""
+    from importlib.resources import files
+
+    text = (files("labcrane.cli") / "demo.yaml").read_text(encoding="utf-8")
+    study = folder / "demo.yaml"
+    study.write_text(text.replace(ENGINES[0], engine), encoding="utf-8")
+    return study
 
 
 def _run_fast(visit: "Visit") -> Path:

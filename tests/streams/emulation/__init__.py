@@ -69,7 +69,7 @@ class Lab:
         return self.folder / "ses-01_streams.xdf"
 
     def start(self, *command: str, env: dict[str, str] | None = None) -> subprocess.Popen[str]:
-        process = subprocess.Popen([sys.executable, *command], env=env, text=True)
+        process = subprocess.Popen([sys.executable, *command], env=env, encoding="utf-8")
         self.processes.append(process)
         return process
 
@@ -96,7 +96,7 @@ class Lab:
             [sys.executable, "-m", "labcrane.streams.recorder.process", json.dumps(told)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            text=True,
+            encoding="utf-8",
         )
         self.processes.append(process)
         return process
