@@ -13,7 +13,8 @@ import pylsl
 import pytest
 from faults.sessions import unique, wait_for
 
-from labcrane import Event, Frame, Tick
+from labcrane import Frame, Tick
+from labcrane.core import Event
 from labcrane.errors import StreamError
 from labcrane.feedback import process
 from labcrane.feedback.config import FeedbackConfig, Part

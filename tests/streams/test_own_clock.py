@@ -1,11 +1,11 @@
 """The recorder's own clock is logged, and where it was slewed other clocks are followed past it."""
 
-import sys
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from needs import needs
 from streams.synthetic import SourceClock, arrivals, probe
 from streams.unkinder import own_slewed
 
@@ -20,12 +20,12 @@ from labcrane.streams.probes import Probe
 from labcrane.streams.recorder.companions import RecordedStreamWriter
 from labcrane.streams.recorder.own_clock import read_own_clock
 from labcrane.streams.recorder.recorder import Recorder
-from labcrane.streams.sync.certificate import Fault, faults
 from labcrane.streams.sync.correction import Treatment, correct
 from labcrane.streams.sync.own_clock import OwnClock
 from labcrane.streams.sync.raw import RawStream, raw_of
+from labcrane.streams.sync.report.certificate import Fault, faults
 
-linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="of Linux alone")
+linux = needs("Linux")
 
 RATE, SLEW, BEGIN, END = 250.0, 500e-6, 160.0, 220.0
 

@@ -24,7 +24,7 @@ def approve(
     from labcrane.registry.registry import discover
 
     registry = discover(study=protocol)
-    grant = decision.Grant(board, reference, a_date(valid_until), consent)
+    grant = decision.Grant(board, reference, read_date(valid_until), consent)
     lock = decision.approve(load(protocol, registry), registry, grant, today())
     materials = lock.content["materials"]
     files = ", ".join(materials["files"]) or "no files"
@@ -54,7 +54,7 @@ def amend(
     grant = decision.Grant(
         board or old.approval["board"],
         reference,
-        a_date(valid_until or old.approval["valid_until"]),
+        read_date(valid_until or old.approval["valid_until"]),
         consent or old.consent,
     )
     lock = decision.amend(load(protocol, registry), registry, grant, why, today())
@@ -83,7 +83,7 @@ def methods(
     out.print(f"codebook: {path}", markup=False)
 
 
-def a_date(text: str) -> date:
+def read_date(text: str) -> date:
     """Read a date as people type it."""
     try:
         return date.fromisoformat(text)

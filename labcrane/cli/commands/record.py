@@ -138,12 +138,12 @@ def record(
         folder.mkdir(parents=True)
     except FileExistsError:
         raise RecordingError(f"{folder} exists; give a new folder for the recording") from None
-    keeper = RecorderHandle(journal_path(folder, 1, "streams"), requests, {})
+    recorder = RecorderHandle(journal_path(folder, 1, "streams"), requests, {})
     out.print("recording; Ctrl-C ends it")
     try:
-        _wait(keeper, seconds)
+        _wait(recorder, seconds)
     finally:
-        keeper.stop()
+        recorder.stop()
     _recover(folder)
 
 
@@ -156,7 +156,7 @@ def _wanted(text: str) -> "StreamRequest":
     return StreamRequest.of({"label": text, key: value})
 
 
-def _wait(keeper: "RecorderHandle", seconds: float | None) -> None:
+def _wait(recorder: "RecorderHandle", seconds: float | None) -> None:
     from labcrane.launcher.signal_reporter import SignalReporter
 
     ends: float | None = None
@@ -164,15 +164,15 @@ def _wait(keeper: "RecorderHandle", seconds: float | None) -> None:
     reporter = SignalReporter(lambda line: out.print(line, markup=False))
     try:
         while ends is None or time.monotonic() < ends:
-            if ends is None and seconds is not None and _flows(keeper.status):
+            if ends is None and seconds is not None and _flows(recorder.status):
                 ends = time.monotonic() + seconds
-            if keeper.watch():
+            if recorder.watch():
                 out.print("the recorder died and was started again")
-            if keeper.status and keeper.complaints() != told:
-                told = keeper.complaints()
+            if recorder.status and recorder.complaints() != told:
+                told = recorder.complaints()
                 for line in told:
                     out.print(line, markup=False)
-            reporter.news(keeper)
+            reporter.news(recorder)
             time.sleep(0.1)
     except KeyboardInterrupt:
         return
