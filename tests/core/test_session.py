@@ -90,7 +90,9 @@ def test_a_session_is_never_run_twice(visit: Visit) -> None:
     path = run(visit, ScriptedConsole())
     before = path.read_bytes()
     with pytest.raises(
-        ProtocolError, match=r"participant P001-SIMULATED has already run session 1 .*; check the"
+        ProtocolError,
+        match=r"P001-SIMULATED has already run session 1 to its end .*; check the number; it was "
+        r"the last one of the study: take another --participant",
     ):
         run(visit, ScriptedConsole())
     assert path.read_bytes() == before
