@@ -136,7 +136,7 @@ def check_new(visit: Visit) -> None:
     others = (
         f", or give the one that is next: {left[0]}"
         if left
-        else "; it was the last one of the study: take another --participant"
+        else "; no session of the study is left: take another --participant"
     )
     pilot = "; for a pilot any other --participant will do" if visit.pilot and left else ""
     raise ProtocolError(
