@@ -207,6 +207,16 @@ def test_no_import_goes_round_in_a_circle() -> None:
     order.prepare()  # raises CycleError, which names the circle
 
 
+def test_only_the_search_asks_liblsl_who_is_there() -> None:
+    asking = [
+        path.relative_to(ROOT).as_posix()
+        for folder in ("labcrane", "plugins")
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        if re.search(r"pylsl\.\w*[Rr]esolve|lsl_resolve", path.read_text(encoding="utf-8"))
+    ]
+    assert asking == ["labcrane/streams/search.py"]
+
+
 ASKED_FOR_BY_OTHERS = {"get_code", "format_commands"}  # by Python's import, and by click
 
 

@@ -5,7 +5,6 @@ import contextlib
 import http.client
 import socket
 import ssl
-import subprocess
 import threading
 import time
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trustme
 from faults.sessions import unique, wait_for
 from pages.room import STUDY, Room, a_room
 from pages.test_rights import ask, cookie_of
@@ -232,20 +232,19 @@ def test_a_certificate_that_is_none_is_refused_in_words(tmp_path: Path) -> None:
 
 @pytest.mark.long
 def test_pages_are_served_over_tls_by_the_labs_certificate(tmp_path: Path) -> None:
-    names = ["-subj", "/CN=127.0.0.1", "-addext", "subjectAltName=IP:127.0.0.1"]
-    files = ["-keyout", tmp_path / "lab.key", "-out", tmp_path / "lab.pem"]
-    subprocess.run(
-        ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", *names, *files],
-        check=True,
-        capture_output=True,
-    )
+    authority = trustme.CA()
+    issued = authority.issue_cert("127.0.0.1")
+    authority.cert_pem.write_to_path(tmp_path / "authority.pem")
+    issued.private_key_pem.write_to_path(tmp_path / "lab.key")
+    for part in issued.cert_chain_pems:
+        part.write_to_path(tmp_path / "lab.pem", append=True)
     path = tmp_path / "study.yaml"
     text = STUDY.format(study=unique("tls"), steps=STEPS)
     path.write_text(text + "page: {certificate: lab.pem, key: lab.key}\n")
     with a_room(path, tmp_path / "data") as room:
         link = room.links()["supervisor"]
         assert link.startswith(f"https://127.0.0.1:{room.port}/supervisor?token=")
-        trusted = ssl.create_default_context(cafile=tmp_path / "lab.pem")
+        trusted = ssl.create_default_context(cafile=tmp_path / "authority.pem")
         to = http.client.HTTPSConnection("127.0.0.1", room.port, timeout=20, context=trusted)
         wait_for(lambda: opens(room.port))
         to.request("GET", link.partition(str(room.port))[2])

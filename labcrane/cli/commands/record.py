@@ -1,5 +1,6 @@
 """Commands about streams and recordings: streams, record, recover, resync."""
 
+import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -58,12 +59,11 @@ def streams(
 
 
 def _watch(wait: float, seconds: float | None, protocol: Path | None) -> None:
-    import pylsl
-
     from labcrane.monitoring.watch import StreamWatch
+    from labcrane.streams.search import find
 
     builder = _monitors(protocol)
-    infos = pylsl.resolve_streams(wait)
+    infos = find("", wait, minimum=sys.maxsize)
     if not infos:
         out.print(f"no stream answered within {wait:g} s")
         return
