@@ -17,6 +17,7 @@ from labcrane.cli.typed import lines, next_key, single_keys
 from labcrane.core.items import AnswerError
 from labcrane.core.records import Event, is_done
 from labcrane.core.roles import Questionnaire
+from labcrane.design.counts import TrialCounts
 from labcrane.session.commands import Command, Order, QueueConsole
 
 KEYS: Mapping[str, Order] = {
@@ -56,8 +57,8 @@ class Terminal:
 
     Parameters
     ----------
-    total
-        How many counted trials the session has, for the progress bar.
+    counts
+        What the session's trials are called, and how many there are.
     keys
         Whether to listen at all; a simulated session needs nobody.
     """
@@ -66,7 +67,7 @@ class Terminal:
         self,
         console: QueueConsole,
         out: Console,
-        total: int,
+        counts: TrialCounts,
         *,
         keys: bool,
         questionnaires: Mapping[str, Questionnaire] | None = None,
@@ -75,6 +76,7 @@ class Terminal:
         self._sheet: Sheet | None = None
         self._console = console
         self._out = out
+        self._counts = counts
         self._keys = keys
         self._over = threading.Event()
         self._progress = Progress(
@@ -84,7 +86,7 @@ class Terminal:
             TimeElapsedColumn(),
             console=out,
         )
-        self._bar = self._progress.add_task("trials", total=total)
+        self._bar = self._progress.add_task("trials", total=counts.total)
         self._printer = threading.Thread(target=self._print, name="terminal-out")
         self._listener = threading.Thread(target=self._listen, name="terminal-in", daemon=True)
 
@@ -114,7 +116,10 @@ class Terminal:
             if event.name == "trial.end" and event.data["counted"]:
                 if is_done(event.data):
                     self._progress.advance(self._bar)
-                self._progress.print(_trial_line(event.data), markup=False, highlight=False)
+                ended = _trial_line(event.data, self._counts)
+                self._progress.print(ended, markup=False, highlight=False)
+            elif event.name == "session.standing":
+                self._progress.update(self._bar, completed=int(str(event.data["done"])))
             elif line := _event_line(event):
                 self._progress.print(line, markup=False, highlight=False)
 
@@ -181,13 +186,14 @@ class Terminal:
         return text.strip()
 
 
-def _trial_line(data: Mapping[str, object]) -> str:
+def _trial_line(data: Mapping[str, object], counts: TrialCounts) -> str:
     measures = [
         f"{name.replace('_', ' ')} {value:.3g} {unit}"
         for name, unit in (("movement_time", "s"), ("error", "m"))
         if isinstance(value := data.get(name), float) and math.isfinite(value)
     ]
-    return f"trial {data['trial']}: {', '.join([str(data['outcome']), *measures])}"
+    called = counts.name(int(str(data["trial"])))
+    return f"{called}: {', '.join([str(data['outcome']), *measures])}"
 
 
 FOLDERS = re.compile(r"(?<=\()/[^():]*/(?=[^/():]+:\d+\))")

@@ -251,6 +251,10 @@ class SessionState:
     scene: str = ""
 
 
+UNDONE = frozenset({Phase.REPEATED, Phase.ENDED, Phase.INTERRUPTED})
+"""How an attempt ends that is not its trial's last."""
+
+
 def is_counted(about: Mapping[str, Value]) -> bool:
     """Whether a trial is one that the study is about: no practice, and not just the way to it.
 
@@ -260,8 +264,11 @@ def is_counted(about: Mapping[str, Value]) -> bool:
 
 
 def is_done(ended: Mapping[str, Value]) -> bool:
-    """Whether a counted trial is over for good, by its ``trial.end``."""
-    return is_counted(ended) and ended.get("outcome") != "repeated"
+    """Whether a counted trial is over for good, by its ``trial.end``.
+
+    One that is repeated is not, nor one in whose middle the session stopped.
+    """
+    return is_counted(ended) and ended.get("outcome") not in UNDONE
 
 
 @dataclass(frozen=True, slots=True, eq=False)

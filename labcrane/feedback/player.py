@@ -75,7 +75,7 @@ def _present(
     from labcrane.streams.context import ContextOutlet  # noqa: PLC0415 - loads liblsl
     from labcrane.streams.frames import FrameOutlet  # noqa: PLC0415
 
-    outlets = (FrameOutlet(run, source), ContextOutlet(run, source, 1))
+    outlets = (FrameOutlet(run, source), ContextOutlet(run, source))
     show = partial(_send, [outlet.push for outlet in outlets])
     try:
         first, now = frames[0], time.perf_counter()

@@ -27,9 +27,9 @@ from labcrane.session.commands import (
     StreamBack,
     StreamLost,
 )
-from labcrane.session.eligibility import check_eligibility
-from labcrane.session.session import finish, outlook, recording, running
-from labcrane.session.visit import Visit
+from labcrane.session.eligibility import Admission, check_eligibility
+from labcrane.session.session import finish, outlook, recording, running, still_owed
+from labcrane.session.visit import Visit, claim
 from labcrane.streams.recorder.handle import RecorderHandle
 from labcrane.streams.sync.report.sync_report import SyncReport
 
@@ -55,7 +55,8 @@ class Outcome:
     sync_report
         How right the session's time stamps are; None when nothing was recorded.
     owed
-        What the session still owes, in its own words; empty when it ran to its end or has died.
+        What the session still owes, as people count trials; empty when it ran to its end or has
+        died.
     """
 
     died: int | None = None
@@ -84,7 +85,7 @@ class Launcher:
         self._lost: set[str] = set()
         self._signals = SignalReporter(say)
         self._kept: list[Message] = []
-        self._owed = ""
+        self._owes = False
         self.sync_report: SyncReport | None = None
 
     def run(self) -> Outcome:
@@ -100,12 +101,15 @@ class Launcher:
         with running(visit):
             if visit.resumed:
                 with recording(visit):  # of a launcher that died, the session may still be ending
-                    self._say(outlook(visit, admission))
+                    ahead = outlook(visit, admission)
+                self._say(ahead.text)
+                now = time.perf_counter()
+                self._console.report(Event("session.standing", now, {"done": ahead.done}))
             else:
-                visit.folder.claim(visit.session)
-            return self._run_all()
+                claim(visit)
+            return self._run_all(admission)
 
-    def _run_all(self) -> Outcome:
+    def _run_all(self, admission: Admission) -> Outcome:
         visit = self._visit
         requests = [
             need.request(label, required=not visit.simulated)
@@ -128,7 +132,8 @@ class Launcher:
             if parts(visit.journal):
                 report = self.sync_report = finish(visit)
         where = read_whereabouts(visit.whereabouts) if died is not None else None
-        return Outcome(died, str(where or ""), report, self._owed)
+        owed = still_owed(visit, admission) if self._owes and parts(visit.journal) else ""
+        return Outcome(died, str(where or ""), report, owed)
 
     @property
     def streams_status(self) -> dict[str, Any]:
@@ -208,7 +213,7 @@ class Launcher:
                     self._crew.offer(message.streams)
                 continue
             if message.name == "session.end":
-                self._owed = str(message.data["owed"])
+                self._owes = bool(message.data["owed"])
             self._console.report(message)
         return None
 

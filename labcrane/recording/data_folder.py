@@ -70,19 +70,6 @@ class DataFolder:
         found = (re.match(r"ses-(\d+)_", entry.name) for entry in self.path.glob("ses-*_run*.xdf"))
         return sorted({int(match[1]) for match in found if match})
 
-    def claim(self, session: int) -> None:
-        """Make the folder, and make sure that ``session`` can be recorded in it.
-
-        Raises
-        ------
-        ProtocolError
-            The session has been recorded already: nothing is ever overwritten.
-        RecordingError
-            The folder cannot be written.
-        """
-        self.make()
-        self.check_new(session)
-
     def make(self) -> None:
         """Make the folder, if it is not there.
 
@@ -105,22 +92,6 @@ class DataFolder:
             raise RecordingError(self._cannot_write(error.strerror)) from error
         if not os.access(self.path, os.W_OK | os.X_OK):
             raise RecordingError(self._cannot_write("permission denied"))
-
-    def check_new(self, session: int) -> None:
-        """Make sure that ``session`` has not been begun.
-
-        Raises
-        ------
-        ProtocolError
-            It has: nothing is ever overwritten.
-        """
-        if session in self.sessions():
-            done = ", ".join(map(str, self.sessions()))
-            pilot = ", or any other number, for a pilot" if "-PILOT" in self.name else ""
-            raise ProtocolError(
-                f"participant {self.name} has already run session {session} (recorded in "
-                f"{self.path}: {done}); check the number, or give the next session{pilot}"
-            )
 
     def _refuse_twin(self) -> None:
         """Refuse a name that some disk or format would take for that of another folder here."""

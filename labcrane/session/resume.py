@@ -7,13 +7,13 @@ one that was ended by order.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from labcrane.core.records import Phase, Trial, Value
+from labcrane.design.counts import TableNumbers, TrialCounts, numbers, spans
 from labcrane.design.plan import Owed, PlannedBlock, PlannedStep, SessionPlan, next_attempt
 from labcrane.errors import ProtocolError
 from labcrane.protocol.study import Study
@@ -28,6 +28,8 @@ BROKEN = frozenset({Phase.ENDED, Phase.INTERRUPTED})
 
 COMPLETE, INCOMPLETE = "complete", "incomplete"
 """Why a session ended that nobody ended: it owes nothing, or what the policy gave up."""
+
+RECORD = TableNumbers()
 
 KILLED = "its process died"
 """How a session stopped that has said nothing of an end."""
@@ -362,8 +364,7 @@ def resumption(plan: SessionPlan, so_far: Progress, policy: Policy) -> dict[str,
 
     ``void`` are the trials that were done and are redone with their block.
     """
-    left = [trial for block in plan.blocks for trial in block.trials]
-    again = [trial.number for trial in left if trial.number in so_far.attempts]
+    again = repeats(plan, so_far)
     return {
         "after": so_far.stop,
         "policy": policy,
@@ -373,36 +374,38 @@ def resumption(plan: SessionPlan, so_far: Progress, policy: Policy) -> dict[str,
     }
 
 
-def owed_text(plan: SessionPlan) -> str:
-    """Return what a plan consists of in words, for people and the record; empty for nothing."""
-    return "; ".join(text for step in plan.steps for text in _step_texts(step))
+def repeats(plan: SessionPlan, so_far: Progress) -> list[int]:
+    """Return the numbers of the trials that are left in a plan and were begun before."""
+    left = (trial.number for block in plan.blocks for trial in block.trials)
+    return [number for number in left if number in so_far.attempts]
 
 
-def _step_texts(step: PlannedStep) -> Iterator[str]:
+def owed_text(plan: SessionPlan, counts: TrialCounts | TableNumbers = RECORD) -> str:
+    """Return what a plan consists of in words; empty for nothing.
+
+    ``counts`` are the whole session's for people; the record has the numbers of its trial table.
+    """
+    return "; ".join(text for step in plan.steps for text in _step_texts(step, counts))
+
+
+def _step_texts(step: PlannedStep, counts: TrialCounts | TableNumbers) -> Iterator[str]:
     block = step.block
     if block is None:
         asked = " ".join(step.questionnaires)
         yield f"step {step.number}: {step.kind}" + (f" {asked}" if asked else "")
         return
     for owed in block.owed:
-        yield f"step {step.number}: {owed.questionnaire} after trial {owed.after.number}"
+        after = counts.name(owed.after.number)
+        yield f"step {step.number}: {owed.questionnaire} after {after}"
     if block.trials:
-        trials = spans([trial.number for trial in block.trials])
-        yield f"step {step.number}: {step.kind} {block.name!r}, trials {trials}"
+        trials = counts.names(trial.number for trial in block.trials)
+        yield f"step {step.number}: {step.kind} {block.name!r}, {trials}"
 
 
-def spans(wanted: Sequence[int]) -> str:
-    """Return whole numbers as text: ``1-3 5``."""
-    found = sorted(set(wanted))
-    gaps = [at for at, (one, two) in enumerate(pairwise(found), start=1) if two > one + 1]
-    runs = [found[start:end] for start, end in pairwise([0, *gaps, len(found)]) if start < end]
-    return " ".join(f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs)
-
-
-def numbers(text: str) -> list[int]:
-    """Return the numbers that :func:`spans` wrote."""
-    ends = [[int(end) for end in run.split("-")] for run in text.split()]
-    return [number for run in ends for number in range(run[0], run[-1] + 1)]
+def done_before(whole: SessionPlan, so_far: Progress, left: SessionPlan) -> int:
+    """Return how many counted trials are over for good when what is ``left`` is begun."""
+    again = {trial.number for block in left.blocks for trial in block.trials}
+    return sum(trial.number in so_far.done and trial.number not in again for trial in whole.trials)
 
 
 def within_limits(study: Study, angles: Sequence[float]) -> tuple[float, ...]:

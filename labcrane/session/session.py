@@ -3,11 +3,13 @@
 import gc
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from labcrane.core.clock import Clock, ManualClock, SystemClock
 from labcrane.core.records import Event, Frame, Phase, Run
+from labcrane.design.counts import TrialCounts
 from labcrane.design.plan import SessionPlan, plan_session
 from labcrane.errors import DeviceError, PluginError, ProtocolError
 from labcrane.files.lock import held
@@ -30,14 +32,16 @@ from labcrane.session.resume import (
     Policy,
     Progress,
     check_recorded,
+    done_before,
     owed_text,
     progress,
     remaining,
+    repeats,
     resumption,
     within_limits,
 )
 from labcrane.session.sequencer import Sequencer
-from labcrane.session.visit import Visit
+from labcrane.session.visit import Visit, claim
 from labcrane.streams.sync.report.sync_report import SyncReport
 
 RESERVE_S = 60.0
@@ -156,7 +160,7 @@ def _record(
     study = visit.study
     so_far, plan = go_on(visit, whole) if visit.resumed else (None, whole)
     if so_far is None:
-        visit.folder.claim(visit.session)
+        claim(visit)
     rig = Rig.build(study, simulated=visit.simulated)
     clock = _clock(visit, so_far)
     died = read_whereabouts(visit.whereabouts) if visit.resumed else None
@@ -177,13 +181,14 @@ def _record(
         ledger = Ledger(study, whole, so_far)
         for event in opening:
             ledger.take(event.name, event.data)
+        done = done_before(whole, so_far, plan) if so_far is not None else 0
         waits = not visit.simulated
         sequencer = Sequencer(study, plan, rig, waits=waits, awaits=awaits, ledger=ledger)
         log = _log(visit, run, clock, reserve=round(RESERVE_S * second))
         try:
             for event in opening:
                 log.note(event)
-            with _outlets(visit, plan, run, offer) as outlets:
+            with _outlets(visit, whole, done, run, offer) as outlets:
                 sinks = [*outlets, _teller(console)]
                 if not visit.fast:
                     sinks.append(OverrunReporter(study.oversight, run.rate_hz, log, console))
@@ -192,8 +197,8 @@ def _record(
         except (PluginError, DeviceError) as error:
             log.note(Event("session.failed", clock.now(), {"why": str(error)}))
             error.add_note(
-                "what was recorded until then is in the participant file; go on with: labcrane "
-                f"resume {study.path} --participant {visit.participant} --session {visit.session}"
+                "what was recorded until then is in the participant file; go on with: "
+                f"{visit.resume_command}"
             )
             raise
         finally:
@@ -247,7 +252,8 @@ def go_on(visit: Visit, whole: SessionPlan) -> tuple[Progress, SessionPlan]:
             "to go on with; labcrane recover makes its participant file"
         )
     if so_far.stop == INCOMPLETE:
-        given_up = owed_text(remaining(visit.study, whole, so_far, "redo_trial"))
+        left = remaining(visit.study, whole, so_far, "redo_trial")
+        given_up = owed_text(left, TrialCounts.of(whole))
         raise ProtocolError(
             f"session {visit.session} of {visit.folder.name} owes nothing that policy "
             f"{policy_of(visit)!r} would repeat; it gave up {given_up}; to repeat that, give "
@@ -256,8 +262,24 @@ def go_on(visit: Visit, whole: SessionPlan) -> tuple[Progress, SessionPlan]:
     return so_far, left  # all is done, and only its end is still to be said
 
 
-def outlook(visit: Visit, admission: Admission) -> str:
-    """Return what people are told before a session goes on: how it stopped, and what follows.
+@dataclass(frozen=True, slots=True)
+class Outlook:
+    """What people are told before a session goes on.
+
+    Attributes
+    ----------
+    text
+        How it stopped, and what follows.
+    done
+        How many counted trials are over for good.
+    """
+
+    text: str
+    done: int
+
+
+def outlook(visit: Visit, admission: Admission) -> Outlook:
+    """Return what people are told before a session goes on.
 
     Raises
     ------
@@ -266,13 +288,22 @@ def outlook(visit: Visit, admission: Admission) -> str:
     """
     whole = plan_session(visit.study, visit.participant, visit.session, admission.slot)
     so_far, left = go_on(visit, whole)
-    said = resumption(left, so_far, policy_of(visit))
+    counts = TrialCounts.of(whole)
+    again = repeats(left, so_far)
     lines = [
-        f"session {visit.session} of {visit.folder.name} stopped: {said['after']}",
-        f"left to do: {said['owed'] or 'nothing but its end'}",
-        f"repeated, as new attempts ({said['policy']}): trials {said['repeats'] or 'none'}",
+        f"session {visit.session} of {visit.folder.name} stopped: {so_far.stop}",
+        f"left to do: {owed_text(left, counts) or 'nothing but its end'}",
+        f"repeated, as new attempts ({policy_of(visit)}): "
+        f"{counts.names(again) if again else 'nothing'}",
     ]
-    return "\n".join(lines)
+    return Outlook("\n".join(lines), done_before(whole, so_far, left))
+
+
+def still_owed(visit: Visit, admission: Admission) -> str:
+    """Return what a session that was recorded owes, as people count trials; empty for nothing."""
+    whole = plan_session(visit.study, visit.participant, visit.session, admission.slot)
+    so_far = progress(visit.journal, visit.study.machine.names)
+    return owed_text(remaining(visit.study, whole, so_far, "redo_trial"), TrialCounts.of(whole))
 
 
 def _opening(
@@ -312,7 +343,8 @@ def _teller(console: Console) -> Callable[[Frame], None]:
 @contextmanager
 def _outlets(
     visit: Visit,
-    plan: SessionPlan,
+    whole: SessionPlan,
+    done: int,
     run: Run,
     offer: Callable[[Mapping[str, str]], None] | None,
 ) -> Iterator[list[Callable[[Frame], None]]]:
@@ -324,7 +356,7 @@ def _outlets(
     from labcrane.streams.outlets import Outlets  # noqa: PLC0415 - loads liblsl
 
     frames = FrameOutlet(run, visit.source)
-    about = ContextOutlet(run, visit.source, len(plan.trials))
+    about = ContextOutlet(run, visit.source, TrialCounts.of(whole).counted, done)
     outlets = (Outlets(run, visit.source), frames, about)
     if offer:
         offer({FRAME: frames.description, CONTEXT: about.description})

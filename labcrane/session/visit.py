@@ -1,5 +1,8 @@
 """Visit of a participant: which session is to be run, of whom, how, and where it is recorded."""
 
+import os
+import shlex
+import subprocess
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -14,7 +17,7 @@ from labcrane.recording.journal import START
 from labcrane.recording.journal_reader import read_journal
 from labcrane.recording.paths import journal_path, parts
 from labcrane.registry.registry import discover
-from labcrane.session.resume import Policy
+from labcrane.session.resume import INCOMPLETE, Policy, progress
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,10 +80,69 @@ class Visit:
         """The first part of the journal of the streams of others."""
         return journal_path(self.folder.path, self.session, "streams")
 
+    @property
+    def resume_command(self) -> str:
+        """What is typed to go on with it, with every option that it was run with."""
+        words = ["labcrane", "resume", str(self.study.path), "--participant", self.participant]
+        words += ["--session", str(self.session)]
+        if self.data != self.study.path.parent / "data":
+            words += ["--data", str(self.data)]
+        words += ["--pilot"] * self.pilot + ["--simulate"] * self.simulated
+        return subprocess.list2cmdline(words) if os.name == "nt" else shlex.join(words)
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Cross to another process by the names of things: the study is loaded again there."""
         rest = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "study"}
         return _again, (self.study.path, self.study.recorded, rest)
+
+
+def claim(visit: Visit) -> None:
+    """Make the participant's folder, and make sure that the session can be recorded in it.
+
+    Raises
+    ------
+    ProtocolError
+        The session has been begun already: nothing is ever overwritten.
+    RecordingError
+        The folder cannot be written.
+    """
+    visit.folder.make()
+    check_new(visit)
+
+
+def check_new(visit: Visit) -> None:
+    """Make sure that a session has not been begun.
+
+    Raises
+    ------
+    ProtocolError
+        It has, and says how it ended and what can be run instead: nothing is ever overwritten.
+    """
+    folder = visit.folder
+    begun = folder.sessions()
+    if visit.session not in begun:
+        return
+    so_far = progress(visit.journal, visit.study.machine.names)
+    if not so_far.called_complete:
+        again = " --policy redo_trial" if so_far.stop == INCOMPLETE else ""
+        raise ProtocolError(
+            f"participant {folder.name} has begun session {visit.session} (recorded in "
+            f"{folder.path}), and it did not come to its end: {so_far.stop}; go on with: "
+            f"{visit.resume_command}{again}"
+        )
+    sessions = enumerate(visit.study.protocol.sessions, start=1)
+    rest = [(number, each.name) for number, each in sessions if number not in begun]
+    left = [f"--session {number} ({name!r})" for number, name in rest]
+    others = (
+        f", or give the one that is next: {left[0]}"
+        if left
+        else "; no session of the study is left: take another --participant"
+    )
+    pilot = "; for a pilot any other --participant will do" if visit.pilot and left else ""
+    raise ProtocolError(
+        f"participant {folder.name} has already run session {visit.session} to its end (recorded "
+        f"in {folder.path}: {', '.join(map(str, begun))}); check the number{others}{pilot}"
+    )
 
 
 def visit_of(protocol: Path, participant: str, session: int, data: Path, **options: Any) -> Visit:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter
 
-from labcrane.core.records import Event, Frame, Run, SessionState, is_counted, is_done
+from labcrane.core.records import Event, Frame, Run, SessionState, is_done
 from labcrane.recording.run_codec import write_run
 from labcrane.streams.outlets import channel, stream_info
 
@@ -26,9 +26,17 @@ CONTEXT = "labcrane.context"
 
 EVERY_S = 1.0
 
+NO_TRIALS: Mapping[int, int] = {}
+"""Which of the counted trials each is, where none is counted: a recording that is shown again."""
 
-def situation_after(situation: SessionState, event: Event) -> SessionState:
-    """Return what the session is about once ``event`` has happened."""
+
+def situation_after(
+    situation: SessionState, event: Event, counted: Mapping[int, int] = NO_TRIALS
+) -> SessionState:
+    """Return what the session is about once ``event`` has happened.
+
+    ``counted`` says which of the counted trials each is, by its number in the plan.
+    """
     data: Mapping[str, Any] = event.data
     counts = {**situation.counts, event.name: situation.counts.get(event.name, 0) + 1}
     now = replace(situation, counts=counts)
@@ -45,8 +53,8 @@ def situation_after(situation: SessionState, event: Event) -> SessionState:
         case "trial.start":
             named = data.get("feedback", "none")
             active = () if named == "none" else tuple(named.split("+"))
-            counted = now.done + 1 if is_counted(data) else 0
-            return replace(now, trial=data["trial"], active=active, counted=counted)
+            which = counted.get(data["trial"], 0)
+            return replace(now, trial=data["trial"], active=active, counted=which)
         case "trial.end":
             return replace(now, trial=0, active=(), counted=0, done=now.done + is_done(data))
         case "scene.placed":
@@ -73,16 +81,27 @@ def _read_after(now: SessionState, event: Event) -> SessionState:
 
 
 class ContextOutlet:
-    """Sends the context at every event and once a second."""
+    """Sends the context at every event and once a second.
 
-    def __init__(self, run: Run, source: str, trials: int) -> None:
+    Parameters
+    ----------
+    counted
+        Which of the counted trials each is, from 1, by its number in the plan.
+    done
+        How many of them were over before: of a session that goes on.
+    """
+
+    def __init__(
+        self, run: Run, source: str, counted: Mapping[int, int] = NO_TRIALS, done: int = 0
+    ) -> None:
         import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
 
         info = stream_info(CONTEXT, "Context", 1, "string", rate_hz=0.0, source=source)
         channel(info, label="context", unit="none", type="JSON")
         self._outlet: pylsl.StreamOutlet | None = pylsl.StreamOutlet(info)
         self._scene = write_run(run)
-        self._situation = SessionState(trials=trials)
+        self._counted = counted
+        self._situation = SessionState(trials=len(counted), done=done)
         self._due = float("-inf")
 
     @property
@@ -93,7 +112,7 @@ class ContextOutlet:
     def push(self, frame: Frame) -> None:
         """Take up what happened in a frame, and send the context if it changed or is due."""
         for event in frame.events:
-            self._situation = situation_after(self._situation, event)
+            self._situation = situation_after(self._situation, event, self._counted)
         if self._outlet is None or not (frame.events or frame.tick.due >= self._due):
             return
         self._due = frame.tick.due + EVERY_S

@@ -144,7 +144,11 @@ class ExporterContract:
         names = " ".join(str(path.relative_to(out)) for path in out.rglob("*"))
         contents = b"".join(path.read_bytes() for path in out.rglob("*") if path.is_file())
         for person in people:
-            assert person.name in names or person.name.encode() in contents
+            assert person.name in names or person.name.encode() in contents, (
+                f"export() of two participants left nothing of {person.name}, neither in a file's "
+                f"name nor in its contents; there is: {names or 'no file'}; write every one that "
+                "it is given into the folder it is given"
+            )
 
     def test_participants_are_gone_through_once(self, exporter: Exporter, tmp_path: Path) -> None:
         person = a_participant(tmp_path)
@@ -157,7 +161,11 @@ class ExporterContract:
             yield person
 
         exporter.export(once(), out)
-        assert asked == [person.name]
+        assert asked, "export() did not go through its participants; go through them once"
+        assert asked == [person.name], (
+            f"export() began {len(asked)} times with its participants; go through them once, for "
+            "each is opened on the way and there may be thousands"
+        )
 
     def test_recordings_are_not_touched(self, exporter: Exporter, tmp_path: Path) -> None:
         person = a_participant(tmp_path)
@@ -165,5 +173,10 @@ class ExporterContract:
         out = tmp_path / "out"
         out.mkdir()
         exporter.export([person], out)
-        assert person.path.read_bytes() == before
-        assert any(out.iterdir()), "nothing was written"
+        assert person.path.read_bytes() == before, (
+            f"export() changed the recording {person.path.name}; open it for reading only, and "
+            "write into the folder that export() is given"
+        )
+        assert any(out.iterdir()), (
+            "export() wrote nothing into the folder that it is given; write its files there"
+        )

@@ -22,12 +22,22 @@ class SignalMonitorContract:
     def test_monitor_finds_nothing_in_a_living_signal(
         self, monitor: SignalMonitor, stream: SignalStream, clean: FloatArray
     ) -> None:
-        assert monitor.knows(stream)
+        assert monitor.knows(stream), (
+            f"knows() is not true of the stream {stream.name!r} of the fixture 'stream'; let it "
+            "return True, or give a stream that the monitor is for"
+        )
         monitor.begin(stream)
-        assert list(monitor.look(_times(stream, clean), clean)) == []
+        found = list(monitor.look(_times(stream, clean), clean))
+        assert not found, (
+            f"look() found {found} in the fixture 'clean'; find nothing in a living signal, or "
+            "give one that is"
+        )
 
     def test_monitor_knows_no_stream_without_channels_or_rate(self, monitor: SignalMonitor) -> None:
-        assert not monitor.knows(SignalStream("nothing", "nothing", 0.0, ()))
+        assert not monitor.knows(SignalStream("nothing", "nothing", 0.0, ())), (
+            "knows() is true of a stream without channels and rate; look at the stream's type, "
+            "channels and rate, and return False for what the monitor cannot judge"
+        )
 
     def test_verdict_does_not_depend_on_how_samples_come(
         self, monitor: SignalMonitor, stream: SignalStream, clean: FloatArray
@@ -42,7 +52,11 @@ class SignalMonitorContract:
         for at in range(len(whole)):
             faults = monitor.look(times[at : at + 1], whole[at : at + 1])
             one_by_one = _checked(stream, faults)
-        assert one_by_one == at_once
+        assert one_by_one == at_once, (
+            f"look() told {sorted(one_by_one)} at the end when samples came one by one, and "
+            f"{sorted(at_once)} when all came at once; judge by the samples' times, and keep what "
+            "is needed of the earlier ones"
+        )
 
     def test_monitor_takes_whatever_a_source_may_send(
         self, monitor: SignalMonitor, stream: SignalStream, clean: FloatArray
@@ -61,7 +75,11 @@ class SignalMonitorContract:
         with np.errstate(all="ignore"):
             monitor.look(_times(stream, clean), np.full(clean.shape, np.nan))
         monitor.begin(stream)
-        assert list(monitor.look(_times(stream, clean), clean)) == []
+        found = list(monitor.look(_times(stream, clean), clean))
+        assert not found, (
+            f"look() found {found} in a living signal after a bad one and begin(); let begin() "
+            "forget all that came before"
+        )
 
     def test_monitor_takes_a_tenth_of_the_time_that_the_signal_takes(
         self, monitor: SignalMonitor, stream: SignalStream, clean: FloatArray
@@ -70,7 +88,10 @@ class SignalMonitorContract:
         began = time.process_time()
         monitor.look(_times(stream, clean), clean)
         took, lasts = time.process_time() - began, len(clean) / stream.rate_hz
-        assert took < SHARE * lasts, f"{took:.2f} s of computing for {lasts:.1f} s of signal"
+        assert took < SHARE * lasts, (
+            f"look() took {took:.2f} s for {lasts:.1f} s of signal; it may take a tenth of it, for "
+            "others run beside it: compute with whole arrays"
+        )
 
 
 def _times(stream: SignalStream, samples: FloatArray) -> FloatArray:
@@ -83,9 +104,18 @@ def _checked(stream: SignalStream, faults: object) -> set[tuple[str, str]]:
     found: set[tuple[str, str]] = set()
     assert isinstance(faults, list | tuple), f"look() must return a sequence, not {faults!r}"
     for fault in faults:
-        assert isinstance(fault, SignalFault), fault
-        assert fault.channel in labels, f"there is no channel {fault.channel!r}"
-        assert fault.kind, "a fault needs a kind"
-        assert fault.message, "a fault needs words: what is seen, and what to do"
+        assert isinstance(fault, SignalFault), (
+            f"look() returned {fault!r}; return SignalFault(channel, kind, message)"
+        )
+        assert fault.channel in labels, (
+            f"look() told a fault of channel {fault.channel!r}, which the stream does not have; it "
+            f"has {sorted(labels - {''})}, and '' is the whole stream"
+        )
+        assert fault.kind, (
+            f"look() told a fault without a kind: {fault}; give it a word that groups such faults"
+        )
+        assert fault.message, (
+            f"look() told a fault without a message: {fault}; write what is seen, and what to do"
+        )
         found.add((fault.channel, fault.kind))
     return found

@@ -131,7 +131,11 @@ class FeedbackContract:
                 )
                 for name, signals in feedback.streams.items():
                     rows = np.atleast_2d(samples[name])
-                    assert rows.shape[1:] == (Layout(name, signals).size,), name
+                    promised = Layout(name, signals).size
+                    assert rows.shape[1:] == (promised,), (
+                        f"samples()[{name!r}] has rows of shape {rows.shape[1:]}, and streams "
+                        f"promise ({promised},); return one row per sample"
+                    )
 
     def test_feedback_has_pictures_of_its_cameras_only(self, feedback: Feedback) -> None:
         run = make_run(ch8(), task=TARGETS)
@@ -142,9 +146,17 @@ class FeedbackContract:
                 f"pictures() has {sorted(pictures)}; cameras are {sorted(feedback.cameras)}"
             )
             for name, picture in pictures.items():
-                assert picture.pixels.dtype == np.uint8, name
-                assert picture.pixels.shape[2:] in {(), (3,)}, name
-                assert np.isfinite(picture.due), name
+                pixels = picture.pixels
+                assert pixels.dtype == np.uint8, (
+                    f"pictures()[{name!r}] has pixels of {pixels.dtype}; give them as uint8"
+                )
+                assert pixels.shape[2:] in {(), (3,)}, (
+                    f"pictures()[{name!r}] has shape {pixels.shape}; give (height, width) for "
+                    "greys, or (height, width, 3)"
+                )
+                assert np.isfinite(picture.due), (
+                    f"pictures()[{name!r}] is of {picture.due} s; due is the time of its frame"
+                )
 
     def test_feedback_rests_between_trials(self, feedback: Feedback) -> None:
         run = make_run(ch8(), task=TARGETS)

@@ -121,10 +121,18 @@ def check_array(component: Component, array: FloatArray) -> None:
 
 def check_signals(component: Component) -> None:
     """Check that signal names are dotted lower-case words, and that no column occurs twice."""
-    columns = Layout("component", component.signals).columns
-    assert len(set(columns)) == len(columns), f"a column occurs twice: {columns}"
+    name = type(component).__name__
+    columns = Layout(name, component.signals).columns
+    twice = sorted({column for column in columns if columns.count(column) > 1})
+    assert not twice, (
+        f"{name}.signals have a column more than once: {', '.join(twice)}; give each Signal a name "
+        "of its own"
+    )
     for column in columns:
-        assert all(word.isidentifier() and word.islower() for word in column.split(".")), column
+        assert all(word.isidentifier() and word.islower() for word in column.split(".")), (
+            f"{name}.signals have a column {column!r}; write words of small letters, digits and _ "
+            "with dots between them, such as 'tip.position.x'"
+        )
 
 
 class InputContract:

@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Mapping
 
 from labcrane.core.records import Event
+from labcrane.design.counts import TrialCounts
 from labcrane.session.commands import Order
 from labcrane.web.door.access import SUPERVISOR
 from labcrane.web.form import ConsentCard, Form
@@ -75,7 +76,7 @@ def _facts(context: PageContext) -> list[str]:
     left = sum(trial.planned.expected_s for trial in trials[session.trials_done :])
     found = [f"trials {session.trials_done} of {len(trials)}", f"about {left / 60:.0f} min left"]
     if session.trial:
-        found.append(f"trial {session.trial['trial']}, attempt {session.trial['attempt']}")
+        found.append(f"{_called(context)}, attempt {session.trial['attempt']}")
     found += [f"{name} {count}" for name, count in sorted(session.counts.items())]
     if "worst_lateness" in session.last_trial:
         worst = float(str(session.last_trial["worst_lateness"]))
@@ -85,6 +86,11 @@ def _facts(context: PageContext) -> list[str]:
     if live.age_s is not None:
         found.append(f"newest frame {1000 * live.age_s:.0f} ms old")
     return found
+
+
+def _called(context: PageContext) -> str:
+    """Return what the running trial is called."""
+    return TrialCounts.of(context.plan).name(int(str(context.session.trial["trial"])))
 
 
 def _orders(context: PageContext) -> None:

@@ -84,6 +84,8 @@ class SessionView:
                 )
             case _ if self.trial and not event.name.startswith(ROUTINE):
                 self.counts[event.name] += 1
+        if event.name == "session.standing":
+            self.trials_done = int(str(event.data["done"]))
         self._stage(event)
         self.version += 1
 

@@ -193,7 +193,8 @@ def test_the_situation_follows_from_events() -> None:
         Event("feedback.setting", 2.0, {"feedback": "ball", "key": "far", "value": 2.0}),
     ]
     for event in events:
-        now = situation_after(now, event)
+        now = situation_after(now, event, {1: 2})
+    assert now.counted == 2
     assert (now.step, now.block_name, now.trial, now.active) == (1, "a", 1, ("ball", "tone"))
     assert now.settings == {"ball": {"far": 2.0}}
     after = situation_after(now, Event("trial.end", 3.0, {}))

@@ -71,7 +71,7 @@ class Session:
     def __init__(self, source: str) -> None:
         self.run = make_run(ch8(), task=TARGETS)
         self.frames = FrameOutlet(self.run, source)
-        self.context = ContextOutlet(self.run, source, trials=1)
+        self.context = ContextOutlet(self.run, source, {1: 1})
         self._number = 0
 
     def frame(self, *events: Event) -> Frame:

@@ -91,7 +91,9 @@ def test_a_session_is_never_run_twice(visit: Visit) -> None:
     path = run(visit, ScriptedConsole())
     before = path.read_bytes()
     with pytest.raises(
-        ProtocolError, match=r"participant P001-SIMULATED has already run session 1 .*; check the"
+        ProtocolError,
+        match=r"P001-SIMULATED has already run session 1 to its end .*; check the number; no "
+        r"session of the study is left: take another --participant",
     ):
         run(visit, ScriptedConsole())
     assert path.read_bytes() == before

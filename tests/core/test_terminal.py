@@ -16,6 +16,7 @@ from rich.console import Console
 from labcrane import open_recording
 from labcrane.cli.terminal import Terminal
 from labcrane.core import Event
+from labcrane.design.counts import TrialCounts
 from labcrane.session.commands import QueueConsole
 
 
@@ -142,7 +143,7 @@ def test_a_questionnaire_is_filled_in_at_the_terminal(tmp_path: Path) -> None:
 def test_a_refused_order_is_called_as_it_is_given() -> None:
     console, printed = QueueConsole(), io.StringIO()
     refused = {"refused": "no trial is running", "text": "", "by": "terminal"}
-    with Terminal(console, Console(file=printed), total=1, keys=False):
+    with Terminal(console, Console(file=printed), TrialCounts({}, {}), keys=False):
         console.report(Event("order.repeat", 1.0, refused))
     assert "repeat: no trial is running" in map(str.strip, printed.getvalue().splitlines())
 
@@ -151,7 +152,7 @@ def test_a_line_is_short_and_says_nothing_of_what_is_not_known() -> None:
     from labcrane.cli.terminal import _event_line, _trial_line
 
     ended = {"trial": 3, "outcome": "timeout", "movement_time": float("nan"), "error": 0.25}
-    assert _trial_line(ended) == "trial 3: timeout, error 0.25 m"
+    assert _trial_line(ended, TrialCounts({3: 1}, {})) == "trial 1 of 1: timeout, error 0.25 m"
     place = "dynamics 'slow' of plugin 'p', in step (/home/someone/a/b/slow.py:12), took 9 ms"
     slow = Event("plugin.slow", 0.0, {"why": place})
     assert _event_line(slow) == (

@@ -55,5 +55,20 @@ def test_a_session_that_was_run_is_refused_before_anything_is_shown(
     assert main(["run", str(protocol), "--participant", "P001", "--pilot", "--local"]) == 2
     said = capsys.readouterr()
     assert said.out == ""
-    assert "P001-PILOT has already run session 1" in said.err
-    assert "or any other number, for a pilot" in said.err
+    assert "P001-PILOT has begun session 1" in said.err
+    assert "it did not come to its end: its process died; go on with: labcrane resume" in said.err
+    assert "--participant P001 --session 1 --pilot" in " ".join(said.err.split())
+
+
+@pytest.mark.parametrize("pilot", [[], ["--pilot"]])
+def test_a_hurried_session_that_was_run_is_refused_before_anything_is_shown(
+    protocol: Path, capsys: pytest.CaptureFixture[str], pilot: list[str]
+) -> None:
+    stamps = "-PILOT-SIMULATED" if pilot else "-SIMULATED"
+    (protocol.parent / "data" / f"P001{stamps}").mkdir(parents=True)
+    (protocol.parent / "data" / f"P001{stamps}" / "ses-01_run.xdf").write_bytes(b"XDF:")
+    words = ["run", str(protocol), "--participant", "P001", "--simulate", "--fast", *pilot]
+    assert main(words) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert f"P001{stamps} has begun session 1" in said.err

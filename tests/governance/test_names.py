@@ -170,7 +170,7 @@ def test_a_folder_that_differs_in_capitals_only_is_refused(lab: Lab) -> None:
     visit = lab.visit("P001", pilot=True)
     (lab.places.root / "p001-pilot").mkdir()
     with pytest.raises(ProtocolError, match=r"P001-PILOT and p001-pilot, who is here already"):
-        visit.folder.claim(1)
+        visit.folder.make()
 
 
 def outside(lab: Lab) -> Path:
@@ -232,7 +232,7 @@ def test_no_session_is_recorded_behind_a_link(tmp_path: Path) -> None:
 
     assert study.protocol.study == "rehearsal"
     with pytest.raises(RecordingError, match="is a link, and links are never followed"):
-        DataFolder(tmp_path, "P001", pilot=False, simulated=False).claim(1)
+        DataFolder(tmp_path, "P001", pilot=False, simulated=False).make()
 
 
 def test_transfer_follows_no_links(lab: Lab) -> None:

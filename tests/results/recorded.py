@@ -24,6 +24,7 @@ from labcrane.session.metadata import context
 from labcrane.session.postprocess import conclude
 from labcrane.session.sequencer import Sequencer
 from labcrane.session.session import Visit
+from labcrane.session.visit import claim
 
 STUDY = """\
 labcrane: 1
@@ -67,7 +68,7 @@ def record(
     """Record session 1; a program takes the controls, whatever the stamps say."""
     visit = Visit(the_study, participant, 1, data, simulated=simulated, fast=True, pilot=pilot)
     plan = plan_session(the_study, participant, 1)
-    visit.folder.claim(1)
+    claim(visit)
     rig = Rig.build(the_study, simulated=True)
     clock = ManualClock(start=100.0)
     with rig.opened(the_study, plan.seed) as run:

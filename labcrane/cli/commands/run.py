@@ -165,17 +165,29 @@ def _demo_on(engine: str, folder: Path) -> Path:
     return study
 
 
+def _check(visit: "Visit") -> None:
+    """Make sure that a visit can be run, before anything is shown of it."""
+    from labcrane.session.session import check_free
+    from labcrane.session.visit import check_new
+
+    check_free(visit)
+    if not visit.resumed:
+        check_new(visit)
+    visit.study.check_installed(simulated=visit.simulated, feedback=visit.feedback)
+
+
 def _run_fast(visit: "Visit") -> Path:
     from labcrane.cli.terminal import Terminal
+    from labcrane.design.counts import TrialCounts
     from labcrane.design.plan import plan_session
     from labcrane.session.commands import QueueConsole
     from labcrane.session.session import run as run_session
 
     visit = replace(visit, fast=True)
-    visit.study.check_installed(simulated=True, feedback=False)
+    _check(visit)
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
-    with Terminal(console, out.console, len(plan.trials), keys=False):
+    with Terminal(console, out.console, TrialCounts.of(plan), keys=False):
         return run_session(visit, console)
 
 
@@ -183,17 +195,14 @@ def _launch(visit: "Visit", *, page: bool) -> None:
     from labcrane.cli.consent import ask_for_consent, await_consent
     from labcrane.cli.sync import print_report
     from labcrane.cli.terminal import Terminal
+    from labcrane.design.counts import TrialCounts
     from labcrane.design.plan import plan_session
     from labcrane.launcher.launcher import Launcher
     from labcrane.launcher.pages import pages
     from labcrane.registry.offers import LAB, not_installed
     from labcrane.session.commands import QueueConsole
-    from labcrane.session.session import check_free
 
-    check_free(visit)  # before anything is shown
-    if not visit.resumed:
-        visit.folder.check_new(visit.session)
-    visit.study.check_installed(simulated=visit.simulated, feedback=visit.feedback)
+    _check(visit)
     needs = {"pylsl": LAB, **({"nicegui": LAB} if page else {})}
     if missing := not_installed(needs):
         raise PluginError(f"a session {missing}")
@@ -201,8 +210,8 @@ def _launch(visit: "Visit", *, page: bool) -> None:
     plan = plan_session(visit.study, visit.participant, visit.session)
     console = QueueConsole()
     keys, asked = not visit.simulated, visit.study.questionnaires
-    shown, count = out.console, len(plan.trials)
-    with Terminal(console, shown, count, keys=keys, questionnaires=asked) as terminal:
+    shown, counts = out.console, TrialCounts.of(plan)
+    with Terminal(console, shown, counts, keys=keys, questionnaires=asked) as terminal:
         launcher = Launcher(visit, console, terminal.say)
         with (
             pages(visit, launcher, console, terminal.say, feedback=visit.feedback)
@@ -216,10 +225,7 @@ def _launch(visit: "Visit", *, page: bool) -> None:
         print_report(outcome.sync_report)
     if visit.folder.participant_file.exists():
         out.print(f"participant file: {visit.folder.participant_file}", markup=False)
-    again = (
-        f"go on with: labcrane resume {visit.study.path} --participant {visit.participant} "
-        f"--session {visit.session}"
-    )
+    again = f"go on with: {visit.resume_command}"
     if outcome.owed:
         out.print(f"the session is not complete: {outcome.owed}; {again}", markup=False)
     if outcome.died is not None:

@@ -1,0 +1,91 @@
+"""Numbers of trials as people count them: trial 3 of 8, and practice apart.
+
+A plan numbers everything that is run, the way to a trial and practice included; so does the record.
+Whoever counts trials counts those of :attr:`SessionPlan.trials`, on every screen and in every line.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Self
+
+from labcrane.design.plan import SessionPlan
+
+
+@dataclass(frozen=True, slots=True)
+class TrialCounts:
+    """What people call the trials of a whole session.
+
+    Attributes
+    ----------
+    counted
+        Which trial each is, from 1, by its number in the plan.
+    practice
+        Which practice trial each is, from 1, by its number in the plan.
+    """
+
+    counted: Mapping[int, int]
+    practice: Mapping[int, int]
+
+    @classmethod
+    def of(cls, plan: SessionPlan) -> Self:
+        """Return what the trials of ``plan``, which leaves none out, are called."""
+        practice = (
+            trial
+            for block in plan.blocks
+            if block.practice
+            for trial in block.trials
+            if trial.planned.counted
+        )
+        return cls(
+            {trial.number: place for place, trial in enumerate(plan.trials, start=1)},
+            {trial.number: place for place, trial in enumerate(practice, start=1)},
+        )
+
+    @property
+    def total(self) -> int:
+        """How many trials are counted."""
+        return len(self.counted)
+
+    def name(self, number: int) -> str:
+        """Return what the trial of this number in the plan is called."""
+        if number in self.counted:
+            return f"trial {self.counted[number]} of {self.total}"
+        if number in self.practice:
+            return f"practice trial {self.practice[number]}"
+        return "the way to a trial"
+
+    def names(self, wanted: Iterable[int]) -> str:
+        """Return what the trials of these numbers in the plan are called: ``trials 4-8 of 8``."""
+        numbers = list(wanted)
+        practice = [self.practice[number] for number in numbers if number in self.practice]
+        counted = [self.counted[number] for number in numbers if number in self.counted]
+        found = [f"practice trials {spans(practice)}"] * bool(practice)
+        found += [f"trials {spans(counted)} of {self.total}"] * bool(counted)
+        return ", ".join(found) or "no trial that is counted"
+
+
+class TableNumbers:
+    """What the record calls trials: by the numbers of its own trial table."""
+
+    def name(self, number: int) -> str:
+        """Return what the trial of this number in the plan is called."""
+        return f"trial {number}"
+
+    def names(self, wanted: Iterable[int]) -> str:
+        """Return what the trials of these numbers in the plan are called."""
+        return f"trials {spans(list(wanted))}"
+
+
+def spans(wanted: Sequence[int]) -> str:
+    """Return whole numbers as text: ``1-3 5``."""
+    found = sorted(set(wanted))
+    gaps = [at for at, (one, two) in enumerate(pairwise(found), start=1) if two > one + 1]
+    runs = [found[start:end] for start, end in pairwise([0, *gaps, len(found)]) if start < end]
+    return " ".join(f"{run[0]}-{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs)
+
+
+def numbers(text: str) -> list[int]:
+    """Return the numbers that :func:`spans` wrote."""
+    ends = [[int(end) for end in run.split("-")] for run in text.split()]
+    return [number for run in ends for number in range(run[0], run[-1] + 1)]

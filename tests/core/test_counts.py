@@ -1,0 +1,139 @@
+"""Trials are counted in one way, on every screen and in every line."""
+
+import io
+import random
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from rehearsal import SHORT, ScriptedConsole, a_study
+from rich.console import Console
+
+from labcrane import Event, ProtocolError
+from labcrane.cli.terminal import Terminal
+from labcrane.core.records import SessionState, is_done
+from labcrane.design.counts import TrialCounts, numbers, spans
+from labcrane.design.plan import SessionPlan, plan_session
+from labcrane.recording.journal_reader import read_journal
+from labcrane.session.commands import Command, Order, QueueConsole
+from labcrane.session.eligibility import EXEMPT
+from labcrane.session.session import outlook, run, still_owed
+from labcrane.session.visit import Visit, check_new
+from labcrane.streams.context import situation_after
+from labcrane.web.state import SessionView
+
+PRACTISED = SHORT.replace(
+    "      - block: {task: aiming, pairs: 1}",
+    "      - practice: {task: aiming, pairs: 1}\n      - block: {task: aiming, pairs: 2}",
+)
+TWO = PRACTISED + PRACTISED.partition("sessions:\n")[2].replace("only", "again")
+
+
+@pytest.fixture
+def visit(tmp_path: Path) -> Visit:
+    study = a_study(tmp_path, PRACTISED)
+    return Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=True)
+
+
+def the_plan(visit: Visit) -> SessionPlan:
+    return plan_session(visit.study, visit.participant, visit.session)
+
+
+def stopped(visit: Visit) -> None:
+    """Run the visit and end it by order somewhere in its counted trials."""
+
+    class Ending(ScriptedConsole):
+        def commands(self) -> list[Command]:
+            done = sum(is_done(event.data) for event in self.told if event.name == "trial.end")
+            return [Command(Order.END)] if done == 1 else []
+
+    run(visit, Ending())
+
+
+def shown(counts: TrialCounts, events: list[Event]) -> list[str]:
+    console, printed = QueueConsole(), io.StringIO()
+    with Terminal(console, Console(file=printed, width=120), counts, keys=False):
+        for event in events:
+            console.report(event)
+    return [line.strip() for line in printed.getvalue().splitlines()]
+
+
+def test_the_lines_the_bar_the_page_and_the_view_count_alike(visit: Visit) -> None:
+    console = ScriptedConsole()
+    run(visit, console)
+    counts = TrialCounts.of(the_plan(visit))
+    lines = shown(counts, console.told)
+    ends = [line.partition(":")[0] for line in lines if "trial " in line and ": success" in line]
+    practice = [f"practice trial {number}" for number in range(1, len(counts.practice) + 1)]
+    assert ends == practice + [f"trial {n} of {counts.total}" for n in range(1, counts.total + 1)]
+    assert f"{counts.total}/{counts.total}" in lines[-1]
+    page, situation, seen = SessionView(), SessionState(), []
+    for event in console.told:
+        page.take(event)
+        situation = situation_after(situation, event, counts.counted)
+        seen += [situation.counted] * bool(situation.counted and event.name == "trial.start")
+    assert page.trials_done == situation.done == counts.total
+    assert seen == list(range(1, counts.total + 1))
+
+
+def test_a_resumed_session_goes_on_counting_where_it_stopped(visit: Visit) -> None:
+    stopped(visit)
+    counts = TrialCounts.of(the_plan(visit))
+    ahead = outlook(replace(visit, resumed=True), EXEMPT)
+    assert ahead.done == 1
+    rest = f"trials 2-{counts.total} of {counts.total}"
+    assert f"'aiming', {rest}" in ahead.text
+    assert rest in still_owed(visit, EXEMPT)
+    console = ScriptedConsole()
+    run(replace(visit, resumed=True), console)
+    told = [Event("session.standing", 0.0, {"done": ahead.done}), *console.told]
+    assert f"{counts.total}/{counts.total}" in shown(counts, told)[-1]
+    page = SessionView()
+    for event in told:
+        page.take(event)
+    assert page.trials_done == counts.total
+
+
+def test_the_record_keeps_the_numbers_of_its_trial_table(visit: Visit) -> None:
+    stopped(visit)
+    log, _ = read_journal([visit.journal])
+    owed = next(event.data["owed"] for event in log.events if event.name == "session.end")
+    last = the_plan(visit).trials[-1].number
+    assert owed.endswith(f"-{last}")
+
+
+@pytest.mark.parametrize("outcome", ["repeated", "ended", "interrupted"])
+def test_a_trial_that_is_run_again_is_not_done(outcome: str) -> None:
+    assert not is_done({"counted": True, "practice": False, "outcome": outcome})
+
+
+def test_spans_of_any_numbers_are_read_back() -> None:
+    dice = random.Random(1)
+    for _ in range(200):
+        some = sorted(dice.sample(range(1, 40), dice.randint(0, 30)))
+        assert numbers(spans(some)) == some
+
+
+def test_a_session_that_stopped_is_named_with_its_resume_command(visit: Visit) -> None:
+    stopped(visit)
+    with pytest.raises(
+        ProtocolError,
+        match=r"has begun session 1 .*: by order; go on with: labcrane resume \S+study.yaml "
+        r"--participant P001 --session 1 --simulate$",
+    ):
+        check_new(visit)
+
+
+def test_data_elsewhere_and_a_pilot_are_in_the_resume_command(visit: Visit, tmp_path: Path) -> None:
+    there = replace(visit, data=tmp_path / "a b", pilot=True, simulated=False)
+    _, _, options = there.resume_command.partition(" --data ")
+    assert options[1:-9] == str(tmp_path / "a b")
+    assert options.endswith(" --pilot")
+
+
+def test_the_next_session_is_named_where_there_is_one(tmp_path: Path) -> None:
+    study = a_study(tmp_path, TWO)
+    visit = Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=True)
+    run(visit, ScriptedConsole())
+    with pytest.raises(ProtocolError, match=r"give the one that is next: --session 2 \('again'\)$"):
+        check_new(visit)
