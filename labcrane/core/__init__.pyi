@@ -21,7 +21,7 @@ from .references import (
     SignalName,
     ViewName,
 )
-from .settings import Names, StudyPath, read_yaml, was_run
+from .settings import Names, StudyPath, Unit, read_yaml, was_run
 from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
 
 __all__ = [
@@ -56,6 +56,7 @@ __all__ = [
     "SignalStream",
     "StudyPath",
     "TargetFinder",
+    "Unit",
     "Value",
     "Verdict",
     "ViewName",

@@ -10,6 +10,7 @@ from pydantic import AfterValidator, ValidationInfo
 
 from labcrane.files.model import StrictModel
 from labcrane.files.model import was_run as was_run  # noqa: PLC0414 - public here
+from labcrane.files.units import Unit as Unit  # noqa: PLC0414 - public here
 from labcrane.files.yaml import read_yaml as read_yaml  # noqa: PLC0414 - public here
 
 if TYPE_CHECKING:
@@ -33,6 +34,14 @@ class Settings(StrictModel):
         ``labcrane check`` warns of it where it is always there, in every group.
         """
         return ""
+
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        """Return numbers that hardly anybody means, by key: ``{"limit_s": "is 0.1 s, and ..."}``.
+
+        ``labcrane check`` asks whether each is meant, until the protocol says so. The key may lead
+        inside: ``"jaws.grip_n"``.
+        """
+        return {}
 
     def provides(self, machine: Machine) -> Names:
         """Return the names that a component with these settings gives others to refer to, by kind.

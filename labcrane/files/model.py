@@ -1,12 +1,20 @@
-"""Models of YAML: strict, with a schema that says what the docstring under a key says."""
+"""Models of YAML: strict, with units, and a schema that says what is written under a key."""
 
 import ast
 import inspect
+from collections.abc import Iterator, Mapping
 from textwrap import dedent
+from types import UnionType
+from typing import Any, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationInfo
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationInfo, field_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
+
+from labcrane.files.units import read_quantities, unit_of
+
+UNIT = "x-unit"
+"""Key of a schema that says the unit of numbers."""
 
 
 class StrictModel(BaseModel):
@@ -19,6 +27,24 @@ class StrictModel(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
+    @field_validator("*", mode="before")
+    @classmethod
+    def _in_its_own_unit(cls, value: Any, info: ValidationInfo) -> Any:
+        """Take ``50 cm`` where a number of metres is asked for."""
+        if not isinstance(value, str | list | bool) or info.field_name is None:
+            return value
+        field = cls.model_fields[info.field_name]
+        unit = unit_of(info.field_name, field.metadata)
+        shape = _shape(field.annotation)
+        if isinstance(value, bool):
+            if shape is float and not was_run(info):
+                said = str(value).lower()
+                raise ValueError(f"{said} is no number; write one, or text in quotation marks")
+            return value
+        if unit is None or shape is None:
+            return value
+        return read_quantities(value, unit, several=shape is list)
+
     @classmethod
     def __get_pydantic_json_schema__(
         cls, core: CoreSchema, handler: GetJsonSchemaHandler
@@ -29,6 +55,10 @@ class StrictModel(BaseModel):
         for key, words in descriptions(cls).items():
             if key in keys:
                 keys[key].setdefault("description", words)
+        for name, field in cls.model_fields.items():
+            unit, key = unit_of(name, field.metadata), field.alias or name
+            if unit is not None and key in keys and _shape(field.annotation) is not None:
+                keys[key][UNIT] = unit
         return written
 
 
@@ -52,6 +82,45 @@ def was_run(info: ValidationInfo) -> bool:
     ...         return colours
     """
     return bool(info.context and info.context.get("recorded"))
+
+
+def quantities(model: BaseModel) -> Iterator[tuple[tuple[str | int, ...], str, float]]:
+    """Yield every number with a unit that was written into a model: its place, unit and value."""
+    for name in type(model).model_fields:
+        if name in model.model_fields_set:
+            field, value = type(model).model_fields[name], getattr(model, name)
+            unit = unit_of(name, field.metadata)
+            if _shape(field.annotation) is None:
+                unit = None
+            yield from _quantities((field.alias or name,), unit, value)
+
+
+def _quantities(
+    place: tuple[str | int, ...], unit: str | None, value: Any
+) -> Iterator[tuple[tuple[str | int, ...], str, float]]:
+    if isinstance(value, BaseModel):
+        for inside, its, number in quantities(value):
+            yield (*place, *inside), its, number
+    elif isinstance(value, Mapping):
+        for key, each in value.items():
+            yield from _quantities((*place, key), None, each)
+    elif isinstance(value, list | tuple):
+        for at, each in enumerate(value):
+            yield from _quantities((*place, at), unit, each)
+    elif unit is not None and isinstance(value, int | float) and not isinstance(value, bool):
+        yield place, unit, float(value)
+
+
+def _shape(annotation: Any) -> type | None:
+    """Return whether a key asks for a number (float) or numbers (list); None for anything else."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if annotation in {int, float}:
+        return float
+    if origin in {tuple, list}:
+        return list if any(_shape(each) for each in arguments) else None
+    if origin in {Union, UnionType}:
+        return next((shape for each in arguments if (shape := _shape(each))), None)
+    return _shape(arguments[0]) if arguments and hasattr(annotation, "__metadata__") else None
 
 
 def descriptions(model: type[BaseModel]) -> dict[str, str]:

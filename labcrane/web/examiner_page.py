@@ -4,6 +4,7 @@ import json
 from collections.abc import Callable, Mapping
 
 from labcrane.core.records import Event
+from labcrane.protocol.questions import about, questions
 from labcrane.session.commands import Order
 from labcrane.web.door.access import SUPERVISOR
 from labcrane.web.form import ConsentCard, Form
@@ -33,6 +34,7 @@ def supervisor_page(desk: PageContext) -> None:
     ui.colors(primary=PRIMARY)
     with ui.column().classes("w-full max-w-7xl mx-auto p-3 gap-3"):
         _status(desk)
+        _questions(desk)
         ConsentCard(desk, SUPERVISOR).build()
         _orders(desk)
         with ui.element("div").classes("grid grid-cols-1 lg:grid-cols-2 gap-3 w-full"):
@@ -67,6 +69,16 @@ def _status(desk: PageContext) -> None:
         alarm.set_text(board.alarm)
 
     ui.timer(RATE_S, update)
+
+
+def _questions(desk: PageContext) -> None:
+    """Show what ``labcrane check`` asks of the protocol, and nobody has answered in it."""
+    from nicegui import ui  # noqa: PLC0415
+
+    for question in questions(desk.study):
+        said = about(desk.study, question)
+        line = f"line {said['line']} of {desk.study.path.name}: {said['text']}"
+        ui.label(line).props(f'id="question-{question.key}"').classes("text-amber-900")
 
 
 def _facts(desk: PageContext) -> list[str]:

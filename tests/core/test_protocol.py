@@ -135,7 +135,7 @@ def test_an_axis_that_the_device_does_not_have_is_told(complaint) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "1: a protocol is a mapping of keys, beginning with 'labcrane: 1'"),
+        ("", "1: it must be a mapping of keys, beginning with 'labcrane: 1'"),
         ("a: [1, 2", "1: this is no YAML"),
         ("a: 1\na: 2\n", "2: this is no YAML: found duplicate key \"a\""),
     ],
