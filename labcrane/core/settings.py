@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import AfterValidator, ValidationInfo
 
+from labcrane.core.references import Reference
 from labcrane.files.model import StrictModel
 from labcrane.files.model import was_run as was_run  # noqa: PLC0414 - public here
 from labcrane.files.units import Unit as Unit  # noqa: PLC0414 - public here
@@ -61,6 +62,6 @@ def _beside(path: Path, info: ValidationInfo) -> Path:
     return info.context["folder"] / path if info.context else path
 
 
-StudyPath = Annotated[Path, AfterValidator(_beside)]
+StudyPath = Annotated[Path, AfterValidator(_beside), Reference("file")]
 """A file of the study in a component's settings: a relative path counts from the folder of the
 protocol that names it."""

@@ -126,6 +126,7 @@ WANTED = {
     "float_type": "a number",
     "float_parsing": "a number",
     "bool_parsing": "true or false",
+    "path_type": "the name of a file",
     "finite_number": "a number that is one: neither .nan nor .inf",
 }
 """What each of pydantic's types is for people who write YAML."""

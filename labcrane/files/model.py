@@ -5,7 +5,7 @@ import inspect
 from collections.abc import Iterator, Mapping
 from textwrap import dedent
 from types import UnionType
-from typing import Any, Union, get_args, get_origin
+from typing import Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationInfo, field_validator
 from pydantic.json_schema import JsonSchemaValue
@@ -31,17 +31,14 @@ class StrictModel(BaseModel):
     @classmethod
     def _in_its_own_unit(cls, value: Any, info: ValidationInfo) -> Any:
         """Take ``50 cm`` where a number of metres is asked for."""
-        if not isinstance(value, str | list | bool) or info.field_name is None:
+        if not isinstance(value, str | list | dict | bool) or info.field_name is None:
             return value
         field = cls.model_fields[info.field_name]
         unit = unit_of(info.field_name, field.metadata)
         shape = _shape(field.annotation)
-        if isinstance(value, bool):
-            if shape is float and not was_run(info):
-                said = str(value).lower()
-                raise ValueError(f"{said} is no number; write one, or text in quotation marks")
-            return value
-        if unit is None or shape is None:
+        if not was_run(info):
+            _no_truth(field.annotation, value)
+        if unit is None or shape is None or not isinstance(value, str | list):
             return value
         return read_quantities(value, unit, several=shape is list)
 
@@ -60,6 +57,36 @@ class StrictModel(BaseModel):
             if unit is not None and key in keys and _shape(field.annotation) is not None:
                 keys[key][UNIT] = unit
         return written
+
+
+def _no_truth(annotation: Any, value: Any) -> None:
+    """Refuse ``true`` where a number is asked for: it would be taken for 1."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if isinstance(value, bool):
+        kinds = set(_plain_types(annotation))
+        if kinds & {int, float} and not kinds & {bool, Any}:
+            said = str(value).lower()
+            raise ValueError(f"{said} is no number; write one")
+    elif isinstance(value, list) and origin in {tuple, list}:
+        for each in value:
+            _no_truth(Union[arguments], each)  # noqa: UP007 - of what is only known now
+    elif isinstance(value, dict) and origin is dict:
+        for each in value.values():
+            _no_truth(arguments[1], each)
+
+
+def _plain_types(annotation: Any) -> Iterator[Any]:
+    """Yield the types that a value of a type can be, behind unions and marks."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin in {Union, UnionType}:
+        for each in arguments:
+            yield from _plain_types(each)
+    elif hasattr(annotation, "__metadata__"):
+        yield from _plain_types(arguments[0])
+    elif origin is Literal:
+        yield from map(type, arguments)
+    else:
+        yield annotation
 
 
 def was_run(info: ValidationInfo) -> bool:

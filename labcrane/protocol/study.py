@@ -248,7 +248,10 @@ class Checker:
             self._feedback_exists(("design", "groups", group), names)
         for place, block in self._blocks():
             if block.feedback == "group" and not self._protocol.design.groups:
-                message = "feedback is by group, but design has no groups"
+                message = (
+                    "feedback is by group, but design has no groups; write them under design:, or "
+                    "feedback: all, none or a list of names"
+                )
                 self._source.problem((*place, "feedback"), message)
             elif isinstance(block.feedback, tuple):
                 self._feedback_exists((*place, "feedback"), block.feedback)

@@ -101,7 +101,7 @@ def test_what_was_switched_on_is_in_the_trial_table(tmp_path: Path) -> None:
         (FED + "views: {v: {use: view, camera: moon}}\n", "there is no camera 'moon'; there is"),
         (
             SHORT.replace("pairs: 1", "feedback: group"),
-            "feedback is by group, but design has no groups",
+            "feedback is by group, but design has no groups; write them under design:",
         ),
     ],
 )
