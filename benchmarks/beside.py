@@ -9,7 +9,6 @@ stood still, as a program with a higher priority saw it. Needs jackd and real-ti
 the sound; nothing leaves this computer.
 """
 
-import json
 import os
 import subprocess
 import sys
@@ -19,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.table import Row, show
+from benchmarks.table import Row, dumped, loaded, show
 from labcrane import open_recording
 from labcrane.streams.network import LOOPBACK
 
@@ -38,7 +37,7 @@ def rows() -> list[Row]:
         [sys.executable, "-m", "benchmarks.beside", "--json"],
         check=True, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
-    return [Row(*fields) for fields in json.loads(done.stdout.splitlines()[-1])]
+    return loaded(done.stdout.splitlines()[-1])
 
 
 def measure(folder: Path) -> list[Row]:
@@ -169,8 +168,7 @@ def main() -> None:
         found = measure(folder)
     show(found)
     if "--json" in sys.argv:
-        fields = ("subject", "what", "ours", "bare", "reference", "limit")
-        print(json.dumps([[getattr(row, field) for field in fields] for row in found]))
+        print(dumped(found))
 
 
 if __name__ == "__main__":

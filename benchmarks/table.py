@@ -1,7 +1,9 @@
 """Rows of every benchmark: a figure, a bare reference from the same run, and a limit."""
 
+import json
+import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 
 @dataclass(frozen=True)
@@ -17,7 +19,12 @@ class Row:
     reference
         What the reference is.
     limit
-        What the ratio may be at most.
+        What the ratio may be at most: a figure of which nothing is promised is no row.
+
+    Raises
+    ------
+    ValueError
+        The limit is none that a ratio could miss.
     """
 
     subject: str
@@ -26,6 +33,10 @@ class Row:
     bare: float
     reference: str
     limit: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.limit < math.inf:
+            raise ValueError(f"{self.subject}: {self.what}: {self.limit} is no limit for a ratio")
 
     @property
     def ratio(self) -> float:
@@ -55,3 +66,13 @@ def show(rows: Iterable[Row]) -> None:
             f"{row.subject:10} {row.what}: {row.ours:.3g}; {row.reference}: {row.bare:.3g}; "
             f"ratio {row.ratio:.3g} (at most {row.limit:g}){'' if row.kept else '  MISSED'}"
         )
+
+
+def dumped(rows: Iterable[Row]) -> str:
+    """Return rows as one line, for the process that asked for them."""
+    return json.dumps([astuple(row) for row in rows])
+
+
+def loaded(line: str) -> list[Row]:
+    """Return the rows of :func:`dumped`."""
+    return [Row(*fields) for fields in json.loads(line)]

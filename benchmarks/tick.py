@@ -10,6 +10,7 @@ PyBullet's. Rounds alternate, so that a wandering machine moves all figures toge
 """
 
 import gc
+import math
 import subprocess
 import sys
 import tempfile
@@ -40,7 +41,9 @@ from labcrane.testing import ch8, make_run
 ROUNDS = 7
 TICKS = 2400
 WARM_UP = 200
-RATES_HZ = (240, 500, 1000, 2000, 4000, 8000, 16000)
+RATES_HZ = tuple(round(240 * 1.2**step) for step in range(24))
+"""A session's rate, and on in steps of a fifth up to 16 kHz."""
+
 PACED_S = 4.0
 FEW = 0.01
 """Share of late ticks up to which a rate is held."""
@@ -48,7 +51,7 @@ FEW = 0.01
 LIMITS = {"whole": (1.5, 2.5), "whole, LSL": (1.8, 3.5)}
 """How much longer than a bare tick a whole one may take: in the median, and in 99 % of ticks."""
 
-SLOWEST = 4.0
+SLOWEST = 2.0
 """How much lower the highest rate held may be than that of a loop that does nothing."""
 
 ENGINE_LIMIT = 0.7
@@ -121,11 +124,11 @@ def whole(study: Study, folder: Path, clock: Clock, count: int, *, lsl: bool) ->
         seen.append(frame)
 
     with rig.opened(study, plan.seed) as run:
-        course = Sequencer(study, plan, rig, waits=False)
+        sequencer = Sequencer(study, plan, rig, waits=False)
         path = folder / f"{time.perf_counter_ns()}.xdf"
         with SessionJournal(path, columns(run), run.rate_hz) as journal, outlets(run, lsl) as push:
             log, sinks = FrameLog(journal, run), (*push, end_of_tick)
-            loop.run(rig, run, course, clock, UntilTick(count), log, sinks)
+            loop.run(rig, run, sequencer, clock, UntilTick(count), log, sinks)
         path.unlink()
     return seen
 
@@ -182,10 +185,7 @@ def rows() -> list[Row]:
     use_loopback()
     with tempfile.TemporaryDirectory() as name:
         found = [*costs(cost(Path(name))), engine_row(engine_times())]
-        held = rates(Path(name))
-    what = "shortest tick that is held, LSL, ms"
-    ours, bare = (1e3 / held[kind] for kind in ("whole", "empty"))
-    return [*found, Row("tick", what, ours, bare, "of an empty loop", SLOWEST)]
+        return [*found, rate_row(rates(Path(name)))]
 
 
 def costs(found: Mapping[str, Sequence[np.ndarray]]) -> list[Row]:
@@ -279,27 +279,43 @@ def late(dues: Sequence[float], wakes: Sequence[float], rate_hz: float) -> float
     return float(np.mean(np.subtract(wakes, dues) > 1.0 / rate_hz))
 
 
-def rates(folder: Path) -> dict[str, int]:
-    """Print late ticks at rising rates, until the whole loop falls behind; return what is held."""
+def lateness(kind: str, rate: int, folder: Path) -> float:
+    """Return the share of late ticks of the empty or of the whole loop, paced at ``rate`` Hz."""
+    count = round(PACED_S * rate)
+    if kind == "empty":
+        seen = [tick for tick, _ in zip(ticks(SystemClock(), rate), range(count), strict=False)]
+    else:
+        frames = whole(study_at(rate, folder), folder, SystemClock(), count, lsl=True)
+        seen = [frame.tick for frame in frames]
+    return late([tick.due for tick in seen], [tick.woke for tick in seen], rate)
+
+
+def rates(folder: Path, measure: Callable[[str, int, Path], float] = lateness) -> dict[str, float]:
+    """Print late ticks at rising rates; return in Hz what each loop holds before it falls behind.
+
+    A rate above one that is not held does not count; nan is a loop that does not hold the lowest.
+    """
     print(f"\nlate ticks over {PACED_S:g} s (woke over one period after due), LSL with a consumer")
     print(f"{'rate Hz':>8} {'empty loop':>12} {'whole loop':>12}")
-    held = {"empty": 1, "whole": 1}  # Hz, where not even the lowest is held
+    held = dict.fromkeys(("empty", "whole"), math.nan)
+    climbing = list(held)
     for rate in RATES_HZ:
-        count = round(PACED_S * rate)
-        empty = [tick for tick, _ in zip(ticks(SystemClock(), rate), range(count), strict=False)]
-        frames = whole(study_at(rate, folder), folder, SystemClock(), count, lsl=True)
-        shares = {
-            "empty": late([t.due for t in empty], [t.woke for t in empty], rate),
-            "whole": late([f.tick.due for f in frames], [f.tick.woke for f in frames], rate),
-        }
-        print(f"{rate:8} {shares['empty']:12.2%} {shares['whole']:12.2%}")
-        for name, share in shares.items():
-            if share < FEW:
-                held[name] = rate
-        if shares["whole"] >= FEW and shares["empty"] >= FEW:
+        shares = {kind: measure(kind, rate, folder) for kind in climbing}
+        cells = (f"{shares[kind]:.2%}" if kind in shares else "-" for kind in held)
+        print(" ".join([f"{rate:8}", *(f"{cell:>12}" for cell in cells)]))
+        climbing = [kind for kind, share in shares.items() if share < FEW]
+        held.update(dict.fromkeys(climbing, float(rate)))
+        if not climbing:
             break
     print(f"held with under 1 % late: empty loop {held['empty']} Hz, whole {held['whole']} Hz")
     return held
+
+
+def rate_row(held: Mapping[str, float]) -> Row:
+    """Return the shortest tick of a whole loop beside that of an empty one."""
+    ours, bare = (1e3 / held[kind] for kind in ("whole", "empty"))
+    what = "shortest tick that is held, LSL, ms"
+    return Row("tick", what, ours, bare, "of an empty loop", SLOWEST)
 
 
 if __name__ == "__main__":

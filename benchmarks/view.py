@@ -16,8 +16,8 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.table import Row
-from labcrane import Run, Sphere
-from labcrane.core import SessionState
+from labcrane import Run
+from labcrane.core import SessionState, Sphere
 from labcrane.machines.machine import Body
 from labcrane.streams.pictures import png
 from labcrane.testing import TARGETS, ch8, make_run, make_target

@@ -1,10 +1,8 @@
 """The public names, and the modules from which they are imported."""
 
 from . import analysis, core, machines, participants, recording, registry, replay, testing
-from .analysis.exporter import Exporter
 from .core.clock import Tick
-from .core.primitives import Cylinder, Sphere
-from .core.records import Event, Frame, Phase, PlannedTrial, Run, Trial, TrialStatus
+from .core.records import Frame, Run, Trial
 from .core.roles import (
     Controller,
     Cue,
@@ -36,11 +34,8 @@ __version__: str
 __all__ = [
     "Controller",
     "Cue",
-    "Cylinder",
     "DeviceError",
     "Dynamics",
-    "Event",
-    "Exporter",
     "Feedback",
     "FloatArray",
     "Frame",
@@ -48,8 +43,6 @@ __all__ = [
     "LabcraneError",
     "Machine",
     "Offer",
-    "Phase",
-    "PlannedTrial",
     "PluginError",
     "ProtocolError",
     "Questionnaire",
@@ -58,12 +51,10 @@ __all__ = [
     "Settings",
     "Signal",
     "SignalMonitor",
-    "Sphere",
     "StreamError",
     "Task",
     "Tick",
     "Trial",
-    "TrialStatus",
     "analysis",
     "core",
     "hookimpl",

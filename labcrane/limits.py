@@ -45,6 +45,7 @@ class Limit:
 TEXT = "Unicode without control characters, halves of surrogates and marks that turn the direction"
 EVENT = "refused with an event; the session goes on"
 ERROR = "an error with file, line and what to do"
+HELD = "the session ends with an error that says how many frames could not be written"
 LOST = "the input is lost: command to zero, pause, event; back with the next good value"
 
 LIMITS: Mapping[str, Limit] = {
@@ -55,14 +56,41 @@ LIMITS: Mapping[str, Limit] = {
         200, "characters", 0, "one line without YAML's marks", "web.page, session.commands", EVENT
     ),
     "order": Limit(200, "characters", 0, TEXT, "web.page, session.commands", EVENT),
+    "message to a session": Limit(
+        65_536,
+        "bytes",
+        0,
+        "JSON of a known kind",
+        "session.commands",
+        "refused by its sender, and told",
+    ),
+    "frames waiting for a disk": Limit(
+        200_000_000, "bytes", 0, "frames and events", "recording.frame_log", HELD
+    ),
+    "signals waiting for monitors": Limit(
+        64_000_000,
+        "bytes",
+        0,
+        "samples",
+        "streams.recorder.signal_feed",
+        "monitors look at the next ones; the record has all",
+    ),
     "request body": Limit(
-        32_000, "bytes", 0, "any", "web.guard", "status 413 before it is buffered"
+        32_000, "bytes", 0, "any", "web.door.guard", "status 413 before it is buffered"
     ),
     "message of a page": Limit(
-        64_000, "bytes", 0, "any", "web.guard", "the socket is closed with 1009"
+        64_000, "bytes", 0, "any", "web.door.guard", "the socket is closed with 1009"
     ),
     "requests of one address": Limit(
-        200, "requests a second", 0, "any", "web.guard", "status 429; one event a second"
+        200, "requests a second", 0, "any", "web.door.guard", "status 429; one event a second"
+    ),
+    "page loads of one address": Limit(
+        5,
+        "loads a second, 30 at once",
+        0,
+        "any",
+        "web.door.guard",
+        "status 429; one event a second",
     ),
     "orders of one page": Limit(
         20, "orders a second", 0, "any", "web.page", "refused; one event a second"
@@ -92,6 +120,14 @@ LIMITS: Mapping[str, Limit] = {
         ERROR,
     ),
     "DBC file": Limit(1_000_000, "bytes", 0, "a DBC file", "labcrane_can", ERROR),
+    "CSV table": Limit(
+        50_000_000,
+        "bytes",
+        0,
+        "UTF-8 without NUL, gzipped or not; the bytes are those unpacked",
+        "files.table",
+        ERROR,
+    ),
     "mesh": Limit(100_000_000, "bytes", 0, "STL, OBJ or glTF", "machines.mesh", ERROR),
     "participant file": Limit(
         5_000_000, "values a column", 0, "HDF5 without links and data outside", "recording", ERROR

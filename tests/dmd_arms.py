@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from labcrane import Dynamics, PlannedTrial, Signal
+from labcrane import Dynamics, Signal
+from labcrane.core import PlannedTrial
 from labcrane.machines.library import load_machine
 from labcrane.testing import RATE_HZ, make_run, make_trial
 from labcrane_dmd import labcrane_dynamics

@@ -83,6 +83,11 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
         lambda: _succeeds(*UNSHARE, "sh", "-c", "mount -t tmpfs none /mnt"),
         "allow user namespaces with mounts",
     ),
+    "networks": (
+        lambda: _succeeds("unshare", "-rn", "true"),
+        "apt install util-linux; allow user namespaces with networks",
+    ),
+    "/dev/shm": (lambda: Path("/dev/shm").is_dir(), "mount a tmpfs there"),
     "real-time priorities": (_may_run_in_real_time, "docs/lab.md says how a user is allowed them"),
     "fork": (lambda: hasattr(os, "fork"), "Windows has none"),
     "terminals": (lambda: find_spec("pty") is not None, "Windows has no pseudo-terminals"),

@@ -7,19 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from ideal_crane import IdealCrane
 
-from labcrane import (
-    Controller,
-    FloatArray,
-    Frame,
-    Machine,
-    Phase,
-    PlannedTrial,
-    Run,
-    Signal,
-    Tick,
-    Trial,
-)
-from labcrane.core import CraneSettings
+from labcrane import Controller, FloatArray, Frame, Machine, Run, Signal, Tick, Trial
+from labcrane.core import CraneSettings, Phase, PlannedTrial
 from labcrane.machines import ACTUATOR_PRESETS
 from labcrane.testing import RATE_HZ, ch8, make_run
 from labcrane_bullet.kinematic_crane import KinematicCrane

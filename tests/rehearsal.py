@@ -97,9 +97,9 @@ def rehearse(
     plan = plan_session(study, "P001", 1)
     rig = rig or Rig.build(study, simulated=True)
     with rig.opened(study, plan.seed) as run:
-        course = Sequencer(study, plan, rig, waits=waits, awaits=awaits)
+        sequencer = Sequencer(study, plan, rig, waits=waits, awaits=awaits)
         seen = Rehearsal(run)
         console = ScriptedConsole(orders)
         keep = [lambda frame: seen.frames.append(copy.deepcopy(frame))]
-        loop.run(rig, run, course, ManualClock(start=1000.0), console, NoLog(), keep)
+        loop.run(rig, run, sequencer, ManualClock(start=1000.0), console, NoLog(), keep)
     return seen

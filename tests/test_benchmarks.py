@@ -1,6 +1,9 @@
 """Checks of the benchmarks: what is slower, larger or worse than promised makes them red."""
 
+import ast
+import dataclasses
 import importlib
+import itertools
 import subprocess
 import sys
 import time
@@ -52,6 +55,65 @@ def test_the_table_is_what_was_measured_with_every_limit(benchmarks: types.Modul
     assert slow.startswith("| slow | a step, us | 6.3 | a bare one | 3 | 2.10 | 2.00 | 20")
 
 
+@pytest.mark.parametrize("error", [FileNotFoundError("no jackd"), SystemExit(3)])
+def test_a_benchmark_that_cannot_be_run_is_named_and_the_others_go_on(
+    benchmarks: types.ModuleType,
+    error: BaseException,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def rows() -> list[object]:
+        raise error
+
+    benchmarks.main([])
+    monkeypatch.setattr(sys.modules["benchmarks.fine"], "rows", rows)
+    capsys.readouterr()
+    assert benchmarks.main([]) == 1, "whether it is asked to check or not"
+    said = capsys.readouterr().out
+    assert f"MISSED fine could not be run: {type(error).__name__}: {error}\n" in said
+    assert "MISSED slow: a step, us is 6.3" in said
+    *_, fine, slow = benchmarks.RESULTS.read_text(encoding="utf-8").splitlines()
+    assert fine.startswith("| fine |"), "what was measured before stays, with its date"
+    assert slow.startswith("| slow |")
+
+
+def test_a_benchmark_without_a_figure_is_missed(
+    benchmarks: types.ModuleType,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(sys.modules["benchmarks.fine"], "rows", list)
+    assert benchmarks.main(["--only", "fine"]) == 1
+    assert "MISSED fine gave no figure\n" in capsys.readouterr().out
+
+
+def test_the_table_that_is_kept_has_the_head_and_the_columns_that_are_written_now() -> None:
+    main = importlib.import_module("benchmarks.__main__")
+    text = main.RESULTS.read_text(encoding="utf-8")
+    assert text.startswith(main.head())
+    rows = text.removeprefix(main.head()).splitlines()
+    assert {row.split("|")[1].strip() for row in rows} <= set(main.SUBJECTS)
+    assert {row.count("|") for row in rows} == {main.HEAD.count("|")}
+
+
+@pytest.mark.parametrize("limit", [float("inf"), float("nan"), 0.0])
+def test_a_row_without_a_limit_that_can_be_missed_is_none(limit: float) -> None:
+    row = importlib.import_module("benchmarks.table").Row
+    with pytest.raises(ValueError, match=f"a: b: {limit} is no limit for a ratio"):
+        row("a", "b", 1.0, 1.0, "c", limit)
+
+
+def test_every_benchmark_makes_rows_and_says_their_limits_itself() -> None:
+    main = importlib.import_module("benchmarks.__main__")
+    row = importlib.import_module("benchmarks.table").Row
+    (limit,) = [field for field in dataclasses.fields(row) if field.name == "limit"]
+    assert limit.default is limit.default_factory is dataclasses.MISSING
+    for subject in main.SUBJECTS:
+        source = Path(main.__file__).with_name(f"{subject}.py").read_text(encoding="utf-8")
+        calls = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call)]
+        assert any(ast.unparse(call.func) == "Row" for call in calls), subject
+
+
 def test_a_ratio_that_is_no_number_is_missed() -> None:
     table = importlib.import_module("benchmarks.table")
     nothing = table.Row("a", "b", float("nan"), 1.0, "c", 2.0)
@@ -64,9 +126,7 @@ def test_a_component_that_takes_two_milliseconds_more_a_tick_is_missed(
     slower_s: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tick = importlib.import_module("benchmarks.tick")
-    monkeypatch.setattr(
-        tick, "LIMITS", {"whole": (20.0, float("inf"))}
-    )  # on however busy a computer
+    monkeypatch.setattr(tick, "LIMITS", {"whole": (20.0, 1e9)})  # on however busy a computer
     step = BulletCrane.step
 
     def slow(self: BulletCrane, *arguments: object) -> object:
@@ -87,6 +147,109 @@ def test_an_engine_that_costs_more_than_it_may_is_missed() -> None:
     missed = importlib.import_module("benchmarks.table").missed
     assert not missed([tick.engine_row({"bullet_crane": 1e-5, "mujoco_crane": 6e-6})])
     assert missed([tick.engine_row({"bullet_crane": 1e-5, "mujoco_crane": 8e-6})])
+
+
+SESSION_HZ = 240
+
+
+def held_where(late: dict[str, set[int]]) -> dict[str, float]:
+    """Return the rates held by loops that are late at some steps and at no other."""
+    tick = importlib.import_module("benchmarks.tick")
+    steps = {rate: number for number, rate in enumerate(tick.RATES_HZ)}
+    return tick.rates(Path(), lambda kind, rate, _: float(steps[rate] in late[kind]))
+
+
+def test_a_rate_above_one_that_is_not_held_does_not_count() -> None:
+    tick = importlib.import_module("benchmarks.tick")
+    found = held_where({"empty": {9}, "whole": {3, 5}})
+    assert found == {"empty": tick.RATES_HZ[8], "whole": tick.RATES_HZ[2]}
+
+
+@pytest.mark.parametrize("late", [{"whole"}, {"empty"}, {"whole", "empty"}])
+def test_a_loop_that_holds_not_even_the_lowest_rate_is_missed(late: set[str]) -> None:
+    tick = importlib.import_module("benchmarks.tick")
+    missed = importlib.import_module("benchmarks.table").missed
+    held = held_where({kind: {0} if kind in late else set() for kind in ("empty", "whole")})
+    assert missed([tick.rate_row(held)])
+    assert not missed([tick.rate_row(held_where({"empty": set(), "whole": set()}))])
+
+
+def test_rates_rise_in_steps_of_a_fifth_from_that_of_a_session() -> None:
+    tick = importlib.import_module("benchmarks.tick")
+    steps = [upper / lower for lower, upper in itertools.pairwise(tick.RATES_HZ)]
+    assert tick.RATES_HZ[0] == SESSION_HZ
+    assert max(steps) < 1.21
+    assert tick.SLOWEST < 2.5, "no loop may lose half its rate and half of the rest unseen"
+
+
+def promised_of(**changed: object) -> list[str]:
+    """Return what is missed of ten draws that keep all promises, but for what is changed."""
+    score = importlib.import_module("streams.unkind_score")
+    fault = next(iter(score.Fault))
+    kept = score.Score(
+        row="unkind", p95=0.1, most=0.2, cover=1.0, width=0.1, passed=True, usual=0.5,
+        untouched=0.5, named=frozenset({fault}), present=frozenset({fault}), clean=True, limit=0.2,
+        samples=1000, apart=0.1, usual_apart=0.5, apart_limit=0.2,
+    )  # fmt: skip
+    draws = [kept] * 9 + [dataclasses.replace(kept, **changed)]
+    sync = importlib.import_module("benchmarks.sync")
+    return importlib.import_module("benchmarks.table").missed(sync.promises(draws))
+
+
+@pytest.mark.parametrize(
+    ("changed", "missed"),
+    [
+        ({}, []),
+        ({"p95": 0.3, "usual": 0.6}, ["unkind draws that break a promise, and one is 2"]),
+        (
+            {"p95": 9.9, "usual": 0.1, "untouched": 10.0, "clean": False},
+            ["unkind devices worse than by pyxdf, and one is 2"],
+        ),
+        ({"cover": 0.95, "samples": 9000}, ["samples beyond what is stated, % is 2.5"]),
+        ({"named": frozenset()}, ["worst fault: wrong or left out, % is 10"]),
+        ({"present": frozenset()}, ["worst fault: wrong or left out, % is 10"]),
+    ],
+)
+def test_each_promise_of_unkind_devices_that_is_broken_is_missed(
+    changed: dict[str, object], missed: list[str]
+) -> None:
+    found = promised_of(**changed)
+    assert len(found) == len(missed), found
+    for line, words in zip(found, missed, strict=True):
+        assert line.startswith(f"sync: {words},")
+
+
+@pytest.mark.parametrize(("wrong", "clocks"), [(0, 3), (1, 3), (0, 2), (0, 4)])
+def test_a_wrong_stamp_or_a_clock_that_is_not_found_after_restarts_is_missed(
+    wrong: int, clocks: int
+) -> None:
+    sync = importlib.import_module("benchmarks.sync")
+    missed = importlib.import_module("benchmarks.table").missed
+    assert len(missed(sync.restarted(wrong, clocks, 2))) == (wrong > 0) + (clocks != 3)
+
+
+ENDING = "import sys; print({said!r}); print('no gcc', file=sys.stderr); sys.exit({code})"
+
+
+@pytest.mark.parametrize(
+    ("ours", "code", "fails"), [(1.0, 0, False), (3.0, 1, False), (1.0, 1, True), (None, 1, True)]
+)
+def test_the_exit_status_of_the_benchmark_of_sync_counts(
+    *, ours: float | None, code: int, fails: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sync = importlib.import_module("benchmarks.sync")
+    table = importlib.import_module("benchmarks.table")
+    rows = [] if ours is None else [table.Row("sync", "error, ms", ours, 2.0, "limit", 1.0)]
+    said = table.dumped(rows) if rows else "a table that ends"
+    run = subprocess.run
+    program = [sys.executable, "-c", ENDING.format(said=said, code=code)]
+    monkeypatch.setattr(sync.subprocess, "run", lambda _, **how: run(program, **how))
+    if fails:
+        with pytest.raises(RuntimeError, match="no gcc"):
+            sync.rows()
+    else:
+        assert sync.rows() == rows
+        assert bool(table.missed(rows)) == bool(code)
 
 
 def test_memory_is_that_of_the_command_itself_and_not_of_who_started_it() -> None:

@@ -23,11 +23,10 @@ from labcrane import (
     Run,
     Settings,
     Signal,
-    Sphere,
     hookimpl,
     offer,
 )
-from labcrane.core import Shape
+from labcrane.core import Shape, Sphere
 
 labcrane_api = 1
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from labcrane_sqlite import Sqlite, SqliteSettings
 
-from labcrane import Exporter
+from labcrane.analysis import Exporter
 from labcrane.testing import ExporterContract
 from labcrane.testing.exporters import MOVEMENT_S, RATE_HZ, TRIALS, a_participant
 

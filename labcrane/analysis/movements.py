@@ -89,7 +89,8 @@ def groups(session: SessionRecord) -> dict[str, "pd.DataFrame"]:
 def machine_of(session: SessionRecord) -> Machine:
     """Return the machine that was operated."""
     text = session.context["machine"]
-    return Machine.model_validate(parse_yaml(text, "the recorded machine", recorded=True))
+    written = parse_yaml(text, "the recorded machine", recorded=True)
+    return Machine.model_validate(written, context={"recorded": True})
 
 
 def movements_of(session: SessionRecord) -> Iterator[Movement]:

@@ -5,7 +5,7 @@ in docs/indicator.md.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +38,7 @@ class OperatorTest:
     scenario
         The trial's condition ``scenario``; the block's name where it has none.
     reference_s
-        The operator's reference time, in seconds.
+        The operator's reference time in this scenario, in seconds.
     why
         Where the completion factor comes from.
     """
@@ -54,18 +54,41 @@ class OperatorTest:
     settings: IndicatorSettings
 
 
-def operator_tests(cohort: Cohort, settings: IndicatorSettings | None = None) -> list[OperatorTest]:
+LeaveOut = Callable[[str, str], None]
+"""Told whose tests cannot be scored, and why."""
+
+
+def operator_tests(
+    cohort: Cohort,
+    settings: IndicatorSettings | None = None,
+    leave_out: LeaveOut = lambda name, why: None,
+) -> list[OperatorTest]:
     """Return all tests of who is included, by operator, session and time.
 
-    ``settings`` takes the place of what each session was recorded with.
+    Tests without a reference are left out, and those of all others scored.
+
+    Parameters
+    ----------
+    settings
+        Takes the place of what each session was recorded with.
+    leave_out
+        Told whose tests are left out, and why.
 
     Raises
     ------
     RecordingError
-        There is no test, or an operator has no reference stage.
+        There is no test, or none with a reference.
     """
     people = cohort.included
-    tests = [test for person in people for test in _tests(person.recording, settings)]
+    missing: list[tuple[str, str]] = []
+
+    def without(name: str, why: str) -> None:
+        missing.append((name, why))
+        leave_out(name, why)
+
+    tests = [test for person in people for test in _tests(person.recording, settings, without)]
+    if not tests and missing:
+        raise RecordingError("; ".join(f"{name} {why}" for name, why in missing))
     if not tests:
         raise RecordingError(
             f"no test in {cohort.folder}: {len(people)} participant files, and no trial with the "
@@ -74,34 +97,54 @@ def operator_tests(cohort: Cohort, settings: IndicatorSettings | None = None) ->
     return tests
 
 
-def _tests(recording: Recording, settings: IndicatorSettings | None) -> Iterator[OperatorTest]:
-    reference: list[float] = []
+def _tests(
+    recording: Recording, settings: IndicatorSettings | None, leave_out: LeaveOut
+) -> Iterator[OperatorTest]:
+    reference: dict[str, list[float]] = {}
+    lacking: dict[str, int] = {}
     for number, session in zip(recording.sessions, recording, strict=True):
         trials = session.trials
         if not {TIME, *COUNTS.values()} <= set(trials.columns):
             continue
         rows = trials.to_dict("records")
-        here = [float(row[TIME]) for row in rows if _is_reference(row)]
-        reference = here or reference  # the latest stage that there is
+        here: dict[str, list[float]] = {}
+        for row in filter(_is_reference, rows):
+            here.setdefault(_scene(row), []).append(float(row[TIME]))
+        reference |= here  # the latest stage that there is, scenario by scenario
         for row in rows:
-            if row["practice"] != 1 and row.get("reference") != 1 and row["outcome"] != "repeated":
-                mean = _mean(reference, recording, number)
-                used = settings or _settings(session)
-                yield _test(recording.participant, number, session, row, mean, used)
+            if row["practice"] == 1 or row.get("reference") == 1 or row["outcome"] == "repeated":
+                continue
+            times = reference.get(_scene(row), [])
+            if not times:
+                lacking[_scene(row)] = lacking.get(_scene(row), 0) + 1
+                continue
+            used = settings or _settings(session)
+            mean = sum(times) / len(times)
+            yield _test(recording.participant, number, session, row, mean, used)
+    if lacking:
+        leave_out(recording.participant, _without_reference(lacking, reference, recording))
+
+
+def _scene(row: Mapping[Any, Any]) -> str:
+    """Return what a reference time is of: the scenario; "" where a task has none."""
+    return str(row.get("scenario") or "")
+
+
+def _without_reference(
+    lacking: Mapping[str, int], reference: Mapping[str, object], recording: Recording
+) -> str:
+    named = [f"{name!r} ({count})" for name, count in lacking.items() if name]
+    scenes = f" of {', '.join(named)}" if named and reference else ""
+    tests = sum(lacking.values())
+    return (
+        f"has no reference stage{scenes} that was completed before {tests} of the tests "
+        f"({recording.path}); the indicator needs the operator's own reference time: run a step "
+        "'reference: {task: ...}' first"
+    )
 
 
 def _is_reference(row: Mapping[Any, Any]) -> bool:
     return row.get("reference") == 1 and row["outcome"] == "success"
-
-
-def _mean(reference: Sequence[float], recording: Recording, session: int) -> float:
-    if not reference:
-        raise RecordingError(
-            f"{recording.participant} has no reference stage that was completed in or before "
-            f"session {session} ({recording.path}); the indicator needs the operator's own "
-            "reference time: run a step 'reference: {task: ...}' first"
-        )
-    return sum(reference) / len(reference)
 
 
 def _settings(session: SessionRecord) -> IndicatorSettings:
@@ -117,8 +160,13 @@ def _test(
     settings: IndicatorSettings,
 ) -> OperatorTest:
     counts = {name: int(row[column]) for name, column in COUNTS.items()}
-    overruled = _overruled(session, row)
-    completed, why = completion(row, max(counts.values()), settings, overruled=overruled)
+    completed, why = completion(
+        row,
+        max(counts.values()),
+        settings,
+        overruled=_overruled(session, row),
+        overruled_after=_overruled(session, row, after=True),
+    )
     answers = session.questionnaires
     performance = Performance(
         float(row[TIME]),
@@ -143,12 +191,23 @@ def _test(
 
 
 def completion(
-    row: Mapping[Any, Any], worst: int, settings: IndicatorSettings, *, overruled: bool
+    row: Mapping[Any, Any],
+    worst: int,
+    settings: IndicatorSettings,
+    *,
+    overruled: bool,
+    overruled_after: bool = False,
 ) -> tuple[bool, str]:
-    """Return the completion factor of a trial, and who or what set it."""
+    """Return the completion factor of a trial, and who or what set it.
+
+    An end that was overridden while the trial ran lets it go on to another one; one that was
+    overridden afterwards, before the next test began, does not count.
+    """
     flag = row.get("completion", math.nan)
     if flag in {0, 1}:
         return flag == 1, "set by the supervisor"
+    if overruled_after:
+        return True, "overridden by the supervisor after its end"
     if worst > settings.mistakes and not overruled:
         return False, f"more than {settings.mistakes} mistakes of one kind"
     if row["outcome"] == "success":
@@ -156,10 +215,13 @@ def completion(
     return False, f"the trial ended with {row['outcome']}"
 
 
-def _overruled(session: SessionRecord, row: Mapping[Any, Any]) -> bool:
+def _overruled(session: SessionRecord, row: Mapping[Any, Any], *, after: bool = False) -> bool:
+    """Say whether a trial's end was overridden: while it ran, or after it, before the next."""
     events = session.events
-    of_trial = events[(events["name"] == OVERRIDE) & (events["trial"] == row["trial"])]
-    return any(data.get("refused") is None for data in of_trial["data"])
+    own = events[(events["name"] == OVERRIDE) & (events["trial"] == row["trial"])]
+    return any(
+        data.get("refused") is None and bool(data.get("after")) is after for data in own["data"]
+    )
 
 
 def _rating(answers: "pd.DataFrame", asked: str, row: Mapping[Any, Any]) -> float:

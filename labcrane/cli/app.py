@@ -27,6 +27,7 @@ MODULES = {
     "score": ("score",),
     "results": ("export", "report", "replay"),
     "simulate": ("simulate", "power"),
+    "engines": ("compare_engines",),
     "approval": ("approve", "amend", "methods"),
     "participants": ("participants", "consent", "exclude", "note", "waive", "deviations"),
     "data": ("where", "erase", "relabel", "transfer"),

@@ -12,7 +12,7 @@ SECTIONS = {
         "plugins", "new-plugin", "schema",
     ),
     "Run it": ("demo", "run", "resume", "consent", "streams", "record"),
-    "Analyse it": ("report", "score", "export", "replay"),
+    "Analyse it": ("report", "score", "export", "replay", "compare-engines"),
     "Keep people and data": (
         "participants", "where", "note", "exclude", "waive", "deviations", "recover", "resync",
         "erase", "relabel", "transfer",

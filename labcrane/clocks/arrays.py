@@ -27,6 +27,7 @@ def correct(
     latency_s: float = 0.0,
     evening: Literal["auto", "forbid", "force"] = "auto",
     end: float | None = None,
+    own_clock: npt.ArrayLike | None = None,
 ) -> Corrected:
     """Map time stamps of another clock onto the receiver's, and say how far each may be off.
 
@@ -62,6 +63,10 @@ def correct(
         a steady sample clock (``"auto"``), never, or always.
     end
         When the recording ended, on the receiver's clock: tells of a source that died before.
+    own_clock
+        The receiver's clock and, at the same moments, one of the same computer that nothing turns
+        (on Linux ``CLOCK_MONOTONIC`` and ``CLOCK_MONOTONIC_RAW``), shape ``(n_readings, 2)``:
+        where NTP slewed the receiver's clock meanwhile, the source is followed on the other one.
 
     Returns
     -------
@@ -110,8 +115,16 @@ def correct(
         when = _column("arrivals", arrivals, count)
         came = np.column_stack([np.arange(1.0, count + 1.0), when])
     index = None if counter is None else _column("counter", counter, count)
+    own = None
+    if own_clock is not None:
+        own = np.asarray(own_clock, dtype=np.float64)
+        if own.ndim != 2 or own.shape[1] != 2 or not np.isfinite(own).all():  # noqa: PLR2004
+            raise RecordingError(
+                "own_clock must be finite numbers of the shape (n, 2), the receiver's clock and "
+                f"one that nothing turns; they have the shape {own.shape}"
+            )
     treatment = Treatment(rate_hz=rate_hz, latency_s=latency_s, dejitter=EVENING[evening])
-    return correct_raw(RawStream.of(taken, shown, came, index=index), treatment, end)
+    return correct_raw(RawStream.of(taken, shown, came, index=index, own=own), treatment, end)
 
 
 def _column(name: str, values: npt.ArrayLike, count: int | None = None) -> npt.NDArray[np.float64]:

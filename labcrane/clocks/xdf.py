@@ -1,6 +1,6 @@
 """Correction of XDF files of any recorder, certified, and compared with pyxdf."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from labcrane.errors import RecordingError
 from labcrane.files.atomic import replacing
 from labcrane.recording.foreign_streams import RecordedStream, read_streams
+from labcrane.recording.journal_reader import JournalState
 from labcrane.recording.participant_file.columns import node_names, write_attributes, write_numbers
 from labcrane.recording.participant_file.stream_group import TIME_COLUMNS
 from labcrane.streams.recorder.health import counter_label
@@ -34,11 +35,14 @@ class Resynced:
     against_pyxdf
         By stream, the median and the largest distance of the times from pyxdf's, in seconds; empty
         where pyxdf is not installed, or reads other samples.
+    damage
+        What of the file could not be read, one line each.
     """
 
     path: Path
     report: SyncReport
     against_pyxdf: dict[str, tuple[float, float]]
+    damage: tuple[str, ...] = ()
 
 
 def resync_xdf(path: Path) -> Resynced:
@@ -53,7 +57,7 @@ def resync_xdf(path: Path) -> Resynced:
 
     if not path.is_file():
         raise RecordingError(f"there is no XDF file {path}")
-    streams, _ = read_streams([path])
+    streams, states = read_streams([path])
     if not streams:
         raise RecordingError(f"{path} holds no stream; is it whole?")
     raws = pooled([_raw(one) for one in streams], [one.header.host for one in streams])
@@ -77,7 +81,18 @@ def resync_xdf(path: Path) -> Resynced:
             for column, values in columns_of(each).items():
                 write_numbers(group, column, values, TIME_COLUMNS[column])
             write_attributes(group["time"], quality_of(each, treatment_of(one.header)))
-    return Resynced(beside, report, _compared(path, streams, corrected))
+    return Resynced(beside, report, _compared(path, streams, corrected), _damage(states))
+
+
+def _damage(states: list[JournalState]) -> tuple[str, ...]:
+    """Return what is missing from these times because it could not be read."""
+    told = [note for state in states for note in state.notes]
+    told += [
+        f"{state.name}: its last {state.torn} bytes are no whole chunk of XDF and were left out"
+        for state in states
+        if state.torn
+    ]
+    return tuple(told)
 
 
 def _raw(recorded: RecordedStream) -> RawStream:
@@ -87,7 +102,7 @@ def _raw(recorded: RecordedStream) -> RawStream:
         return raw
     column = recorded.header.labels.index(label)
     index = unwrapped(np.asarray(recorded.data[:, column], np.float64))
-    return RawStream(raw.stamps, raw.probes, raw.arrivals, raw.resets, index)
+    return replace(raw, index=index)
 
 
 def _compared(

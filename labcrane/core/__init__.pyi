@@ -5,8 +5,16 @@ from .crane_settings import CraneSettings, GrappleSettings, LoadedCraneSettings
 from .findings import Finding, Verdict
 from .hanging import HangingLoad
 from .items import AnswerError, Answers, Item, Score, numeric_answers
-from .primitives import Shape, TargetFinder
-from .records import CameraImage, SessionState, Value
+from .primitives import Cylinder, Shape, Sphere, TargetFinder
+from .records import (
+    CameraImage,
+    Event,
+    Phase,
+    PlannedTrial,
+    SessionState,
+    TrialStatus,
+    Value,
+)
 from .references import (
     AxisName,
     ButtonName,
@@ -21,7 +29,7 @@ from .references import (
     SignalName,
     ViewName,
 )
-from .settings import Names, StudyPath, Unit, read_yaml, was_run
+from .settings import Names, StudyPath, Unit, read_csv_text, read_yaml, was_run
 from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
 
 __all__ = [
@@ -34,6 +42,8 @@ __all__ = [
     "Covers",
     "Crane",
     "CraneSettings",
+    "Cylinder",
+    "Event",
     "EventName",
     "Finding",
     "GrappleSettings",
@@ -45,6 +55,8 @@ __all__ = [
     "LoadedCraneSettings",
     "Names",
     "Once",
+    "Phase",
+    "PlannedTrial",
     "Reference",
     "SceneObject",
     "Score",
@@ -54,13 +66,16 @@ __all__ = [
     "SignalFault",
     "SignalName",
     "SignalStream",
+    "Sphere",
     "StudyPath",
     "TargetFinder",
+    "TrialStatus",
     "Unit",
     "Value",
     "Verdict",
     "ViewName",
     "numeric_answers",
+    "read_csv_text",
     "read_yaml",
     "signals_of",
     "was_run",

@@ -5,14 +5,19 @@ from pathlib import Path
 from typing import Any
 
 from labcrane.core.findings import Finding, Verdict
-from labcrane.doctor import clock, components, disk, scheduling
-from labcrane.doctor.report import Check, as_data, diagnosis, latest
+from labcrane.doctor import apart, clock, components, disk, scheduling
+from labcrane.doctor.report import Check, Diagnosis, as_data, diagnosis, keep, latest
 from labcrane.doctor.versions import versions
 from labcrane.protocol.study import Study
 from labcrane.registry.registry import Registry
 
 RATE_HZ = 240.0
 """Ticks a second where no protocol says how many."""
+
+OTHERWISE = "end other programs and ask again; if it stays so, send this with a bug report"
+UNMOUNTED = "the server or disk that holds it does not answer: mount it again, or give --data"
+UNPLUGGED = "look at the network of this computer, or give --local"
+"""What to do where an examination does not answer."""
 
 
 def examine(
@@ -41,9 +46,12 @@ def examine(
     """
     rate_hz = study.protocol.rate_hz if study else RATE_HZ
     yield from _checks("version", (Finding(Verdict.PASS, line) for line in versions()))
-    yield from _checks("clock", clock.examine())
-    yield from _checks("scheduling", scheduling.examine(rate_hz))
-    yield from _checks("disk", disk.examine(data, needed_bytes))
+    for area, call in (
+        ("clock", apart.Call("the clock", OTHERWISE, clock.examine)),
+        ("scheduling", apart.Call("scheduling", OTHERWISE, scheduling.examine, (rate_hz,))),
+        ("disk", apart.Call(f"folder {data}", UNMOUNTED, disk.examine, (data, needed_bytes))),
+    ):
+        yield from _checks(area, apart.examine(call))
     looks = components.of_study(study, registry) if study else components.of_everything(registry)[0]
     for look in looks:
         yield from _checks(look.area, components.examine(look, move=move))
@@ -53,6 +61,17 @@ def examine(
 def left_out(registry: Registry, study: Study | None) -> Sequence[str]:
     """Return what is not looked at, and how it would be."""
     return () if study else components.of_everything(registry)[1]
+
+
+def keep_apart(found: Diagnosis, data: Path) -> Finding:
+    """Keep a diagnosis in the data folder; a folder that hangs or takes nothing is a finding."""
+    (finding,) = apart.examine(apart.Call(f"folder {data}", UNMOUNTED, _keep, (found, data)))
+    return finding
+
+
+def _keep(found: Diagnosis, data: Path) -> Iterator[Finding]:
+    text = f"kept in {keep(found, data)}: sessions within a day have it in their record"
+    yield Finding(Verdict.PASS, text)
 
 
 def at_start(data: Path) -> dict[str, Any]:
@@ -78,9 +97,11 @@ def _network(study: Study | None, peers: Sequence[str]) -> Iterator[Check]:
 
     needs = study.protocol.streams if study else {}
     requests = [need.request(label, required=need.required) for label, need in needs.items()]
-    yield from _checks("lsl", lsl.examine(requests))
+    streams = apart.Call("LSL streams", UNPLUGGED, lsl.examine, (requests,))
+    yield from _checks("lsl", apart.examine(streams))
     for peer in peers:
-        yield from _checks(f"lsl {peer}", lsl.ask_peer(peer))
+        call = apart.Call(f"peer {peer}", UNPLUGGED, lsl.ask_peer, (peer,))
+        yield from _checks(f"lsl {peer}", apart.examine(call))
 
 
 def _checks(area: str, findings: Iterable[Finding]) -> Iterator[Check]:

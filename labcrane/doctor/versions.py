@@ -1,18 +1,25 @@
 """Versions of labcrane and of what it stands on: the lines that a bug report needs."""
 
+import os
 import platform
+import shutil
+import subprocess
 import sys
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, entry_points, version
 from pathlib import Path
 
 from labcrane.registry.hookspecs import PROJECT
+from labcrane.streams.network import VARIABLE
 
 LIBRARIES = (
     "numpy", "scipy", "pandas", "h5py", "pydantic", "pylsl", "panda3d", "mujoco", "pybullet", "pyo",
     "pygame", "python-can", "nicegui", "typer",
 )  # fmt: skip
 """Distributions whose version has explained a fault before."""
+
+GIT_S = 5.0
+"""How long git may take to say which commit it is."""
 
 
 def versions() -> Sequence[str]:
@@ -27,12 +34,59 @@ def versions() -> Sequence[str]:
         }
     )
     return (
-        f"labcrane {_version(PROJECT)} in {package}",
+        f"labcrane {_version(PROJECT)} in {package}{commit(package.parent)}",
         f"Python {platform.python_version()} ({sys.executable})",
         f"computer: {platform.platform()}, {platform.machine()}, {_system()}",
         f"libraries: {libraries}",
+        f"{liblsl()}; {configuration()}",
         f"plugins of others: {', '.join(others) or 'none'}",
     )
+
+
+def commit(root: Path) -> str:
+    """Return which commit a clone is at, and whether files are changed; nothing for no clone."""
+    if not (root / ".git").exists():  # a folder, or a file in a further working tree
+        return ""
+    if (git := shutil.which("git")) is None:
+        return ", a clone of which git is not there to tell the commit"
+    command = [
+        git,
+        "-C",
+        str(root),
+        "describe",
+        "--always",
+        "--dirty",
+        "--abbrev=12",
+        "--exclude=*",
+    ]
+    try:
+        done = subprocess.run(  # noqa: S603 - git itself
+            command, check=False, capture_output=True, text=True, timeout=GIT_S
+        )
+    except subprocess.TimeoutExpired:
+        return f", a clone of which git did not tell the commit within {GIT_S:g} s"
+    if done.returncode:
+        return f", a clone of which git does not tell the commit ({done.stderr.strip()})"
+    return f", commit {done.stdout.strip()}"
+
+
+def liblsl() -> str:
+    """Return the version of the library below pylsl, which is not pylsl's own."""
+    try:
+        import pylsl  # noqa: PLC0415 - not in every installation
+    except ModuleNotFoundError:
+        return "liblsl: not installed"
+    except Exception as error:  # noqa: BLE001 - pylsl raises RuntimeError where it finds no liblsl
+        return f"liblsl: cannot be loaded ({error})"
+    number = pylsl.library_version()
+    return f"liblsl {number // 100}.{number % 100} ({pylsl.library_info()})"
+
+
+def configuration() -> str:
+    """Return which configuration liblsl is told of, and whether it is there."""
+    if not (name := os.environ.get(VARIABLE)):
+        return f"{VARIABLE} is not set, liblsl looks for lsl_api.cfg itself"
+    return f"{VARIABLE} is {name}{'' if Path(name).is_file() else ', which is not there'}"
 
 
 def _version(name: str) -> str:

@@ -34,6 +34,8 @@ class FeedbackHandle:
         What it has said of itself since it is ready: renderer, device, delay.
     presented
         How many frames the present process has presented.
+    sends
+        The descriptions of its streams.
     """
 
     def __init__(
@@ -53,6 +55,7 @@ class FeedbackHandle:
         self._failed: str | None = None
         self.facts = ""
         self.presented = 0
+        self.sends: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -103,6 +106,7 @@ class FeedbackHandle:
     def _take(self, message: Mapping[str, Any]) -> None:
         self.presented = message.get("beat", self.presented)
         self._failed = message.get("failed", self._failed)
+        self.sends = tuple(message.get("sends", self.sends))
         if message.get("ready"):
             self.facts = ", ".join(f"{name} {value}" for name, value in message["facts"].items())
             self._process.ready = True

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from labcrane.core.records import Frame
-from labcrane.errors import LabcraneError
+from labcrane.errors import LabcraneError, StreamError
 from labcrane.feedback.config import FeedbackConfig
 from labcrane.feedback.presenter import Presenter
 from labcrane.processes.parent import Parent
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 WAIT_S = 0.05
 BEAT_S = 0.2
 LISTEN_S = 1.0
+TAKEN_S = 45.0
+"""How long a recorder may take to receive its streams once the session has begun."""
 
 
 class FeedbackProcess:
@@ -67,6 +69,7 @@ class FeedbackProcess:
             log = FeedbackLog(self._order.name, self._order.source, presenter)
             if presenter.feedback.cameras:
                 self._pictures = PictureOutlet(self._order.name, self._order.source)
+            self._say({"sends": log.descriptions})
             self._say({"ready": True, "facts": presenter.facts})
             found = self._found(CONTEXT, FRAME)
             if not found:
@@ -85,9 +88,18 @@ class FeedbackProcess:
     def _join(self, context: "ContextInlet", log: "FeedbackLog") -> None:
         """Wait for what belongs to the first frame: what it is about, and who records it."""
         recorded = self._order.recorded
+        since = time.monotonic()
         while not (self._stop.is_set() or (context.text and (log.taken or not recorded))):
             context.changed(WAIT_S)
             self._beat()
+            if not context.text:
+                since = time.monotonic()
+            elif time.monotonic() - since > TAKEN_S:
+                raise StreamError(
+                    f"no recorder has taken what {self._order.name!r} presents for {TAKEN_S:g} s; "
+                    "labcrane doctor counts LSL's free ports: if none are left, end other programs "
+                    "that search or set PortRange = 128 in lsl_api.cfg (docs/lab.md)"
+                )
 
     def _follow(
         self,

@@ -63,6 +63,11 @@ class FeedbackProcesses:
         before, self._news = self._news, []
         return before + news
 
+    @property
+    def sends(self) -> tuple[str, ...]:
+        """The descriptions of all streams in which feedback says what it did."""
+        return tuple(text for keeper in self.keepers for text in keeper.sends)
+
     def offer(self, streams: Mapping[str, str]) -> None:
         """Tell all processes the session's streams, by name and description."""
         for keeper in self.keepers:

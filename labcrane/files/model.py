@@ -1,9 +1,6 @@
 """Models of YAML: strict, with units, and a schema that says what is written under a key."""
 
-import ast
-import inspect
 from collections.abc import Iterator, Mapping
-from textwrap import dedent
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
@@ -20,12 +17,12 @@ UNIT = "x-unit"
 class StrictModel(BaseModel):
     """A part of a file: unknown keys are errors, values never change.
 
-    The docstring under a key describes it in the JSON Schema. It is read from the source when a
-    schema is asked for: reading it for every model that is imported takes as long as checking a
-    protocol does.
+    The docstring under a key describes it in the JSON Schema.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
 
     @field_validator("*", mode="before")
     @classmethod
@@ -46,12 +43,9 @@ class StrictModel(BaseModel):
     def __get_pydantic_json_schema__(
         cls, core: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """Describe every key that does not describe itself."""
+        """Say the unit of every key that has one."""
         written = handler(core)
         keys = handler.resolve_ref_schema(written).get("properties", {})
-        for key, words in descriptions(cls).items():
-            if key in keys:
-                keys[key].setdefault("description", words)
         for name, field in cls.model_fields.items():
             unit, key = unit_of(name, field.metadata), field.alias or name
             if unit is not None and key in keys and _shape(field.annotation) is not None:
@@ -148,30 +142,3 @@ def _shape(annotation: Any) -> type | None:
     if origin in {Union, UnionType}:
         return next((shape for each in arguments if (shape := _shape(each))), None)
     return _shape(arguments[0]) if arguments and hasattr(annotation, "__metadata__") else None
-
-
-def descriptions(model: type[BaseModel]) -> dict[str, str]:
-    """Return the docstrings under a model's keys, inherited ones included, by key."""
-    found: dict[str, str] = {}
-    for each in reversed(model.__mro__):
-        if issubclass(each, StrictModel) and each is not StrictModel:
-            found |= _own(each)
-    return found
-
-
-def _own(model: type[BaseModel]) -> dict[str, str]:
-    try:
-        source = inspect.getsource(model)
-    except (OSError, TypeError):  # typed at a prompt: there is no source, and so there are no words
-        return {}
-    (parsed,) = ast.parse(dedent(source)).body
-    assert isinstance(parsed, ast.ClassDef)  # noqa: S101 - the source of a class
-    return {
-        key.target.id: inspect.cleandoc(words.value.value)
-        for key, words in zip(parsed.body, parsed.body[1:], strict=False)
-        if isinstance(key, ast.AnnAssign)
-        and isinstance(key.target, ast.Name)
-        and isinstance(words, ast.Expr)
-        and isinstance(words.value, ast.Constant)
-        and isinstance(words.value.value, str)
-    }

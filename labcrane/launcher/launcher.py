@@ -174,7 +174,7 @@ class Launcher:
 
     def _watch(self, session: SessionHandle) -> int | None:
         """Return the exit code of a session that died, None of one that ended in order."""
-        stillness = HangDetector(self._visit.whereabouts, self._say)
+        detector = HangDetector(self._visit.whereabouts, self._say)
         while True:
             over = session.ended  # asked first: what it said before is taken below
             try:
@@ -192,7 +192,7 @@ class Launcher:
                 return None
             if over:
                 return session.close()
-            if stillness.hangs():
+            if detector.hangs():
                 session.kill()  # its journal is whole; the exit code is passed on as any other
             self._watch_streams(session.send)
             if self._crew:
@@ -216,6 +216,8 @@ class Launcher:
         recorder = self._recorder
         if recorder is None:
             return
+        if self._crew:
+            recorder.offer(self._crew.sends)
         if recorder.watch():
             self._say("a recorder died: the other one has all streams, and a new one was started")
         for news in self._signals.news(recorder):

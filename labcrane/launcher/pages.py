@@ -52,16 +52,16 @@ def pages(
             f"the pages are served on {where.host} without TLS: who listens on that network can "
             "read along; give page: certificate and key"
         )
-    keeper = PageHandle(order, console.give, say, lambda: launcher.streams_status)
-    console.listeners.append(keeper.tell)
-    for page, link in keeper.links().items():
+    handle = PageHandle(order, console.give, say, lambda: launcher.streams_status)
+    console.listeners.append(handle.tell)
+    for page, link in handle.links().items():
         say(f"{page} page: {link}")
     try:
         yield
     finally:
         report = launcher.sync_report
         rows = [" · ".join(row) for row in report.table()] + report.advice() if report else []
-        keeper.close(rows)
+        handle.close(rows)
 
 
 def _tls(protocol: Path, where: "PageSettings") -> tuple[Path | None, Path | None]:

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, PositiveFloat, ValidationInfo
 
-from labcrane.files.model import StrictModel
+from labcrane.files.model import StrictModel, was_run
 from labcrane.limits import check_size
 
 FORMATS = (".stl", ".obj", ".gltf", ".glb")
@@ -15,6 +15,8 @@ Triple = tuple[float, float, float]
 
 def _beside(path: Path, info: ValidationInfo) -> Path:
     """Return the path through the folder of the file that names it."""
+    if was_run(info):
+        return path  # of a record: where it was, which is another computer's, or gone
     file = info.context["folder"] / path if info.context else path
     if file.suffix.lower() not in FORMATS:
         raise ValueError(f"{str(path)!r} is no mesh; {', '.join(FORMATS)} can be shown")

@@ -22,6 +22,7 @@ TABLES = {".csv": ",", ".tsv": "\t"}
 
 PARQUET, PACKED = ".parquet", ".gz"
 GZIP_HEAD = 512
+LONGEST_CELL = 2**31 - 1
 MANIFEST = ".labcrane/labcrane_export.json"
 """What labcrane notes beside an export: who is in it, and who was left out."""
 
@@ -267,13 +268,17 @@ def _rows_without(text: str, separator: str, old: str, mentions: Mentions) -> st
 
 
 def _records(text: str, separator: str) -> Iterator[tuple[list[str], str]]:
-    """Yield each record of a table with the text it was read from."""
+    """Yield each record of a table with the text it was read from, however long its cells are."""
     lines = text.splitlines(keepends=True)
-    reader = csv.reader(iter(lines), delimiter=separator)
-    before = 0
-    for row in reader:
-        yield row, "".join(lines[before : reader.line_num])
-        before = reader.line_num
+    usual = csv.field_size_limit(LONGEST_CELL)  # an event's data may be longer than csv allows
+    try:
+        reader = csv.reader(iter(lines), delimiter=separator)
+        before = 0
+        for row in reader:
+            yield row, "".join(lines[before : reader.line_num])
+            before = reader.line_num
+    finally:
+        csv.field_size_limit(usual)
 
 
 def _manifest_without(content: bytes, old: str) -> bytes:

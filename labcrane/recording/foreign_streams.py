@@ -9,7 +9,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import reduce
 from pathlib import Path
 from typing import Any
@@ -40,10 +40,23 @@ OPENED = "opened"
 RESET = "reset"
 """A note of a source that was replaced."""
 
+SAME_CLOCK_S = 10.0
+
 COUNTER_GAP = "counter gap"
 """A note of samples that the source's own counter left out; ``missing`` says how many."""
 PROBE_CHANNELS = tuple(Channel(label, "s") for label in ("remote_time", "offset", "rtt", "local"))
 ARRIVAL_CHANNELS = (Channel("count", "1"), Channel("time", "s"))
+OWN_CLOCK_CHANNELS = (
+    Channel("time", "s"),
+    Channel("raw", "s"),
+    Channel("frequency", "ppm"),
+    Channel("tick", "us"),
+    Channel("offset", "s"),
+)
+"""The monotonic clock, one that nothing turns, and what turned it as adjtimex tells it."""
+
+OWN_CLOCK = StreamHeader("labcrane|own clock", "labcrane.own_clock", OWN_CLOCK_CHANNELS, "double64")
+"""The one stream of a journal that is of its recorder, and not beside another one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +98,9 @@ class RecordedStream:
         What the recorder noticed, in order.
     offsets
         Clock offsets as XDF has them, shape ``(n_offsets, 2)``.
+    own_clock
+        The recorder's clock beside one that nothing turns, shape ``(n_readings, 5)``, in the order
+        of :data:`OWN_CLOCK_CHANNELS`; empty where the system has none.
     starts
         Index of the first sample, and of the first one after each time without any recorder.
     """
@@ -98,6 +114,7 @@ class RecordedStream:
     notes: tuple[Note, ...]
     offsets: FloatArray
     starts: tuple[int, ...] = (0,)
+    own_clock: FloatArray = field(default_factory=lambda: np.empty((0, len(OWN_CLOCK_CHANNELS))))
 
 
 def companion_headers(header: StreamHeader, number: int) -> dict[str, StreamHeader]:
@@ -163,7 +180,11 @@ def _last_heard(stream: RecordedStream) -> float:
 def _streams(file: XdfFile) -> list[RecordedStream]:
     beside: dict[tuple[str, str], XdfStream] = {}
     own = []
+    clock = np.empty((0, len(OWN_CLOCK_CHANNELS)))
     for stream in file.streams:
+        if stream.header.type == OWN_CLOCK.type:
+            clock = _table(stream, len(OWN_CLOCK_CHANNELS))
+            continue
         of = stream.header.desc.get("of")
         kind = stream.header.name.rpartition("|")[2]
         if isinstance(of, str) and kind in (PROBES, ARRIVALS, NOTES):
@@ -180,6 +201,7 @@ def _streams(file: XdfFile) -> list[RecordedStream]:
             arrivals=_table(beside.get((str(stream.number), ARRIVALS)), len(ARRIVAL_CHANNELS)),
             notes=_notes(beside.get((str(stream.number), NOTES))),
             offsets=stream.offsets,
+            own_clock=clock,
         )
         for stream in own
     ]
@@ -243,7 +265,23 @@ def _continued(before: RecordedStream, after: RecordedStream) -> RecordedStream:
         notes=tuple(sorted(notes, key=lambda note: note.time) if overlap else notes),
         offsets=np.concatenate([before.offsets, _later(after.offsets, after.probes, late)]),
         starts=(*before.starts, *goes_on),
+        own_clock=both_clocks(before.own_clock, after.own_clock),
     )
+
+
+def both_clocks(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return what two recorders of one computer logged of its clock, in order, each once.
+
+    Monotonic clocks begin anew with the computer: of two that cannot be one, the longer counts.
+    """
+    if not len(one) or not len(other):
+        return one if len(one) else other
+    apart = (one[-1, 1] - one[-1, 0]) - (other[0, 1] - other[0, 0])
+    if abs(apart) > SAME_CLOCK_S:
+        return max(one, other, key=len)
+    together = np.concatenate([one, other])
+    _, first = np.unique(together[:, 0], return_index=True)
+    return np.asarray(together[first])
 
 
 def _keys(stream: RecordedStream) -> "npt.NDArray[np.uint64]":

@@ -11,6 +11,7 @@ import numpy as np
 from labcrane.core.clock import Tick
 from labcrane.core.records import Event, Frame, Phase, Run
 from labcrane.errors import RecordingError
+from labcrane.limits import LIMITS
 from labcrane.recording.journal import Column, SessionJournal
 from labcrane.types import FloatArray
 
@@ -104,6 +105,10 @@ class FrameRow:
         )
 
 
+AROUND_A_FRAME = 500
+"""Bytes that a frame takes in memory beside its numbers."""
+
+
 class FrameLog:
     """Writes frames through to the journal, each before anybody else sees it.
 
@@ -129,13 +134,24 @@ class FrameLog:
         self._fill = FrameRow(sizes(run)).fill
         self._wrote = 0.0
         self._waiting: deque[Callable[[], None]] = deque()
+        self._over = ""
+        self._most = LIMITS["frames waiting for a disk"].most // (self._row.nbytes + AROUND_A_FRAME)
 
     def write(self, frame: Frame) -> None:
-        """Write one frame and its events; when this returns, the operating system has them."""
+        """Write one frame and its events; when this returns, the operating system has them.
+
+        Raises
+        ------
+        RecordingError
+            The disk has refused for so long that no more can wait in memory.
+        """
         began = time.perf_counter()
         row, tick = self._row, frame.tick
         self._fill(row, frame, self._wrote)
         if self._waiting or not self._through(frame, row):
+            if len(self._waiting) >= self._most:
+                self._over = self._too_many()
+                raise RecordingError(self._over)
             self._waiting.append(partial(self._journal.write_frame, tick.due, row.copy()))
             self._write_events(frame)
         if not self._waiting:
@@ -178,7 +194,15 @@ class FrameLog:
         if lost:
             raise RecordingError(self._not_written(lost))
 
+    def _too_many(self) -> str:
+        return (
+            f"{len(self._waiting)} frames and events wait for the disk, and no more can: "
+            f"{self.trouble}; the session ends, mend the disk and go on with labcrane resume"
+        )
+
     def _not_written(self, lost: int) -> str:
+        if self._over:
+            return f"{self._over}; what came before is in {self._journal.path}"
         return (
             f"{lost} frames and events could not be written: {self.trouble}; what came before is "
             f"in {self._journal.path}"

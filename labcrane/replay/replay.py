@@ -147,7 +147,7 @@ def _run(
         run = closing.enter_context(rig.opened(study, plan.seed))
         log = _Log(run, script)
         waits = not bool(record.context["simulated"])
-        course = Sequencer(study, plan, rig, waits=waits, awaits=script.awaited)
+        sequencer = Sequencer(study, plan, rig, waits=waits, awaits=script.awaited)
         shown: list[Callable[[Frame], None]] = []
         if speed is not None:
             show = _Show(run, f"replay/{participant}/ses-{session:02}", speed)
@@ -155,7 +155,7 @@ def _run(
             shown.append(show)
         clock = ManualClock(start=script.start)
         with suppress(RecordOver):
-            loop.run(rig, run, course, clock, script, log, (*sinks, *shown))
+            loop.run(rig, run, sequencer, clock, script, log, (*sinks, *shown))
     return Replayed(log.ticks, parts, log.compare(record), log.frames())
 
 

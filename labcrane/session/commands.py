@@ -14,9 +14,9 @@ from pydantic import TypeAdapter, ValidationError
 
 from labcrane.core.records import Event, Value
 from labcrane.errors import LabcraneError
-from labcrane.limits import LimitError, check_text
+from labcrane.limits import LIMITS, LimitError, check_text
 
-MOST_BYTES = 65_536
+MOST_BYTES = LIMITS["message to a session"].most
 """Size of the largest message to a session, as JSON: about forty pages of text."""
 
 

@@ -15,33 +15,33 @@ from labcrane.session.sequencer import Sequencer
 def run(
     rig: Rig,
     run: Run,
-    course: Sequencer,
+    sequencer: Sequencer,
     clock: Clock,
     console: Console,
     log: FrameLog,
     sinks: Sequence[Callable[[Frame], None]],
 ) -> None:
-    """Tick until the course is over.
+    """Tick until the session is over.
 
     Every frame is written to the journal first, and only then shown to the ``sinks``.
     """
     dt = 1.0 / run.rate_hz
     read, control, rest = rig.input.read, rig.controller.command, rig.controller.idle
     state, step = rig.dynamics.state, rig.dynamics.step
-    handle, evaluate, write = course.handle, course.evaluate, log.write
+    handle, evaluate, write = sequencer.handle, sequencer.evaluate, log.write
     no_task = np.full(run.task.size, np.nan)
 
     frame = _before(rig, run)
     for tick in ticks(clock, run.rate_hz):
         axes = read(tick, frame)
         handle(console.commands(), rig.input.fault, log.trouble)
-        command = control(axes, state()) if course.moving else rest()
+        command = control(axes, state()) if sequencer.moving else rest()
         frame = Frame(tick, 0.0, axes, command, step(command, dt), no_task)
         evaluate(frame)
         write(frame)
         for show in sinks:
             show(frame)
-        if course.over:
+        if sequencer.over:
             return
 
 

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -73,7 +73,7 @@ def _read(group: "h5py.Group", needs: dict[str, StreamNeed]) -> _Read:
     counting = counter_label(header, None if need is None else need.counter)
     counts = None if counting is None else read_channel(group, counting)
     if counts is not None and (index := unwrapped(counts)) is not None:
-        raw = RawStream(raw.stamps, raw.probes, raw.arrivals, raw.resets, index)
+        raw = replace(raw, index=index)
     return _Read(group, recorded, raw, label, need)
 
 

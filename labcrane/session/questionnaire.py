@@ -193,7 +193,7 @@ class QuestionnaireRun:
         about: dict[str, Value] = {"step": step}
         if after is not None:
             about["trial"] = after.number
-        self._inquiry = QuestionnaireForm(name, study.questionnaires[name], about, answered)
+        self._form = QuestionnaireForm(name, study.questionnaires[name], about, answered)
         self._name = name
         self._rules = [rule for rule in study.protocol.stop_rules if rule.questionnaire == name]
         self._seed = derive("answers", after.seed if after else plan.seed, step, name)
@@ -202,13 +202,13 @@ class QuestionnaireRun:
     @property
     def over(self) -> bool:
         """Whether it has been handed in."""
-        return self._inquiry.over
+        return self._form.over
 
     def begin(self, *, simulated: bool) -> Iterator[Said]:
         """Yield what is said at its beginning, and a simulated participant's answers."""
-        yield self._inquiry.begin()
+        yield self._form.begin()
         if simulated:
-            yield from self._inquiry.simulated(self._seed)
+            yield from self._form.simulated(self._seed)
 
     def handle(self, request: Answer | Submission, about: Mapping[str, Value]) -> Said:
         """Take an answer, or hand the questionnaire in; return what is said of it.
@@ -217,9 +217,9 @@ class QuestionnaireRun:
         """
         by = str(about["by"])
         if isinstance(request, Answer):
-            name, data = self._inquiry.take(request.text, by)
+            name, data = self._form.take(request.text, by)
         else:
-            name, data = self._inquiry.hand_in(by)
+            name, data = self._form.hand_in(by)
         return name, {**data, **about}
 
     def end(self, *, skipped: bool) -> Iterator[Said]:
@@ -228,8 +228,8 @@ class QuestionnaireRun:
         One that was left and not skipped is owed: the session has ended.
         """
         if not self.over:
-            yield self._inquiry.leave(done=skipped)
-        scores = self._inquiry.scores()
+            yield self._form.leave(done=skipped)
+        scores = self._form.scores()
         for rule in self._rules:
             if scores[rule.score] > rule.above:  # a score that is NaN stops nobody
                 self.alarming = True

@@ -85,6 +85,7 @@ class Sequencer:
         self._ledger = ledger or Ledger(study, plan)
         self._held = Suspenders(study.protocol.on_fault, self._say, awaits)
         self._attempt: TrialRun | None = None
+        self._last: TrialRun | None = None  # the one that runs, else the one that ended last
         self._stage = ""
         self._step = 0
         self._asking: QuestionnaireRun | None = None
@@ -253,6 +254,7 @@ class Sequencer:
 
     def _enter(self, stage: str, attempt: TrialRun | None = None) -> None:
         self._stage, self._attempt = stage, attempt
+        self._last = attempt or self._last
         self._wishes.clear()
 
     # Orders
@@ -269,11 +271,20 @@ class Sequencer:
                 # Every door has looked already; the loop must not fall when one has not.
                 beyond = beyond_limits(command)
                 refused = beyond or self._refusal(request)
+                about |= self._afterwards(request)
                 # What names a person must not be in the record, not even as a refused note.
                 text = "" if beyond or personal(command.text) else command.text
                 self._note(f"order.{command.order}", text=text, refused=refused, **about)
                 if refused is None:
                     self._obey(request)
+
+    def _afterwards(self, request: Request) -> dict[str, Value]:
+        """Return which trial an order is about that came after its end, before the next began."""
+        match request:
+            case Control(Order.OVERRIDE) | Completion() if self._last and not self._attempt:
+                whose = self._last.about
+                return {"trial": whose["trial"], "attempt": whose["attempt"], "after": True}
+        return {}
 
     def _obey(self, request: Request) -> None:
         match request:
@@ -285,11 +296,13 @@ class Sequencer:
             case Control(Order.END):
                 self._held.ending.append("by order")
             case Control(Order.OVERRIDE):
-                self._running().lift_limits()
+                if self._attempt is not None:  # of one that has ended the event is all there is
+                    self._attempt.lift_limits()
             case Control(order):
                 self._wishes.add(order)
             case Completion(completed):
-                self._running().completion = completed
+                if self._attempt is not None:
+                    self._attempt.completion = completed
             case SettingChange():
                 self._note("feedback.setting", **self._settings.change(request))
             case _:
@@ -300,8 +313,8 @@ class Sequencer:
         match request:
             case (
                 Control(Order.REPEAT | Order.OVERRIDE) | Completion() | Malformed(Order.COMPLETION)
-            ) if self._stage != "trial":
-                return "no trial is running"
+            ) if why := self._without_trial(request):
+                return why
             case Control(Order.SKIP) if self._stage not in STAGES:
                 return "no trial, break or questionnaire is running"
             case Control(Order.START) if self._stage != "waiting" and not self._paused:
@@ -320,15 +333,16 @@ class Sequencer:
                 return why
         return None
 
+    def _without_trial(self, request: Request) -> str | None:
+        """Return why a request about a trial has none; one that has ended can still be judged."""
+        if request == Control(Order.REPEAT):
+            return None if self._attempt else "no trial is running"
+        return None if self._last else "no trial is running, and none has ended"
+
     @property
     def _paused(self) -> bool:
         """Whether it waits for the examiner to let it go on."""
         return EXAMINER in self._held or STOP in self._held
-
-    def _running(self) -> TrialRun:
-        if self._attempt is None:
-            raise AssertionError("orders that need a trial are refused without one")
-        return self._attempt
 
     # What is written down
 

@@ -178,7 +178,7 @@ def _record(
         for event in opening:
             ledger.take(event.name, event.data)
         waits = not visit.simulated
-        course = Sequencer(study, plan, rig, waits=waits, awaits=awaits, ledger=ledger)
+        sequencer = Sequencer(study, plan, rig, waits=waits, awaits=awaits, ledger=ledger)
         log = _log(visit, run, clock, reserve=round(RESERVE_S * second))
         try:
             for event in opening:
@@ -188,7 +188,7 @@ def _record(
                 if not visit.fast:
                     sinks.append(OverrunReporter(study.oversight, run.rate_hz, log, console))
                 with _settled():
-                    loop.run(rig, run, course, clock, console, log, sinks)
+                    loop.run(rig, run, sequencer, clock, console, log, sinks)
         except (PluginError, DeviceError) as error:
             log.note(Event("session.failed", clock.now(), {"why": str(error)}))
             error.add_note(

@@ -58,6 +58,11 @@ class FeedbackLog:
         """Whether somebody receives all of its streams: what is sent to nobody is lost."""
         return all(samples.taken for samples in self._samples.values())
 
+    @property
+    def descriptions(self) -> list[str]:
+        """Its streams as XML: who has them needs no search."""
+        return [samples.description for samples in self._samples.values()]
+
     def push(
         self, frame: Frame, values: FloatArray, skipped: int, more: Mapping[str, FloatArray]
     ) -> float:

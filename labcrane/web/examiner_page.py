@@ -26,71 +26,71 @@ AXIS = {"axisLine": {"onZero": False}, "axisLabel": {"color": "#333"}}
 RATE_S = 0.25
 
 
-def supervisor_page(desk: PageContext) -> None:
+def supervisor_page(context: PageContext) -> None:
     """Build the page."""
     from nicegui import ui  # noqa: PLC0415 - loads for a second
 
-    ui.page_title(f"labcrane: {desk.participant}")
+    ui.page_title(f"labcrane: {context.participant}")
     ui.colors(primary=PRIMARY)
     with ui.column().classes("w-full max-w-7xl mx-auto p-3 gap-3"):
-        _status(desk)
-        _questions(desk)
-        ConsentCard(desk, SUPERVISOR).build()
-        _orders(desk)
+        _status(context)
+        _questions(context)
+        ConsentCard(context, SUPERVISOR).build()
+        _orders(context)
         with ui.element("div").classes("grid grid-cols-1 lg:grid-cols-2 gap-3 w-full"):
             with ui.card().classes("w-full"):
-                Scene(desk).build()
-                Loads(desk).build()
+                Scene(context).build()
+                Loads(context).build()
             with ui.card().classes("w-full"):
-                _chart(desk)
-            Cameras(desk).build()
+                _chart(context)
+            Cameras(context).build()
             with ui.card().classes("w-full"):
-                _log(desk)
+                _log(context)
             with ui.card().classes("w-full"):
-                _streams(desk)
+                _streams(context)
             with ui.card().classes("w-full lg:col-span-2"):
-                Form(desk, SUPERVISOR).build()
+                Form(context, SUPERVISOR).build()
 
 
-def _status(desk: PageContext) -> None:
+def _status(context: PageContext) -> None:
     from nicegui import ui  # noqa: PLC0415
 
-    title = f"{desk.study.protocol.title}: {desk.participant}, session {desk.plan.number}"
+    title = f"{context.study.protocol.title}: {context.participant}, session {context.plan.number}"
     ui.label(title).classes("text-xl font-medium").props("role=heading")
     line = ui.label().classes("text-lg").props('id="stage" role=status')
     facts = ui.label().props('id="facts"')
     alarm = ui.label().classes("text-lg font-bold text-red-900").props('id="alarm" role=alert')
 
     def update() -> None:
-        board = desk.board
-        held = f" · HELD by {', '.join(sorted(board.holds))}" if board.holds else ""
-        line.set_text(board.stage + held)
-        facts.set_text(" · ".join(_facts(desk)))
-        alarm.set_text(board.alarm)
+        session = context.session
+        held = f" · HELD by {', '.join(sorted(session.holds))}" if session.holds else ""
+        line.set_text(session.stage + held)
+        facts.set_text(" · ".join(_facts(context)))
+        alarm.set_text(session.alarm)
 
     ui.timer(RATE_S, update)
 
 
-def _questions(desk: PageContext) -> None:
+def _questions(context: PageContext) -> None:
     """Show what ``labcrane check`` asks of the protocol, and nobody has answered in it."""
     from nicegui import ui  # noqa: PLC0415
 
-    for question in questions(desk.study):
-        said = about(desk.study, question)
-        line = f"line {said['line']} of {desk.study.path.name}: {said['text']}"
+    for question in questions(context.study):
+        said = about(context.study, question)
+        line = f"line {said['line']} of {context.study.path.name}: {said['text']}"
         ui.label(line).props(f'id="question-{question.key}"').classes("text-amber-900")
 
 
-def _facts(desk: PageContext) -> list[str]:
-    board, live = desk.board, desk.live
-    trials = desk.plan.trials
-    left = sum(trial.planned.expected_s for trial in trials[board.trials_done :])
-    found = [f"trials {board.trials_done} of {len(trials)}", f"about {left / 60:.0f} min left"]
-    if board.trial:
-        found.append(f"trial {board.trial['trial']}, attempt {board.trial['attempt']}")
-    found += [f"{name} {count}" for name, count in sorted(board.counts.items())]
-    if "worst_lateness" in board.last_trial:
-        worst = float(str(board.last_trial["worst_lateness"]))
+def _facts(context: PageContext) -> list[str]:
+    session, live = context.session, context.live
+    trials = context.plan.trials
+    left = sum(trial.planned.expected_s for trial in trials[session.trials_done :])
+    found = [f"trials {session.trials_done} of {len(trials)}", f"about {left / 60:.0f} min left"]
+    if session.trial:
+        found.append(f"trial {session.trial['trial']}, attempt {session.trial['attempt']}")
+    found += [f"{name} {count}" for name, count in sorted(session.counts.items())]
+    if "worst_lateness" in session.last_trial:
+        worst = float(str(session.last_trial["worst_lateness"]))
         found.append(f"worst lateness of last trial {1000 * worst:.1f} ms")
     if live.lateness_s is not None:
         found.append(f"loop at most {1000 * live.lateness_s:.1f} ms late")
@@ -99,11 +99,11 @@ def _facts(desk: PageContext) -> list[str]:
     return found
 
 
-def _orders(desk: PageContext) -> None:
+def _orders(context: PageContext) -> None:
     from nicegui import ui  # noqa: PLC0415
 
     def give(order: Order, text: str = "") -> Callable[[], object]:
-        return lambda: desk.give(SUPERVISOR, order, text)
+        return lambda: context.give(SUPERVISOR, order, text)
 
     with ui.row().classes("gap-2 items-center w-full"):
         for label, (order, text, colour) in BUTTONS.items():
@@ -122,23 +122,23 @@ def _orders(desk: PageContext) -> None:
     with ui.row().classes("gap-3 items-center w-full"):
         for order, label in ((Order.NOTE, "Note"), (Order.HINT, "Hint to the operator")):
             with ui.row().classes("gap-2 items-center no-wrap"):
-                _words(desk, order, label)
+                _words(context, order, label)
 
 
-def _words(desk: PageContext, order: Order, label: str) -> None:
+def _words(context: PageContext, order: Order, label: str) -> None:
     from nicegui import ui  # noqa: PLC0415
 
     field = ui.input(label).props(f'outlined dense for="{order.value}-field"').classes("w-72")
 
     def send() -> None:
-        desk.give(SUPERVISOR, order, str(field.value or "").strip())
+        context.give(SUPERVISOR, order, str(field.value or "").strip())
         field.set_value("")
 
     field.on("keydown.enter", send)
     ui.button("Send", on_click=send).props(f'no-caps color=blue-10 id="order-{order.value}"')
 
 
-def _chart(desk: PageContext) -> None:
+def _chart(context: PageContext) -> None:
     from nicegui import ui  # noqa: PLC0415
 
     choice = ui.select([], label="Signal").classes("w-full").props('id="signal"')
@@ -153,18 +153,18 @@ def _chart(desk: PageContext) -> None:
     ).classes("w-full h-60")
 
     def update() -> None:
-        signals = sorted(name for name in desk.live.newest if "." in name)  # of machine and task
+        signals = sorted(name for name in context.live.newest if "." in name)  # of machine and task
         if signals and choice.options != signals:
             tip = [name for name in signals if name.startswith("state.tip.position")]
             choice.set_options(signals, value=choice.value or (tip or signals)[0])
         if choice.value:
-            chart.options["series"][0]["data"] = desk.live.history(choice.value)
+            chart.options["series"][0]["data"] = context.live.history(choice.value)
             chart.update()
 
     ui.timer(RATE_S, update)
 
 
-def _log(desk: PageContext) -> None:
+def _log(context: PageContext) -> None:
     from nicegui import ui  # noqa: PLC0415
 
     ui.label("Events").classes("font-medium")
@@ -172,7 +172,9 @@ def _log(desk: PageContext) -> None:
     text.props('id="events"')
     ui.timer(
         RATE_S,
-        lambda: text.set_text("\n".join(_line(e) for e in [*desk.board.events][: -LINES - 1 : -1])),
+        lambda: text.set_text(
+            "\n".join(_line(e) for e in [*context.session.events][: -LINES - 1 : -1])
+        ),
     )
 
 
@@ -181,19 +183,19 @@ def _line(event: Event) -> str:
     return f"{event.time:.1f}  {event.name}  {json.dumps(data, ensure_ascii=False)[:160]}"
 
 
-def _streams(desk: PageContext) -> None:
+def _streams(context: PageContext) -> None:
     from nicegui import ui  # noqa: PLC0415
 
     ui.label("Streams and clocks").classes("font-medium")
     text = ui.label().classes("whitespace-pre-wrap font-mono text-sm").props('id="streams"')
-    ui.timer(RATE_S, lambda: text.set_text("\n".join(_health(desk))))
+    ui.timer(RATE_S, lambda: text.set_text("\n".join(_health(context))))
 
 
-def _health(desk: PageContext) -> list[str]:
-    board = desk.board
-    if board.sync_report:
-        return board.sync_report
-    streams = board.streams.get("streams", ())
+def _health(context: PageContext) -> list[str]:
+    session = context.session
+    if session.sync_report:
+        return session.sync_report
+    streams = session.streams.get("streams", ())
     if not streams:
         return ["the study records no streams of others"]
     return [

@@ -25,10 +25,10 @@ class Form:
     as given, also after a reload.
     """
 
-    def __init__(self, desk: PageContext, page: str) -> None:
-        self._desk = desk
+    def __init__(self, context: PageContext, page: str) -> None:
+        self._context = context
         self._page = page
-        self._words = desk.words(page)
+        self._words = context.words(page)
         self._refreshers: list[Callable[[], object]] = []
         self._shown = -1
 
@@ -41,13 +41,13 @@ class Form:
 
     def update(self) -> None:
         """Follow the record."""
-        board = self._desk.board
-        if board.form_version != self._shown:
-            self._shown = board.form_version
+        session = self._context.session
+        if session.form_version != self._shown:
+            self._shown = session.form_version
             self._area.clear()
             self._refreshers.clear()
             with self._area:
-                self._rebuild(board.form)
+                self._rebuild(session.form)
         for refresh in self._refreshers:
             refresh()
 
@@ -56,19 +56,19 @@ class Form:
 
         if name is None:
             wait = ui.label().classes("text-lg").props('id="wait"')
-            board = self._desk.board
+            session = self._context.session
             self._refreshers.append(
-                lambda: wait.set_text("" if board.consent else self._words.wait)
+                lambda: wait.set_text("" if session.consent else self._words.wait)
             )
             return
-        questionnaire = self._desk.study.questionnaires[name]
+        questionnaire = self._context.study.questionnaires[name]
         ui.label(questionnaire.title).classes("text-2xl font-medium").props("role=heading")
         for item in questionnaire.items():
             self._item(name, item)
         refusal = ui.label().classes("text-red-900 text-lg").props('role=alert id="refusal"')
         self._refreshers.append(lambda: refusal.set_text(self._refusal()))
         ui.button(
-            self._words.hand_in, on_click=lambda: self._desk.give(self._page, Order.SUBMIT)
+            self._words.hand_in, on_click=lambda: self._context.give(self._page, Order.SUBMIT)
         ).props('size=lg no-caps color=blue-10 id="submit"')
 
     def _item(self, name: str, item: Item) -> None:
@@ -115,7 +115,7 @@ class Form:
         marked = [False]
 
         def refresh() -> None:
-            given = self._desk.board.answers.get(item.name) == value
+            given = self._context.session.answers.get(item.name) == value
             if given != marked[0]:
                 marked[0] = given
                 button.props("unelevated aria-pressed=true", remove="outline") if given else (
@@ -127,7 +127,7 @@ class Form:
     def _field(self, name: str, item: Item) -> None:
         from nicegui import ui  # noqa: PLC0415
 
-        held = self._desk.board.answers.get(item.name)
+        held = self._context.session.answers.get(item.name)
         hint = "" if item.kind == "text" else self._words.takes(item)
         shown = "" if held is None else f"{held:g}" if isinstance(held, float) else str(held)
         field = ui.input(hint, value=shown).classes("w-full")
@@ -147,23 +147,25 @@ class Form:
 
     def _answer(self, name: str, item: Item, value: object) -> None:
         given = {"questionnaire": name, "item": item.name, "value": value}
-        self._desk.give(self._page, Order.ANSWER, json.dumps(given, ensure_ascii=False))
+        self._context.give(self._page, Order.ANSWER, json.dumps(given, ensure_ascii=False))
 
     def _status(self, item: Item) -> str:
-        board, words = self._desk.board, self._words
-        if board.refusal and board.refused_item == item.name:
-            return f"{words.not_taken}: {words.refused(board.refusal, item)}"
-        if item.name not in board.answers:
+        session, words = self._context.session, self._words
+        if session.refusal and session.refused_item == item.name:
+            return f"{words.not_taken}: {words.refused(session.refusal, item)}"
+        if item.name not in session.answers:
             return ""
-        return words.declined if board.answers[item.name] is None else words.saved
+        return words.declined if session.answers[item.name] is None else words.saved
 
     def _refusal(self) -> str:
         """Return why the last answer, or what was handed in, was not taken."""
-        board = self._desk.board
-        if not (board.refusal and board.form):
+        session = self._context.session
+        if not (session.refusal and session.form):
             return ""
-        items = {item.name: item for item in self._desk.study.questionnaires[board.form].items()}
-        return self._words.refused(board.refusal, items.get(board.refused_item))
+        items = {
+            item.name: item for item in self._context.study.questionnaires[session.form].items()
+        }
+        return self._words.refused(session.refusal, items.get(session.refused_item))
 
 
 def _ticks(item: Item) -> int:
@@ -185,8 +187,8 @@ SIGNED = "The participant has signed this text"
 class ConsentCard:
     """Shows the approved text and its version for as long as a consent to it is missing."""
 
-    def __init__(self, desk: PageContext, page: str) -> None:
-        self._desk = desk
+    def __init__(self, context: PageContext, page: str) -> None:
+        self._context = context
         self._page = page
         self._shown = ""
 
@@ -198,7 +200,7 @@ class ConsentCard:
         ui.timer(0.1, self._update)
 
     def _update(self) -> None:
-        version = str(self._desk.board.consent.get("version", ""))
+        version = str(self._context.session.consent.get("version", ""))
         if version != self._shown:
             self._shown = version
             self._area.clear()
@@ -209,7 +211,7 @@ class ConsentCard:
     def _rebuild(self, version: str) -> None:
         from nicegui import ui  # noqa: PLC0415
 
-        asked, words = self._desk.board.consent, self._desk.words(self._page)
+        asked, words = self._context.session.consent, self._context.words(self._page)
         with ui.card().classes("w-full").props('id="consent"'):
             ui.label(words.consent).classes("text-2xl font-medium").props("role=heading")
             ui.label(f"{asked['file']}, {words.version} {version}").props('id="consent-version"')
@@ -220,5 +222,5 @@ class ConsentCard:
             )
             ui.button(
                 words.take_part if self._page == PARTICIPANT else SIGNED,
-                on_click=lambda: self._desk.give(self._page, Order.CONSENT, version),
+                on_click=lambda: self._context.give(self._page, Order.CONSENT, version),
             ).props('no-caps size=lg color=blue-10 id="order-consent"')

@@ -39,7 +39,7 @@ class PageContext:
     study: Study
     plan: SessionPlan
     participant: str
-    board: SessionView
+    session: SessionView
     live: Live
     pictures: Pictures
     send: Callable[[Command], None]

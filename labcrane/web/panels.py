@@ -19,14 +19,14 @@ SHARE = "1"
 class Loads:
     """A line for each joint, as long as the machine's state has loads; nothing otherwise."""
 
-    def __init__(self, desk: PageContext) -> None:
-        self._desk = desk
+    def __init__(self, context: PageContext) -> None:
+        self._context = context
 
     def build(self) -> None:
         """Build it where the page stands, and keep it up to date."""
         from nicegui import ui  # noqa: PLC0415 - loads for a second
 
-        joints = self._desk.study.machine.joints
+        joints = self._context.study.machine.joints
         with ui.element("div").classes("w-full") as self._all:
             ui.label("Torques").classes("font-medium")
             with ui.element("div").classes("grid grid-cols-[auto_1fr] gap-x-4 font-mono text-sm"):
@@ -38,9 +38,9 @@ class Loads:
         ui.timer(RATE_S, self._update)
 
     def _update(self) -> None:
-        live = self._desk.live
+        live = self._context.live
         self._all.set_visibility(any(column.startswith(LOAD) for column in live.newest))
-        for joint in self._desk.study.machine.joints:
+        for joint in self._context.study.machine.joints:
             column = f"{LOAD}.{joint.name}"
             load, unit = live.newest.get(column, math.nan), live.units.get(column, SHARE)
             self._values[joint.name].set_text(said(load, unit, joint))
@@ -61,8 +61,8 @@ RATE_S = 0.1
 class Cameras:
     """A picture for each camera that a view sends, with its age; none that is out of date."""
 
-    def __init__(self, desk: PageContext) -> None:
-        self._pictures = desk.pictures
+    def __init__(self, context: PageContext) -> None:
+        self._pictures = context.pictures
 
     def build(self) -> None:
         """Build it where the page stands, and keep it up to date."""

@@ -5,12 +5,12 @@ from labcrane.web.form import ConsentCard, Form
 from labcrane.web.page import PRIMARY, PageContext
 
 
-def participant_page(desk: PageContext) -> None:
+def participant_page(context: PageContext) -> None:
     """Build the page."""
     from nicegui import ui  # noqa: PLC0415 - loads for a second
 
     ui.page_title("labcrane")
     ui.colors(primary=PRIMARY)
     with ui.column().classes("w-full max-w-4xl mx-auto p-4"):
-        ConsentCard(desk, PARTICIPANT).build()
-        Form(desk, PARTICIPANT).build()
+        ConsentCard(context, PARTICIPANT).build()
+        Form(context, PARTICIPANT).build()

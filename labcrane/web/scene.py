@@ -24,14 +24,14 @@ TARGET = tuple(f"task.target.position.{axis}" for axis in "xyz")
 class Scene:
     """Draws a beam for each link, the tip, the target if there is one, and what stands around."""
 
-    def __init__(self, desk: PageContext) -> None:
-        self._desk = desk
+    def __init__(self, context: PageContext) -> None:
+        self._context = context
 
     def build(self) -> None:
         """Build it where the page stands, and keep it up to date."""
         from nicegui import ui  # noqa: PLC0415 - loads for a second
 
-        machine = self._desk.study.machine
+        machine = self._context.study.machine
         rest = machine.rest
         points = _points(machine, rest)
         span = float(np.abs(points).max())
@@ -48,12 +48,12 @@ class Scene:
         scene.move_camera(
             x=1.1 * span, y=-1.6 * span, z=1.1 * span, look_at_z=0.2 * span, duration=0
         )
-        self._surroundings = Surroundings(self._desk, scene)
+        self._surroundings = Surroundings(self._context, scene)
         self._place(points)
         ui.timer(RATE_S, self._update)
 
     def _update(self) -> None:
-        machine, newest = self._desk.study.machine, self._desk.live.newest
+        machine, newest = self._context.study.machine, self._context.live.newest
         angles = [newest.get(f"state.joint.angle.{name}") for name in machine.names]
         given = [angle for angle in angles if angle is not None]
         if len(given) == len(angles):
@@ -65,7 +65,7 @@ class Scene:
             beam.move(*((a + b) / 2).tolist())
             beam.rotate_R(_along(b - a))
         self._tip.move(*points[-1].tolist())
-        where = [self._desk.live.newest.get(name, math.nan) for name in TARGET]
+        where = [self._context.live.newest.get(name, math.nan) for name in TARGET]
         known = all(map(math.isfinite, where))
         self._target.visible(known)
         if known:

@@ -118,9 +118,11 @@ def serve(order: PageConfig, parent: Parent) -> None:
     denials = Denials(lambda why: parent.tell(Command(Order.DENIED, why, "page")))
     live, pictures = Live(order.source), Pictures(order.source, order.cameras)
     view = SessionView()
-    desk = PageContext(study, plan, order.folder_name, view, live, pictures, parent.tell, denials)
+    context = PageContext(
+        study, plan, order.folder_name, view, live, pictures, parent.tell, denials
+    )
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    _routes(app, desk)
+    _routes(app, context)
     ui.run_with(app, title="labcrane", show_welcome_message=False)
     secure = order.certificate is not None
     gate = Gate(app, order.keys, lambda page: parent.tell(Used(page)), denials, secure=secure)
@@ -163,7 +165,7 @@ def _listen(parent: Parent, view: SessionView, end: Callable[[], None]) -> None:
     end()
 
 
-def _routes(app: Any, desk: PageContext) -> None:
+def _routes(app: Any, context: PageContext) -> None:
     from fastapi import Request, Response  # noqa: PLC0415
     from nicegui import ui  # noqa: PLC0415
 
@@ -172,18 +174,18 @@ def _routes(app: Any, desk: PageContext) -> None:
 
     @ui.page("/supervisor", reconnect_timeout=AWAY_S)
     def supervisor() -> None:
-        supervisor_page(desk)
+        supervisor_page(context)
 
     @ui.page("/participant", reconnect_timeout=AWAY_S)
     def participant() -> None:
-        participant_page(desk)
+        participant_page(context)
 
     @app.get("/consent")  # type: ignore[untyped-decorator]  # app may be any ASGI app
     def consent() -> Response:
         """Give the approved consent text, as it is asked for; no other file can be had."""
-        if not desk.board.consent:
+        if not context.session.consent:
             return Response("no consent is asked for", NOT_FOUND)
-        text = read_lock(desk.study.path).consent
+        text = read_lock(context.study.path).consent
         kind, _ = mimetypes.guess_type(text.name)
         return Response(text.read_bytes(), media_type=kind or "application/octet-stream")
 
@@ -195,7 +197,9 @@ def _routes(app: Any, desk: PageContext) -> None:
         if word not in set(Order):
             return Response(f"{word!r} is not an order", FORBIDDEN)
         text = (await request.body()).decode(errors="replace")
-        if why := desk.give(page, Order(word), text, request.client.host if request.client else ""):
+        if why := context.give(
+            page, Order(word), text, request.client.host if request.client else ""
+        ):
             return Response(why, FORBIDDEN)
         return Response(status_code=202)
 

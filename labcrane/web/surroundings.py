@@ -32,21 +32,21 @@ class Surroundings:
     ``scene.NAME.position`` and ``.orientation``. What has none stays where it was placed.
     """
 
-    def __init__(self, desk: PageContext, canvas: "ui.scene") -> None:
-        self._desk = desk
+    def __init__(self, context: PageContext, canvas: "ui.scene") -> None:
+        self._context = context
         self._canvas = canvas
         self._drawn = ""
         self._groups: dict[str, Group] = {}
 
     def update(self) -> None:
         """Follow the session."""
-        things = self._desk.board.things
+        things = self._context.session.things
         if things != self._drawn:
             self._drawn = things
             for group in self._groups.values():
                 group.delete()
             self._groups = {placed.name: self._draw(placed) for placed in read_placed(things)}
-        newest = self._desk.live.newest
+        newest = self._context.live.newest
         for name, group in self._groups.items():
             where = [newest.get(f"state.scene.{name}.position.{axis}", math.nan) for axis in "xyz"]
             turn = [newest.get(f"state.scene.{name}.orientation.{q}", math.nan) for q in "xyzw"]

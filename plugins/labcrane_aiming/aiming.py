@@ -4,19 +4,8 @@ import math
 from collections.abc import Mapping, Sequence
 from functools import partial
 
-from labcrane import (
-    Event,
-    Frame,
-    Machine,
-    Phase,
-    PlannedTrial,
-    ProtocolError,
-    Run,
-    Signal,
-    Task,
-    Trial,
-    TrialStatus,
-)
+from labcrane import Frame, Machine, ProtocolError, Run, Signal, Task, Trial
+from labcrane.core import Event, Phase, PlannedTrial, TrialStatus
 from labcrane.machines import reach
 from labcrane_aiming.pairs import Pair, Point, index_of_difficulty, pairs
 from labcrane_aiming.settings import AimingSettings

@@ -5,8 +5,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from labcrane import Exporter, Machine
-from labcrane.analysis import Participant
+from labcrane import Machine
+from labcrane.analysis import Exporter, Participant
 from labcrane.recording import SessionRecord
 from labcrane_bids.dataset import (
     copy_phenotype,

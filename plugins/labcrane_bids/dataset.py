@@ -1,12 +1,14 @@
 """Dataset description of a BIDS export."""
 
 import csv
+import io
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from labcrane import ProtocolError
+from labcrane.core import read_csv_text
 from labcrane_bids.events import HED_VERSION
 from labcrane_bids.files import MISSING, label, write_json, write_tsv
 from labcrane_bids.settings import BidsSettings
@@ -94,15 +96,32 @@ def people_table(path: Path | None) -> dict[str, dict[str, str]]:
             f"there is no file {path} with age, sex, handedness and group; name one with --set "
             "people=FILE, or leave it out"
         )
-    with path.open(encoding="utf-8", newline="") as file:
-        reader = csv.DictReader(file)
-        if "participant" not in (reader.fieldnames or ()):
-            there = ", ".join(reader.fieldnames or ()) or "none"
+    try:
+        return _people(csv.DictReader(io.StringIO(read_csv_text(path), newline="")), path)
+    except (OSError, ValueError, csv.Error) as error:
+        raise ProtocolError(f"{path} cannot be read as CSV: {error}") from error
+
+
+def _people(reader: "csv.DictReader[str]", path: Path) -> dict[str, dict[str, str]]:
+    if "participant" not in (reader.fieldnames or ()):
+        there = ", ".join(reader.fieldnames or ()) or "none"
+        raise ProtocolError(
+            f"{path} has no column 'participant'; its columns are {there}: add one with the "
+            "pseudonyms"
+        )
+    people: dict[str, dict[str, str]] = {}
+    for row in reader:
+        if None in row or None in row.values():
             raise ProtocolError(
-                f"{path} has no column 'participant'; its columns are {there}: add one with the "
-                "pseudonyms"
+                f"{path}, line {reader.line_num}: this row has more or fewer cells than the head "
+                "has columns; give it as many"
             )
-        return {row["participant"]: {k: v for k, v in row.items() if v} for row in reader}
+        if (name := row["participant"]) in people:
+            raise ProtocolError(
+                f"{path}, line {reader.line_num}: {name!r} is there twice; keep one row"
+            )
+        people[name] = {name: cell for name, cell in row.items() if cell}
+    return people
 
 
 def copy_phenotype(source: Path | None, folder: Path, recorded: Sequence[str] = ()) -> None:
@@ -133,7 +152,10 @@ def copy_phenotype(source: Path | None, folder: Path, recorded: Sequence[str] = 
         described = path.with_suffix(".json")
         if not described.is_file():
             raise ProtocolError(f"{path} has no description; write {described} beside it")
-        table = pd.read_csv(path)
+        try:
+            table = pd.read_csv(io.StringIO(read_csv_text(path)))
+        except (OSError, ValueError) as error:
+            raise ProtocolError(f"{path} cannot be read as CSV: {error}") from error
         if "participant" not in table:
             raise ProtocolError(
                 f"{path} has no column 'participant'; its columns are "

@@ -122,6 +122,11 @@ class PanelCommands:
         self.refused += 1
         self.why = why
 
+    def forget(self) -> None:
+        """Let no command count that came before the bus was lost: the panel says them anew."""
+        for asked in self.asked.values():
+            asked.signal, asked.floats, asked.wrong, asked.time = 0.0, False, "", -math.inf
+
     def _take_valve(self, frame: CanFrame, time: float) -> None:
         try:
             command = decode(frame.arbitration_id, bytes(frame.data))

@@ -137,6 +137,7 @@ class Listener:
         except DeviceError:
             self._over.wait(AGAIN_S)
         else:
+            self._commands.forget()
             self.lost = None
 
     def _shut(self) -> None:

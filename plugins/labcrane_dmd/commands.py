@@ -4,8 +4,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
+from pydantic import ValidationError
 from rich.console import Console
 from rich.table import Table
+
+from labcrane import ProtocolError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,6 +40,16 @@ def fit(
     max_degree: Annotated[
         int, typer.Option(help="largest degree of the polynomials", min=1, max=12)
     ] = 9,
+    levels: Annotated[
+        str | None, typer.Option(help="signals of the layers: 40,80,120; the paper's by default")
+    ] = None,
+    validation: Annotated[
+        str | None, typer.Option(help="signals that the fit never looks at: 20,60,100")
+    ] = None,
+    edge: Annotated[
+        str | None,
+        typer.Option(help="further signals for the edge of the dead band; '' for none"),
+    ] = None,
 ) -> None:
     """Make a Dynamic Model Description from recordings of joints."""
     from labcrane_dmd.fit.fitting import fit_model
@@ -44,7 +57,14 @@ def fit(
     from labcrane_dmd.model.model_file import save
     from labcrane_dmd.model.settings import FitSettings
 
-    settings = FitSettings(between=between, max_degree=max_degree)
+    given = {"levels": levels, "validation": validation, "edge": edge}
+    signals = {name: _signals(name, text) for name, text in given.items() if text is not None}
+    try:
+        settings = FitSettings.model_validate(
+            {"between": between, "max_degree": max_degree, **signals}
+        )
+    except ValidationError as error:
+        raise ProtocolError(str(error.errors()[0]["msg"]).removeprefix("Value error, ")) from None
     model = fit_model(read_recordings(recordings), settings)
     save(model, to)
     table = _table("segment", "direction", "dead band", "dead time", "lag", "degrees", "not whole")
@@ -61,6 +81,21 @@ def fit(
             )
     out.print(table)
     out.print(f"model: {to}", markup=False)
+
+
+def _signals(name: str, text: str) -> tuple[int, ...]:
+    """Return the signals of a list with commas."""
+    try:
+        found = tuple(int(part) for part in text.split(",") if part.strip())
+    except ValueError:
+        raise ProtocolError(
+            f"--{name} {text!r} is no list of signals; write whole numbers with commas: 40,80,120"
+        ) from None
+    if wrong := [signal for signal in found if signal <= 0]:
+        raise ProtocolError(
+            f"--{name} has {wrong[0]}; write sizes above 0, each is used in both directions"
+        )
+    return found
 
 
 def validate(

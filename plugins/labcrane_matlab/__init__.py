@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from labcrane import Exporter, Machine, Offer, hookimpl, offer
+from labcrane import Machine, Offer, hookimpl, offer
+from labcrane.analysis import Exporter
 from labcrane_matlab.settings import MatlabSettings
 
 labcrane_api = 1

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from labcrane import Exporter, RecordingError
-from labcrane.analysis import Participant, answers_of, codebook_of, measures_of, scores_of
+from labcrane import RecordingError
+from labcrane.analysis import Exporter, Participant, answers_of, codebook_of, measures_of, scores_of
 from labcrane.recording import SessionRecord
 from labcrane_matlab.settings import MatlabSettings
 

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labcrane import FloatArray, Frame, InputDevice, Phase, Run, Signal, Tick, Trial
-from labcrane.core import Layout, Value
+from labcrane import FloatArray, Frame, InputDevice, Run, Signal, Tick, Trial
+from labcrane.core import Layout, Phase, Value
 from labcrane_operator.aimer import STILL, Aimer
 from labcrane_operator.noise import Noise
 from labcrane_operator.settings import STICK, OperatorSettings

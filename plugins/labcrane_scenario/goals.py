@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from labcrane import Event, FloatArray, Run
-from labcrane.core import Layout
+from labcrane import FloatArray, Run
+from labcrane.core import Event, Layout
 from labcrane.machines import PlacedObject, Scene
 
 Point = tuple[float, float, float]

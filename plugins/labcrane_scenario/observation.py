@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from labcrane import Event, FloatArray, Run
-from labcrane.core import Value
+from labcrane import FloatArray, Run
+from labcrane.core import Event, Value
 from labcrane.machines import PlacedObject
 from labcrane_scenario.mistakes import Episode, Mistakes
 from labcrane_scenario.settings import ScenarioSettings

@@ -9,13 +9,13 @@ from labcrane import (
     Frame,
     InputDevice,
     Machine,
-    Phase,
     ProtocolError,
     Run,
     Signal,
     Tick,
     Trial,
 )
+from labcrane.core import Phase
 from labcrane_scenario.settings import OperatorSettings
 
 NEAR = 0.6

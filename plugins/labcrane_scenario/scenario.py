@@ -6,21 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from labcrane import (
-    Event,
-    FloatArray,
-    Frame,
-    Machine,
-    Phase,
-    PlannedTrial,
-    ProtocolError,
-    Run,
-    Signal,
-    Task,
-    Trial,
-    TrialStatus,
-)
-from labcrane.core import Value
+from labcrane import FloatArray, Frame, Machine, ProtocolError, Run, Signal, Task, Trial
+from labcrane.core import Event, Phase, PlannedTrial, TrialStatus, Value
 from labcrane.machines import SCENE_PLACED, Scene, load_scene, place_objects, write_placed
 from labcrane_scenario.goals import Way
 from labcrane_scenario.mistakes import KINDS

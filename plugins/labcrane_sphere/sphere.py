@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labcrane import Cue, FloatArray, Frame, Run, Signal, Sphere
-from labcrane.core import Shape
+from labcrane import Cue, FloatArray, Frame, Run, Signal
+from labcrane.core import Shape, Sphere
 from labcrane_sphere.settings import SphereSettings
 
 STEEPNESS = 9.0

@@ -4,8 +4,7 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
-from labcrane import Exporter
-from labcrane.analysis import Participant, answers_of, codebook_of, measures_of, scores_of
+from labcrane.analysis import Exporter, Participant, answers_of, codebook_of, measures_of, scores_of
 from labcrane_tables.frames import snake
 from labcrane_tables.settings import PsychDsSettings
 from labcrane_tables.tables import write_csv

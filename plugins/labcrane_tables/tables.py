@@ -7,8 +7,7 @@ from pathlib import Path
 from shutil import copyfile
 from typing import TYPE_CHECKING, Any
 
-from labcrane import Exporter
-from labcrane.analysis import Participant, answers_of, codebook_of, measures_of, scores_of
+from labcrane.analysis import Exporter, Participant, answers_of, codebook_of, measures_of, scores_of
 from labcrane.recording import SessionRecord
 from labcrane_tables.frames import snake, stream_tables
 from labcrane_tables.settings import TableSettings

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labcrane import FloatArray, Frame, Run, Sphere
-from labcrane.core import Shape
+from labcrane import FloatArray, Frame, Run
+from labcrane.core import Shape, Sphere
 from labcrane.machines import PlacedObject, read_placed
 from labcrane_view.scene.outline import of_body, of_thing
 

@@ -10,18 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from panda3d import core
 
-from labcrane import (
-    Cylinder,
-    DeviceError,
-    Feedback,
-    FloatArray,
-    Frame,
-    Machine,
-    PluginError,
-    Run,
-    Signal,
-)
-from labcrane.core import CameraImage, SessionState, Shape, TargetFinder, Value
+from labcrane import DeviceError, Feedback, FloatArray, Frame, Machine, PluginError, Run, Signal
+from labcrane.core import CameraImage, Cylinder, SessionState, Shape, TargetFinder, Value
 from labcrane.machines import link_frames
 from labcrane_view.areas import Areas
 from labcrane_view.camera import Camera, Delay, Part

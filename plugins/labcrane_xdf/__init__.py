@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from labcrane import Exporter, Machine, Offer, Settings, hookimpl, offer
+from labcrane import Machine, Offer, Settings, hookimpl, offer
+from labcrane.analysis import Exporter
 
 labcrane_api = 1
 

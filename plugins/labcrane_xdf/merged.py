@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from labcrane import Exporter
-from labcrane.analysis import Participant
+from labcrane.analysis import Exporter, Participant
 from labcrane.recording import Channel, SessionRecord, Stream, StreamHeader, XdfWriter
 
 CHUNK = 4096

@@ -3,6 +3,7 @@
 import csv
 import math
 import subprocess
+from collections.abc import Sequence
 from datetime import date
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from labcrane.participants.enrolment import exclude
 from labcrane.participants.folders import Places
 from labcrane.participants.register import Entry, changed
 from labcrane.recording.journal import Column, SessionJournal
+from labcrane.recording.participant_file.reader import open_recording
 from labcrane.recording.participant_file.writer import consolidate
 
 LITERAL = IndicatorSettings()
@@ -134,7 +136,13 @@ ROW = {
 
 
 def record(
-    folder: Path, operator: str, rows: list[dict], *, session: int = 1, ratings: bool = True
+    folder: Path,
+    operator: str,
+    rows: list[dict],
+    *,
+    session: int = 1,
+    ratings: bool = True,
+    more: Sequence[tuple[str, float, dict]] = (),
 ) -> None:
     """Record trials as a scenario task would, ratings after each, as a session writes them."""
     home = folder / operator
@@ -157,6 +165,8 @@ def record(
                 done = {"questionnaire": name, "step": at, "score.share": share, "missing": 0}
                 if ratings:
                     journal.write_event(Event("questionnaire.end", 10.0 * at + 1, done), at)
+        for name, time, data in more:
+            journal.write_event(Event(name, time, {**data, "refused": None}), len(rows))
     consolidate(home / f"{operator}.h5", [path])
 
 
@@ -190,6 +200,74 @@ def test_every_operator_needs_a_reference_stage(tmp_path: Path) -> None:
     record(tmp_path, "R001", [trial(60.0, reference=True, outcome="timeout"), trial(70.0)])
     with pytest.raises(RecordingError, match="R001 has no reference stage that was completed"):
         scored(tmp_path)
+
+
+def test_each_scenario_has_its_own_reference_and_a_slow_one_can_score(tmp_path: Path) -> None:
+    """Six scenes of very different length; each test takes 30 % longer than its reference."""
+    times = {"touch": 20.0, "carry": 55.0, "lift": 90.0, "reach": 140.0, "pull": 33.0, "over": 71.0}
+    references = [trial(t, reference=True, scenario=name) for name, t in times.items()]
+    tests = [trial(1.3 * t, scenario=name, completion=1) for name, t in times.items()]
+    record(tmp_path, "R001", references + tests)
+    found = scored(tmp_path)
+    assert {test.scenario: test.reference_s for test in found} == times
+    for test in found:
+        assert test.indicator.points["duration"] == pytest.approx(20.0 / 1.3)
+
+
+def test_one_without_a_reference_is_named_and_the_others_are_scored(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    record(tmp_path, "R001", [trial(60.0), trial(70.0)])
+    record(tmp_path, "R002", [trial(60.0, reference=True), trial(70.0)])
+    touched = [trial(50.0, reference=True, scenario="touch"), trial(60.0, scenario="touch")]
+    record(tmp_path, "R003", [*touched, trial(60.0, scenario="carry")])
+    assert main(["score", str(tmp_path)]) == 3
+    said = " ".join(capsys.readouterr().out.split())
+    assert "left out: R001 has no reference stage that was completed before 2 of the tests" in said
+    assert (
+        "left out: R003 has no reference stage of 'carry' (1) that was completed before 1 of"
+    ) in said
+    with (tmp_path / "evaluation.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["operator"] for row in rows] == ["R002", "R003"]
+
+
+def test_totals_are_values_for_pandas_with_formulas_beside_them_and_a_csv_twin(
+    tmp_path: Path,
+) -> None:
+    import pandas as pd
+
+    record(tmp_path, "R001", the_vectors())
+    assert main(["score", str(tmp_path)]) == 0
+    tests = scored(tmp_path)
+    sheet = pd.read_excel(tmp_path / "evaluation.xlsx", sheet_name="Tests")
+    twin = pd.read_csv(tmp_path / "evaluation.csv")
+    for name in ("raw", "percent", "objective", "subjective"):
+        expected = [getattr(test.indicator, name) for test in tests]
+        assert sheet[name].to_numpy() == pytest.approx(expected)
+        assert twin[name].to_numpy() == pytest.approx(expected)
+    assert not any("formula" in name for name in twin)
+    means = pd.read_excel(tmp_path / "evaluation.xlsx", sheet_name="Summary")
+    assert means["percent"].item() == pytest.approx(sheet["percent"].mean())
+
+
+def test_what_was_judged_after_a_test_is_in_the_trial_table_and_counts(tmp_path: Path) -> None:
+    rows = [trial(60.0, reference=True), trial(60.0), trial(60.0, outcome="failure")]
+    record(
+        tmp_path,
+        "R001",
+        rows,
+        more=[
+            ("order.completion", 21.0, {"trial": 2, "attempt": 1, "after": True, "text": "0"}),
+            ("order.override", 31.0, {"trial": 3, "attempt": 1, "after": True, "text": ""}),
+        ],
+    )
+    first, second = scored(tmp_path)
+    assert (first.indicator.completed, first.why) == (False, "set by the supervisor")
+    after = "overridden by the supervisor after its end"
+    assert (second.indicator.completed, second.why) == (True, after)
+    table = open_recording(tmp_path / "R001" / "R001.h5").session(1).trials
+    assert table.set_index("trial")["completion"].loc[2] == 0
 
 
 def test_a_folder_without_tests_says_what_a_test_is(tmp_path: Path) -> None:
@@ -271,7 +349,8 @@ def test_a_missing_rating_leaves_no_total_in_the_workbook(tmp_path: Path) -> Non
     [test] = scored(tmp_path)
     write_workbook([test], tmp_path / "book.xlsx")
     head, row = converted(tmp_path / "book.xlsx", 2)
-    assert dict(zip(head, row, strict=True))["raw"] == "#VALUE!"
+    cells = dict(zip(head, row, strict=True))
+    assert (cells["raw"], cells["raw (formula)"]) == ("no rating", "#VALUE!")
 
 
 def runs(percents: list[tuple[float, int]]) -> list[OperatorTest]:

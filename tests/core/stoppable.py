@@ -7,18 +7,8 @@ from pathlib import Path
 import numpy as np
 from rehearsal import a_study
 
-from labcrane import (
-    Controller,
-    Dynamics,
-    InputDevice,
-    Phase,
-    PlannedTrial,
-    Questionnaire,
-    Signal,
-    Task,
-    TrialStatus,
-)
-from labcrane.core import Item, Score
+from labcrane import Controller, Dynamics, InputDevice, Questionnaire, Signal, Task
+from labcrane.core import Item, Phase, PlannedTrial, Score, TrialStatus
 from labcrane.protocol.design import Criterion
 from labcrane.protocol.evaluation import StopRule
 from labcrane.protocol.protocol import OnFault

@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from labcrane import Cue, Frame, Run, Settings, Sphere, offer
+from labcrane import Cue, Frame, Run, Settings, offer
+from labcrane.core import Sphere
 from labcrane.core.primitives import Shape
 from labcrane.testing import CueContract, PluginContract
 

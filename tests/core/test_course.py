@@ -110,6 +110,35 @@ def test_notes_and_the_completion_flag_are_in_the_record(study: Study) -> None:
     assert seen.events("trial.end")[0].data["completion"] == 0
 
 
+def test_a_test_that_has_ended_is_judged_until_the_next_begins(tmp_path: Path) -> None:
+    text = SHORT.replace("task: aiming", "task: aiming, ask: [subjective_accuracy]")
+    study = a_study(tmp_path, text)
+    ended = next(
+        number
+        for number, frame in enumerate(rehearse(study).frames)
+        for event in frame.events
+        if event.name == "trial.end" and event.data["counted"]
+    )
+    orders = {ended + 1: [*give(Order.COMPLETION, "0"), *give(Order.OVERRIDE)]}
+    seen = rehearse(study, orders)
+    (late,) = seen.events("order.completion")
+    (override,) = seen.events("order.override")
+    row = next(row for row in seen.trials() if row["counted"])
+    for order in (late, override):
+        told = (order.data["refused"], order.data["trial"], order.data["after"])
+        assert told == (None, row["trial"], True)
+    assert row["completion"] is None  # as it ended; the participant file has what was set
+
+
+def test_before_the_first_trial_there_is_nothing_to_judge(study: Study) -> None:
+    orders = {5: give(Order.COMPLETION, "1"), 6: give(Order.OVERRIDE), 40: give(Order.START)}
+    seen = rehearse(study, orders, waits=True)
+    for name in ("order.completion", "order.override"):
+        (order,) = seen.events(name)
+        assert order.data["refused"] == "no trial is running, and none has ended"
+        assert "after" not in order.data
+
+
 def test_an_overridden_trial_outlasts_its_limit(tmp_path: Path) -> None:
     text = SHORT.replace("movements: 2", "movements: 2, limit_s: 0.5")
     study = a_study(tmp_path, text)

@@ -1,4 +1,4 @@
-"""What is written in YAML describes itself where a schema is asked for, and nowhere else."""
+"""What is written in YAML describes itself."""
 
 import subprocess
 import sys
@@ -6,7 +6,7 @@ import sys
 import pytest
 from pydantic import Field, ValidationError
 
-from labcrane.files.model import StrictModel, descriptions
+from labcrane.files.model import StrictModel
 
 
 class Link(StrictModel):
@@ -54,11 +54,6 @@ def test_models_inside_a_model_are_described_as_well() -> None:
     inside = Chain.model_json_schema()["$defs"]["Link"]["properties"]
     assert inside["length"]["description"] == "Length,\nin metres."
     assert "description" not in inside["colour"]
-
-
-def test_descriptions_are_found_by_key_with_those_that_are_inherited() -> None:
-    assert descriptions(Link).keys() == {"length", "mass"}
-    assert descriptions(Chain).keys() == {"length", "mass", "colour", "links", "end"}
 
 
 def test_a_model_whose_source_is_nowhere_has_a_schema_without_words() -> None:

@@ -9,8 +9,8 @@ from core.fed_study import FED
 from rehearsal import SHORT, ScriptedConsole, a_study, rehearse
 
 import labcrane
-from labcrane import DeviceError, Event, ProtocolError, Signal
-from labcrane.core import Layout, SessionState, TargetFinder
+from labcrane import DeviceError, ProtocolError, Signal
+from labcrane.core import Event, Layout, SessionState, TargetFinder
 from labcrane.design.order import faded
 from labcrane.design.plan import plan_session
 from labcrane.feedback.processes import FeedbackProcesses

@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labcrane import Event, Frame, PluginError, RecordingError, Tick
+from labcrane import Frame, PluginError, RecordingError, Tick
+from labcrane.core import Event
 from labcrane.recording.frame_log import FrameLog, columns
 from labcrane.recording.journal import SessionJournal
 from labcrane.recording.journal_reader import SessionLog, read_journal

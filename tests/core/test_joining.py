@@ -1,22 +1,29 @@
 """A feedback process that joins a session under way."""
 
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pylsl
 import pytest
 from faults.sessions import unique, wait_for
 
-from labcrane import Event, Frame, Tick
+from labcrane import Frame, Tick
+from labcrane.core import Event
+from labcrane.errors import StreamError
+from labcrane.feedback import process
 from labcrane.feedback.config import FeedbackConfig, Part
 from labcrane.feedback.process import FeedbackProcess
 from labcrane.streams.context import CONTEXT, ContextOutlet
 from labcrane.streams.feedback_log import log_source
 from labcrane.streams.frames import FRAME, FrameOutlet
+from labcrane.streams.recorder import recorder
+from labcrane.streams.request import StreamRequest
 from labcrane.testing import TARGETS, ch8, make_run, make_target
 from labcrane.web.pictures import Pictures
 
@@ -160,3 +167,40 @@ def test_pictures_for_the_supervisor_are_made_only_while_somebody_watches(joined
             return page.of("notes", "eye")[1] != "no picture yet"
 
         wait_for(a_picture_has_come, patience_s=240)
+
+
+class Nobody:
+    """A search that finds nothing, as where all of liblsl's ports are taken."""
+
+    def __init__(self, **_: object) -> None: ...
+
+    def results(self) -> list[pylsl.StreamInfo]:
+        return []
+
+    def close(self) -> None: ...
+
+
+def test_a_recorder_takes_what_is_presented_without_a_search(
+    joined: Joined, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder, "Search", Nobody)
+    wait_for(lambda: any("sends" in one for one in joined.said), patience_s=240)
+    sends = next(one["sends"] for one in joined.said if "sends" in one)
+    wanted = StreamRequest(label="notes", source_id=log_source(joined.source, "notes"))
+    with closing(recorder.Recorder(tmp_path / "streams.xdf", [wanted])) as recording:
+        recording.look()
+        assert recording.health()[0].condition == "absent"
+        recording.know(sends)
+        wait_for(joined.shown, patience_s=240)
+        assert recording.health()[0].condition != "absent"
+
+
+def test_what_nobody_records_says_why_after_a_time(
+    joined: Joined, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(process, "TAKEN_S", 0.2)
+    context = SimpleNamespace(text="a trial", changed=time.sleep)
+    with pytest.raises(
+        StreamError, match=r"no recorder has taken what 'notes' presents.*PortRange"
+    ):
+        joined._process._join(context, SimpleNamespace(taken=False))

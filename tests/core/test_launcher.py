@@ -95,7 +95,7 @@ def test_a_spare_recorder_that_hangs_keeps_no_recorder_from_closing_its_journal(
     monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
     monkeypatch.setattr(recorder_handle, "MODULE", "hanging_spare")
     keeper = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
-    wait_for(lambda: keeper.ready, 60.0)
+    wait_for(lambda: keeper.ready)
     for _ in range(recorder_handle.SPARES):
         assert not keeper.watch()
     monkeypatch.setattr(recorder_handle, "PATIENCE_S", 3.0)

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 import labcrane
-from labcrane import Cylinder, Feedback, Settings, Signal, Sphere, offer
-from labcrane.core import SessionState
+from labcrane import Feedback, Settings, Signal, offer
+from labcrane.core import Cylinder, SessionState, Sphere
 from labcrane.feedback.config import FeedbackConfig, Part
 from labcrane.feedback.presenter import Presenter
 from labcrane.registry.registry import discover

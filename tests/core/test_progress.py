@@ -10,6 +10,7 @@ from rehearsal import SHORT, ScriptedConsole, a_study
 
 from labcrane import ProtocolError, open_recording
 from labcrane.design.plan import plan_session
+from labcrane.recording.paths import parts
 from labcrane.session.commands import Command, Order
 from labcrane.session.resume import progress, remaining
 from labcrane.session.session import Visit, finish, record, run
@@ -190,3 +191,19 @@ def test_the_rating_of_a_trial_that_was_cut_off_is_asked_on(tmp_path: Path, answ
     scores = table[table["kind"] == "score"]
     assert scores["value"].tolist() == [5.0, 0.5] * 2
     assert session.trials["outcome"].tolist() == ["success"] * 2
+
+
+def test_a_session_begun_by_another_plan_is_not_gone_on_with(tmp_path: Path) -> None:
+    begun = Visit(a_study(tmp_path, SHORT), "P001", 1, tmp_path / "data", simulated=True, fast=True)
+    record(begun, ScriptedConsole({100: [Command(Order.END)]}))
+    other = tmp_path / "other"
+    other.mkdir()
+    study = a_study(other, SHORT.replace("distances: [2]", "distances: [2.5]"))
+    with pytest.raises(
+        ProtocolError,
+        match=r"begun by another plan: trial 1 was pair '2m_\w+', distance 2\.0, .* and the plan "
+        r"has pair '2\.5m_\w+', distance 2\.5, .*; go on with the protocol, and the place in the "
+        r"design, with which it was begun",
+    ):
+        record(replace(begun, study=study, resumed=True), ScriptedConsole())
+    assert len(parts(begun.journal)) == 1, "nothing was begun"

@@ -17,7 +17,8 @@ from rehearsal import SHORT, ScriptedConsole, a_study, rehearse
 from virtual_sticks import desk
 
 import labcrane
-from labcrane import DeviceError, Event, PluginError, ProtocolError, RecordingError
+from labcrane import DeviceError, PluginError, ProtocolError, RecordingError
+from labcrane.core import Event
 from labcrane.protocol.rig import Rig
 from labcrane.session.session import Visit, run
 

@@ -13,8 +13,9 @@ from needs import needs
 from rehearsal import SHORT
 from rich.console import Console
 
-from labcrane import Event, open_recording
+from labcrane import open_recording
 from labcrane.cli.terminal import Terminal
+from labcrane.core import Event
 from labcrane.session.commands import QueueConsole
 
 

@@ -17,6 +17,9 @@ SIDES = {"LEFT": "left", "RIGHT": "right"}
 OTHER = {"left": "right", "right": "left"}
 PATIENCE_S = 400.0
 
+DESK = Path(__file__).with_name("desk")
+"""With this in its path, a process and all that it starts have two sticks."""
+
 TOLD = re.compile(
     r"push the (?P<push>LEFT|RIGHT) stick (?P<where>to the RIGHT|TOWARDS you)"
     r"|(?P<let>let go of it)\s*[\r\n]"
@@ -41,9 +44,9 @@ class Person:
         if program == "python":
             program, *words = words[1:]
         self._process = subprocess.Popen(
-            [sys.executable, str(Path(__file__).with_name("desk_program.py")), program, *words],
+            [sys.executable, "-m", program, *words],
             cwd=folder,
-            env={**environment, "HANDS": str(pipe), "COLUMNS": "300"},
+            env={**environment, "HANDS": str(pipe), "COLUMNS": "300", "PYTHONPATH": str(DESK)},
             stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True,
         )  # fmt: skip
         os.close(theirs)

@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from needs import needs
 
 from labcrane.core.findings import Finding, Verdict
 from labcrane.doctor import clock, disk, scheduling
@@ -81,7 +82,7 @@ def test_the_innermost_mount_holds_a_folder(place: str, kind: str) -> None:
     assert disk.file_system(Path(place), MOUNTS) == kind
 
 
-@pytest.mark.skipif(not Path("/dev/shm").is_dir(), reason="no tmpfs at /dev/shm")
+@needs("/dev/shm")
 def test_a_folder_in_memory_fails() -> None:
     found = disk.light(Path("/dev/shm/labcrane-none/data"), needed=1.0)
     (kind,) = [one for one in found if "file system" in one.text]

@@ -2,6 +2,8 @@
 
 import json
 import platform
+import threading
+import time
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -11,10 +13,12 @@ from rehearsal import SHORT, ScriptedConsole
 import labcrane
 from labcrane.cli.app import main
 from labcrane.core.findings import Finding, Verdict
-from labcrane.doctor import components
+from labcrane.doctor import apart, components
+from labcrane.doctor.checks import examine, keep_apart
 from labcrane.doctor.components import Look, of_everything, of_study
 from labcrane.doctor.report import Check, diagnosis, keep, latest
 from labcrane.errors import RecordingError
+from labcrane.processes.handle import ProcessHandle
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
@@ -95,10 +99,94 @@ def test_a_plugins_look_cannot_harm_the_doctor(
     verdict: Verdict,
     text: str,
 ) -> None:
-    monkeypatch.setattr(components, "WAIT_S", 8.0 if does == "hangs" else 30.0)
+    monkeypatch.setattr(apart, "WAIT_S", 8.0 if does == "hangs" else 30.0)
     look = Look("feedback lamp", "feedback", "lamp", lamp.model_validate({"does": does}))
     (found,) = components.examine(look, move=False)
     assert (found.verdict, found.text) == (verdict, text)
+
+
+SITE = """
+import shutil, time
+def disk_usage(path):
+    time.sleep(600)
+shutil.disk_usage = disk_usage
+"""
+"""What makes every process that starts stand still where it looks at a folder's server."""
+
+
+def test_a_data_folder_that_hangs_is_named_and_the_rest_is_looked_at(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "sitecustomize.py").write_text(SITE)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(apart, "WAIT_S", 4.0)
+    (tmp_path / "study.yaml").write_text(SHORT)
+    registry = discover()
+    study = load(tmp_path / "study.yaml", registry)
+    checks = list(examine(tmp_path, registry, study, peers=["127.0.0.1"]))
+    (hung,) = [check.finding for check in checks if check.area == "disk"]
+    assert hung.verdict is Verdict.FAIL
+    assert hung.text.startswith(
+        f"looking at folder {tmp_path} did not answer within 4 s; it stood still in disk_usage() "
+        "(sitecustomize.py:4), called by _space() (disk.py:"
+    )
+    assert "mount it again, or give --data" in hung.advice
+    areas = {check.area for check in checks}
+    assert {"clock", "scheduling", "input dual_joystick", "lsl", "lsl 127.0.0.1"} < areas
+
+
+def still(*_: object) -> list[Finding]:
+    """Stand still."""
+    time.sleep(600.0)
+    return []
+
+
+@pytest.mark.parametrize(
+    "place",
+    ["clock.examine", "scheduling.examine", "disk.examine", "lsl.examine", "lsl.ask_peer"],
+)
+def test_no_examination_is_made_in_the_doctors_own_process(
+    place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module, _, function = place.partition(".")
+    monkeypatch.setattr(f"labcrane.doctor.{module}.{function}", still)
+    made = []
+
+    def noted(call: apart.Call, **_: object) -> list[Finding]:
+        made.append(getattr(call, "function", None))
+        return []
+
+    monkeypatch.setattr(apart, "examine", noted)
+    (tmp_path / "study.yaml").write_text(SHORT)
+    registry = discover()
+    study = load(tmp_path / "study.yaml", registry)
+    list(examine(tmp_path, registry, study, peers=["127.0.0.1"]))
+    assert still in made
+
+
+def test_a_process_that_cannot_be_ended_keeps_the_doctor_no_longer_than_its_patience(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    released, stop = threading.Event(), ProcessHandle.stop
+
+    def late(self: ProcessHandle) -> int:
+        released.wait()
+        return stop(self)
+
+    monkeypatch.setattr(ProcessHandle, "stop", late)
+    monkeypatch.setattr(apart, "END_S", 0.1)
+    try:
+        found = keep_apart(diagnosis([]), tmp_path)
+        assert found.text.startswith(f"kept in {tmp_path}")
+    finally:
+        released.set()
+
+
+def test_a_diagnosis_that_cannot_be_kept_is_told(tmp_path: Path) -> None:
+    (tmp_path / "data").write_text("no folder")
+    found = keep_apart(diagnosis([]), tmp_path / "data")
+    assert found.verdict is Verdict.FAIL
+    assert found.text.startswith(f"looking at folder {tmp_path / 'data'} raised RecordingError: ")
 
 
 def test_a_study_needs_looks_at_what_it_uses_and_at_nothing_else() -> None:

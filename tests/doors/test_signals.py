@@ -75,7 +75,7 @@ def test_whatever_a_frame_holds_the_signals_stay_within_full_flow(
     assert all(abs(signal) <= 250.0 for signal in commands.signals(0.0)[0])
 
 
-def wait_for(ready, seconds: float = 10.0) -> None:
+def wait_for(ready, seconds: float = 240.0) -> None:
     end = time.monotonic() + seconds
     while not ready():
         assert time.monotonic() < end

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from labcrane import Cue, Feedback, Questionnaire, Settings, Signal, Sphere, hookimpl, offer
-from labcrane.core import CraneSettings, Item
+from labcrane import Cue, Feedback, Questionnaire, Settings, Signal, hookimpl, offer
+from labcrane.core import CraneSettings, Item, Sphere
 from labcrane_aiming.aiming import Aiming
 from labcrane_aiming.settings import AimingSettings
 from labcrane_bullet.kinematic_crane import KinematicCrane

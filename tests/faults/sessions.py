@@ -144,7 +144,7 @@ def program(name: str, *arguments: str, into: Path) -> Iterator[None]:
             [sys.executable, str(Path(__file__).with_name(name)), *arguments], stdout=file
         )
         try:
-            wait_for(lambda: into.read_text().startswith("ready"), 60.0)
+            wait_for(lambda: into.read_text().startswith("ready"))
             yield
         finally:
             process.kill()

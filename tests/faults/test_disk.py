@@ -1,13 +1,16 @@
 """A disk that fills up, or vanishes, while a session is recorded; and one that is read-only."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from recording.test_full_disk import in_namespace, needs_mounts
-from rehearsal import SHORT, a_study
+from rehearsal import SHORT, ScriptedConsole, a_study
 
 from labcrane import RecordingError
+from labcrane.limits import LIMITS
+from labcrane.recording import frame_log
 from labcrane.session.commands import Command, Order
 from labcrane.session.session import Visit, record
 
@@ -174,6 +177,28 @@ def test_a_session_that_will_not_fit_is_refused_with_numbers(tmp_path: Path) -> 
     assert done.returncode == 0, done.stderr
     assert "the session needs up to" in done.stdout
     assert "and only 2 MB are free" in done.stdout
+
+
+def test_no_more_frames_wait_for_a_disk_than_the_table_of_limits_allows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    few = replace(LIMITS["frames waiting for a disk"], most=200_000)
+    monkeypatch.setattr(frame_log, "LIMITS", {**LIMITS, "frames waiting for a disk": few})
+    visit = Visit(a_study(tmp_path, SHORT), "P001", 1, tmp_path / "data", simulated=True)
+
+    class RemovesTheFolder(ScriptedConsole):
+        def commands(self) -> list[Command]:
+            if self._tick == 100:
+                shutil.rmtree(visit.folder.path)
+            return super().commands()
+
+    console = RemovesTheFolder({2000: [Command(Order.END)]})
+    with pytest.raises(RecordingError, match="the file was removed") as caught:
+        record(visit, console)
+    [said] = caught.value.__notes__
+    assert "frames and events wait for the disk, and no more can: cannot write" in said
+    assert "the session ends, mend the disk and go on with labcrane resume" in said
+    assert "order.end" not in [event.name for event in console.told], "long before the order"
 
 
 def test_a_folder_that_vanishes_holds_the_session(tmp_path: Path) -> None:

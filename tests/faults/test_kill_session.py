@@ -27,7 +27,7 @@ from labcrane.recording.xdf.reader import read_xdf
 from labcrane.session.postprocess import conclude
 from labcrane.session.resume import progress
 
-SIXTY = [pytest.mark.long, pytest.mark.timeout(1500)]
+SIXTY = [pytest.mark.soak, pytest.mark.timeout(1500)]
 """The first of these tests waits for all sessions to be killed and recovered."""
 
 

@@ -167,8 +167,8 @@ def kill(lab: Lab, data: Path, victims: tuple[str, ...], chance: random.Random) 
     killed = [name for name in victims if name in found]
     for name in killed:
         found[name].kill()
-    run.communicate(timeout=120)
-    psutil.wait_procs(everybody, timeout=60)
+    run.communicate(timeout=240)
+    psutil.wait_procs(everybody, timeout=240)
     return set(killed)
 
 
@@ -177,7 +177,7 @@ def go_on(lab: Lab, data: Path) -> list[str]:
     said = []
     for _ in range(4):
         resumed = lab.start("resume", data, "--no-page")
-        said.append(" ".join(resumed.communicate(timeout=120)[0].split()))
+        said.append(" ".join(resumed.communicate(timeout=240)[0].split()))
         if "so there is nothing to go on with" in said[-1]:
             return said
         assert resumed.returncode == 0, said
@@ -251,7 +251,7 @@ def kill_and_go_on(lab: Lab, data: Path, victims: tuple[str, ...], seed: int) ->
 
 
 @pytest.mark.long
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize(("number", "victims"), list(enumerate(DOZEN)))
 def test_a_session_whose_processes_were_killed_comes_to_its_planned_end(
     lab: Lab, tmp_path: Path, number: int, victims: tuple[str, ...]
@@ -260,7 +260,7 @@ def test_a_session_whose_processes_were_killed_comes_to_its_planned_end(
 
 
 @pytest.mark.soak
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("victim", VICTIMS)
 @pytest.mark.parametrize("number", range(60))
 def test_sixty_kills_of_each_process(lab: Lab, tmp_path: Path, number: int, victim: str) -> None:
@@ -268,7 +268,7 @@ def test_sixty_kills_of_each_process(lab: Lab, tmp_path: Path, number: int, vict
 
 
 @pytest.mark.soak
-@pytest.mark.timeout(300)
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("pair", PAIRS, ids="-".join)
 @pytest.mark.parametrize("number", range(3))
 def test_thirty_kills_of_two_processes(

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from needs import needs
 
 from labcrane.streams.network import LOOPBACK
 from labcrane.streams.search import PORTS
@@ -16,11 +17,7 @@ HERE = Path(__file__).parent
 OUTLETS = {"session or page": 7, "feedback.process": 2, "recorder.process": 0}
 """Streams that one process of a kind sends: the session 6, and the gateway's flow."""
 
-needs_network = pytest.mark.skipif(
-    not sys.platform.startswith("linux")
-    or subprocess.run([*NETWORK, "true"], capture_output=True, check=False).returncode != 0,
-    reason="needs a network namespace of its own (Debian package util-linux, user namespaces)",
-)
+needs_network = needs("networks")
 
 
 def begun(folder: Path, times: int) -> list[dict]:

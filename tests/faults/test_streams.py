@@ -74,7 +74,7 @@ class Conversation:
             self.said.append(line.strip())
 
     def until(self, words: str, times: int = 1) -> None:
-        wait_for(lambda: sum(words in line for line in self.said) >= times, patience_s=40.0)
+        wait_for(lambda: sum(words in line for line in self.said) >= times)
 
     def order(self, words: str) -> None:
         self.process.stdin.write(words + "\n")

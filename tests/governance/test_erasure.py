@@ -1,5 +1,6 @@
 """What erasing leaves, what it does not touch, and what a kill does to it."""
 
+import csv
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,8 @@ from governed import TODAY, Lab
 
 from labcrane import ProtocolError
 from labcrane.participants import recovery as unfinished
+from labcrane.participants.copies import _rows_without
+from labcrane.participants.mentions import Mentions
 from labcrane.participants.register import read
 
 
@@ -106,3 +109,14 @@ def test_another_commands_call_finishes_an_erasure_as_well(lab: Lab) -> None:
         lab.consent("P009")
     unfinished.move(lab.places, store_of(lab))
     check_erased(lab)
+
+
+@pytest.mark.parametrize("long", [131_000, 200_000, 2_000_000])
+def test_a_table_with_a_cell_of_any_length_is_edited_row_by_row(long: int) -> None:
+    """A note, or what a session says of its study, may be longer than csv takes by itself."""
+    mentions, limit = Mentions(["P001", "P002"]), csv.field_size_limit()
+    rows = ['P001,"' + "a" * long + '"\n', 'P002,"' + "b,\n" * (long // 3) + '"\n']
+    assert _rows_without("who,said\n" + "".join(rows), ",", "P001", mentions) == (
+        "who,said\n" + rows[1]
+    )
+    assert csv.field_size_limit() == limit

@@ -30,7 +30,9 @@ for _ in sys.stdin:
     ends = time.perf_counter() + spell
     with socket.create_connection(("127.0.0.1", port)) as silent:
         silent.sendall(request)
-        opened = sum(gets_in() for _ in range(times))
+        opened = 0
+        while opened < times:  # the door lets in so many a second
+            opened += gets_in()
         time.sleep(max(0.0, ends - time.perf_counter()))
     sys.stdout.write(f"{opened}\n")
     sys.stdout.flush()

@@ -15,7 +15,7 @@ from pages.room import STUDY, Room, a_room
 from labcrane import open_recording
 from labcrane.session.commands import Order
 
-RECONNECTS = 200
+RECONNECTS = 60
 
 NOBODYS = (Order.DENIED,)
 """What pages say of themselves, and nobody may order."""

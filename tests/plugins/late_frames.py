@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 
-from labcrane import Sphere
+from labcrane.core import Sphere
 from labcrane.testing import TARGETS, ch8, make_run, make_target
 from labcrane_view.settings import ViewSettings
 from labcrane_view.view import View

@@ -6,7 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from labcrane import Phase, ProtocolError, Task
+from labcrane import ProtocolError, Task
+from labcrane.core import Phase
 from labcrane.machines import reach
 from labcrane.machines.library import load_machine
 from labcrane.testing import TaskContract, ch8, crane_at, make_frame, make_run, make_trial, opened

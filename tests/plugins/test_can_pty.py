@@ -141,8 +141,8 @@ def session(folder: Path, controls: str, panel: Panel) -> list:
             frames.append((frame.tick.woke, command, frame.paused, frame.events))
             panel.watch(frame, command)
 
-        course = Sequencer(study, plan, rig, waits=False)
-        loop.run(rig, run, course, SystemClock(), PanelConsole(panel), NoLog(), [keep])
+        sequencer = Sequencer(study, plan, rig, waits=False)
+        loop.run(rig, run, sequencer, SystemClock(), PanelConsole(panel), NoLog(), [keep])
     return frames
 
 

@@ -270,6 +270,42 @@ def test_the_commands_leave_model_tables_and_figures(tmp_path: Path, capsys) -> 
         save(labcrane_dmd.load(Path(arm)), tmp_path / "no folder" / "arm.yaml")
 
 
+def test_the_command_fits_other_grids_as_a_line_through_two_sets_of_speeds(
+    tmp_path: Path,
+) -> None:
+    arm = tmp_path / "arm.yaml"
+    grid = ["--levels", "120,250", "--validation", "160,200,220", "--edge", ""]
+    assert main(["dmd", "fit", str(FOLDER), "--out", str(arm), *grid]) == 0
+    model = labcrane_dmd.load(arm)
+    assert model.settings.levels == (120, 250)
+    boom = model["boom"]
+    angle = sum(boom.limits) / 2.0
+    low, high = boom.speed(120, angle), boom.speed(250, angle)
+    assert low != high
+    for signal in (130, 185, 240):
+        line = low + (signal - 120) / 130 * (high - low)
+        assert boom.speed(signal, angle) == pytest.approx(line, rel=1e-9)
+    assert main(["dmd", "validate", str(arm), str(FOLDER), "--out", str(tmp_path / "out")]) == 0
+    table = pd.read_csv(tmp_path / "out" / "validation.csv")
+    assert sorted(table["signal"].abs().unique()) == [160, 200, 220]
+
+
+@pytest.mark.parametrize(
+    ("words", "refused"),
+    [
+        (("--levels", "40;80"), "--levels '40;80' is no list of signals; write whole numbers"),
+        (("--levels", "-40,80"), "--levels has -40; write sizes above 0, each is used in both"),
+        (("--levels", ""), "a model needs at least one level; write the signals of its layers"),
+        (("--validation", "20,80"), "signal 80 is to validate the model and to be fitted; leave"),
+    ],
+)
+def test_grids_that_make_no_sense_are_refused_in_words(
+    words: tuple[str, str], refused: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["dmd", "fit", str(FOLDER), "--out", str(tmp_path / "arm.yaml"), *words]) == 2
+    assert refused in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("words", "refused"),
     [

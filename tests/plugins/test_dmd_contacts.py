@@ -10,7 +10,8 @@ import pytest
 from cranes import needs_bullet
 from rehearsal import Rehearsal, rehearse
 
-from labcrane import FloatArray, Frame, InputDevice, Phase, Run, Signal, Tick
+from labcrane import FloatArray, Frame, InputDevice, Run, Signal, Tick
+from labcrane.core import Phase
 from labcrane.machines import reach
 from labcrane.machines.library import load_machine
 from labcrane.protocol.rig import Rig

@@ -2,7 +2,7 @@
 
 import pytest
 
-from labcrane import Exporter
+from labcrane.analysis import Exporter
 from labcrane.registry.registry import discover
 from labcrane.testing import ExporterContract, ch8
 

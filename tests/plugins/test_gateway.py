@@ -72,14 +72,14 @@ def test_a_program_written_from_the_documentation_drives_the_arm(tmp_path: Path)
         with rig.opened(study, plan.seed) as run:
             arm = run.state.index("joint.angle.arm")
             signal = run.command.find("valve.signal")
-            course = Sequencer(study, plan, rig, waits=False)
+            sequencer = Sequencer(study, plan, rig, waits=False)
 
             def keep(frame):
                 moved = frame.state[arm], frame.command[signal].tolist()
                 seen.append((frame.tick.woke, frame.paused, *moved, frame.events))
 
             console = ScriptedConsole({240 * 10: [Command(Order.END)]})
-            loop.run(rig, run, course, SystemClock(), console, NoLog(), [keep])
+            loop.run(rig, run, sequencer, SystemClock(), console, NoLog(), [keep])
         output, _ = program.communicate(timeout=240)
     finally:
         program.kill()

@@ -80,7 +80,7 @@ def a_view_that_sends(
     desk = Desk(view, **settings)
     try:
         keys = desk.keyboard._keys
-        wait_for(lambda: keys.connected or keys.complaint, patience_s=10.0)
+        wait_for(lambda: keys.connected or keys.complaint)
         yield desk, outlet
     finally:
         desk.keyboard.close()

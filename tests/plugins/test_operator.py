@@ -7,7 +7,8 @@ import pytest
 from ideal_crane import IdealCrane
 from operator_loop import DISTANCES, RADIUS, SCHEMES, Loop, ends
 
-from labcrane import InputDevice, Phase, PlannedTrial, Trial
+from labcrane import InputDevice, Trial
+from labcrane.core import Phase, PlannedTrial
 from labcrane.machines import ACTUATOR_PRESETS
 from labcrane.machines.library import load_machine
 from labcrane.testing import RATE_HZ, InputContract, ch8

@@ -51,6 +51,9 @@ def session(data: Path) -> SessionRecord:
 def test_all_six_scenarios_are_run_through_in_the_reference_and_in_the_block(session) -> None:
     trials = session.trials
     assert set(trials["outcome"]) == {"success"}
+    learnt = session.events[session.events["name"] == "practice.end"]["data"].iloc[0]
+    assert (learnt["met"], learnt["wanted"]) == (True, 4)
+    trials = trials[trials["practice"] == 0]
     for _, stage in trials.groupby("block"):
         assert sorted(stage["scenario"]) == sorted(SCENES)
     assert len(SCENES) == 6
@@ -111,10 +114,12 @@ def test_the_study_can_be_scored(data: Path, session, tmp_path: Path) -> None:
     head, *rows = load_workbook(workbook)["Tests"].iter_rows(values_only=True)
     tests = [dict(zip(head, row, strict=True)) for row in rows]
     trials = session.trials
+    trials = trials[trials["practice"] == 0]
     reference = trials["reference"] == 1.0
     assert [test["scenario"] for test in tests] == list(trials["scenario"][~reference])
-    t_ref = trials["time"][reference].mean()
+    own = trials[reference].groupby("scenario")["time"].mean()
     for test, seconds in zip(tests, trials["time"][~reference], strict=True):
+        t_ref = own[test["scenario"]]
         assert test["reference_s"] == pytest.approx(t_ref)
         assert test["duration_s"] == pytest.approx(seconds)
         assert test["points duration"] == pytest.approx(20.0 * min(1.0, t_ref / seconds))

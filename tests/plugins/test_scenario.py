@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labcrane import Event, InputDevice, Phase, PlannedTrial, ProtocolError, Signal, Task
+from labcrane import InputDevice, ProtocolError, Signal, Task
+from labcrane.core import Event, Phase, PlannedTrial
 from labcrane.machines import load_scene, place_objects
 from labcrane.testing import (
     InputContract,

@@ -26,7 +26,8 @@ def recorded(tmp_path: Path) -> Path:
     shutil.copytree(RETRIEVAL, study)
     text = (study / "protocol.yaml").read_text(encoding="utf-8")
     for line in text.splitlines():
-        if (line.startswith("    - scenes/") and "touch" not in line) or "reference:" in line:
+        stage = "- reference:" in line or "- practice:" in line
+        if (line.startswith("    - scenes/") and "touch" not in line) or stage:
             text = text.replace(line + "\n", "")
     (study / "protocol.yaml").write_text(text, encoding="utf-8")
     visit = Visit(

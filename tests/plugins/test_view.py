@@ -23,8 +23,8 @@ from windows import (
     shown,
 )
 
-from labcrane import DeviceError, Feedback, ProtocolError, Sphere
-from labcrane.core import SessionState
+from labcrane import DeviceError, Feedback, ProtocolError
+from labcrane.core import SessionState, Sphere
 from labcrane.machines.kinematics import Arm
 from labcrane.testing import FeedbackContract, crane_at
 from labcrane_view.monitors import parse

@@ -5,8 +5,8 @@ import pytest
 from pydantic import ValidationError
 from windows import MACHINE, SIZE, a_view, make_frame, projected, shown
 
-from labcrane import DeviceError, Frame, Sphere
-from labcrane.core import SessionState
+from labcrane import DeviceError, Frame
+from labcrane.core import SessionState, Sphere
 from labcrane_view.hud import notice
 from labcrane_view.settings import CAMERAS, CameraSettings
 

@@ -105,6 +105,16 @@ def test_a_mesh_is_the_same_in_every_format(name: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1.0, atol=1e-6)
 
 
+@pytest.mark.parametrize("broken", ["v 1e999 0 0", "vn 0 1e9990 1"])
+def test_a_mesh_with_what_is_no_number_is_refused_in_words(broken: str, tmp_path: Path) -> None:
+    path = tmp_path / "broken.obj"
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+    more = "v 0 0 1\n" if broken.startswith("vn") else "vn 0 0 1\n"
+    path.write_text(f"{corners}{more}{broken}\nf 1//1 2//1 3//1\nf 1//1 2//1 4//1\n")
+    with pytest.raises(DeviceError, match=r"broken\.obj' has points or normals that are no finite"):
+        read_mesh(MeshFile(file=path))
+
+
 def test_a_mesh_is_scaled_turned_and_put_in_its_place(tmp_path: Path) -> None:
     asked = MeshFile(
         file=written(tmp_path, "a.stl"), scale=0.1, turn_deg=(90, 0, 90), position=(1, 2, 3)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from labcrane import Event
+from labcrane.core import Event
 from labcrane.recording.journal import Column, SessionJournal
 
 COLUMNS = (

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labcrane import Event, PluginError, RecordingError
+from labcrane import PluginError, RecordingError
+from labcrane.core import Event
 from labcrane.recording.journal import Column, SessionJournal, event_text
 from labcrane.recording.journal_reader import UNREADABLE, read_journal
 from labcrane.recording.xdf.header import Channel, StreamHeader

@@ -1,6 +1,7 @@
 """Recordings of protocols that would be refused today: read, replayed, exported, gone on with."""
 
 import random
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +9,9 @@ from pathlib import Path
 import pytest
 from recording.test_before import BEFORE, labcrane_command
 
-from labcrane import ProtocolError
+from labcrane import ProtocolError, open_recording
+from labcrane.analysis.movements import machine_of
+from labcrane.machines.library import find_machine
 from labcrane.protocol.study import Study, load
 from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
@@ -172,3 +175,28 @@ def test_a_participant_whose_name_was_allowed_is_gone_on_with(tmp_path: Path, na
     folder = visit.folder
     folder.path.mkdir(parents=True)
     folder.make()  # it is there, so it was made before
+
+
+def test_a_record_of_a_machine_whose_meshes_are_gone_is_read_as_before(tmp_path: Path) -> None:
+    """Only those who draw it need them; who reads the record is on another computer."""
+    lab = tmp_path / "lab"
+    lab.mkdir()
+    (lab / "foot.stl").write_text("solid foot")
+    crane = find_machine("ch8").read_text().replace("joints:", "base_mesh: foot.stl\njoints:", 1)
+    (lab / "crane.yaml").write_text(crane)
+    path = lab / "study.yaml"
+    path.write_text(
+        (BEFORE / "protocol.yaml").read_text().replace("machine: ch8", "machine: crane.yaml")
+    )
+    study = load(path, discover(study=path))
+    visit = Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=True)
+    record(visit, Ended(-1))
+    finish(visit)
+    shutil.rmtree(lab)
+    file = visit.folder.participant_file
+    assert machine_of(open_recording(file).session(1)).names == study.machine.names
+    assert "every number the same bit for bit" in labcrane_command("replay", file)
+    out = tmp_path / "tables"
+    words = ("--to", "tables", "--out", out, "--include", "simulated")
+    labcrane_command("export", visit.data, *words)
+    assert (out / "trials.csv").is_file()

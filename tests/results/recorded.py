@@ -71,11 +71,11 @@ def record(
     rig = Rig.build(the_study, simulated=True)
     clock = ManualClock(start=100.0)
     with rig.opened(the_study, plan.seed) as run:
-        course = Sequencer(the_study, plan, rig, waits=False)
+        sequencer = Sequencer(the_study, plan, rig, waits=False)
         with SessionJournal(visit.journal, columns(run), run.rate_hz) as journal:
             log = FrameLog(journal, run)
             log.note(Event("session.start", clock.now(), context(visit, plan, rig, run)))
-            loop.run(rig, run, course, clock, ScriptedConsole(orders), log, [])
+            loop.run(rig, run, sequencer, clock, ScriptedConsole(orders), log, [])
     journals = [visit.journal]
     if gaze:
         journals.append(_gaze(visit.streams_journal, clock.now()))

@@ -7,9 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from labcrane.analysis.report.report import anova_table, trend_table
-from labcrane.analysis.statistics.anova import greenhouse_geisser, repeated_measures
+from labcrane.analysis.report import outcomes
+from labcrane.analysis.report.factors import factors_of, with_factors
+from labcrane.analysis.statistics.anova import analyse, greenhouse_geisser
 from labcrane.analysis.statistics.reported import Reported, check_reported
+from labcrane.analysis.statistics.time_outs import median_time
 from labcrane.analysis.statistics.trends import holm, linear_trend, mixed_model
 from results.consumers import needs_r, r, table
 from results.synthetic import cohort_of_36
@@ -36,6 +38,16 @@ mm <- lmer(log(movement_time) ~ s + b + far_side + (1 + s | participant), d, REM
            control = lmerControl(optCtrl = list(ftol_abs = 1e-12, xtol_abs = 1e-12)))
 say("fixed", fixef(mm)); say("se", sqrt(diag(as.matrix(vcov(mm))))); say("sigma", sigma(mm))
 """
+
+
+def anova_table(movements: pd.DataFrame) -> pd.DataFrame:
+    table = with_factors(movements)
+    return outcomes.anova_table(table, factors_of(table))
+
+
+def trend_table(movements: pd.DataFrame) -> pd.DataFrame:
+    table = with_factors(movements)
+    return outcomes.trend_table(table, factors_of(table))
 
 
 @pytest.fixture(scope="module")
@@ -111,15 +123,14 @@ def test_epsilon_is_1_under_sphericity_and_least_for_one_varying_level() -> None
 
 def test_who_lacks_a_level_is_left_out_of_the_test_by_name(movements: pd.DataFrame) -> None:
     gone = (movements["participant"] == "P004") & (movements["sequence"] == 3)
-    test = repeated_measures(movements[~gone], "movement_time", "sequence")
-    assert test is not None
+    (test,) = analyse(movements[~gone], "movement_time", ["sequence"])
     assert (test.n, test.left_out) == (35, ("P004",))
     assert mixed_model(movements[~gone], "movement_time").participants == 36
 
 
 def test_two_participants_are_not_tested(movements: pd.DataFrame) -> None:
     two = movements[movements["participant"] <= "P002"]
-    assert repeated_measures(two, "movement_time", "sequence") is None
+    assert analyse(two, "movement_time", ["sequence"]) == []
     assert linear_trend(two, "movement_time") is None
     assert mixed_model(two, "movement_time") is None
     assert anova_table(two).empty
@@ -128,3 +139,37 @@ def test_two_participants_are_not_tested(movements: pd.DataFrame) -> None:
 
 def test_a_test_that_was_not_made_is_not_corrected_for() -> None:
     assert holm([0.02, math.nan]) == pytest.approx([0.02, math.nan], nan_ok=True)
+
+
+MEDIANS = """
+library(survival)
+d <- read.csv(commandArgs(TRUE)[1])
+m <- sapply(split(d, d$set), function(x)
+  summary(survfit(Surv(seconds, finished) ~ 1, x))$table["median"])
+for (i in seq_along(m)) cat(i - 1, sprintf("%.17g", m[i]), sep = "|", fill = 1000)
+"""
+
+
+@needs_r
+def test_medians_with_time_outs_are_those_of_survival(tmp_path: Path) -> None:
+    rng = np.random.default_rng(41)
+    tables = []
+    for number in range(60):
+        n = int(rng.integers(1, 12))
+        seconds = np.round(rng.uniform(1.0, 6.0, n), 1)
+        finished = (rng.uniform(size=n) < rng.uniform(0.3, 1.0)).astype(float)
+        tables.append(pd.DataFrame({"set": number, "seconds": seconds, "finished": finished}))
+    pd.concat(tables).to_csv(tmp_path / "times.csv", index=False)
+    theirs = table(r(MEDIANS, tmp_path / "times.csv"))
+    for number, own in enumerate(tables):
+        ours = median_time(own["seconds"].to_numpy(), own["finished"].to_numpy())
+        value = theirs[str(number)][0]
+        expected = np.nan if value == "NA" else float(value)
+        assert ours == pytest.approx(expected, nan_ok=True), own
+
+
+def test_half_of_what_was_given_up_has_no_median_and_ten_per_cent_shifts_it() -> None:
+    times = np.array([1.0, 2.0, 3.0, 4.0, 9.0, 9.0, 9.0, 9.0, 9.0])
+    assert np.isnan(median_time(times, np.array([1.0] * 4 + [0.0] * 5)))
+    assert median_time(np.arange(1.0, 6.0), np.array([1.0, 1.0, 1.0, 1.0, 0.0])) == 3.0
+    assert np.isnan(median_time(np.ones(3), np.zeros(3)))

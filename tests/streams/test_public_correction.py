@@ -1,5 +1,7 @@
 """The correction as others use it: on plain arrays, and on anybody's XDF file."""
 
+import re
+import struct
 from pathlib import Path
 
 import h5py
@@ -11,8 +13,6 @@ from streams.unkind import Clock, probes, regular
 from labcrane.cli.app import main
 from labcrane.clocks import correct
 from labcrane.errors import RecordingError
-from labcrane.recording.xdf.header import Channel, StreamHeader
-from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.streams.sync.correction import Treatment
 from labcrane.streams.sync.correction import correct as correct_raw
 from labcrane.streams.sync.pool import pooled
@@ -94,18 +94,75 @@ def test_clocks_that_differ_are_not_pooled_whatever_their_host_is_called(
         assert raw.probes is alone.probes
 
 
-def as_labrecorder_writes(path: Path, random: np.random.Generator) -> np.ndarray:
-    """Write a stream with the offsets that LabRecorder notes; return its true times."""
-    times = 100.0 + np.arange(30_000) / 250.0
+def chunk(tag: int, content: bytes) -> bytes:
+    """Return a chunk of XDF 1.0, with its length in as few bytes as it needs, as LabRecorder."""
+    return varlen(len(content) + 2) + struct.pack("<H", tag) + content
+
+
+def varlen(number: int) -> bytes:
+    short = number < 256
+    return struct.pack("<BB", 1, number) if short else struct.pack("<BI", 4, number)
+
+
+def as_labrecorder_writes(path: Path, random: np.random.Generator) -> dict[str, np.ndarray]:
+    """Write an amplifier and markers byte for byte as LabRecorder 1.16 does; return true times.
+
+    Nothing of it is by our writer: boundaries, stamps left out where they follow from the rate,
+    offsets every 5 s paired with the time of asking, footers with the offsets again.
+    """
+    times = {
+        "EEG": 100.0 + np.arange(30_000) / 250.0,
+        "Markers": np.sort(random.uniform(101, 219, 60)),
+    }
     clock = SourceClock(ppm=100.0)
-    header = StreamHeader("EEG", "EEG", (Channel("Cz"),), rate_hz=250.0, source_id="amp")
     shown = probe(clock, 100.3, 221.0, random, every=2.0)
-    with XdfWriter(path) as writer:
-        stream = writer.add_stream(header)
-        writer.write_samples(stream, clock(times), np.zeros((len(times), 1)))
-        for now in np.arange(102.0, 220.0, 5.0):
-            offset = shown[np.searchsorted(shown[:, 3], now) - 1, 1]
-            writer.write_offset(stream, now - offset, offset)
+    with path.open("wb") as file:
+        file.write(b"XDF:" + chunk(1, b"<?xml version='1.0'?><info><version>1.0</version></info>"))
+        for number, (name, form, rate) in enumerate(
+            [("EEG", "float32", 250.0), ("Markers", "string", 0.0)], 1
+        ):
+            text = (
+                f"<?xml version='1.0'?><info><name>{name}</name><type>{name}</type>"
+                f"<channel_count>1</channel_count><nominal_srate>{rate}</nominal_srate>"
+                f"<channel_format>{form}</channel_format><source_id>{name}-7</source_id>"
+                "<version>1.1</version><created_at>1.5</created_at><uid>a-b</uid>"
+                "<session_id>default</session_id><hostname>amp-pc</hostname>"
+                "<v4address /><v4data_port>16573</v4data_port>"
+                "<v4service_port>16573</v4service_port>"
+                "<v6address /><v6data_port>0</v6data_port><v6service_port>0</v6service_port>"
+                "<desc /></info>"
+            )
+            file.write(chunk(2, struct.pack("<I", number) + text.encode()))
+        footers: dict[int, str] = {1: "", 2: ""}
+        for begin in np.arange(100.0, 222.0, 0.5):  # LabRecorder pulls every half second
+            for number, name in enumerate(times, 1):
+                here = times[name][(times[name] >= begin) & (times[name] < begin + 0.5)]
+                body, last = b"", None
+                for at in clock(here):
+                    deduced = number == 1 and last is not None and abs(at - last - 0.004) < 1e-9
+                    body += b"\0" if deduced else struct.pack("<Bd", 8, at)
+                    body += struct.pack("<f", 1.0) if number == 1 else varlen(2) + b"go"
+                    last = at
+                if len(here):
+                    head = struct.pack("<IBI", number, 4, len(here))
+                    file.write(chunk(3, head + body))
+                if begin % 5.0 == 2.0:
+                    offset = shown[np.searchsorted(shown[:, 3], begin) - 1, 1]
+                    file.write(chunk(4, struct.pack("<Idd", number, begin - offset, offset)))
+                    footers[number] += (
+                        f"<offset><time>{begin - offset}</time><value>{offset}</value></offset>"
+                    )
+            if begin % 10.0 == 0.0:
+                file.write(chunk(5, bytes.fromhex("43a546dccbf5410fb30ed5467383cbe4")))
+        for number, name in enumerate(times, 1):
+            first, last = clock(times[name][[0, -1]])
+            text = (
+                f"<?xml version='1.0'?><info><first_timestamp>{first}</first_timestamp>"
+                f"<last_timestamp>{last}</last_timestamp>"
+                f"<sample_count>{len(times[name])}</sample_count>"
+                f"<clock_offsets>{footers[number]}</clock_offsets></info>"
+            )
+            file.write(chunk(6, struct.pack("<I", number) + text.encode()))
     return times
 
 
@@ -120,9 +177,24 @@ def test_an_xdf_file_of_labrecorder_is_corrected_and_certified(
     assert "EEG: pyxdf's times are" in said
     assert path.read_bytes() == before
     with h5py.File(tmp_path / "others_resync.h5") as file:
-        error = np.abs(file["EEG/time"][:] - times)
-        assert (error <= file["EEG/time_error"][:]).all()
-        assert np.quantile(error, 0.95) < 1.5e-4
+        for name, true in times.items():
+            error = np.abs(file[f"{name}/time"][:] - true)
+            assert (error <= file[f"{name}/time_error"][:]).all()
+            assert np.quantile(error, 0.95) < 1.5e-4
+
+
+def test_what_of_an_xdf_file_could_not_be_read_is_told(
+    tmp_path: Path, random: np.random.Generator, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "others.xdf"
+    as_labrecorder_writes(path, random)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(len(whole) * random.uniform(0.4, 0.8))])
+    assert main(["resync", str(path)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert re.search(
+        r"others.xdf: its last \d+ bytes are no whole chunk of XDF and were left", said
+    )
 
 
 def test_an_xdf_file_that_is_not_there_is_told(

@@ -126,6 +126,18 @@ def shortcomings(one: Score) -> list[str]:
     return found
 
 
+def table_line(found: list[Score]) -> str:
+    """Return a row's line of the table in docs/accuracy.md. Milliseconds."""
+    error = np.mean([one.p95 for one in found])
+    usual = np.mean([one.usual for one in found])
+    return (
+        f"| {found[0].row} | {error:.3f} ({max(one.p95 for one in found):.3f}) | "
+        f"{np.median([one.width for one in found]):.3f} | "
+        f"{100.0 * min(one.cover for one in found):.1f} % | {usual:.3g} | "
+        f"{sum(one.passed for one in found)} of {len(found)} |"
+    )
+
+
 def worse_rows(scores: list[Score]) -> list[str]:
     """Return the rows whose error is larger than pyxdf's over all draws, nothing left out."""
     return [

@@ -119,6 +119,37 @@ def bad_wireless(random):
     )  # fmt: skip
 
 
+def own_slewed(random, *, logged):
+    """NTP turns the recorder's own clock for a minute; on Linux its recorder logs that."""
+    begin = START + random.uniform(50, 120)
+    rate = random.choice([-1, 1]) * random.uniform(300e-6, 500e-6)
+    end = begin + random.uniform(30, 90)
+
+    def ours(t):
+        return t + rate * (np.clip(t, begin, end) - begin)
+
+    drawn = received(random, Clock(random), regular(random, 250.0), 250.0)
+    given = drawn.raw
+    middle, local = given.probes[:, 0] + given.probes[:, 1], given.probes[:, 3]
+    trip = given.probes[:, 2]
+    shown = np.column_stack(
+        [
+            given.probes[:, 0],
+            (ours(middle - trip / 2) + ours(middle + trip / 2)) / 2 - given.probes[:, 0],
+            ours(middle + trip / 2) - ours(middle - trip / 2),
+            ours(local),
+        ]
+    )
+    came = np.column_stack([given.arrivals[:, 0], ours(given.arrivals[:, 1])])
+    read = np.sort(START + random.uniform(-1.0, drawn.truth[-1] - START + 1.0, 4 * len(local)))
+    read = read[np.r_[True, np.diff(read) > 0.05]]
+    crystal = random.uniform(-3e-5, 3e-5)
+    seen = read + random.exponential(2e-7, len(read))
+    log = np.column_stack([ours(read), 3e5 + seen * (1 + crystal)]) if logged else None
+    raw = RawStream.of(given.stamps, shown, came, own=log)
+    return replace(drawn, raw=raw, truth=ours(drawn.truth), faults=frozenset({Fault.SLEWED}))
+
+
 def together(random):
     """A fault of the clock, one of the samples and one of the way, each there or not."""
     clock, faults = Clock(random), set()
@@ -173,6 +204,8 @@ MORE: dict[str, Callable] = {
     "samples of bursts stamped one by one": one_by_one,
     "two or three faults at once": together,
     "wireless that comes and goes": bad_wireless,
+    "our own clock slewed, logged": lambda r: own_slewed(r, logged=True),
+    "our own clock slewed, not logged": lambda r: own_slewed(r, logged=False),
     "small steps of its clock": lambda r: stepping(r, 5e-3, 5e-2, 1, faults=STEPPED),
     "steps too small to tell": lambda r: stepping(r, 5e-4, 5e-3, 3, clean=False, perhaps=EITHER),
     "steps again and again": lambda r: stepping(r, 0.05, 5.0, 8, faults=STEPPED),

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 WORDS = {
     "movement_time": "movement time (s)",
+    "circle_to_circle": "time from circle to circle (s)",
     "absolute_error": "distance from the target's centre (m)",
     "simultaneous": "time with two or more axes (fraction)",
     "bimanual": "time with both sticks (fraction)",
@@ -64,17 +65,32 @@ def over(movements: "pd.DataFrame", measure: str, by: list[str]) -> "pd.DataFram
 
 
 def by_sequence(movements: "pd.DataFrame", measure: str) -> Drawing:
-    """Draw a measure over the sequence: everybody thin, the mean thick."""
+    """Draw a measure over the sequence: everybody thin, the mean of each group thick."""
     figure, (axes,) = new_figure()
     each = movements.groupby(["participant", "sequence"])[measure].mean().unstack(level=0)
     axes.plot(each.index, each, color="0.75", lw=0.8)
-    table = over(movements, measure, ["sequence"])
-    _with_ci(axes, table["sequence"], table, "C0", "mean")
+    groups = movements["group"].nunique() > 1 if "group" in movements else False
+    by = ["group", "sequence"] if groups else ["sequence"]
+    table = over(movements, measure, by)
+    for number, (name, part) in enumerate(table.groupby("group") if groups else [("mean", table)]):
+        for at, own in enumerate(_by_phase(movements, part)):
+            label = str(name) if at == 0 else "_"
+            _with_ci(axes, own["sequence"], own, f"C{number}", label)
+    if groups:
+        axes.legend(title="group", fontsize="small")
     axes.set(xlabel="position in the sequence", ylabel=WORDS.get(measure, measure))
     caption = (
         f"{WORDS.get(measure, measure)} over the sequence; mean with 95 % CI, each participant"
     )
     return Drawing(f"{measure}_by_sequence", caption, figure, table)
+
+
+def _by_phase(movements: "pd.DataFrame", table: "pd.DataFrame") -> "list[pd.DataFrame]":
+    """Return a table cut where a session or block ends: no line leads from one into the next."""
+    if "phase" not in movements:
+        return [table]
+    phases = movements.groupby("sequence")["phase"].first()
+    return [part for _, part in table.groupby(table["sequence"].map(phases))]
 
 
 def by_distance(movements: "pd.DataFrame") -> Drawing:
@@ -136,17 +152,24 @@ def _line(who: str, x: "pd.Series[float]", y: "pd.Series[float]") -> dict[str, o
 
 
 def learning(movements: "pd.DataFrame", curves: "pd.DataFrame", measure: str) -> Drawing:
-    """Draw participants' means and the better of both learning curves for each."""
+    """Draw participants' means and the better of both learning curves for each.
+
+    Curves count from the first position of their session or block.
+    """
     figure, (axes,) = new_figure()
     better = curves[(curves["measure"] == measure) & (curves["better"] == "yes")]
-    for number, row in enumerate(better.itertuples(index=False)):
+    people = {name: number for number, name in enumerate(better["participant"].unique())}
+    for row in better.itertuples(index=False):
         own = movements[movements["participant"] == row.participant]
+        if "phase" in better:
+            own = own[own["phase"] == row.phase]
         means = own.groupby("sequence")[measure].mean()
-        color = f"C{number % 10}"
+        color = f"C{people[row.participant] % 10}"
         axes.plot(means.index, means, ".", color=color, ms=4)
-        n = np.linspace(1, float(means.index.max()), 100)
+        before = float((own["sequence"] - own["place"]).iloc[0]) if "place" in own else 0.0
+        n = np.linspace(1, float(means.index.max()) - before, 100)
         curve: Callable[..., np.ndarray] = CURVES[str(row.curve)]
-        axes.plot(n, curve(n, row.asymptote, row.gain, row.rate), color=color, lw=0.8)
+        axes.plot(n + before, curve(n, row.asymptote, row.gain, row.rate), color=color, lw=0.8)
     axes.set(xlabel="position in the sequence", ylabel=WORDS.get(measure, measure))
     return Drawing(f"learning_{measure}", "learning curves, one per participant", figure, curves)
 

@@ -62,6 +62,11 @@ class Page:
         cut = f", first {MOST_ROWS} of {len(table)} rows here" if len(table) > MOST_ROWS else ""
         self._body.append(f'<p><a href="{self._up}{where}">{where}</a>{cut}</p>')
 
+    def text(self, name: str, text: str) -> None:
+        """Write a text beside the page, and link to it."""
+        (self._root / name).write_text(text, encoding="utf-8")
+        self.links({name: f"{self._up}{name}"})
+
     def draw(self, drawing: Drawing) -> None:
         """Add a figure, and write it as SVG and PNG, and its table as CSV."""
         folder = self._root / "figures"

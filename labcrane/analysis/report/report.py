@@ -1,7 +1,6 @@
 """The report of a study: one page, one page per participant, figures and tables."""
 
-from collections.abc import Callable
-from dataclasses import asdict
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,20 +9,29 @@ from labcrane.analysis.cohort import Cohort, Participant, Status
 from labcrane.analysis.measures import DEFAULTS, MEASURES, MeasureSettings, measures_of
 from labcrane.analysis.parallel import work
 from labcrane.analysis.quality import exclusions, is_result, loop_quality, sync_quality
-from labcrane.analysis.report import figures
+from labcrane.analysis.questionnaires import answers_of, scores_of
+from labcrane.analysis.report import figures, outcomes
+from labcrane.analysis.report.factors import (
+    GROUP,
+    PLACE,
+    Factors,
+    factors_of,
+    running,
+    with_factors,
+)
 from labcrane.analysis.report.html import Page
-from labcrane.analysis.statistics.anova import repeated_measures
+from labcrane.analysis.report.outcomes import PRIMARY, measures_in
+from labcrane.analysis.report.sample import in_words, sample
+from labcrane.analysis.report.words import STYLES, Results, paragraphs
 from labcrane.analysis.statistics.fitts import throughput
 from labcrane.analysis.statistics.learning import learning_curves
-from labcrane.analysis.statistics.trends import holm, linear_trend, mixed_model
+from labcrane.analysis.statistics.time_outs import time_outs
+from labcrane.analysis.statistics.trends import mixed_model
 from labcrane.errors import LabcraneError
 from labcrane.recording.participant_file.writer import DAMAGED
 
 if TYPE_CHECKING:
     import pandas as pd
-
-PRIMARY = ("movement_time", "absolute_error")
-"""What is tested; their trends share one Holm correction."""
 
 SHOWN = ("movement_time", "absolute_error", "path_ratio", "sub_movements", "sparc", "ldlj")
 
@@ -67,16 +75,20 @@ def write_report(
         if progress is not None:
             progress(len(found), len(cohort.included))
     in_order = [found[participant.name] for participant in cohort.included]
-    movements, loops, syncs = zip(*in_order, strict=True)
+    movements, loops, syncs, answers, scores = zip(*in_order, strict=True)
     everything = pd.concat(movements, ignore_index=True)
     page = Page(_title(cohort.included[0]), folder / "report.html", folder)
     _stamp(page, [participant.status for participant in cohort.included])
     page.links({p.name: f"participants/{p.name}.html" for p in cohort.included})
     _who(page, cohort, everything)
-    results = everything[is_result(everything)]
-    if _is_aiming(results):
-        _movements(page, results)
-        _statistics(page, results)
+    groups = {
+        person.name: _group(own) for person, own in zip(cohort.included, movements, strict=True)
+    }
+    about = sample(_joined(answers), groups)
+    page.heading("Sample")
+    page.table("sample", about)
+    if _is_aiming(everything[is_result(everything)]):
+        _study(page, everything, _joined(scores), groups, in_words(about))
     page.heading("Loop and clocks")
     page.table("loop_quality", pd.concat(loops, ignore_index=True))
     _syncs(page, pd.concat(syncs, ignore_index=True))
@@ -87,23 +99,39 @@ def write_report(
     return page.write()
 
 
+def _joined(tables: "Sequence[pd.DataFrame]") -> "pd.DataFrame":
+    """Return tables as one; those without rows have no types to go by."""
+    import pandas as pd
+
+    filled = [table for table in tables if len(table)]
+    return pd.concat(filled, ignore_index=True) if filled else tables[0]
+
+
+def _group(own: "pd.DataFrame") -> str:
+    return str(own[GROUP].iloc[0]) if len(own) else ""
+
+
 def _one(
     participant: Participant, settings: MeasureSettings, folder: Path
-) -> "tuple[str, str, pd.DataFrame, pd.DataFrame, pd.DataFrame]":
-    """Write one participant's page; return name, movements, and quality of loop and clocks.
+) -> "tuple[str, str, *tuple[pd.DataFrame, ...]]":
+    """Write one participant's page; return name and tables.
 
-    The second is why the data cannot be used, and then the tables are empty.
+    These are movements, quality of loop and of clocks, answers and scores. The second of what is
+    returned is why the data cannot be used, and then the tables are empty.
     """
     import pandas as pd
 
     try:
         own = measures_of(participant, settings)
+        if GROUP not in own:  # trials say it where the study has groups
+            own.insert(0, GROUP, str(participant.context.get("group", "")))
+        asked = (answers_of(participant), scores_of(participant))
         loop, sync = loop_quality(participant), sync_quality(participant)
         _participant_page(participant, own, loop, sync, folder)
     except (LabcraneError, *DAMAGED) as error:  # one recording never stops a cohort
         nothing = pd.DataFrame()
-        return participant.name, _words(error), nothing, nothing, nothing
-    return participant.name, "", own, loop, sync
+        return participant.name, _words(error), *([nothing] * 5)
+    return participant.name, "", own, loop, sync, *asked
 
 
 def _words(error: Exception) -> str:
@@ -138,16 +166,54 @@ def _who(page: Page, cohort: Cohort, everything: "pd.DataFrame") -> None:
     page.table("excluded_movements", out)
 
 
+def _study(
+    page: Page,
+    everything: "pd.DataFrame",
+    scores: "pd.DataFrame",
+    groups: dict[str, str],
+    about: str,
+) -> None:
+    """Add what is only known of all together: figures, tests, and the results in words."""
+    everything = with_factors(everything)
+    factors = factors_of(everything)
+    results = everything[is_result(everything)]
+    by = [*factors.between, *factors.over_phases, "distance"]
+    counts = time_outs(everything, by)
+    page.heading("Time-outs")
+    page.say(
+        "Times from the trial's start. A mean of successes alone makes a hard condition look fast; "
+        "in the median (Kaplan and Meier) a time-out takes longer than it was allowed to."
+    )
+    page.table("time_outs", counts)
+    _movements(page, running(results, factors))
+    said = _statistics(page, everything, results, factors)
+    tests = outcomes.score_tests(scores, groups)
+    if len(scores):
+        page.heading("Questionnaires")
+        page.table("scores", outcomes.score_table(scores, groups))
+        page.table("score_tests", tests)
+    _in_words(page, Results(about, *said, scores=tests, time_outs=counts, factors=factors))
+
+
+def _in_words(page: Page, results: Results) -> None:
+    page.heading("Results in words")
+    for text in paragraphs(results, STYLES["html"]):
+        page.say(text)
+    for name in ("md", "tex"):
+        page.text(f"results.{name}", "\n\n".join(paragraphs(results, STYLES[name])) + "\n")
+
+
 def _movements(page: Page, results: "pd.DataFrame") -> None:
     import pandas as pd
 
     page.heading("Movement time and accuracy")
-    for measure in PRIMARY:
+    for measure in measures_in(results):
         page.draw(figures.by_sequence(results, measure))
     page.draw(figures.by_distance(results))
     page.table("errors", _errors(results))
     page.heading("Learning curves")
-    curves = pd.concat([learning_curves(results, measure) for measure in PRIMARY])
+    in_phase = results.assign(sequence=results[PLACE])
+    curves = pd.concat([learning_curves(in_phase, measure) for measure in PRIMARY])
     if len(curves):
         unknown = int((curves["identified"] == "no").sum())
         page.say(f"In {unknown} of {len(curves)} fits the asymptote cannot be told from the data.")
@@ -173,59 +239,63 @@ def _errors(results: "pd.DataFrame") -> "pd.DataFrame":
     ).reset_index()
 
 
-def _statistics(page: Page, results: "pd.DataFrame") -> None:
+def _statistics(
+    page: Page, everything: "pd.DataFrame", results: "pd.DataFrame", factors: Factors
+) -> "tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame, pd.DataFrame]":
+    """Add the tests; return those of effects, contrasts, trends and time scales."""
     page.heading("Statistics")
-    anovas = anova_table(results)
-    if anovas.empty:
-        page.say("Tests need three or more participants with a value at every level.")
-        return
+    varies = [factors.kind] if len(factors.phases) > 1 else []
     page.say(
-        "Repeated-measures analysis of variance over participants' means; p_gg is corrected after "
-        "Greenhouse and Geisser. It says that some positions differ, not in which direction."
+        f"Within participants: {', '.join([*varies, 'sequence', 'distance', 'far_side'])}. Groups "
+        f"between participants: {', '.join(factors.groups) or 'none'}. A sequence begins anew with "
+        "each session or block."
+    )
+    anovas = outcomes.anova_table(results, factors)
+    contrasts = outcomes.contrast_table(results, factors)
+    trends = outcomes.trend_table(results, factors)
+    scales, scales_by_group = outcomes.time_scale_tables(results, factors)
+    if anovas.empty:
+        page.say("Tests need three or more participants with a value in every cell.")
+        return anovas, contrasts, trends, scales
+    page.say(
+        "Analysis of variance over participants' means (type III); p_gg is corrected after "
+        "Greenhouse and Geisser. It says that some levels differ, not in which direction. Pairs of "
+        "circles come in another order for everybody: with pairs' means taken away, a position is "
+        "compared with what its pair takes on average."
     )
     page.table("anova", anovas)
+    if len(contrasts):
+        page.say("Differences two by two; p_holm is corrected within a factor, at one level.")
+        page.table("contrasts", contrasts)
     page.say("Linear trends over the sequence; p_holm is corrected for the two primary measures.")
-    page.table("trends", trend_table(results))
+    page.table("trends", trends)
+    page.say("Two time scales: within a session or block, and from one to the next.")
+    page.table("time_scales", scales)
+    if len(scales_by_group):
+        page.table("time_scales_by_group", scales_by_group)
+    if len(practised := outcomes.practice_table(everything, factors)):
+        page.say("Practice against what counts.")
+        page.table("practice", practised)
+    if len(looked := outcomes.gaze_table(results, factors)):
+        page.say("How long areas were looked at, before onset and during movements, in seconds.")
+        page.table("gaze", looked)
     for measure in PRIMARY:
-        model = mixed_model(results, measure)
-        if model is None:
-            page.say(f"No mixed model of {measure} could be fitted.")
-            continue
-        slopes = "with" if model.slopes else "without (the data could not carry them)"
-        page.say(
-            f"log {measure}, {model.n} movements of {model.participants} participants, {slopes} a "
-            f"slope for each participant; standard deviation over participants "
-            f"{model.participant_sd:.3g}, residual {model.residual_sd:.3g}."
-        )
-        page.table(f"mixed_model_{measure}", model.terms)
+        _mixed(page, results.assign(sequence=results[PLACE]), measure)
+    return anovas, contrasts, trends, scales
 
 
-def anova_table(results: "pd.DataFrame") -> "pd.DataFrame":
-    """Return the tests of both primary measures over sequence and distance."""
-    import pandas as pd
-
-    tests = [
-        repeated_measures(results, measure, factor)
-        for measure in PRIMARY
-        for factor in ("sequence", "distance")
-    ]
-    rows = [asdict(test) | {"left_out": " ".join(test.left_out)} for test in tests if test]
-    return pd.DataFrame(rows)
-
-
-def trend_table(results: "pd.DataFrame") -> "pd.DataFrame":
-    """Return the trends of both primary measures, corrected together."""
-    import pandas as pd
-
-    found = [trend for m in PRIMARY if (trend := linear_trend(results, m)) is not None]
-    corrected = holm([trend.p for trend in found])
-    return pd.DataFrame(
-        [
-            {**asdict(trend), "slope_low": trend.slope_ci[0], "slope_high": trend.slope_ci[1]}
-            | {"p_holm": p}
-            for trend, p in zip(found, corrected, strict=True)
-        ]
-    ).drop(columns="slope_ci", errors="ignore")
+def _mixed(page: Page, results: "pd.DataFrame", measure: str) -> None:
+    model = mixed_model(results, measure)
+    if model is None:
+        page.say(f"No mixed model of {measure} could be fitted.")
+        return
+    slopes = "with" if model.slopes else "without (the data could not carry them)"
+    page.say(
+        f"log {measure}, {model.n} movements of {model.participants} participants, {slopes} a "
+        f"slope for each participant; standard deviation over participants "
+        f"{model.participant_sd:.3g}, residual {model.residual_sd:.3g}."
+    )
+    page.table(f"mixed_model_{measure}", model.terms)
 
 
 def _syncs(page: Page, syncs: "pd.DataFrame") -> None:
@@ -256,7 +326,9 @@ def _participant_page(
     page.say(participant.why)
     results = own[is_result(own)]
     if _is_aiming(results):
-        curves = learning_curves(results, "movement_time")
+        whole = with_factors(own)
+        results = running(whole[is_result(own)], factors_of(whole))
+        curves = learning_curves(results.assign(sequence=results[PLACE]), "movement_time")
         if len(curves):
             page.draw(figures.learning(results, curves, "movement_time"))
         page.draw(figures.by_distance(results))

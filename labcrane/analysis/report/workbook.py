@@ -1,9 +1,10 @@
-"""The evaluation workbook: tests, operators, trend and advice, with totals as live formulas."""
+"""The evaluation workbook: tests, operators, trend and advice, totals as values and as formulas."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
+from statistics import fmean
 from typing import TYPE_CHECKING
 
 from labcrane.analysis.advice import Advice, familiarity, fatigue, suggest
@@ -30,6 +31,16 @@ HEAD = (
     "subjective",
     "raw",
     "percent",
+    *(f"{name} (formula)" for name in ("objective", "subjective", "raw", "percent")),
+)
+SUMMARY = (
+    "operator",
+    "tests",
+    "raw",
+    "percent",
+    "suggestion",
+    "raw (formula)",
+    "percent (formula)",
 )
 WIDTH = 14
 NO_RATING = "no rating"
@@ -44,7 +55,7 @@ def write_workbook(tests: Sequence[OperatorTest], path: Path) -> None:
     if summary is None:
         raise AssertionError("a new workbook has a sheet")
     summary.title = "Summary"
-    _fill(summary, ("operator", "tests", "raw", "percent", "suggestion"), _operators(tests))
+    _fill(summary, SUMMARY, _operators(tests))
     _fill(book.create_sheet("Tests"), HEAD, map(_row, tests, range(2, len(tests) + 2)))
     _trend(book, tests)
     _fill(
@@ -54,6 +65,18 @@ def write_workbook(tests: Sequence[OperatorTest], path: Path) -> None:
     )
     _fill(book.create_sheet("Settings"), ("operator", "session", "setting", "value"), _used(tests))
     book.save(path)
+
+
+def write_csv(tests: Sequence[OperatorTest], path: Path) -> None:
+    """Write the sheet ``Tests`` as CSV: its values, without the formulas."""
+    import csv
+
+    columns = [at for at, name in enumerate(HEAD) if not name.endswith("(formula)")]
+    rows = [_row(test, number) for number, test in enumerate(tests, start=2)]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow([HEAD[at] for at in columns])
+        writer.writerows([_safe(row[at]) for at in columns] for row in rows)
 
 
 def advice(tests: Sequence[OperatorTest]) -> Iterator[Advice]:
@@ -72,7 +95,7 @@ def _row(test: OperatorTest, number: int) -> tuple[Cell, ...]:
     points = [_number(indicator.points.get(name)) for name in COMPONENTS]
     weights = [indicator.largest.get(name) for name in COMPONENTS]
     at = {name: _letters(HEAD.index(name) + 1) + str(number) for name in HEAD}
-    k, raw = at["k"], at["raw"]
+    k, raw = at["k"], at["raw (formula)"]
     objective = f"=SUM({at['points duration']}:{at['points overload_min']})"
     subjective = f"={at['points accuracy']}+{at['points awareness']}"
     return (
@@ -87,9 +110,12 @@ def _row(test: OperatorTest, number: int) -> tuple[Cell, ...]:
         test.why,
         *points,
         *weights,
+        *map(
+            _number, (indicator.objective, indicator.subjective, indicator.raw, indicator.percent)
+        ),
         objective,
         subjective,
-        f"={k}*({at['objective']}+{at['subjective']})",
+        f"={k}*({at['objective (formula)']}+{at['subjective (formula)']})",
         f"=100*{raw}/SUM({at['weight duration']}:{at['weight awareness']})",
     )
 
@@ -100,10 +126,12 @@ def _operators(tests: Sequence[OperatorTest]) -> Iterator[tuple[Cell, ...]]:
         own = [test for test in tests if test.operator == operator]
         yield (
             operator,
-            f"=COUNTIF({_column('operator')},A{row})",
-            f"=AVERAGEIFS({_column('raw')},{_column('operator')},A{row})",
-            f"=AVERAGEIFS({_column('percent')},{_column('operator')},A{row})",
+            len(own),
+            _number(fmean(test.indicator.raw for test in own)),
+            _number(fmean(test.indicator.percent for test in own)),
             suggest(own).verdict,
+            f"=AVERAGEIFS({_column('raw (formula)')},{_column('operator')},A{row})",
+            f"=AVERAGEIFS({_column('percent (formula)')},{_column('operator')},A{row})",
         )
 
 
@@ -120,7 +148,7 @@ def _trend(book: "Workbook", tests: Sequence[OperatorTest]) -> None:
             return None
         name = f"{_letters(column)}$1"
         by = f"{_column('operator')},{name},{_column('session')},$A{row}"
-        return f"=AVERAGEIFS({_column('percent')},{by})"
+        return f"=AVERAGEIFS({_column('percent (formula)')},{by})"
 
     rows = (
         (session, *(mean(name, at, row) for at, name in enumerate(operators, start=2)))

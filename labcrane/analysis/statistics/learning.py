@@ -139,19 +139,22 @@ def _aicc(squares: float, n: int) -> float:
 def learning_curves(movements: "pd.DataFrame", measure: str) -> "pd.DataFrame":
     """Fit both curves to each participant's means of ``measure`` along the sequence.
 
-    Returns one row per participant and curve; ``better`` is yes for the one with the lower AICc.
+    With a column ``phase``, each session or block has curves of its own, from its first position.
+    Returns one row per participant, phase and curve; ``better`` is yes for the one with the lower
+    AICc.
     """
     import pandas as pd
 
     rows: list[dict[str, object]] = []
-    for participant, own in movements.groupby("participant"):
+    by = ["participant", *(name for name in ("phase",) if name in movements)]
+    for key, own in movements.groupby(by):
         means = own.groupby("sequence")[measure].mean()
         n = means.index.to_numpy(float)
         fits = [fit_curve(curve, n, means.to_numpy(float)) for curve in CURVES]
         found = [fit for fit in fits if fit is not None]
         lowest = min((fit.aicc for fit in found), default=math.nan)
         rows += [
-            {"participant": participant, "measure": measure}
+            {**dict(zip(by, key, strict=True)), "measure": measure}
             | {name: getattr(fit, name) for name in LearningCurve.__slots__}
             | {"better": "yes" if fit.aicc == lowest else "no"}
             | {"identified": "yes" if fit.identified else "no"}

@@ -19,6 +19,9 @@ LEAST_EIGENVALUE = 1e-4
 FIXED = ("sequence", "difficulty", "far_side")
 """Fixed terms of the mixed model; one that does not vary is left out."""
 
+DESIGN = ("group", "phase")
+"""Further ones where a study has them; groups may learn in another way too."""
+
 
 @dataclass(frozen=True, slots=True)
 class Trend:
@@ -95,7 +98,8 @@ class MixedModel:
     """A linear mixed model of the logarithm of a measure.
 
     ``log measure ~ sequence + difficulty + far_side + (1 + sequence | participant)``, sequence
-    and difficulty centred.
+    and difficulty centred; with groups also ``group * sequence``, with sessions or blocks
+    ``phase``.
 
     Attributes
     ----------
@@ -137,7 +141,9 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel | None:
     data = _modelled(movements, measure)
     if data["participant"].nunique() < 3:  # noqa: PLR2004
         return None
-    varied = [name for name in FIXED if data[name].nunique() > 1]
+    varied = [name for name in (*FIXED, *DESIGN) if name in data and data[name].nunique() > 1]
+    if {"group", "sequence"} <= set(varied):
+        varied.append("group:sequence")
     formula = "y ~ " + (" + ".join(varied) or "1")
     for slopes in (True, False):
         found = _fit(formula, data, "~sequence" if slopes else "1")
@@ -168,9 +174,10 @@ def mixed_model(movements: "pd.DataFrame", measure: str) -> MixedModel | None:
 
 def _modelled(movements: "pd.DataFrame", measure: str) -> "pd.DataFrame":
     """Return what the model is fitted to: the measure's logarithm, and centred terms."""
-    table = movements[[measure, *FIXED, "participant"]].dropna()
+    names = [*FIXED, *(name for name in DESIGN if name in movements), "participant"]
+    table = movements[[measure, *names]].dropna()
     table = table[table[measure] > 0.0]
-    data = table[[*FIXED, "participant"]].assign(y=np.log(table[measure]))
+    data = table[names].assign(y=np.log(table[measure]))
     for name in ("sequence", "difficulty"):
         data[name] -= data[name].mean()
     return data

@@ -25,7 +25,7 @@ def approve(
     from labcrane.simulation.rehearsal import rehearse
 
     registry = discover(study=protocol)
-    grant = decision.Grant(board, reference, a_date(valid_until), consent)
+    grant = decision.Grant(board, reference, read_date(valid_until), consent)
     study = load(protocol, registry)
     rehearse(study)
     lock = decision.approve(study, registry, grant, today())
@@ -58,7 +58,7 @@ def amend(
     grant = decision.Grant(
         board or old.approval["board"],
         reference,
-        a_date(valid_until or old.approval["valid_until"]),
+        read_date(valid_until or old.approval["valid_until"]),
         consent or old.consent,
     )
     study = load(protocol, registry)
@@ -89,7 +89,7 @@ def methods(
     out.print(f"codebook: {path}", markup=False)
 
 
-def a_date(text: str) -> date:
+def read_date(text: str) -> date:
     """Read a date as people type it."""
     try:
         return date.fromisoformat(text)

@@ -64,8 +64,8 @@ def _examine(
 ) -> None:
     from labcrane.core.findings import Verdict
     from labcrane.doctor import disk
-    from labcrane.doctor.checks import examine, left_out
-    from labcrane.doctor.report import diagnosis, keep
+    from labcrane.doctor.checks import examine, keep_apart, left_out
+    from labcrane.doctor.report import diagnosis
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
 
@@ -84,14 +84,16 @@ def _examine(
     else:
         for line in found.left_out:
             out.print(f"not looked at: {line}", markup=False, style="dim")
+    kept = None
     if study:
         from rich.console import Console
 
-        kept = keep(found, folder)
-        Console(stderr=True, soft_wrap=True).print(
-            f"kept in {kept}: sessions within a day have it in their record", markup=False
+        kept = keep_apart(found, folder)
+        said = (
+            kept.text if kept.verdict is Verdict.PASS else f"not kept: {kept.text}; {kept.advice}"
         )
-    if found.verdict is Verdict.FAIL:
+        Console(stderr=True, soft_wrap=True).print(said, markup=False)
+    if found.verdict is Verdict.FAIL or (kept and kept.verdict is Verdict.FAIL):
         raise typer.Exit(1)
 
 

@@ -1,5 +1,6 @@
 """Commands about streams and recordings: streams, record, recover, resync."""
 
+import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -58,12 +59,11 @@ def streams(
 
 
 def _watch(wait: float, seconds: float | None, protocol: Path | None) -> None:
-    import pylsl
-
     from labcrane.monitoring.watch import StreamWatch
+    from labcrane.streams.search import find
 
     builder = _monitors(protocol)
-    infos = pylsl.resolve_streams(wait)
+    infos = find("", wait, minimum=sys.maxsize)
     if not infos:
         out.print(f"no stream answered within {wait:g} s")
         return
@@ -138,12 +138,12 @@ def record(
         folder.mkdir(parents=True)
     except FileExistsError:
         raise RecordingError(f"{folder} exists; give a new folder for the recording") from None
-    keeper = RecorderHandle(journal_path(folder, 1, "streams"), requests, {})
+    recorder = RecorderHandle(journal_path(folder, 1, "streams"), requests, {})
     out.print("recording; Ctrl-C ends it")
     try:
-        _wait(keeper, seconds)
+        _wait(recorder, seconds)
     finally:
-        keeper.stop()
+        recorder.stop()
     _recover(folder)
 
 
@@ -156,7 +156,7 @@ def _wanted(text: str) -> "StreamRequest":
     return StreamRequest.of({"label": text, key: value})
 
 
-def _wait(keeper: "RecorderHandle", seconds: float | None) -> None:
+def _wait(recorder: "RecorderHandle", seconds: float | None) -> None:
     from labcrane.launcher.signal_reporter import SignalReporter
 
     ends: float | None = None
@@ -164,15 +164,15 @@ def _wait(keeper: "RecorderHandle", seconds: float | None) -> None:
     reporter = SignalReporter(lambda line: out.print(line, markup=False))
     try:
         while ends is None or time.monotonic() < ends:
-            if ends is None and seconds is not None and _flows(keeper.status):
+            if ends is None and seconds is not None and _flows(recorder.status):
                 ends = time.monotonic() + seconds
-            if keeper.watch():
+            if recorder.watch():
                 out.print("the recorder died and was started again")
-            if keeper.status and keeper.complaints() != told:
-                told = keeper.complaints()
+            if recorder.status and recorder.complaints() != told:
+                told = recorder.complaints()
                 for line in told:
                     out.print(line, markup=False)
-            reporter.news(keeper)
+            reporter.news(recorder)
             time.sleep(0.1)
     except KeyboardInterrupt:
         return
@@ -241,6 +241,8 @@ def _resync_xdf(file: Path) -> None:
     from labcrane.clocks.xdf import resync_xdf
 
     done = resync_xdf(file)
+    for line in done.damage:
+        out.print(line, style="yellow", markup=False)
     print_report(done.report)
     for name, (usual, most) in done.against_pyxdf.items():
         out.print(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labcrane.cli.commands.approval import today
-from labcrane.cli.commands.results import cohort_of
+from labcrane.cli.commands.results import LEFT_OUT, cohort_of
 from labcrane.cli.output import out
 
 if TYPE_CHECKING:
@@ -32,16 +32,23 @@ def score(
     from rich.table import Table
 
     from labcrane.analysis.operator_tests import operator_tests
-    from labcrane.analysis.report.workbook import advice, write_workbook
+    from labcrane.analysis.report.workbook import advice, write_csv, write_workbook
     from labcrane.participants.products import product
 
     # Operators are scored while they are still in training.
     cohort = cohort_of(folder, [HALF_FINISHED, *(include or ())])
-    tests = operator_tests(cohort, _settings(settings) if settings else None)
+    left_out: list[str] = []
+
+    def leave_out(name: str, why: str) -> None:
+        left_out.append(name)
+        out.print(f"left out: {name} {why}", markup=False)
+
+    tests = operator_tests(cohort, _settings(settings) if settings else None, leave_out)
     path = into or folder / "evaluation.xlsx"
     names = [person.name for person in cohort.included]
     with product(folder, "score", path.resolve().parent, names, today(), whole=True) as made:
         write_workbook(tests, made.folder / path.name)
+        write_csv(tests, made.folder / path.with_suffix(".csv").name)
     table = Table("operator", "session", "trial", "scenario", "raw", "percent")
     for test in tests:
         raw, percent = test.indicator.raw, test.indicator.percent
@@ -50,7 +57,9 @@ def score(
     out.print(table)
     for each in advice(tests):
         out.print(f"{each.operator}, {each.about}: {each.verdict} ({each.evidence})", markup=False)
-    out.print(f"workbook: {path}", markup=False)
+    out.print(f"workbook: {path}, and its tests as {path.with_suffix('.csv').name}", markup=False)
+    if left_out:
+        raise typer.Exit(LEFT_OUT)
 
 
 def _settings(path: Path) -> "IndicatorSettings":

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane.recording.foreign_streams import Note, RecordedStream
+from labcrane.recording.foreign_streams import OWN_CLOCK_CHANNELS, Note, RecordedStream
 from labcrane.recording.participant_file.columns import text_of, texts_of
 from labcrane.recording.participant_file.reader import open_recording
 from labcrane.recording.participant_file.writer import Conclude, opened, renewed
@@ -76,7 +76,16 @@ def read_stream(group: "h5py.Group") -> RecordedStream:
         ),
         offsets=offsets,
         starts=tuple(int(start) for start in group["starts"][:]),
+        own_clock=_own_clock(group),
     )
+
+
+def _own_clock(group: "h5py.Group") -> FloatArray:
+    """Return what the session's recorder logged of its own clock; files of before have nothing."""
+    session = group.parent.parent
+    if "own_clock" not in session:
+        return np.empty((0, len(OWN_CLOCK_CHANNELS)))
+    return np.column_stack([session[f"own_clock/{one.label}"][:] for one in OWN_CLOCK_CHANNELS])
 
 
 def read_channel(group: "h5py.Group", label: str) -> FloatArray | None:

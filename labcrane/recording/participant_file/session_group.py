@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 SYNC_REPORT = "sync_report"
 TRIAL_END = "trial.end"
+COMPLETION_ORDER = "order.completion"
 COUNTED = "counted"
 """Only trials whose end says so are results, and rows of the trial table."""
 
@@ -115,6 +116,7 @@ def _trial_rows(log: SessionLog) -> list[Mapping[str, Any]]:
     for data in begun:
         last[data.get("trial")] = max(last.get(data.get("trial"), 1), data.get("attempt", 1))
     rows = []
+    set_after = _set_after(log)
     for event in log.events:
         data = event.data
         if event.name != TRIAL_END or data.get(COUNTED) is not True:
@@ -122,8 +124,24 @@ def _trial_rows(log: SessionLog) -> list[Mapping[str, Any]]:
         redone = data.get("attempt", 1) < last.get(data.get("trial"), 1)
         if redone and data.get("outcome") not in CUT_OFF:
             data = {**data, "outcome": REPEATED}
+        if (late := set_after.get((data.get("trial"), data.get("attempt")))) is not None:
+            data = {**data, "completion": late}
         rows.append(data)
     return rows
+
+
+def _set_after(log: SessionLog) -> dict[tuple[object, object], int]:
+    """Return completion flags that the examiner set after a trial had ended, by trial and attempt.
+
+    The row that the trial ended with stays in the events as it was.
+    """
+    return {
+        (event.data.get("trial"), event.data.get("attempt")): int(event.data["text"])
+        for event in log.events
+        if event.name == COMPLETION_ORDER
+        and event.data.get("after")
+        and event.data.get("refused") is None
+    }
 
 
 def _write_trials(group: "h5py.Group", log: SessionLog) -> None:

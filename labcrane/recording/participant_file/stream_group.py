@@ -2,12 +2,18 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from functools import reduce
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from labcrane.errors import RecordingError
-from labcrane.recording.foreign_streams import PROBE_CHANNELS, RecordedStream
+from labcrane.recording.foreign_streams import (
+    OWN_CLOCK_CHANNELS,
+    PROBE_CHANNELS,
+    RecordedStream,
+    both_clocks,
+)
 from labcrane.recording.participant_file.columns import (
     node_names,
     write_attributes,
@@ -36,6 +42,9 @@ def write_streams(group: "h5py.Group", streams: Sequence[RecordedStream]) -> Non
     names = node_names([stream.header.name for stream in streams])
     for (_, safe), stream in zip(names, streams, strict=True):
         _write_stream(all_streams.create_group(safe), stream)
+    clocks = reduce(both_clocks, (stream.own_clock for stream in streams))
+    for column, channel in enumerate(OWN_CLOCK_CHANNELS if len(clocks) else ()):
+        write_numbers(group, f"own_clock/{channel.label}", clocks[:, column], channel.unit)
 
 
 def _write_stream(group: "h5py.Group", stream: RecordedStream) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 from labcrane.processes.handle import Patience, ProcessHandle
 from labcrane.recording.paths import part_number, parts
-from labcrane.streams.recorder.process import STOP, RecorderConfig
+from labcrane.streams.recorder.process import KNOWN, STOP, RecorderConfig
 from labcrane.streams.request import StreamRequest
 
 MODULE = "labcrane.streams.recorder.process"
@@ -58,6 +58,7 @@ class RecorderHandle:
         self._recorders: list[_Recorder] = []
         self._part = max((part_number(part) for part in parts(journal)), default=0)
         self._known: tuple[str, ...] = ()
+        self._offered: tuple[str, ...] = ()
         self._spares = [_Recorder() for _ in range(RECORDERS)]
         for _ in range(RECORDERS):
             self._recorders.append(self._began())
@@ -140,6 +141,13 @@ class RecorderHandle:
             self._spares.append(_Recorder())
         return bool(dead)
 
+    def offer(self, streams: Sequence[str]) -> None:
+        """Tell the recorders of streams on this computer, by description: they need no search."""
+        if new := [one for one in streams if one not in self._offered]:
+            self._offered = tuple(streams)
+            for recorder in self._recorders:
+                recorder.tell({KNOWN: new})
+
     def stop(self) -> None:
         """Let the recorders write down what has come and close their journals."""
         for recorder in self._recorders:
@@ -160,7 +168,7 @@ class RecorderHandle:
                 self._journal,
                 self._requests,
                 part=self._part,
-                known=self._known,
+                known=(*self._offered, *self._known),
                 monitors=monitors,
             )
         )

@@ -5,6 +5,7 @@ seconds after whoever started it has died, so that nothing of the end is lost.
 
 A launcher starts it by a :class:`labcrane.processes.handle.ProcessHandle`, before there is anything
 to record: it has loaded everything and waits for its :class:`RecorderConfig`. It is told ``stop``,
+and descriptions of streams it need not search for,
 and tells every second how each stream is, and whether all that is required flows. By hand, its
 orders are JSON, ``stop`` is a line of its standard input, a status a line of its standard output:
 
@@ -34,6 +35,9 @@ from labcrane.streams.request import StreamRequest
 LOOK_S = 0.25
 STATUS_S = 1.0
 STOP = "stop"
+KNOWN = "known"
+"""Of a message: descriptions of streams that are there now."""
+
 STATUS_FD = 1
 
 
@@ -119,7 +123,7 @@ def run(orders: RecorderConfig, chief: Chief) -> int:
     check_clock()
     recorder = Recorder(orders.journal, orders.streams, orders.part, orders.known, orders.monitors)
     try:
-        for due in _watch(orders, chief):
+        for due in _watch(orders, chief, recorder):
             recorder.look()
             if due:
                 chief.tell(recorder.status())
@@ -130,14 +134,18 @@ def run(orders: RecorderConfig, chief: Chief) -> int:
     return 0 if whole else 1
 
 
-def _watch(orders: RecorderConfig, chief: Chief) -> Iterator[bool]:
+def _watch(orders: RecorderConfig, chief: Chief, recorder: Recorder) -> Iterator[bool]:
     """Yield several times a second until it is time to end; True when a status is due."""
     asked = _signals()
     ends = float("inf")
     due = 0.0
     while time.monotonic() < ends:
-        if STOP in chief.messages() or asked.is_set():
+        said = chief.messages()
+        if STOP in said or asked.is_set():
             return
+        for told in said:
+            if isinstance(told, Mapping):
+                recorder.know(told.get(KNOWN, ()))
         if chief.gone.is_set():
             if ends == float("inf"):  # what the session's streams still send is recorded
                 ends = time.monotonic() + orders.grace_s

@@ -2,15 +2,20 @@
 
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from labcrane.errors import RecordingError
+from labcrane.recording.foreign_streams import OWN_CLOCK
 from labcrane.recording.paths import next_part, part_path
 from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.streams.recorder.health import Condition, Health, complaints, condition, rate
 from labcrane.streams.recorder.inlet import Inlet
+from labcrane.streams.recorder.own_clock import read_own_clock
 from labcrane.streams.recorder.signal_feed import SignalFeed
 from labcrane.streams.request import StreamRequest, unstable_id
 from labcrane.streams.search import Search, known_stream
@@ -61,9 +66,8 @@ class Recorder:
         self._since: dict[str, float] = {}
         self._fault: str | None = None
         self._feed = None if monitors is None else SignalFeed(monitors)
-        for info in map(known_stream, known):
-            if info is not None:
-                self._start(info)
+        self.know(known)
+        self._own = self._writer.add_stream(OWN_CLOCK) if read_own_clock() is not None else None
         self._search = Search(forget_s=FORGET_S)
 
     @property
@@ -72,7 +76,8 @@ class Recorder:
         return self._writer.path
 
     def look(self) -> None:
-        """Start to record what has appeared."""
+        """Start to record what has appeared, and note how our own clock stands."""
+        self._log_own_clock()
         found = [info for info in self._search.results() if self._wanted(info) is not None]
         now = time.monotonic()
         self._since = {info.uid(): self._since.get(info.uid(), now) for info in found}
@@ -83,6 +88,13 @@ class Recorder:
         self._find_duplicates(found, now)
         if self._feed is not None:
             self._feed.look()
+
+    def know(self, descriptions: Sequence[str]) -> None:
+        """Start to record streams on this computer of which somebody tells, without a search."""
+        for info in map(known_stream, descriptions):
+            if info is not None:
+                self._latest[_key(info)] = info
+                self._start(info)
 
     def health(self) -> list[Health]:
         """Return how each stream is now, also those asked for that are not there."""
@@ -117,6 +129,12 @@ class Recorder:
         except RecordingError as error:  # the disk is still full: footers are missing, no samples
             self._fault = str(error)
         return all(whole) and self._fault is None
+
+    def _log_own_clock(self) -> None:
+        reading = None if self._own is None else read_own_clock()
+        if self._own is not None and reading is not None:
+            with suppress(RecordingError):  # of a full disk the streams tell; no sample is lost
+                self._writer.write_sample(self._own, reading.time, np.array(reading))
 
     def _wanted(self, info: "pylsl.StreamInfo") -> StreamRequest | None:
         return next((one for one in self._requests if one.matches(info)), None)

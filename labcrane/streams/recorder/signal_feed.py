@@ -19,12 +19,13 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.core.signals import SignalChannel, SignalStream
+from labcrane.limits import LIMITS
 from labcrane.recording.foreign_streams import MONITORS, SIGNAL
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.streams.request import OURS
 from labcrane.types import FloatArray
 
-MOST_BYTES = 64_000_000
+MOST_BYTES = LIMITS["signals waiting for monitors"].most
 """How much may wait for the monitors: two minutes of 64 channels at 1 kHz."""
 
 HANG_S = 20.0
@@ -121,6 +122,7 @@ class SignalFeed:
         self._answered = 0
         self._heard = time.monotonic()
         self._deaths = 0
+        self._over = False
         self._process: subprocess.Popen[bytes] | None = None
         self._reader: threading.Thread | None = None
         self._thread = threading.Thread(target=self._run, name="signals", daemon=True)
@@ -152,6 +154,10 @@ class SignalFeed:
         """Let the monitors look at what waits for them, for some seconds at most."""
         self._queue.put(None)
         self._thread.join(PATIENCE_S)
+        if self._thread.is_alive() and (hung := self._process) is not None:
+            self._over = True  # what still waits is not looked at
+            hung.kill()  # its full pipe cannot be closed while something is written to it
+            self._thread.join()
         process, reader = self._process, self._reader
         if process is None:
             return
@@ -170,7 +176,7 @@ class SignalFeed:
         while (item := self._queue.get()) is not None:
             number, samples = item
             self._waiting -= 0 if samples is None else samples[1].nbytes
-            if self._deaths >= LIVES:
+            if self._over or self._deaths >= LIVES:
                 continue
             try:
                 self._send(number, samples)

@@ -17,7 +17,7 @@ Nothing recorded is altered, and nothing here depends on when it runs: it can be
 """
 
 import itertools
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,8 @@ import numpy.typing as npt
 
 from labcrane.errors import RecordingError
 from labcrane.streams.sync.dejitter import Dejitter, even, follow_sample_clock
-from labcrane.streams.sync.epochs import REMOTE, RTT, epochs
+from labcrane.streams.sync.epochs import epochs
+from labcrane.streams.sync.own_clock import OwnClock
 from labcrane.streams.sync.placement import Placement, place
 from labcrane.streams.sync.quality import (
     Basis,
@@ -35,7 +36,7 @@ from labcrane.streams.sync.quality import (
     probe_age,
     worst_second,
 )
-from labcrane.streams.sync.raw import RawStream
+from labcrane.streams.sync.raw import REMOTE, RTT, RawStream
 from labcrane.streams.sync.sampling import RATE_CHANGE, Sampling, examine
 from labcrane.types import FloatArray
 
@@ -127,6 +128,20 @@ def correct(raw: RawStream, treatment: Treatment, end: float | None = None) -> C
             f"a least transport delay of {treatment.transport_s} s needs dejitter 'envelope', "
             "which finds the least delayed samples; give the mean delay as latency otherwise"
         )
+    own = OwnClock.of(raw)
+    if own is None:
+        return _correct(raw, treatment, end)
+    last = None if end is None else float(own.straight(np.array([end]))[0])
+    found = _correct(own.straightened(raw), treatment, last)
+    if found.quality.whose:  # of our clock, or of none that was probed
+        return _correct(raw, treatment, end)
+    time, uneven = own.ours(found.time), own.ours(found.uneven)
+    error = found.error + own.doubt(time)
+    quality = replace(found.quality, own_slews=own.slews(), **_errors(time, error, uneven))
+    return Corrected(time, error, uneven, found.segments, quality)
+
+
+def _correct(raw: RawStream, treatment: Treatment, end: float | None) -> Corrected:
     if not len(raw.stamps):
         nothing = np.empty(0)
         return Corrected(nothing, nothing, nothing, quality=Quality(**_trips(raw)))

@@ -18,9 +18,9 @@ from labcrane.types import FloatArray
 CRYSTAL_WALK = 1e-6
 """Variance by which a sampler's rate usually walks in a second, in ppm squared."""
 
-SURE_OF_ALL = 3.0
+SURE_OF_ALL = 3.5
 """A rate that is wrong is wrong for all samples at once. So many standard deviations about a line
-hold all of it with 99 % (Working and Hotelling 1929: the root of twice F with 2 degrees)."""
+hold all of it with 99.8 % (Working and Hotelling 1929: the root of twice F with 2 degrees)."""
 
 FEWEST = 50
 MOST_BLOCKS = 100
@@ -78,12 +78,12 @@ def follow_sample_clock(times: FloatArray, index: FloatArray) -> tuple[FloatArra
     rest = np.array([float((times[block] - due[block]).mean()) for block in blocks])
     change = np.abs(np.diff(rest)) / np.sqrt(2.0)
     # Means of late stamps have a long tail, which the median does not see and a mean does.
-    scatter = max(1.4826 * float(np.median(change)), 0.8 * float(np.std(change) * 1.66)) + 1e-6
+    scatter = max(1.4826 * float(np.median(change)), float(np.sqrt(np.mean(change**2)))) + 1e-6
     followed = smooth(
         middle,
         rest,
         np.zeros(len(rest)),
-        scatter_s=(0.5 * scatter, scatter, 2.0 * scatter),
+        scatter_s=(scatter, 2.0 * scatter),
         usual_walk=CRYSTAL_WALK,
     )
     offset, deviation = followed.at(due)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from labcrane.streams.sync.raw import RawStream
+from labcrane.streams.sync.raw import LOCAL, OFFSET, REMOTE, RTT, RawStream
 from labcrane.types import FloatArray
 
 JUMP_S = 0.002
@@ -29,8 +29,6 @@ FASTEST_SLEW = 0.02
 
 CERTAIN_S = 0.1
 """Jumps beyond this show in the times of arrival, whatever the network did."""
-
-REMOTE, OFFSET, RTT, LOCAL = range(4)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labcrane.streams.sync.clock_curve import Smoothed
-from labcrane.streams.sync.epochs import OFFSET, REMOTE, RTT
+from labcrane.streams.sync.raw import OFFSET, REMOTE, RTT
 from labcrane.streams.sync.smoother import smooth
 from labcrane.types import FloatArray
 

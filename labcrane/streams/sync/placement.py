@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from labcrane.streams.sync.epochs import REMOTE, Epoch
+from labcrane.streams.sync.epochs import Epoch
 from labcrane.streams.sync.offset import SURE, OffsetCurve, fit
 from labcrane.streams.sync.quality import Basis, Segment
-from labcrane.streams.sync.raw import RawStream
+from labcrane.streams.sync.raw import REMOTE, RawStream
 from labcrane.streams.sync.smoother import smooth
 from labcrane.types import FloatArray
 

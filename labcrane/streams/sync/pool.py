@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from labcrane.streams.sync.epochs import LOCAL, OFFSET, REMOTE, RTT, in_order
-from labcrane.streams.sync.raw import RawStream
+from labcrane.streams.sync.epochs import in_order
+from labcrane.streams.sync.raw import LOCAL, OFFSET, REMOTE, RTT, RawStream
 from labcrane.types import FloatArray
 
 SAME_S = 5e-4

@@ -1,6 +1,6 @@
 """A stream as it was received, before anything is made of its time stamps."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,6 +14,10 @@ before."""
 
 ASSUMED_RTT_S = 1e-3
 """Round trip of a probe that was recorded without: few cables need longer."""
+
+
+REMOTE, OFFSET, RTT, LOCAL = range(4)
+"""Columns of probes."""
 
 
 def _nothing(columns: int) -> FloatArray:
@@ -38,6 +42,8 @@ class RawStream:
         the range of samples in which the first one of the new process lies, ends included.
     index
         The source's own sample counter, unwrapped, shape ``(n,)``; None when it has none.
+    own
+        Our clock, and at the same moments one that nothing turns, shape ``(n_readings, 2)``.
     """
 
     stamps: FloatArray
@@ -45,9 +51,10 @@ class RawStream:
     arrivals: FloatArray
     resets: FloatArray
     index: FloatArray | None = None
+    own: FloatArray = field(default_factory=lambda: _nothing(2))
 
     def __post_init__(self) -> None:
-        for name, columns in (("probes", 4), ("arrivals", 2), ("resets", 3)):
+        for name, columns in (("probes", 4), ("arrivals", 2), ("resets", 3), ("own", 2)):
             shape = getattr(self, name).shape
             if len(shape) != 2 or shape[1] != columns:  # noqa: PLR2004
                 raise RecordingError(f"{name} must have the shape (n, {columns}), but have {shape}")
@@ -60,6 +67,7 @@ class RawStream:
         arrivals: FloatArray | None = None,
         resets: FloatArray | None = None,
         index: FloatArray | None = None,
+        own: FloatArray | None = None,
     ) -> "RawStream":
         """Return a stream of which some things may not be known."""
         return cls(
@@ -68,6 +76,7 @@ class RawStream:
             _nothing(2) if arrivals is None else arrivals,
             _nothing(3) if resets is None else resets,
             index,
+            _nothing(2) if own is None else own,
         )
 
     def arrival(self) -> FloatArray | None:
@@ -115,6 +124,7 @@ def raw_of(recorded: RecordedStream) -> RawStream:
         probes=probes,
         arrivals=recorded.arrivals,
         resets=_resets(recorded),
+        own=recorded.own_clock[:, :2],
     )
 
 

@@ -3,9 +3,11 @@
 import secrets
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs
+
+from starlette.requests import HTTPConnection
+from starlette.responses import PlainTextResponse, RedirectResponse
 
 from labcrane.session.commands import Order
 
@@ -16,6 +18,8 @@ RIGHTS: Mapping[str, frozenset[Order]] = {
     PARTICIPANT: frozenset({Order.ANSWER, Order.SUBMIT, Order.CONSENT}),
 }
 """What each page may ask of the session."""
+
+SEE_OTHER, FORBIDDEN = 303, 403
 
 SCOPE = "labcrane.pages"
 """Where a request says which pages its cookies open."""
@@ -61,7 +65,7 @@ class Gate:
         *,
         secure: bool = False,
     ) -> None:
-        self._secure = "; Secure" if secure else ""
+        self._secure = secure
         self._inner = inner
         self._keys = keys
         self._used = used
@@ -75,65 +79,60 @@ class Gate:
         path = scope["path"].strip("/")
         given = parse_qs(scope.get("query_string", b"").decode(errors="replace")).get("token")
         if given and path in RIGHTS:
-            await self._exchange(scope, send, path, given[0])
+            await self._exchange(scope, receive, send, path, given[0])
             return
         pages = self._opened(scope)
         if not pages or (path in RIGHTS and path not in pages):
-            await self._refuse(scope, send, "no right to see it" if pages else "no token")
+            await self._refuse(scope, receive, send, "no right to see it" if pages else "no token")
             return
         await self._inner({**scope, SCOPE: pages}, receive, send)
 
     def _opened(self, scope: Mapping[str, Any]) -> frozenset[str]:
-        headers = dict(scope["headers"])
-        cookie = SimpleCookie()
-        try:
-            cookie.load(headers.get(b"cookie", b"").decode(errors="replace"))
-        except CookieError:
-            return frozenset()
-        shown = {page: cookie[_name(page)].value for page in RIGHTS if _name(page) in cookie}
+        shown = HTTPConnection(dict(scope)).cookies
         return frozenset(
             page
-            for page, value in shown.items()
-            if secrets.compare_digest(value.encode(), self._keys.cookies[page].encode())
+            for page in RIGHTS
+            if secrets.compare_digest(
+                shown.get(_name(page), "").encode(), self._keys.cookies[page].encode()
+            )
         )
 
-    async def _exchange(self, scope: dict[str, Any], send: Any, page: str, token: str) -> None:
+    async def _exchange(
+        self, scope: dict[str, Any], receive: Any, send: Any, page: str, token: str
+    ) -> None:
         held = self._keys.tokens.get(page, "")
         if not (held and secrets.compare_digest(token.encode(), held.encode())):
             if page in self._opened(scope):  # a reload of the link in the browser that used it
-                await _redirect(send, page, None)
+                await self._redirect(scope, receive, send, page, None)
                 return
-            await self._refuse(scope, send, "a wrong or used token")
+            await self._refuse(scope, receive, send, "a wrong or used token")
             return
         del self._keys.tokens[page]
         self._used(page)
-        await _redirect(send, page, self._keys.cookies[page] + self._secure)
+        await self._redirect(scope, receive, send, page, self._keys.cookies[page])
 
-    async def _refuse(self, scope: Mapping[str, Any], send: Any, why: str) -> None:
+    async def _redirect(
+        self, scope: dict[str, Any], receive: Any, send: Any, page: str, cookie: str | None
+    ) -> None:
+        # The token leaves the address bar, and is not passed on as a referrer.
+        headers = {"referrer-policy": "no-referrer", "cache-control": "no-store"}
+        answer = RedirectResponse(f"/{page}", SEE_OTHER, headers)
+        if cookie is not None:
+            answer.set_cookie(
+                _name(page), cookie, httponly=True, samesite="strict", secure=self._secure
+            )
+        await answer(scope, receive, send)
+
+    async def _refuse(self, scope: dict[str, Any], receive: Any, send: Any, why: str) -> None:
         host = (scope.get("client") or ("unknown",))[0]
         self._denied(f"{host} asked for {str(scope['path'])[:80]}: {why}")
         if scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
             return
-        text = f"labcrane: {why}; use the link that labcrane run has printed".encode()
-        head = [(b"content-type", b"text/plain; charset=utf-8"), (b"cache-control", b"no-store")]
-        await send({"type": "http.response.start", "status": 403, "headers": head})
-        await send({"type": "http.response.body", "body": text})
+        text = f"labcrane: {why}; use the link that labcrane run has printed"
+        answer = PlainTextResponse(text, FORBIDDEN, {"cache-control": "no-store"})
+        await answer(scope, receive, send)
 
 
 def _name(page: str) -> str:
     return f"labcrane-{page}"
-
-
-async def _redirect(send: Any, page: str, cookie: str | None) -> None:
-    # The token leaves the address bar, and is not passed on as a referrer.
-    headers = [
-        (b"location", f"/{page}".encode()),
-        (b"referrer-policy", b"no-referrer"),
-        (b"cache-control", b"no-store"),
-    ]
-    if cookie is not None:
-        value = f"{_name(page)}={cookie}; HttpOnly; SameSite=Strict; Path=/"  # Secure by TLS
-        headers.append((b"set-cookie", value.encode()))
-    await send({"type": "http.response.start", "status": 303, "headers": headers})
-    await send({"type": "http.response.body", "body": b""})

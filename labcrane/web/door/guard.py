@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 from weakref import WeakSet
 
+from starlette.responses import PlainTextResponse
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from labcrane.limits import LIMITS
@@ -20,6 +21,12 @@ PATIENCE_S = 10.0
 
 MOST_BODY = LIMITS["request body"].most
 MOST_REQUESTS_S = LIMITS["requests of one address"].most
+MOST_LOADS_S = LIMITS["page loads of one address"].most
+LOADS_AT_ONCE = 30
+"""A page is put together for whoever loads it, which takes 30 ms: fifty a second would leave no
+time for anybody else's orders."""
+
+PAGES = frozenset({"/supervisor", "/participant"})
 MOST_SOCKETS = LIMITS["sockets"].most
 MOST_ADDRESSES = 1024
 
@@ -72,7 +79,7 @@ class Guard:
         usual, self._scheme = (443, "https") if secure else (80, "http")
         if port == usual:
             self._hosts |= names
-        self._buckets: dict[str, Bucket] = {}
+        self._buckets: dict[tuple[str, bool], Bucket] = {}
 
     async def __call__(self, scope: dict[str, Any], receive: Any, send: Any) -> None:
         """Let a request in, or refuse it."""
@@ -81,13 +88,13 @@ class Guard:
             return
         headers = dict(scope["headers"])
         if (refused := self._refused(scope, headers)) is not None:
-            await self._refuse(scope, send, *refused)
+            await self._refuse(scope, receive, send, *refused)
             return
         if scope["type"] == "http":
             body = await self._body(headers, receive)
             if isinstance(body, int):
                 why = {413: f"more than {MOST_BODY} bytes", 408: "too slow"}[body]
-                await self._refuse(scope, send, body, why)
+                await self._refuse(scope, receive, send, body, why)
                 return
             receive = _given(body, receive)
         await self._inner(scope, receive, _with_headers(send))
@@ -97,6 +104,8 @@ class Guard:
     ) -> tuple[int, str] | None:
         if not self._bucket(_address(scope)).take():
             return 429, f"more than {MOST_REQUESTS_S} requests a second"
+        if scope["path"] in PAGES and not self._bucket(_address(scope), loads=True).take():
+            return 429, f"more than {MOST_LOADS_S} pages a second"
         host = headers.get(b"host", b"").decode(errors="replace")
         if host not in self._hosts:
             return 421, f"of host {host[:60]!r}, which is not served here"
@@ -105,12 +114,17 @@ class Guard:
             return 403, f"from a page of {origin[:60].decode(errors='replace')!r}"
         return None
 
-    def _bucket(self, address: str) -> Bucket:
-        if address not in self._buckets:
+    def _bucket(self, address: str, *, loads: bool = False) -> Bucket:
+        key = address, loads
+        if key not in self._buckets:
             if len(self._buckets) >= MOST_ADDRESSES:
                 self._buckets.clear()
-            self._buckets[address] = Bucket(MOST_REQUESTS_S, 2 * MOST_REQUESTS_S)
-        return self._buckets[address]
+            self._buckets[key] = (
+                Bucket(MOST_LOADS_S, LOADS_AT_ONCE)
+                if loads
+                else Bucket(MOST_REQUESTS_S, 2 * MOST_REQUESTS_S)
+            )
+        return self._buckets[key]
 
     @staticmethod
     async def _body(headers: Mapping[bytes, bytes], receive: Any) -> bytes | int:
@@ -132,15 +146,17 @@ class Guard:
             if not message.get("more_body", False):
                 return body
 
-    async def _refuse(self, scope: Mapping[str, Any], send: Any, status: int, why: str) -> None:
+    async def _refuse(
+        self, scope: Mapping[str, Any], receive: Any, send: Any, status: int, why: str
+    ) -> None:
         path = str(scope["path"])[:80]
         self._denied(f"{_address(scope)} asked for {path}: {why}")
         if scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
             return
-        head = [(b"content-type", b"text/plain; charset=utf-8"), (b"connection", b"close")]
-        await send({"type": "http.response.start", "status": status, "headers": [*head, *HEADERS]})
-        await send({"type": "http.response.body", "body": f"labcrane: {why}".encode()})
+        answer = PlainTextResponse(f"labcrane: {why}", status, {"connection": "close"})
+        answer.raw_headers.extend(HEADERS)
+        await answer(dict(scope), receive, send)
 
 
 def _address(scope: Mapping[str, Any]) -> str:

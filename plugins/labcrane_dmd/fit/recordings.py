@@ -6,6 +6,7 @@ signal, and the joint moves towards its far end.
 """
 
 import hashlib
+import io
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from labcrane import FloatArray, RecordingError
+from labcrane.core import read_csv_text
 from labcrane_dmd.model.interpolation import FULL
 
 COLUMNS = ("run", "time_s", "signal", "angle_deg")
@@ -97,8 +99,8 @@ def _read(path: Path) -> SegmentRecording:
     import pandas as pd  # noqa: PLC0415 - loads for a second
 
     try:
-        table = pd.read_csv(path)
-    except (OSError, ValueError, EOFError) as error:
+        table = pd.read_csv(io.StringIO(read_csv_text(path)))
+    except (OSError, ValueError) as error:
         raise RecordingError(f"{path} cannot be read as CSV: {error}") from error
     if missing := [name for name in COLUMNS if name not in table]:
         raise RecordingError(
@@ -107,7 +109,7 @@ def _read(path: Path) -> SegmentRecording:
         )
     try:
         run, time, signal, angle = (table[name].to_numpy(np.float64) for name in COLUMNS)
-    except ValueError as error:
+    except (ValueError, TypeError, OverflowError) as error:  # a number of 400 digits
         raise RecordingError(f"{path} holds something that is no number: {error}") from error
     bad = ~np.isfinite(run + time + signal + angle)
     if bad.any():

@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, PositiveInt, model_validator
 
 from labcrane import Settings
 
@@ -12,13 +12,13 @@ Between = Literal["linear", "pchip"]
 class FitSettings(Settings):
     """What whoever fits a model may choose."""
 
-    levels: tuple[int, ...] = (40, 80, 120, 160, 200, 250)
+    levels: tuple[PositiveInt, ...] = (40, 80, 120, 160, 200, 250)
     """Signals whose recordings become layers, in both directions; 0 is zero."""
 
-    validation: tuple[int, ...] = (20, 60, 100, 140, 180, 220)
+    validation: tuple[PositiveInt, ...] = (20, 60, 100, 140, 180, 220)
     """Signals whose recordings are never looked at by the fit, in both directions."""
 
-    edge: tuple[int, ...] = (10, 30, 50)
+    edge: tuple[PositiveInt, ...] = (10, 30, 50)
     """Signals from whose recordings, beside the layers', the edge of the dead band is found."""
 
     between: Between = "linear"
@@ -27,3 +27,13 @@ class FitSettings(Settings):
 
     max_degree: int = Field(default=9, ge=1, le=12)
     """Largest degree of a layer's polynomial; cross-validation chooses one up to it."""
+
+    @model_validator(mode="after")
+    def _validated_by_others(self) -> "FitSettings":
+        if not self.levels:
+            raise ValueError("a model needs at least one level; write the signals of its layers")
+        if both := sorted({*self.levels, *self.edge} & set(self.validation)):
+            raise ValueError(
+                f"signal {both[0]} is to validate the model and to be fitted; leave it out of one"
+            )
+        return self

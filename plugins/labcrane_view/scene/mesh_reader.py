@@ -30,11 +30,14 @@ def read_mesh(asked: MeshFile) -> Mesh:
             f"mesh {str(asked.file)!r} cannot be read; write it again as STL, OBJ or glTF 2"
         )
     top = core.NodePath(root)
-    parts = [
-        _part(node.node().get_geom(number), node.get_mat(top))
-        for node in top.find_all_matches("**/+GeomNode")
-        for number in range(node.node().get_num_geoms())
-    ]
+    try:
+        parts = [
+            _part(node.node().get_geom(number), node.get_mat(top))
+            for node in top.find_all_matches("**/+GeomNode")
+            for number in range(node.node().get_num_geoms())
+        ]
+    except ValueError as error:
+        raise DeviceError(f"mesh {str(asked.file)!r} {error}; export it again") from error
     whole = [part for part in parts if len(part.faces)]
     if not whole:
         raise DeviceError(f"mesh {str(asked.file)!r} holds no triangles; export its surface")
@@ -69,6 +72,8 @@ def _part(geometry: "core.Geom", place: "core.LMatrix4f") -> Mesh:
     table = plain.get_vertex_data().convert_to(core.GeomVertexFormat.get_v3n3())
     rows = np.frombuffer(bytes(memoryview(table.get_array(0)).cast("B")), np.float32)
     values = rows.reshape(-1, 6).astype(np.float64)
+    if not np.isfinite(values).all():
+        raise ValueError("has points or normals that are no finite numbers")
     matrix = np.array([[place[row][column] for column in range(4)] for row in range(4)])
     points = values[:, :3] @ matrix[:3, :3] + matrix[3, :3]  # rows times matrix, as Panda has it
     normals = values[:, 3:] @ matrix[:3, :3]

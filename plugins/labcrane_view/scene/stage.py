@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from panda3d import core
 
-from labcrane import FloatArray, Run, Sphere
-from labcrane.core import Shape
+from labcrane import FloatArray, Run
+from labcrane.core import Shape, Sphere
 from labcrane.machines import Body, read_placed
 from labcrane_view.scene import shader
 from labcrane_view.scene.forest import forest

@@ -37,6 +37,9 @@ class Skew:
     wander: float = 0.0
     step: float = 0.0
     step_after: float = 0.0
+    slew: float = 0.0
+    slew_after: float = 0.0
+    slew_s: float = 0.0
     reply: float = 0.0
     mode: str = "exact"
 
@@ -50,6 +53,9 @@ class Skew:
             "WANDER": self.wander,
             "STEP": self.step,
             "STEP_AT": now + self.step_after if self.step else 1e18,
+            "SLEW": self.slew,
+            "SLEW_AT": now + self.slew_after if self.slew else 1e18,
+            "SLEW_S": self.slew_s,
             "REPLY": self.reply,
         }
         skew = {f"SKEW_{name}": f"{value:.9f}" for name, value in values.items()}
@@ -73,8 +79,10 @@ class Lab:
         self.processes.append(process)
         return process
 
-    def device(self, name: str, skew: Skew) -> subprocess.Popen[str]:
-        arguments = ("--name", name, "--mode", skew.mode)
+    def device(self, name: str, skew: Skew, **options: float) -> subprocess.Popen[str]:
+        arguments = ["--name", name, "--mode", skew.mode]
+        for option, value in options.items():
+            arguments += [f"--{option.replace('_', '-')}", str(value)]
         return self.start(str(HERE / "device.py"), *arguments, env=skew.environment(self.library))
 
     def markers(self) -> subprocess.Popen[str]:

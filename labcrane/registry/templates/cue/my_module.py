@@ -6,20 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 from pydantic import PositiveFloat
 
-from labcrane import (
-    Cue,
-    Cylinder,
-    FloatArray,
-    Frame,
-    Machine,
-    Offer,
-    Run,
-    Settings,
-    Signal,
-    hookimpl,
-    offer,
-)
-from labcrane.core import Shape
+from labcrane import Cue, FloatArray, Frame, Machine, Offer, Run, Settings, Signal, hookimpl, offer
+from labcrane.core import Cylinder, Shape
 
 labcrane_api = 1
 

@@ -7,7 +7,8 @@ import my_module
 import pytest
 from my_module import MyPart, MyPartSettings
 
-from labcrane import Cue, Cylinder
+from labcrane import Cue
+from labcrane.core import Cylinder
 from labcrane.testing import (
     TARGETS,
     CueContract,

@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from labcrane import Exporter, Machine, Offer, Settings, hookimpl, offer
-from labcrane.analysis import Participant
+from labcrane import Machine, Offer, Settings, hookimpl, offer
+from labcrane.analysis import Exporter, Participant
 
 labcrane_api = 1
 

@@ -8,7 +8,7 @@ import my_module
 import pytest
 from my_module import MyPart, MyPartSettings
 
-from labcrane import Exporter
+from labcrane.analysis import Exporter
 from labcrane.testing import ExporterContract, PluginContract
 from labcrane.testing.exporters import TRIALS, a_participant
 

@@ -6,22 +6,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from pydantic import PositiveFloat
 
-from labcrane import (
-    Event,
-    Frame,
-    Machine,
-    Offer,
-    Phase,
-    PlannedTrial,
-    Run,
-    Settings,
-    Signal,
-    Task,
-    Trial,
-    TrialStatus,
-    hookimpl,
-    offer,
-)
+from labcrane import Frame, Machine, Offer, Run, Settings, Signal, Task, Trial, hookimpl, offer
+from labcrane.core import Event, Phase, PlannedTrial, TrialStatus
 
 labcrane_api = 1
 

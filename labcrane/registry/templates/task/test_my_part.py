@@ -6,7 +6,8 @@ import my_module
 import pytest
 from my_module import MyPart, MyPartSettings
 
-from labcrane import Phase, Task
+from labcrane import Task
+from labcrane.core import Phase
 from labcrane.testing import (
     PluginContract,
     TaskContract,

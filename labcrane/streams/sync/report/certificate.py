@@ -64,7 +64,7 @@ _CLOCK_FAULTS: dict[Fault, Callable[[Quality], bool]] = {
     Fault.STEPPED: lambda q: q.steps > 0,
     Fault.RESTARTED: lambda q: q.restarts > 0,
     Fault.SLEPT: lambda q: q.sleeps > 0,
-    Fault.SLEWED: lambda q: q.slews > 0,
+    Fault.SLEWED: lambda q: q.slews > 0 or q.own_slews > 0,
     Fault.CONGESTED: lambda q: q.congested_s > CONGESTED_S,
     Fault.UNPROBED: lambda q: not q.whose and q.unprobed > 0,
     Fault.PROBES_MISSING: lambda q: q.probe_age_s > UNPROBED_S,
@@ -107,6 +107,7 @@ def corrections(quality: Quality) -> list[str]:
         (quality.restarts, "restarts of its program"),
         (quality.sleeps, "sleeps of its computer"),
         (quality.slews, "slews of a clock"),
+        (quality.own_slews, "slews of this computer's own clock"),
     ):
         if count:
             done.append(f"{count} {what} followed")

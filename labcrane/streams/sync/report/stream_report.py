@@ -189,6 +189,11 @@ def _changes(quality: Quality) -> list[Finding]:
         (quality.steps, "its clock jumped {} times", "look what sets its computer's clock"),
         (quality.sleeps, "its computer slept {} times", "switch off its power saving"),
         (quality.slews, "a clock was slewed {} times", "switch off NTP while you record"),
+        (
+            quality.own_slews,
+            "this computer's own clock was slewed {} times",
+            "switch off NTP here while you record",
+        ),
     ):
         if count:
             _add(found, Verdict.WARN, what.format(count), f"corrected; {advice}")

@@ -1,17 +1,16 @@
-"""Runs ``labcrane`` or ``labcrane_joystick`` at a desk with two sticks, also in child processes.
+"""Two sticks at the desk of every Python that has this folder in ``PYTHONPATH``.
 
-Arguments: the module and its own arguments. ``HANDS`` names a pipe; each line of it moves a stick:
-``left 0 32000`` an axis, ``right trigger 1`` the trigger. A process has sticks from when it first
-starts SDL, which only those do that look for some.
+``HANDS`` names a pipe; each line of it moves a stick: ``left 0 32000`` an axis, ``right trigger 1``
+the trigger. A process has sticks from when it first starts SDL, which only those do that look for
+some.
 """
 
 import os
-import runpy
 import sys
 import threading
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.append(str(Path(__file__).parents[2]))
 
 from labcrane_joystick import sdl
 
@@ -49,11 +48,3 @@ def follow(sticks) -> None:
 
 
 sdl.start = start
-
-if __name__ == "__main__":
-    _, module, *sys.argv[1:] = sys.argv
-    if module == "labcrane":  # which must stay the program that child processes import
-        from labcrane.__main__ import main
-
-        sys.exit(main())
-    runpy.run_module(module, run_name="__main__")

@@ -1,0 +1,113 @@
+"""Factors of a study as its report sees them: group, phase, place in it, distance, side."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+GROUP, PHASE, PLACE = "group", "phase", "place"
+
+
+@dataclass(frozen=True, slots=True)
+class Factors:
+    """What varies in a study.
+
+    Attributes
+    ----------
+    groups
+        Of participants, two or more; otherwise empty.
+    phases
+        Sessions, or blocks where a session has several, in order.
+    kind
+        What a phase is: ``session``, ``block`` or ``phase`` where both vary.
+    places
+        Positions of pairs of targets in each phase.
+    practice
+        Whether there was practice.
+    """
+
+    groups: tuple[str, ...]
+    phases: tuple[str, ...]
+    kind: str
+    places: dict[str, int]
+    practice: bool
+
+    @property
+    def between(self) -> list[str]:
+        """Columns of factors between participants."""
+        return [GROUP] if self.groups else []
+
+    @property
+    def over_phases(self) -> list[str]:
+        """Columns of what varies from phase to phase."""
+        return [PHASE] if len(self.phases) > 1 else []
+
+    @property
+    def alike(self) -> bool:
+        """Whether all phases have as many positions, so that positions can be compared."""
+        return len(set(self.places.values())) == 1
+
+
+def with_factors(movements: "pd.DataFrame") -> "pd.DataFrame":
+    """Return movements with the columns ``group``, ``phase`` and ``place``.
+
+    A phase is a session, or a block where a session has several; a place is the position in it of a
+    pair of targets, from 1. So positions of two sessions are never one. All movements are to be
+    here, also those that count for nothing: a place whose movements all failed is still one.
+    """
+    table = movements.copy()
+    for name in (GROUP, "session_name", "block_name"):
+        if name not in table:
+            table[name] = ""
+    for name, usual in (("session", 1.0), ("block", 1.0), ("practice", 0.0)):
+        if name not in table:
+            table[name] = usual
+    counted = table["practice"].astype(float) == 0.0
+    table[PHASE] = _names(table, counted)
+    table[PLACE] = table.groupby(["participant", PHASE])["sequence"].rank(method="dense")
+    return table
+
+
+def _names(table: "pd.DataFrame", counted: "pd.Series[bool]") -> list[str]:
+    """Return the name of each movement's phase; practice is its own."""
+    keys = table.loc[counted, ["session", "block"]].drop_duplicates()
+    keys = keys.sort_values(["session", "block"])
+    blocks = keys.groupby("session")["block"].size()
+    about = table.drop_duplicates(["session", "block"]).set_index(["session", "block"])
+    several, width = len(keys) > 1, len(str(len(keys)))
+    named: dict[tuple[object, object], str] = {}
+    for number, (session, block) in enumerate(keys.itertuples(index=False), start=1):
+        row = about.loc[(session, block)]
+        words = [str(row["session_name"])] if blocks.size > 1 or not several else []
+        if blocks[session] > 1:
+            words.append(str(row["block_name"]) or f"block {block:g}")
+        name = ", ".join(filter(None, words)) or f"session {session:g}"
+        named[(session, block)] = f"{number:0{width}} {name}" if several else name
+    pairs = zip(table["session"], table["block"], counted, strict=True)
+    return [named[(s, b)] if is_counted else f"practice {b:g}" for s, b, is_counted in pairs]
+
+
+def factors_of(table: "pd.DataFrame") -> Factors:
+    """Return what varies, from movements :func:`with_factors`."""
+    counted = table[table["practice"].astype(float) == 0.0]
+    groups = tuple(sorted(name for name in counted[GROUP].unique() if name))
+    phases = tuple(sorted(counted[PHASE].unique()))
+    sessions = counted["session"].nunique()
+    blocks = counted[["session", "block"]].drop_duplicates().groupby("session").size().max()
+    kind = "session" if blocks == 1 else "block" if sessions == 1 else "phase"
+    places = {str(name): int(own[PLACE].max()) for name, own in counted.groupby(PHASE)}
+    several = groups if len(groups) > 1 else ()
+    return Factors(several, phases, kind, places, practice=len(counted) < len(table))
+
+
+def running(table: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
+    """Return movements with positions that run on from phase to phase, as figures show them.
+
+    So ``sequence`` names one position in one phase only.
+    """
+    before, so_far = {}, 0
+    for phase in factors.phases:
+        before[phase] = so_far
+        so_far += factors.places[phase]
+    return table.assign(sequence=table[PLACE] + table[PHASE].map(before))

@@ -1,0 +1,210 @@
+"""Outcomes of a study in its design: tests, contrasts, time scales, questionnaires."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, replace
+from typing import TYPE_CHECKING, Any
+
+from labcrane.analysis.report.factors import GROUP, PHASE, PLACE, Factors
+from labcrane.analysis.statistics.anova import Anova, Contrast, analyse, compare
+from labcrane.analysis.statistics.time_scales import quantities, summary, taken_away
+from labcrane.analysis.statistics.trends import holm, linear_trend
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PRIMARY = ("movement_time", "absolute_error")
+"""What is tested first; their trends share one Holm correction."""
+
+ALSO = ("circle_to_circle",)
+"""What is tested beside, where it was recorded."""
+
+ADJUSTED = " with pairs' means taken away"
+"""Behind the name of an effect of positions, where pairs come in another order for everybody."""
+
+SEQUENCE, DISTANCE, SIDE = "sequence", "distance", "far_side"
+
+
+def measures_in(results: "pd.DataFrame") -> list[str]:
+    """Return the outcomes that there are."""
+    return [name for name in (*PRIMARY, *ALSO) if name in results and results[name].notna().any()]
+
+
+def anova_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
+    """Return every test of every outcome over positions, distances, sides, phases and groups."""
+    tests: list[Anova] = []
+    for measure in measures_in(results):
+        named: dict[str, Anova] = {}
+        for test in _tests(results, measure, factors):
+            name = _words(test.factor, factors)
+            named.setdefault(name, replace(test, factor=name))  # groups come with every design
+        tests += named.values()
+    return _frame(tests)
+
+
+def _words(name: str, factors: Factors) -> str:
+    words = {PHASE: factors.kind, PLACE: SEQUENCE}
+    effect, separator, rest = name.partition(" ")
+    return ":".join(words.get(part, part) for part in effect.split(":")) + separator + rest
+
+
+def _tests(results: "pd.DataFrame", measure: str, factors: Factors) -> Iterator[Anova]:
+    """Yield the tests; what stands behind an effect's name says where and of what it is."""
+    between, phases = factors.between, factors.over_phases
+    adjusted = results.assign(**{measure: taken_away(results, measure)})
+    # First, because most participants are whole there.
+    yield from analyse(results, measure, phases, between)
+    if factors.alike:
+        yield from _of_places(analyse(results, measure, [*phases, PLACE], between), "")
+        yield from _of_places(analyse(adjusted, measure, [*phases, PLACE], between), ADJUSTED)
+    else:  # positions of phases of unequal length have nothing to do with each other
+        for phase in factors.phases:
+            here = results[PHASE] == phase
+            where = f" in {phase}"
+            tests = analyse(results[here], measure, [PLACE], between)
+            yield from _of_places(tests, where)
+            tests = analyse(adjusted[here], measure, [PLACE], between)
+            yield from _of_places(tests, where + ADJUSTED)
+    for name in (DISTANCE, SIDE):
+        if name in results:
+            yield from analyse(results, measure, [*phases, name], between)
+
+
+def _of_places(tests: Sequence[Anova], suffix: str) -> Iterator[Anova]:
+    for test in tests:
+        if PLACE in test.factor.split(":"):
+            yield replace(test, factor=test.factor + suffix)
+
+
+def practice_table(everything: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
+    """Return the tests of practice against what counts; empty where there was none."""
+    import pandas as pd
+
+    if not factors.practice:
+        return pd.DataFrame()
+    done = everything[everything["outcome"] == "success"].copy()
+    done["practice"] = done["practice"].astype(float).map({0.0: "counted", 1.0: "practice"})
+    tests = [
+        test
+        for measure in measures_in(done)
+        for test in analyse(done, measure, ["practice"], factors.between)
+    ]
+    return _frame(tests)
+
+
+def contrast_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
+    """Return differences of groups, of phases, and of groups in each phase, after Holm."""
+    import pandas as pd
+
+    between, phases = factors.between, factors.over_phases
+    found: list[Contrast] = []
+    for measure in measures_in(results):
+        found += compare(results, measure, GROUP, phases, between)
+        found += compare(results, measure, PHASE, phases, between)
+        if phases:
+            found += compare(results, measure, GROUP, phases, between, at=PHASE)
+        found += compare(results, measure, DISTANCE, [*phases, DISTANCE], between)
+    rows = [asdict(one) | {"factor": _words(one.factor, factors)} for one in found]
+    return pd.DataFrame(rows)
+
+
+def trend_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
+    """Return the linear trends over positions in each phase; both primary measures share Holm."""
+    import pandas as pd
+
+    found = []
+    for measure in measures_in(results):
+        for phase in factors.phases:
+            own = results[results[PHASE] == phase].assign(sequence=lambda t: t[PLACE])
+            trend = linear_trend(own, measure)
+            if trend is not None:
+                found.append((phase, trend))
+    primary = [trend.p for _, trend in found if trend.measure in PRIMARY]
+    corrected = iter(holm(primary))
+    rows = [
+        {
+            **asdict(trend),
+            factors.kind: phase,
+            "slope_low": trend.slope_ci[0],
+            "slope_high": trend.slope_ci[1],
+            "p_holm": next(corrected) if trend.measure in PRIMARY else float("nan"),
+        }
+        for phase, trend in found
+    ]
+    return pd.DataFrame(rows).drop(columns="slope_ci", errors="ignore")
+
+
+def time_scale_tables(
+    results: "pd.DataFrame", factors: Factors
+) -> "tuple[pd.DataFrame, pd.DataFrame]":
+    """Return the summary of learning within and from phase to phase, and tests between groups."""
+    import pandas as pd
+
+    tables, tests = [], []
+    for measure in measures_in(results):
+        found = quantities(results, measure)
+        tables.append(summary(found, measure))
+        if not factors.between:
+            continue
+        for (phase, quantity), own in found.groupby(["phase", "quantity"], sort=False):
+            about = {"phase": phase, "quantity": quantity}
+            named = own.rename(columns={"value": measure})
+            tests += [asdict(test) | about for test in analyse(named, measure, (), [GROUP])]
+    return pd.concat(tables, ignore_index=True), pd.DataFrame(tests)
+
+
+def score_table(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
+    """Return means and spreads of every score, by group and occasion."""
+    import pandas as pd
+
+    own = _occasions(scores, groups).dropna(subset=["value"])
+    if own.empty:
+        return pd.DataFrame()
+    each = own.groupby(["outcome", GROUP, "occasion", "participant"])["value"].mean()
+    table = each.groupby(level=["outcome", GROUP, "occasion"]).agg(["count", "mean", "std"])
+    return table.reset_index().rename(columns={"count": "n", "std": "sd"})
+
+
+def score_tests(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
+    """Return the tests of every score over occasions and groups."""
+    own = _occasions(scores, groups)
+    between = [GROUP] if len({name for name in groups.values() if name}) > 1 else []
+    tests = [
+        test
+        for outcome, part in own.groupby("outcome")
+        for test in analyse(
+            part.rename(columns={"value": str(outcome)}), str(outcome), ["occasion"], between
+        )
+    ]
+    return _frame(tests)
+
+
+def _occasions(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
+    own = scores.copy()
+    own[GROUP] = own["participant"].map(groups).fillna("")
+    own["outcome"] = own["questionnaire"] + " " + own["score"]
+    own["occasion"] = [
+        f"session {session:g}, step {step:g}"
+        for session, step in zip(own["session"], own["step"], strict=True)
+    ]
+    return own
+
+
+def gaze_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
+    """Return means of how long each area was looked at, over participants' means."""
+    import pandas as pd
+
+    columns = [name for name in results if str(name).startswith(("dwell_", "look_lead_"))]
+    if not columns:
+        return pd.DataFrame()
+    by = [*factors.between, *factors.over_phases, DISTANCE]
+    each = results.groupby([*by, "participant"])[columns].mean()
+    return each.groupby(level=by).mean().reset_index()
+
+
+def _frame(tests: Sequence[Anova]) -> "pd.DataFrame":
+    import pandas as pd
+
+    rows: list[dict[str, Any]] = [
+        asdict(test) | {"left_out": " ".join(test.left_out)} for test in tests
+    ]
+    return pd.DataFrame(rows)

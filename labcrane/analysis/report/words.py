@@ -1,0 +1,224 @@
+"""Results in words, with their numbers, as HTML, Markdown and LaTeX want them."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from labcrane.analysis.report.factors import Factors
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+LEVEL = 0.05
+"""Of significance, in the words only; p is always there."""
+
+NAMES = {
+    "movement_time": "Movement time, from onset to offset,",
+    "circle_to_circle": "The time from circle to circle, with reaction and dwell,",
+    "absolute_error": "The distance from the target's centre",
+}
+UNITS = {"movement_time": "s", "circle_to_circle": "s", "absolute_error": "m"}
+SMALLEST = 0.001
+
+
+@dataclass(frozen=True, slots=True)
+class Style:
+    """How a format writes symbols.
+
+    Attributes
+    ----------
+    symbol
+        Writes the name of a statistic: ``F``, ``p``.
+    eta
+        Partial eta squared.
+    minus, percent, less
+        A minus sign before a number, a per cent sign and a less-than sign.
+    plain
+        Writes any other text.
+    """
+
+    symbol: Callable[[str], str]
+    eta: str
+    minus: str
+    percent: str
+    less: str
+    plain: Callable[[str], str]
+
+
+TEX = str.maketrans(
+    {
+        "\\": r"\textbackslash{}",
+        **{sign: f"\\{sign}" for sign in "&%$#_{}"},
+        "~": r"\textasciitilde{}",
+        "^": r"\textasciicircum{}",
+        "°": r"\textdegree{}",
+        "²": r"\textsuperscript{2}",
+    }
+)
+MARKS = str.maketrans({sign: f"\\{sign}" for sign in "\\`*_[]<>#|~"})
+
+STYLES: Mapping[str, Style] = {
+    "html": Style(str, "ηp²", "\N{MINUS SIGN}", "%", "<", str),
+    "md": Style(
+        lambda name: f"*{name}*",
+        "*η*<sub>p</sub>²",
+        "\N{MINUS SIGN}",
+        "%",
+        "&lt;",
+        lambda text: text.translate(MARKS),
+    ),
+    "tex": Style(
+        lambda name: f"${name}$",
+        r"$\eta_p^2$",
+        "$-$",
+        r"\%",
+        "$<$",
+        lambda text: text.translate(TEX),
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Results:
+    """What is put into words.
+
+    Attributes
+    ----------
+    sample
+        The sample in a sentence.
+    anova, contrasts, trends, scales, scores
+        The report's tables; empty ones say nothing.
+    time_outs
+        Counts by condition.
+    factors
+        What varies.
+    """
+
+    sample: str
+    anova: "pd.DataFrame"
+    contrasts: "pd.DataFrame"
+    trends: "pd.DataFrame"
+    scales: "pd.DataFrame"
+    scores: "pd.DataFrame"
+    time_outs: "pd.DataFrame"
+    factors: Factors
+
+
+def paragraphs(results: Results, style: Style) -> list[str]:
+    """Return the results as paragraphs in one format."""
+    found = [style.plain(results.sample) + " " + _given_up(results.time_outs, style)]
+    for measure in _measures(results.anova):
+        sentences = [_effect(row, style) for row in _of(results.anova, measure)]
+        name = NAMES.get(measure, measure)
+        text = f"{style.plain(name)} " + "; ".join(sentences) + "."
+        more = [_trend(row, style) for row in _of(results.trends, measure)]
+        more += [_scale(row, style) for row in _of(results.scales, measure)]
+        more += [_contrast(row, style) for row in _of(results.contrasts, measure)]
+        found.append(" ".join([text, *filter(None, more)]))
+    for outcome in _measures(results.scores):
+        sentences = [_effect(row, style) for row in _of(results.scores, outcome)]
+        found.append(f"{style.plain(outcome)} " + "; ".join(sentences) + ".")
+    return found
+
+
+def _of(table: "pd.DataFrame", measure: str) -> list[dict[str, Any]]:
+    if not len(table):
+        return []
+    rows = table[table["measure"] == measure].to_dict("records")
+    return [{str(name): value for name, value in row.items()} for row in rows]
+
+
+def _measures(table: "pd.DataFrame") -> list[str]:
+    return list(map(str, table["measure"].unique())) if len(table) else []
+
+
+def _given_up(table: "pd.DataFrame", style: Style) -> str:
+    trials, out = int(table["trials"].sum()), int(table["time_outs"].sum())
+    others = int(table["others"].sum())
+    share = f" ({100.0 * out / trials:.1f} {style.percent})" if trials else ""
+    told = f"Of {trials} trials, {out}{share} ended by time-out"
+    return told + (f" and {others} in another way without success." if others else ".")
+
+
+def f_test(row: Mapping[str, Any], style: Style) -> str:
+    """Return ``F(5.27, 184.33) = 2.43, p = .034, ηp² = .06``, corrected where it matters."""
+    whole = row["epsilon"] == 1.0
+    df = [row["epsilon"] * row["df1"], row["epsilon"] * row["df2"]]
+    free = ", ".join(f"{value:.0f}" if whole else f"{value:.2f}" for value in df)
+    return (
+        f"{style.symbol('F')}({free}) = {row['f']:.2f}, {_p(row['p_gg'], style)}, "
+        f"{style.eta} = {_share(row['eta2p'], 2)}"
+    )
+
+
+def _effect(row: Mapping[str, Any], style: Style) -> str:
+    effect, _, rest = str(row["factor"]).partition(" ")
+    found = row["p_gg"] < LEVEL
+    where = f" {style.plain(rest)}" if rest else ""
+    if ":" in effect:
+        names = style.plain(" and ".join(effect.split(":")))
+        said = "there was an interaction" if found else "there was no interaction"
+        return f"{said} of {names}{where}, {f_test(row, style)}"
+    said = "differed" if found else "did not differ"
+    return f"{said} over {style.plain(effect)}{where}, {f_test(row, style)}"
+
+
+def _trend(row: Mapping[str, Any], style: Style) -> str:
+    unit = UNITS.get(row["measure"], "")
+    phase = next((str(row[kind]) for kind in ("session", "block", "phase") if kind in row), "")
+    word = "fell" if row["slope"] < 0 else "rose"
+    holm = "" if math.isnan(row["p_holm"]) else f" (after Holm {_p(row['p_holm'], style)})"
+    low, high = _number(row["slope_low"], style), _number(row["slope_high"], style)
+    return (
+        f"Over the positions of {style.plain(phase)} it {word} by {abs(row['slope']):.3g} {unit} "
+        f"each, 95 {style.percent} CI [{low}, {high}], {_t(row, style)}{holm}."
+    )
+
+
+def _scale(row: Mapping[str, Any], style: Style) -> str:
+    """Return what happened from one phase to the next, over all participants."""
+    spoken = {"change": "Mean change to", "warm-up decrement": "Warm-up decrement at the start of"}
+    spoken["retention"] = "Difference of the last positions, to"
+    if row["group"] != "all" or row["quantity"] not in spoken or math.isnan(row["t"]):
+        return ""
+    unit, mean = UNITS.get(row["measure"], ""), _number(row["mean"], style)
+    said = f"{spoken[row['quantity']]} {style.plain(str(row['phase']))}: {mean} {unit}"
+    return f"{said}, {_t(row, style)}."
+
+
+def _contrast(row: Mapping[str, Any], style: Style) -> str:
+    if math.isnan(row["t"]):
+        return ""  # all are alike
+    at = f" in {style.plain(str(row['at']))}" if row["at"] else ""
+    first, second = style.plain(str(row["first"])), style.plain(str(row["second"]))
+    unit = UNITS.get(row["measure"], "")
+    if row["factor"] == "distance":
+        first, second = f"{first} m", f"{second} m"
+    low, high = _number(row["ci_low"], style), _number(row["ci_high"], style)
+    return (
+        f"{first} minus {second}{at}: {_number(row['difference'], style)} {unit}, "
+        f"95 {style.percent} CI [{low}, {high}], {style.symbol('t')}({row['df']:.0f}) = "
+        f"{_number(row['t'], style, '.2f')}, Holm-corrected {_p(row['p_holm'], style)}."
+    )
+
+
+def _t(row: Mapping[str, Any], style: Style) -> str:
+    value = _number(row["t"], style, ".2f")
+    return f"{style.symbol('t')}({row['df']:.0f}) = {value}, {_p(row['p'], style)}"
+
+
+def _number(value: float, style: Style, spec: str = ".3g") -> str:
+    return (style.minus if value < 0 else "") + format(abs(value), spec)
+
+
+def _p(p: float, style: Style) -> str:
+    if p < SMALLEST:
+        return f"{style.symbol('p')} {style.less} .001"
+    return f"{style.symbol('p')} = {_share(p, 3)}"
+
+
+def _share(value: float, digits: int) -> str:
+    """Return a number that cannot be above 1 as papers do, without the zero before the point."""
+    text = f"{value:.{digits}f}"
+    return text.removeprefix("0")
