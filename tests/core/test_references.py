@@ -235,7 +235,7 @@ def broken(rng: random.Random, text: str, place: Place, *, key: bool) -> tuple[s
 
 
 REMEDY = re.compile(
-    r"there is no such \w+; .*has |no such file; did you|does not exist; |it needs one for each of |must be |needs the "
+    r"there is no such \w+; .*has |no such file; did you|does not exist; |it needs one for each of |must be |needs (the |')"
 )
 
 
