@@ -29,7 +29,7 @@ from .references import (
     SignalName,
     ViewName,
 )
-from .settings import Names, StudyPath, read_csv_text, read_yaml, was_run
+from .settings import Names, StudyPath, Unit, read_csv_text, read_yaml, was_run
 from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
 
 __all__ = [
@@ -70,6 +70,7 @@ __all__ = [
     "StudyPath",
     "TargetFinder",
     "TrialStatus",
+    "Unit",
     "Value",
     "Verdict",
     "ViewName",

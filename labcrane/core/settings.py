@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import AfterValidator, ValidationInfo
 
+from labcrane.core.references import Reference
 from labcrane.files.model import StrictModel
 from labcrane.files.model import was_run as was_run  # noqa: PLC0414 - public here
 from labcrane.files.table import read_csv_text as read_csv_text  # noqa: PLC0414 - public here
+from labcrane.files.units import Unit as Unit  # noqa: PLC0414 - public here
 from labcrane.files.yaml import read_yaml as read_yaml  # noqa: PLC0414 - public here
 
 if TYPE_CHECKING:
@@ -35,6 +37,14 @@ class Settings(StrictModel):
         """
         return ""
 
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        """Return numbers that hardly anybody means, by key: ``{"limit_s": "is 0.1 s, and ..."}``.
+
+        ``labcrane check`` asks whether each is meant, until the protocol says so. The key may lead
+        inside: ``"jaws.grip_n"``.
+        """
+        return {}
+
     def provides(self, machine: Machine) -> Names:
         """Return the names that a component with these settings gives others to refer to, by kind.
 
@@ -53,6 +63,6 @@ def _beside(path: Path, info: ValidationInfo) -> Path:
     return info.context["folder"] / path if info.context else path
 
 
-StudyPath = Annotated[Path, AfterValidator(_beside)]
+StudyPath = Annotated[Path, AfterValidator(_beside), Reference("file")]
 """A file of the study in a component's settings: a relative path counts from the folder of the
 protocol that names it."""

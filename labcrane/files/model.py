@@ -1,6 +1,17 @@
-"""Models of YAML: strict, with a schema that says what the docstring under a key says."""
+"""Models of YAML: strict, with units, and a schema that says what is written under a key."""
 
-from pydantic import BaseModel, ConfigDict, ValidationInfo
+from collections.abc import Iterator, Mapping
+from types import UnionType
+from typing import Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationInfo, field_validator
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
+
+from labcrane.files.units import read_quantities, unit_of
+
+UNIT = "x-unit"
+"""Key of a schema that says the unit of numbers."""
 
 
 class StrictModel(BaseModel):
@@ -12,6 +23,64 @@ class StrictModel(BaseModel):
     model_config = ConfigDict(
         extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
     )
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _in_its_own_unit(cls, value: Any, info: ValidationInfo) -> Any:
+        """Take ``50 cm`` where a number of metres is asked for."""
+        if not isinstance(value, str | list | dict | bool) or info.field_name is None:
+            return value
+        field = cls.model_fields[info.field_name]
+        unit = unit_of(info.field_name, field.metadata)
+        shape = _shape(field.annotation)
+        if not was_run(info):
+            _no_truth(field.annotation, value)
+        if unit is None or shape is None or not isinstance(value, str | list):
+            return value
+        return read_quantities(value, unit, several=shape is list)
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, core: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Say the unit of every key that has one."""
+        written = handler(core)
+        keys = handler.resolve_ref_schema(written).get("properties", {})
+        for name, field in cls.model_fields.items():
+            unit, key = unit_of(name, field.metadata), field.alias or name
+            if unit is not None and key in keys and _shape(field.annotation) is not None:
+                keys[key][UNIT] = unit
+        return written
+
+
+def _no_truth(annotation: Any, value: Any) -> None:
+    """Refuse ``true`` where a number is asked for: it would be taken for 1."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if isinstance(value, bool):
+        kinds = set(_plain_types(annotation))
+        if kinds & {int, float} and not kinds & {bool, Any}:
+            said = str(value).lower()
+            raise ValueError(f"{said} is no number; write one")
+    elif isinstance(value, list) and origin in {tuple, list}:
+        for each in value:
+            _no_truth(Union[arguments], each)  # noqa: UP007 - of what is only known now
+    elif isinstance(value, dict) and origin is dict:
+        for each in value.values():
+            _no_truth(arguments[1], each)
+
+
+def _plain_types(annotation: Any) -> Iterator[Any]:
+    """Yield the types that a value of a type can be, behind unions and marks."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if origin in {Union, UnionType}:
+        for each in arguments:
+            yield from _plain_types(each)
+    elif hasattr(annotation, "__metadata__"):
+        yield from _plain_types(arguments[0])
+    elif origin is Literal:
+        yield from map(type, arguments)
+    else:
+        yield annotation
 
 
 def was_run(info: ValidationInfo) -> bool:
@@ -34,3 +103,42 @@ def was_run(info: ValidationInfo) -> bool:
     ...         return colours
     """
     return bool(info.context and info.context.get("recorded"))
+
+
+def quantities(model: BaseModel) -> Iterator[tuple[tuple[str | int, ...], str, float]]:
+    """Yield every number with a unit that was written into a model: its place, unit and value."""
+    for name in type(model).model_fields:
+        if name in model.model_fields_set:
+            field, value = type(model).model_fields[name], getattr(model, name)
+            unit = unit_of(name, field.metadata)
+            if _shape(field.annotation) is None:
+                unit = None
+            yield from _quantities((field.alias or name,), unit, value)
+
+
+def _quantities(
+    place: tuple[str | int, ...], unit: str | None, value: Any
+) -> Iterator[tuple[tuple[str | int, ...], str, float]]:
+    if isinstance(value, BaseModel):
+        for inside, its, number in quantities(value):
+            yield (*place, *inside), its, number
+    elif isinstance(value, Mapping):
+        for key, each in value.items():
+            yield from _quantities((*place, key), None, each)
+    elif isinstance(value, list | tuple):
+        for at, each in enumerate(value):
+            yield from _quantities((*place, at), unit, each)
+    elif unit is not None and isinstance(value, int | float) and not isinstance(value, bool):
+        yield place, unit, float(value)
+
+
+def _shape(annotation: Any) -> type | None:
+    """Return whether a key asks for a number (float) or numbers (list); None for anything else."""
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if annotation in {int, float}:
+        return float
+    if origin in {tuple, list}:
+        return list if any(_shape(each) for each in arguments) else None
+    if origin in {Union, UnionType}:
+        return next((shape for each in arguments if (shape := _shape(each))), None)
+    return _shape(arguments[0]) if arguments and hasattr(annotation, "__metadata__") else None

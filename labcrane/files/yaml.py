@@ -2,20 +2,23 @@
 
 import re
 import warnings
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
 from datetime import date
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning, YAMLError
 from ruamel.yaml.reader import ReaderError
 
-from labcrane.errors import ProtocolError, suggestion
+from labcrane.errors import ProtocolError
+from labcrane.files.complaints import Place as Place  # noqa: PLC0414 - public here
+from labcrane.files.complaints import named, shown, told
+from labcrane.files.misread import misread
 from labcrane.limits import LIMITS, LimitError, check_size, foreign
 
 DEEPEST = LIMITS["YAML file"].depth
@@ -32,12 +35,9 @@ GARBLED = (ValueError, LookupError, TypeError, ArithmeticError, AttributeError, 
 
 _MARKS = re.compile(r"[,:\[\]{}\n-]")
 _BRACKETS = re.compile(r"[\[\]{}]")
-_MEMBER = re.compile(r"\[.*[\]'\"]|^(constrained-)?(str|int|float|bool)$")
 _STAIRS = re.compile(r"(?:[-?:] *){50}| {200}")
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
-Place = tuple[str | int, ...]
-"""The keys and indices that lead to a value: ``("sessions", 0, "steps", 2)``."""
 
 
 @dataclass
@@ -131,13 +131,16 @@ class YamlFile:
             for step in place:
                 value = value[step]
         if not isinstance(value, Mapping):
-            self.problem(place, f"{_name(place)} must be a mapping of keys, but is {value!r}")
+            self.problem(
+                place,
+                f"{named(place)} is {shown(value)}; it must be a mapping of keys: {{key: value}}",
+            )
             return None
         try:
             context = {"folder": self.path.parent, "recorded": self.recorded}
             return model.model_validate(value, context=context)
         except ValidationError as error:
-            for at, message in _told(error.errors(), place, model):
+            for at, message in told(error.errors(), place, model):
                 self.problem((*place, *_inside(value, at)), message)
             return None
 
@@ -159,117 +162,6 @@ class YamlFile:
             raise ProtocolError("\n".join(dict.fromkeys(lines)))
 
 
-def _told(
-    errors: Sequence[ErrorDetails], place: Place, model: type[BaseModel]
-) -> Iterator[tuple[Place, str]]:
-    """Yield what pydantic complains of; where a value is no member of a union, in one line.
-
-    Pydantic complains once for every member, each as if it were the only one.
-    """
-    unions: dict[Place, list[ErrorDetails]] = {}
-    for each in errors:
-        loc = each["loc"]
-        at = next((n for n, step in enumerate(loc) if _is_member(step)), None)
-        if at is None or at + 1 < len(loc):
-            yield loc, explain(each, place, model)
-        else:
-            unions.setdefault(loc[:at], []).append(each)
-    for loc, several in unions.items():
-        said = [explain(each, place, model) for each in several]
-        head, wanted = (
-            said[0].partition("; it must be ")[0],
-            [text.partition("; it must be ")[2] or text for text in said],
-        )
-        yield loc, f"{head}; it must be {', or '.join(dict.fromkeys(wanted))}"
-
-
-def explain(error: ErrorDetails, place: Place, model: type[BaseModel]) -> str:
-    """Return what was written and what is possible, for one of pydantic's complaints."""
-    loc = error["loc"]
-    key = loc[-1] if loc else _name(place)
-    if error["type"] == "extra_forbidden":
-        possible = _keys(model, loc[:-1])
-        instead = suggestion(str(key), possible, "possible:")
-        return f"{str(key)!r} is not a key of {_name((*place, *loc[:-1]))}; {instead}"
-    if error["type"] == "missing":
-        return f"{_name((*place, *loc[:-1]))} needs {str(key)!r}"
-    name = _name((*place, *(step for step in loc if not _is_member(step))))
-    what = error["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
-    if error["type"] == "value_error":
-        return f"{name}: {what}"
-    if error["type"] in {"too_short", "too_long"}:
-        return f"{name} is {_short(error['input'])}; {_how_many(error)}"
-    if error["type"] == "string_pattern_mismatch":
-        what = PATTERNS.get(error.get("ctx", {}).get("pattern", ""), what)
-    return f"{name} is {_short(error['input'])}; it must be {WANTED.get(error['type'], what)}"
-
-
-WANTED = {
-    "tuple_type": "a list: [.., ..]",
-    "list_type": "a list: [.., ..]",
-    "dict_type": "a mapping of keys: {key: value}",
-    "model_type": "a mapping of keys: {key: value}",
-    "string_type": "text; put it in quotation marks if it is",
-    "bool_type": "true or false",
-    "int_type": "a whole number",
-    "int_parsing": "a whole number",
-    "float_type": "a number, without a unit",
-    "float_parsing": "a number, without a unit",
-}
-"""What each of pydantic's types is for people who write YAML."""
-
-PATTERNS = {
-    "^[a-z][a-z0-9_-]*$": "lower-case letters, digits, hyphens and underscores, a letter first",
-    "^[a-z][a-z0-9_]*$": "lower-case letters, digits and underscores, a letter first",
-    "^-?[a-z][a-z0-9_.]*$": "the name of an axis, as left.x, or -left.x to turn it round",
-}
-"""Patterns in words."""
-
-MOST_SHOWN = 60
-"""Characters of a value that a message repeats."""
-
-
-def _short(value: object) -> str:
-    """Return a value as a message repeats it: a whole section is not printed over a screen."""
-    text = repr(value)
-    if len(text) <= MOST_SHOWN:
-        return text
-    if isinstance(value, Mapping):
-        return f"a mapping of {', '.join(map(str, value))}"[:MOST_SHOWN]
-    if isinstance(value, list | tuple):
-        return f"a list of {len(value)}"
-    return f"{text[:MOST_SHOWN]}..."
-
-
-def _how_many(error: ErrorDetails) -> str:
-    about = error.get("ctx", {})
-    if error["type"] == "too_short":
-        return f"it needs at least {about.get('min_length')}"
-    return f"it can have at most {about.get('max_length')}"
-
-
-def _is_member(step: object) -> bool:
-    """Whether part of pydantic's location is its name for a member of a union."""
-    return isinstance(step, str) and bool(_MEMBER.search(step))
-
-
-def _keys(model: type[BaseModel], place: Place) -> list[str]:
-    fields: Any = model
-    for step in place:
-        if isinstance(step, int):
-            continue
-        annotation = fields.model_fields[step].annotation if step in fields.model_fields else None
-        nested = [a for a in (annotation, *getattr(annotation, "__args__", ())) if _is_model(a)]
-        if not nested:
-            return []
-        fields = nested[0]
-    return list(fields.model_fields)
-
-
-def _is_model(annotation: Any) -> bool:
-    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
-
-
 def _inside(value: Any, loc: Place) -> Place:
     """Return the part of pydantic's location that is really in the file."""
     place: list[str | int] = []
@@ -285,13 +177,6 @@ def _inside(value: Any, loc: Place) -> Place:
 
 def _is_index(step: object, node: CommentedSeq) -> bool:
     return isinstance(step, int) and 0 <= step < len(node)
-
-
-def _name(place: Place) -> str:
-    text = ""
-    for step in place:
-        text += f"[{step + 1}]" if isinstance(step, int) else f".{step}" if text else str(step)
-    return text or "the file"
 
 
 def read_text(path: Path) -> str:
@@ -315,6 +200,11 @@ def read_text(path: Path) -> str:
         raise ProtocolError(f"{path} cannot be read: {error}; split it up") from None
     except UnicodeDecodeError as error:
         raw: bytes = error.object
+        if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+            raise ProtocolError(
+                f"{path}:1: byte 0x{raw[0]:02X} is no UTF-8; the file is in UTF-16: open it in an "
+                "editor and save it as UTF-8"
+            ) from None
         line = raw.count(b"\n", 0, error.start) + 1
         raise ProtocolError(
             f"{path}:{line}: byte 0x{raw[error.start]:02X} is no UTF-8; open the file in an "
@@ -370,7 +260,9 @@ def _scalar(node: Any, name: str, *, recorded: bool) -> Any:
     raise ProtocolError(f"{name} holds {str(node)[:40]!r} with a tag; write plain values")
 
 
+@lru_cache(maxsize=64)
 def _load(text: str, name: str, *, recorded: bool = False) -> Any:
+    """Return what ruamel.yaml makes of a text, which nobody changes: a scene is read many times."""
     try:
         check_size(len(text), "YAML file", "it")
     except LimitError as error:
@@ -388,20 +280,21 @@ def _load(text: str, name: str, *, recorded: bool = False) -> Any:
             warnings.simplefilter("ignore" if recorded else "error", ReusedAnchorWarning)
             return YAML(typ="rt", pure=True).load(text)
     except ReusedAnchorWarning as error:
+        line = max(map(int, re.findall(r"line (\d+)", str(error))), default=1)
         raise ProtocolError(
-            f"{name}: this is no YAML that can be trusted: an anchor is given twice; give each its "
-            "own name"
+            f"{name}:{line}: this is no YAML that can be trusted: an anchor is given twice; give "
+            "each its own name"
         ) from error
     except MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
-        if "'\\t'" in str(error.problem):
-            raise ProtocolError(
-                f"{name}:{line}: there is a tab, which YAML does not take for indentation; write "
-                "spaces, and set the editor to do so"
-            ) from error
-        raise ProtocolError(f"{name}:{line}: this is no YAML: {error.problem}") from error
+        line, why = misread(error, text)
+        raise ProtocolError(f"{name}:{line}: {why}") from error
     except ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
+        if text[:4].count("\0") > 1:
+            raise ProtocolError(
+                f"{name}:1: every other byte is 0, as in UTF-16; open the file in an editor and "
+                "save it as UTF-8"
+            ) from error
         raise ProtocolError(
             f"{name}:{line}: this is no YAML: it holds the character U+{_code(error):04X}, which "
             "no text may; remove it"

@@ -15,6 +15,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from labcrane.errors import suggestion
+from labcrane.files.complaints import written
 from labcrane.files.model import StrictModel
 
 
@@ -49,8 +50,8 @@ class ActuatorSettings(StrictModel):
             message = f"no actuator is called {value!r}; {suggestion(value, ACTUATOR_PRESETS)}"
             raise ValueError(message)  # noqa: TRY004 - pydantic reports no TypeError
         raise ValueError(
-            f"{value!r} is no actuator; write a name ({', '.join(ACTUATOR_PRESETS)}) or a mapping "
-            f"of {', '.join(cls.model_fields)}"
+            f"{written(value)} is no actuator; write a name ({', '.join(ACTUATOR_PRESETS)}) or a "
+            f"mapping of {', '.join(cls.model_fields)}"
         )
 
 

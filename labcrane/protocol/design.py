@@ -20,7 +20,7 @@ class Order(Settings):
     """``as_written``; ``shuffled``: all repetitions together; ``blocked``: each repetition by
     itself; ``latin_square`` or ``williams``: each participant has a row of the square."""
 
-    times: PositiveInt = 1
+    times: PositiveInt = Field(default=1, le=1000)
     """How often each level comes in a block."""
 
     in_a_row: PositiveInt | None = None
@@ -69,5 +69,5 @@ class Criterion(Settings):
     successes: PositiveInt
     """How many counted trials in a row must succeed."""
 
-    rounds: PositiveInt = 1
+    rounds: PositiveInt = Field(default=1, le=1000)
     """How many times the block is run at most; whether it was enough is recorded."""

@@ -8,6 +8,8 @@ from pydantic.json_schema import models_json_schema
 
 from labcrane.core.roles import Component
 from labcrane.core.settings import Settings
+from labcrane.files.model import UNIT
+from labcrane.files.units import EXAMPLES, SPELT
 from labcrane.protocol.protocol import protocol_model
 from labcrane.protocol.steps import Block, Break, Session
 from labcrane.registry.hookspecs import roles_by_key
@@ -42,12 +44,54 @@ def protocol_schema(registry: Registry) -> Schema:
             if part.get("type") == "object":
                 part |= {"additionalProperties": _use(registry, of, named)}
     named[Session]["properties"]["steps"]["items"] = _step(references[(Block, "validation")])
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **protocol,
-        "title": "A labcrane protocol",
-        "$defs": shared,
-    }
+    made: Schema = _with_units(
+        {
+            "$schema": "https://json-schema.org/draft/2020-12/schema",
+            **protocol,
+            "title": "A labcrane protocol",
+            "$defs": shared,
+        }
+    )
+    return made
+
+
+def _with_units(schema: Any) -> Any:
+    """Return a schema in which every number that has a unit may be written with another."""
+    if isinstance(schema, list):
+        return [_with_units(each) for each in schema]
+    if not isinstance(schema, dict):
+        return schema
+    inside = {key: _with_units(value) for key, value in schema.items()}
+    unit = inside.pop(UNIT, None)
+    if unit is None:
+        return inside
+    said = {key: inside.pop(key) for key in ABOUT if key in inside}
+    words = str(said.get("description", "")).strip()
+    said["description"] = f"{words} Plain numbers are in {unit}; {EXAMPLES[unit]} is fine, too."
+    default = said.get("default")
+    shown = EXAMPLES[unit] if not isinstance(default, list) else [EXAMPLES[unit]] * len(default)
+    said["examples"] = [shown] if default is None else [default, shown]
+    return {**said, **_or_quantity(inside)}
+
+
+NUMBERS = {"number", "integer"}
+
+ABOUT = ("title", "description", "default", "examples")
+"""What a schema says of a key as a whole."""
+
+
+def _or_quantity(schema: Schema) -> Schema:
+    """Return a schema of numbers, or lists of them, each of which may be a quantity."""
+    if schema.get("type") in NUMBERS:
+        return {**schema, "type": [schema["type"], "string"], "pattern": SPELT}
+    made = dict(schema)
+    if "anyOf" in made:
+        made["anyOf"] = [_or_quantity(each) for each in made["anyOf"]]
+    if isinstance(made.get("items"), dict):
+        made["items"] = _or_quantity(made["items"])
+    if "prefixItems" in made:
+        made["prefixItems"] = [_or_quantity(each) for each in made["prefixItems"]]
+    return made
 
 
 def _use(

@@ -60,7 +60,7 @@ class Participants(Section):
     pattern: str = r"P\d{3,4}"
     """Regular expression that a participant's pseudonym matches as a whole."""
 
-    planned: PositiveInt = 1
+    planned: PositiveInt = Field(default=1, le=100_000)
     """How many participants are planned."""
 
     @field_validator("pattern")
@@ -178,6 +178,9 @@ class Protocol(Section):
     on_fault: OnFault = OnFault()
     """What happens when something fails."""
 
+    expected: tuple[str, ...] = ()
+    """Answers to the questions of ``labcrane check``, by their keys: what is asked is meant."""
+
 
 def protocol_model() -> type[Protocol]:
     """Return the model of a protocol, with a key for every role that is on the table."""
@@ -203,7 +206,7 @@ def read(path: Path, *, recorded: bool = False) -> tuple[Protocol | None, YamlFi
     """
     source = YamlFile.read(path, recorded=recorded)
     if not isinstance(source.data, dict):
-        source.problem((), "a protocol is a mapping of keys, beginning with 'labcrane: 1'")
+        source.problem((), "it must be a mapping of keys, beginning with 'labcrane: 1'")
         return None, source
     plain = {**source.data, "sessions": read_sessions(source)}
     return source.check(protocol_model(), value=plain), source

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 from labcrane.core.references import EVENTS, Covers, Mark, Mentioned, Once, Reference, mentioned
@@ -65,7 +66,9 @@ class ReferenceChecker:
             written = list(mentioned(settings))
             for mention in written:
                 at = (*place, *mention.place)
-                if isinstance(mention.mark, Reference):
+                if isinstance(mention.value, Path):
+                    self._is_there(at, mention.value)
+                elif isinstance(mention.mark, Reference):
                     self._refers(at, mention, mention.mark, choice)
                 elif place != ("operator",):
                     self._whole(at, mention.mark, mention.value)
@@ -86,6 +89,14 @@ class ReferenceChecker:
             return
         message = f"{_dotted(at)} is {mention.value!r}, and {_has(mark.kind, name, known)}"
         self._source.misnamed(at, message, key=mention.key)
+
+    def _is_there(self, at: Place, path: Path) -> None:
+        if path.exists():
+            return
+        beside = sorted(each.name for each in path.parent.glob("*")) if path.parent.is_dir() else []
+        near = suggestion(path.name, beside, f"{path.parent} has")
+        message = f"{_dotted(at)} is {path.name!r}, and there is no such file; {near}"
+        self._source.misnamed(at, message)
 
     def _needed(self, place: Place, settings: Settings) -> Iterator[tuple[str, Sequence[str]]]:
         try:

@@ -13,6 +13,8 @@ from pydantic import (
 
 from labcrane.core.settings import Settings
 from labcrane.errors import ProtocolError, suggestion
+from labcrane.files.complaints import shown
+from labcrane.files.units import Unit
 from labcrane.files.yaml import Place, YamlFile, read_text
 from labcrane.protocol.design import Criterion
 
@@ -46,7 +48,7 @@ class Block(Section):
     """Share of the trials with feedback, part by part: ``[1, 0.5, 0]`` is all of the first third,
     every second trial of the second, none of the last."""
 
-    repeat: PositiveInt = 1
+    repeat: PositiveInt = Field(default=1, le=1000)
     """How many times the block is run, each time in a new order."""
 
     until: Criterion | None = None
@@ -61,7 +63,7 @@ class Block(Section):
 class Break(Section):
     """A pause in which the machine rests."""
 
-    seconds: NonNegativeFloat
+    seconds: Annotated[NonNegativeFloat, Unit("s")]
     """How long it lasts, in seconds; the examiner can end it earlier, which is recorded."""
 
 
@@ -125,7 +127,9 @@ def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
     if step == "consent":
         return {"kind": step}
     if not (isinstance(step, dict) and len(step) == 1):
-        source.problem(place, f"a step is one of {', '.join(STEPS)} with a value, not {step!r}")
+        source.problem(
+            place, f"a step is {shown(step)}; it must be {', '.join(STEPS)}, with its value"
+        )
         return None
     (kind, value), *_ = step.items()
     if kind not in STEPS:
@@ -152,14 +156,16 @@ def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
 def _questionnaire(source: YamlFile, place: Place, value: Any) -> dict[str, Any] | None:
     names = [value] if isinstance(value, str) else value
     if not (isinstance(names, list) and names and all(isinstance(name, str) for name in names)):
-        source.problem(place, f"questionnaire is a name or a list of names, not {value!r}")
+        told = f"questionnaire is {shown(value)}; it must be a name, or a list of names"
+        source.problem(place, told)
         return None
     return {"kind": "questionnaire", "questionnaires": tuple(names)}
 
 
 def _instructions(source: YamlFile, place: Place, value: Any) -> dict[str, Any] | None:
     if not isinstance(value, str):
-        source.problem(place, f"instructions name a text file, not {value!r}")
+        told = f"instructions is {shown(value)}; it must be the name of a text file"
+        source.problem(place, told)
         return None
     path = source.path.parent / value
     try:

@@ -50,6 +50,8 @@ class Study:
         Whether it was read as the record of what was run.
     outdated
         What would be refused of it today, where it is gone on with as it was begun.
+    source
+        The protocol's file, which knows the line of everything.
     """
 
     path: Path
@@ -73,6 +75,7 @@ class Study:
     oversight: CallMonitor = field(default_factory=CallMonitor)
     recorded: bool = False
     outdated: str = ""
+    source: YamlFile | None = field(default=None, repr=False, compare=False)
 
     @property
     def sha256(self) -> str:
@@ -96,33 +99,6 @@ class Study:
             **{f"{kind}.{name}": choice for kind in named for name, choice in named[kind].items()},
             **self.others,
         }
-
-    def warnings(self) -> Iterator[str]:
-        """Yield what is allowed, but should be known before people take part."""
-        for part, choice in self.choices.items():
-            for warning in choice.settings.warnings():
-                yield f"{part}: {warning}"
-        for name, choice in self.views.items():
-            if told := choice.settings.reveals():
-                yield (
-                    f"views.{name}: {choice.name} tells {told}, in every group and block; put it "
-                    "under feedback, where the design says who is given it"
-                )
-        yield from self._unsaid()
-
-    def _unsaid(self) -> Iterator[str]:
-        """Yield where every group is given all feedback because a block says nothing of it."""
-        if not (self.protocol.design.groups and self.protocol.feedback):
-            return
-        all_of_it = ", ".join(self.protocol.feedback)
-        for session in self.protocol.sessions:
-            for number, step in enumerate(session.steps, start=1):
-                if step.block is not None and "feedback" not in step.block.model_fields_set:
-                    yield (
-                        f"sessions: step {number} of {session.name!r} does not say which feedback "
-                        f"it has, so that every group is given {all_of_it}; write feedback: group, "
-                        "none, all or a list of names"
-                    )
 
     def check_installed(self, *, simulated: bool = False, feedback: bool = True) -> None:
         """Raise :class:`ProtocolError` unless all that a run of the study needs is installed.
@@ -160,6 +136,21 @@ class Study:
         if not 1 <= number <= len(names):
             listed = ", ".join(f"{at} {name!r}" for at, name in enumerate(names, start=1))
             raise ProtocolError(f"there is no session {number}; {self.path} has {listed}")
+
+
+MOST_TRIALS = 100_000
+"""Of a block."""
+
+
+def trials_of(block: Block, protocol: Protocol, task: Task) -> tuple[float, float]:
+    """Return about how many trials a block has, and how long they take in s, without a plan."""
+    share = float(block.repeat * (block.until.rounds if block.until else 1))
+    for factor, levels in task.factors().items():
+        times = protocol.design.order[factor].times if factor in protocol.design.order else 1
+        used = block.limits.get(factor)
+        share *= times if not isinstance(used, int) else min(used / len(levels), times)
+    once = task.plan(task.factors())
+    return len(once) * share, sum(trial.expected_s for trial in once) * share
 
 
 class Checker:
@@ -204,6 +195,7 @@ class Checker:
                 self._source.problem((*place, "task"), message)
             elif task := tasks.get(block.task):
                 self._limits(place, block.limits, task)
+                self._count(place, block, task)
 
     def _blocks(self) -> Iterator[tuple[Place, Block]]:
         for number, session in enumerate(self._protocol.sessions):
@@ -211,6 +203,13 @@ class Checker:
             for at, step in enumerate(session.steps):
                 if step.block is not None:
                     yield ("sessions", number, "steps", at, next(iter(steps[at]))), step.block
+
+    def _count(self, place: Place, block: Block, task: Task) -> None:
+        """Note a block of more trials than anybody does, which no plan could hold."""
+        count = trials_of(block, self._protocol, task)[0]
+        if count > MOST_TRIALS and not self._source.recorded:
+            message = f"the block has {count:.0f} trials; the most are {MOST_TRIALS}: repeat less"
+            self._source.problem(place, message)
 
     def _limits(self, place: Place, limits: Mapping[str, object], task: Task) -> None:
         factors = task.factors()
@@ -249,7 +248,10 @@ class Checker:
             self._feedback_exists(("design", "groups", group), names)
         for place, block in self._blocks():
             if block.feedback == "group" and not self._protocol.design.groups:
-                message = "feedback is by group, but design has no groups"
+                message = (
+                    "feedback is by group, but design has no groups; write them under design:, or "
+                    "feedback: all, none or a list of names"
+                )
                 self._source.problem((*place, "feedback"), message)
             elif isinstance(block.feedback, tuple):
                 self._feedback_exists((*place, "feedback"), block.feedback)
@@ -332,4 +334,5 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
         others=others,
         oversight=chooser.oversight,
         recorded=recorded,
+        source=source,
     )

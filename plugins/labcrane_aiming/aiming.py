@@ -62,7 +62,7 @@ class Aiming(Task):
                 if reach(machine, point) is None:
                     raise ProtocolError(
                         f"the {which} circle of pair {pair.name!r} at "
-                        f"({', '.join(f'{value:.2f}' for value in point)}) m is out of reach of "
+                        f"({', '.join(_short(value) for value in point)}) m is out of reach of "
                         f"the {machine.title}; move the centre or shorten the distance"
                     )
 
@@ -164,6 +164,10 @@ class Aiming(Task):
     def _arrived(self) -> bool:
         anywhere = self._settings.end == "rest_anywhere"
         return not anywhere or self._movement.done >= self._settings.rest_after
+
+
+def _short(value: float) -> str:
+    return f"{value:.2f}" if abs(value) < 1e6 else f"{value:g}"  # noqa: PLR2004 - a screen's width
 
 
 def _point(condition: Mapping[str, object], name: str) -> Point:

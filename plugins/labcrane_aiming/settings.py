@@ -1,6 +1,7 @@
 """Settings of the aiming task."""
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from pydantic import (
@@ -13,7 +14,7 @@ from pydantic import (
 )
 
 from labcrane import Machine, Settings
-from labcrane.core import ButtonName, Names, was_run
+from labcrane.core import ButtonName, Names, Unit, was_run
 
 EVENTS = ("targets.shown", "target.entered", "command.onset", "movement.onset", "movement.offset")
 """What a movement tells beside its beginning and end."""
@@ -26,16 +27,21 @@ class AimingSettings(Settings):
     both bundled machines can reach (``docs/decisions/0004-aiming-geometry.md``).
     """
 
-    distances: Annotated[tuple[PositiveFloat, ...], Field(min_length=1)] = (2.0, 3.0, 4.0, 6.0)
+    distances: Annotated[tuple[PositiveFloat, ...], Field(min_length=1), Unit("m")] = (
+        2.0,
+        3.0,
+        4.0,
+        6.0,
+    )
     """Distances between the two circles' centres, in metres. Each is used in both mirror images."""
 
-    width: PositiveFloat = 0.5
+    width: Annotated[PositiveFloat, Unit("m")] = 0.5
     """Diameter of a circle, in metres."""
 
-    movements: PositiveInt = 4
+    movements: PositiveInt = Field(default=4, le=1000)
     """Counted movements per pair of circles."""
 
-    centre: tuple[float, float, float] = (5.5, 0.0, 0.8)
+    centre: Annotated[tuple[float, float, float], Unit("m")] = (5.5, 0.0, 0.8)
     """Middle between the two circles in the machine's base frame: x, y, z in metres."""
 
     diagonal_deg: float = Field(default=45.0, ge=0.0, le=90.0)
@@ -48,7 +54,7 @@ class AimingSettings(Settings):
     trigger: ButtonName = "right.trigger"
     """The button that ends a movement when ``end`` is ``trigger``."""
 
-    rest_speed: PositiveFloat = 0.02
+    rest_speed: Annotated[PositiveFloat, Unit("m/s")] = 0.02
     """Tip speed below which the tip is at rest, in metres per second."""
 
     rest_s: NonNegativeFloat = 0.2
@@ -57,7 +63,7 @@ class AimingSettings(Settings):
     rest_after: float = Field(default=0.5, gt=0.0, le=1.0)
     """Fraction of the way after which a rest ends a movement, when ``end`` is ``rest_anywhere``."""
 
-    onset_speed: PositiveFloat = 0.02
+    onset_speed: Annotated[PositiveFloat, Unit("m/s")] = 0.02
     """Tip speed above which a movement has begun, in metres per second."""
 
     onset_share: float = Field(default=0.05, ge=0.0, lt=1.0)
@@ -74,6 +80,15 @@ class AimingSettings(Settings):
 
     def needs(self, machine: Machine) -> Names:
         return {"axis": [self.trigger]} if self.end == "trigger" else {}
+
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        needed = shortest_s(self, machine)
+        if self.limit_s >= needed:
+            return {}
+        return {
+            "limit_s": f"is {self.limit_s:g} s, and at full speed the farthest movement takes more "
+            f"than {needed:.2g} s"
+        }
 
     @field_validator("distances")
     @classmethod
@@ -96,3 +111,16 @@ class AimingSettings(Settings):
                 f"write less than {shortest:g}"
             )
         return width
+
+
+def shortest_s(settings: AimingSettings, machine: Machine) -> float:
+    """Return a time in s that the farthest movement and the rest behind it take at least.
+
+    No point of the machine turns about a joint faster than the joint does, at the length of all
+    that is beyond it; so the tip is never faster than the sum over the joints.
+    """
+    lengths = [math.hypot(joint.a, joint.d) for joint in machine.joints]
+    beyond = [sum(lengths[at:]) for at in range(len(lengths))]
+    fastest = sum(speed * arm for speed, arm in zip(machine.speeds, beyond, strict=True))
+    way = max(settings.distances) - settings.width / 2
+    return way / fastest + (settings.rest_s if settings.end != "trigger" else 0.0)

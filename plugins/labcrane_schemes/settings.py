@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from labcrane import Settings
-from labcrane.core import AxisName, ButtonName, Covers, JointName, Once
+from labcrane.core import AxisName, ButtonName, Covers, JointName, Once, Unit
 
 DIRECTIONS = {"base": ("x", "y", "z"), "arm": ("radial", "tangential", "vertical")}
 """What the stick moves the tip along, for each ``frame``."""
@@ -53,7 +53,7 @@ class EndEffectorSettings(HandlingSettings):
     lets the tip pitch wander and takes load off a joint near its limit; or by keeping the tip
     pitch, and stopping at the first limit."""
 
-    damping: float = Field(default=0.2, gt=0.0, le=1.0)
+    damping: Annotated[float, Unit("m")] = Field(default=0.2, gt=0.0, le=1.0)
     """Largest damping of the least squares, in metres, reached at a singularity."""
 
     threshold_m: PositiveFloat = 0.5

@@ -1,11 +1,11 @@
 """Settings of the tone."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
 from labcrane import Machine, Settings
-from labcrane.core import Names
+from labcrane.core import Names, Unit
 
 MOST_OVERTONES = 15
 
@@ -17,7 +17,7 @@ class SonificationSettings(Settings):
     proposal (logarithmic pitch over two octaves, rising as the tip comes closer).
     """
 
-    far: PositiveFloat = 4.0
+    far: Annotated[PositiveFloat, Unit("m")] = 4.0
     """Distance of tip and target, in metres, from which on the tone stays as it is."""
 
     pitch_hz: tuple[PositiveFloat, PositiveFloat] = (220.0, 880.0)
@@ -30,7 +30,7 @@ class SonificationSettings(Settings):
     level: tuple[float, float] = (0.3, 0.3)
     """Amplitude of the fundamental far away and at the target, 0 to 1."""
 
-    aside: PositiveFloat = 2.0
+    aside: Annotated[PositiveFloat, Unit("m")] = 2.0
     """Distance to the side, in metres, at which the tone comes from one side only."""
 
     pan: Literal["towards", "away", "none"] = "towards"

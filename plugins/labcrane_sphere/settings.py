@@ -1,11 +1,11 @@
 """Settings of the sphere."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from labcrane import Machine, Settings
-from labcrane.core import Names
+from labcrane.core import Names, Unit
 
 
 class SphereSettings(Settings):
@@ -17,7 +17,7 @@ class SphereSettings(Settings):
     at: Literal["target", "tip"] = "target"
     """Where it is drawn."""
 
-    far: PositiveFloat = 4.0
+    far: Annotated[PositiveFloat, Unit("m")] = 4.0
     """Distance of tip and target, in metres, from which on the sphere stays as it is."""
 
     law: Literal["linear", "log"] = "linear"
@@ -29,10 +29,10 @@ class SphereSettings(Settings):
     brightness: Literal["brightens", "darkens", "constant"] = "brightens"
     """What its brightness does as the tip comes closer."""
 
-    smallest: PositiveFloat = 0.15
+    smallest: Annotated[PositiveFloat, Unit("m")] = 0.15
     """Smallest radius, in metres."""
 
-    largest: PositiveFloat = 0.60
+    largest: Annotated[PositiveFloat, Unit("m")] = 0.60
     """Largest radius, in metres."""
 
     darkest: NonNegativeFloat = Field(default=0.25, lt=1.0)

@@ -14,7 +14,7 @@ from pydantic import (
 from pydantic import PositiveInt as Pixels
 
 from labcrane import Machine, Settings
-from labcrane.core import CameraName, EventName, LinkName, Names, SceneObject
+from labcrane.core import CameraName, EventName, LinkName, Names, SceneObject, Unit
 
 Triple = tuple[float, float, float]
 
@@ -25,10 +25,10 @@ class CameraSettings(Settings):
     name: str = "camera"
     """Names it in the picture and in the areas of interest."""
 
-    eye: Triple
+    eye: Annotated[Triple, Unit("m")]
     """Where it is, in metres, in the machine's base frame or in that of the joint it rides on."""
 
-    look: Triple
+    look: Annotated[Triple, Unit("m")]
     """A point in the middle of its picture, in the same frame."""
 
     fov_deg: float = Field(default=70.0, gt=1.0, lt=170.0)

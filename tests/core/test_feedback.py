@@ -14,6 +14,7 @@ from labcrane.core import Event, Layout, SessionState, TargetFinder
 from labcrane.design.order import faded
 from labcrane.design.plan import plan_session
 from labcrane.feedback.processes import FeedbackProcesses
+from labcrane.protocol.questions import questions
 from labcrane.protocol.study import Study
 from labcrane.recording.run_codec import read_run, write_run
 from labcrane.session.commands import Command, FeedbackLost, FeedbackReady, Order
@@ -50,10 +51,11 @@ def test_feedback_fades_part_by_part(count: int, shares: tuple[float, ...], expe
 
 
 def test_check_warns_of_a_block_that_gives_every_group_all_feedback_unsaid(tmp_path: Path) -> None:
-    (warning,) = a_study(tmp_path, blocks("pairs: 1", "pairs: 1, feedback: group")).warnings()
-    assert warning.startswith("sessions: step 1 of ")
-    assert "so that every group is given ball, tone; write feedback: group, none, all" in warning
-    assert not list(a_study(tmp_path, blocks("pairs: 1, feedback: all")).warnings())
+    (asked,) = questions(a_study(tmp_path, blocks("pairs: 1", "pairs: 1, feedback: group")))
+    assert asked.text.startswith("sessions: step 1 of ")
+    assert "so that every group is given ball, tone; write feedback: group, none, all" in asked.text
+    said = questions(a_study(tmp_path, blocks("pairs: 1, feedback: all")))
+    assert [each.key for each in said] == ["design.groups"]  # which then do the same
 
 
 def test_a_block_says_what_is_switched_on(tmp_path: Path) -> None:
@@ -99,7 +101,7 @@ def test_what_was_switched_on_is_in_the_trial_table(tmp_path: Path) -> None:
         (FED + "views: {v: {use: view, camera: moon}}\n", "there is no camera 'moon'; there is"),
         (
             SHORT.replace("pairs: 1", "feedback: group"),
-            "feedback is by group, but design has no groups",
+            "feedback is by group, but design has no groups; write them under design:",
         ),
     ],
 )

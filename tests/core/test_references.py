@@ -25,6 +25,7 @@ from labcrane.registry.registry import Registry, discover
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 
 AIMING = (PROTOCOLS / "aiming" / "protocol.yaml").read_text(encoding="utf-8")
+AIMING = "#\n#\n\n" + AIMING[AIMING.index("labcrane: 1") :]  # whatever is said above it
 RETRIEVAL = (PROTOCOLS / "retrieval" / "protocol.yaml").read_text(encoding="utf-8")
 
 
@@ -233,7 +234,9 @@ def broken(rng: random.Random, text: str, place: Place, *, key: bool) -> tuple[s
     return out.getvalue(), fault
 
 
-REMEDY = re.compile(r"there is no such \w+; .*has |it needs one for each of |must be |needs the ")
+REMEDY = re.compile(
+    r"there is no such \w+; .*has |no such file; did you|does not exist; |it needs one for each of |must be |needs (the |')"
+)
 
 
 def line_of(text: str, place: Sequence[Step]) -> int:

@@ -80,10 +80,13 @@ def test_aliases_and_merges_mean_what_they_always_did() -> None:
 @pytest.mark.parametrize(
     ("steps", "message"),
     [
-        ("[true]", "a step is one of consent, instructions, questionnaire, practice, reference"),
-        ("[null, {block: {task: aiming}}]", "with a value, not None"),
-        ("[{}, {block: {task: aiming}}]", "with a value, not {}"),
-        ("[{block: }]", "must be a mapping of keys, but is None"),
+        (
+            "[true]",
+            "a step is true; it must be consent, instructions",
+        ),
+        ("[null, {block: {task: aiming}}]", "a step is nothing; it must be consent"),
+        ("[{}, {block: {task: aiming}}]", "a step is {}; it must be consent"),
+        ("[{block: }]", "is nothing; it must be a mapping of keys"),
         ("[]", "is []; it needs at least 1"),
     ],
 )

@@ -163,7 +163,7 @@ def test_check_warns_of_an_error_that_every_group_is_shown(
     path.write_text(SHORT + "views: {cab: {use: view, hud: [trial, distance]}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0
     said = capsys.readouterr()
-    assert "warning: views.cab: hud: distance tells the operator the task's error" in said.err
+    assert "question: views.cab: hud: distance tells the operator the task's error" in said.err
     always = "views: {cab: {use: view, patch: {on: [target.entered]}}}\n"
     path.write_text(SHORT + always, encoding="utf-8")
     assert main(["check", str(path)]) == 0
@@ -171,8 +171,8 @@ def test_check_warns_of_an_error_that_every_group_is_shown(
     path.write_text(SHORT + "views: {hum: {use: sonification}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0
     assert (
-        "warning: views.hum: sonification tells how far the tip is from the target, in every group "
-        "and block; put it under feedback, where the design says who is given it"
+        "question: views.hum: sonification tells how far the tip is from the target, in every "
+        "group and block; put it under feedback, where the design says who is given it"
     ) in capsys.readouterr().err
     path.write_text(SHORT + "views: {cab: {use: view, patch: {}}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0

@@ -18,14 +18,17 @@ def approve(
     valid_until: Annotated[str, typer.Option(help="last day on which people may take part")],
     consent: Annotated[Path, typer.Option(help="the consent text, in the protocol's folder")],
 ) -> None:
-    """Lock a protocol, with everything it refers to, as approved."""
+    """Lock a protocol, with everything it refers to, as approved; it is rehearsed before."""
     from labcrane.approval import decision
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
+    from labcrane.simulation.rehearsal import rehearse
 
     registry = discover(study=protocol)
     grant = decision.Grant(board, reference, read_date(valid_until), consent)
-    lock = decision.approve(load(protocol, registry), registry, grant, today())
+    study = load(protocol, registry)
+    rehearse(study)
+    lock = decision.approve(study, registry, grant, today())
     materials = lock.content["materials"]
     files = ", ".join(materials["files"]) or "no files"
     out.print(
@@ -49,6 +52,7 @@ def amend(
     from labcrane.approval.lock import read_lock
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
+    from labcrane.simulation.rehearsal import rehearse
 
     registry, old = discover(study=protocol), read_lock(protocol)
     grant = decision.Grant(
@@ -57,7 +61,9 @@ def amend(
         read_date(valid_until or old.approval["valid_until"]),
         consent or old.consent,
     )
-    lock = decision.amend(load(protocol, registry), registry, grant, why, today())
+    study = load(protocol, registry)
+    rehearse(study)
+    lock = decision.amend(study, registry, grant, why, today())
     entry = lock.amendments[-1]
     out.print(f"{lock.path}: amendment {entry['number']}:", markup=False)
     for change in entry["changes"]:

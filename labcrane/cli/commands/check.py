@@ -9,7 +9,7 @@ import typer
 
 from labcrane.cli.options import AsJson, ProtocolPath
 from labcrane.cli.output import out
-from labcrane.errors import ProtocolError
+from labcrane.errors import LabcraneError
 
 if TYPE_CHECKING:
     from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan
@@ -21,37 +21,49 @@ def check(
     simulated: Annotated[
         bool, typer.Option("--simulated", help="what a simulation needs must be installed, no more")
     ] = False,
+    rehearse: Annotated[
+        bool,
+        typer.Option("--rehearse", help="run one trial of each block for every group as well"),
+    ] = False,
 ) -> None:
     """Check a protocol and everything it refers to, without running it."""
+    from labcrane.protocol.questions import about, problems, questions
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
 
     try:
         study = load(protocol, discover(study=protocol))
         study.check_installed(simulated=simulated, feedback=not simulated)
-    except ProtocolError as error:
+        asked = questions(study)
+        if rehearse:
+            from labcrane.simulation.rehearsal import rehearse as rehearse_study
+
+            asked += rehearse_study(study).questions
+    except LabcraneError as error:
         if as_json:
-            typer.echo(json.dumps({"fine": False, "problems": str(error).splitlines()}))
+            told = problems(error)
+            said = [each["whole"] for each in told]
+            typer.echo(json.dumps({"fine": False, "problems": said, "findings": told}))
         raise
+    told = [about(study, each) for each in asked]
     if as_json:
-        typer.echo(
-            json.dumps(
-                {
-                    "fine": True,
-                    "problems": [],
-                    "warnings": list(study.warnings()),
-                    "study": study.protocol.study,
-                }
-            )
-        )
+        fine = {
+            "fine": True,
+            "problems": [],
+            "warnings": [each["text"] for each in told],
+            "findings": told,
+            "study": study.protocol.study,
+        }
+        typer.echo(json.dumps(fine))
         return
-    for warning in study.warnings():
-        typer.echo(f"{protocol}: warning: {warning}", err=True)
+    for each in told:
+        typer.echo(each["whole"], err=True)
     sessions = len(study.protocol.sessions)
+    done = ", and was rehearsed" if rehearse else ""
     # One plain line, for which rich is not worth loading.
     typer.echo(
         f"{protocol}: study {study.protocol.study!r} is fine: {sessions} "
-        f"session{'s' if sessions > 1 else ''} on the {study.machine.title}"
+        f"session{'s' if sessions > 1 else ''} on the {study.machine.title}{done}"
     )
 
 
@@ -73,6 +85,8 @@ def plan(
     from labcrane.design.plan import plan_session
     from labcrane.design.pseudonyms import pseudonyms
     from labcrane.files.atomic import SHARED_FILE, write_text
+    from labcrane.protocol.effective import written_quantities
+    from labcrane.protocol.questions import key_of
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
 
@@ -89,6 +103,10 @@ def plan(
     if as_json:
         typer.echo(json.dumps([_row(each) for session in plans for each in session], indent=1))
         return
+    for each in written_quantities(study):
+        if isinstance(each.written, str):
+            line = f"{key_of(each.place)}: {each.written} is {each.value:g} {each.unit}"
+            out.print(line, markup=False)
     for session in plans:
         _print(session)
     if not participant:

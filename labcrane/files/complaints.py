@@ -1,0 +1,222 @@
+"""Complaints of pydantic in the words of those who write YAML: what is there, and what must be."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from difflib import get_close_matches
+from math import isfinite
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
+
+from labcrane.errors import suggestion
+from labcrane.files.units import EXAMPLES, unit_of
+
+Place = tuple[str | int, ...]
+"""The keys and indices that lead to a value: ``("sessions", 0, "steps", 2)``."""
+
+_MEMBER = re.compile(r"\[.*[\]'\"]|^(constrained-)?(str|int|float|bool)$")
+_COMMA = re.compile(r"\s*-?\d+,\d+\s*")
+
+
+def told(
+    errors: Sequence[ErrorDetails], place: Place, model: type[BaseModel]
+) -> Iterator[tuple[Place, str]]:
+    """Yield what pydantic complains of; where a value is no member of a union, in one line.
+
+    Pydantic complains once for every member, each as if it were the only one.
+    """
+    unions: dict[Place, list[ErrorDetails]] = {}
+    for each in errors:
+        loc = each["loc"]
+        if _follows(each, errors):
+            continue
+        if each["type"] == "missing" and (meant := _meant(each)):
+            holder = named((*place, *loc[:-1]))
+            said = f"{holder} needs {str(loc[-1])!r}; is it what {meant!r} is to be?"
+            yield (*loc[:-1], meant), said
+            continue
+        at = next((n for n, step in enumerate(loc) if _is_member(step)), None)
+        if at is None or at + 1 < len(loc):
+            yield loc, explain(each, place, model)
+        else:
+            unions.setdefault(loc[:at], []).append(each)
+    for loc, several in unions.items():
+        texts = [explain(each, place, model) for each in several]
+        head = texts[0].partition("; it must be ")[0]
+        wanted = [text.partition("; it must be ")[2] or text for text in texts]
+        yield loc, f"{head}; it must be {', or '.join(dict.fromkeys(wanted))}"
+
+
+def _follows(error: ErrorDetails, errors: Sequence[ErrorDetails]) -> bool:
+    """Whether a complaint only follows from others: too few items, of which some are wrong."""
+    loc, kind = error["loc"], error["type"]
+    if kind == "too_short":
+        return any(
+            len(each["loc"]) > len(loc) and each["loc"][: len(loc)] == loc for each in errors
+        )
+    if kind == "missing" and isinstance(loc[-1], int):  # of several, the last says how many
+        return any(
+            each["type"] == kind and each["loc"][:-1] == loc[:-1] and each["loc"][-1] > loc[-1]  # type: ignore[operator]  # both are indices
+            for each in errors
+        )
+    return False
+
+
+def _meant(error: ErrorDetails) -> str | None:
+    """Return the key that is there and looks like one that is missing."""
+    there, wanted = error["input"], error["loc"][-1]
+    if not isinstance(there, Mapping) or not isinstance(wanted, str):
+        return None
+    return next(
+        iter(get_close_matches(wanted, [str(key) for key in there], n=1, cutoff=0.65)), None
+    )
+
+
+def explain(error: ErrorDetails, place: Place, model: type[BaseModel]) -> str:
+    """Return what was written and what is possible, for one of pydantic's complaints."""
+    loc = error["loc"]
+    key = loc[-1] if loc else named(place)
+    if error["type"] == "extra_forbidden":
+        possible = _keys(model, loc[:-1])
+        instead = suggestion(str(key), possible, "possible:")
+        return f"{str(key)!r} is not a key of {named((*place, *loc[:-1]))}; {instead}"
+    if error["type"] == "missing" and isinstance(key, int):
+        holder = named((*place, *loc[:-1]))
+        return f"{holder} is {shown(error['input'])}; it needs {key + 1} items"
+    if error["type"] == "missing":
+        return f"{named((*place, *loc[:-1]))} needs {str(key)!r}"
+    name = named((*place, *(step for step in loc if not _is_member(step))))
+    what = error["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
+    if error["type"] == "value_error":
+        return f"{name}: {what}"
+    if error["type"] in {"too_short", "too_long"}:
+        return f"{name} is {shown(error['input'])}; {_how_many(error)}"
+    if error["type"] == "string_pattern_mismatch":
+        pattern = error.get("ctx", {}).get("pattern", "")
+        what = PATTERNS.get(pattern, f"of the form {pattern}")
+    what = WANTED.get(error["type"], what)
+    if what in NUMBERS:
+        what = _number(error, model, what)
+    return f"{name} is {shown(error['input'])}; it must be {what}"
+
+
+def _number(error: ErrorDetails, model: type[BaseModel], what: str) -> str:
+    """Return which number must be there: in which unit, and with a point."""
+    if isinstance(error["input"], str) and _COMMA.fullmatch(error["input"]):
+        return f"{what}; write decimals with a point: {error['input'].strip().replace(',', '.')}"
+    keys = [step for step in error["loc"] if isinstance(step, str) and not _is_member(step)]
+    field = _field(model, error["loc"])
+    unit = unit_of(keys[-1], field.metadata) if field and keys else None
+    return f"{what} in {unit}, or one with its unit, as {EXAMPLES[unit]}" if unit else what
+
+
+WANTED = {
+    "tuple_type": "a list: [.., ..]",
+    "list_type": "a list: [.., ..]",
+    "dict_type": "a mapping of keys: {key: value}",
+    "model_type": "a mapping of keys: {key: value}",
+    "string_type": "text; put it in quotation marks if it is",
+    "bool_type": "true or false",
+    "int_type": "a whole number",
+    "int_parsing": "a whole number",
+    "int_parsing_size": "a whole number, and a smaller one",
+    "int_from_float": "a whole number",
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "bool_parsing": "true or false",
+    "path_type": "the name of a file",
+    "finite_number": "a number that is one: neither .nan nor .inf",
+}
+"""What each of pydantic's types is for people who write YAML."""
+
+NUMBERS = {"a number", "a whole number"}
+
+PATTERNS = {
+    "^[0-9a-f]{4}:[0-9a-f]{4}$": "vendor and product of a USB device, four hexadecimal digits "
+    "each, as 044f:b10a",
+    "^[a-z][a-z0-9_-]*$": "lower-case letters, digits, hyphens and underscores, a letter first",
+    "^[a-z][a-z0-9_]*$": "lower-case letters, digits and underscores, a letter first",
+    "^-?[a-z][a-z0-9_.]*$": "the name of an axis, as left.x, or -left.x to turn it round",
+}
+"""Patterns in words."""
+
+MOST_SHOWN = 60
+"""Characters of a value that a message repeats."""
+
+
+def shown(value: object) -> str:
+    """Return a value as a message repeats it: a whole section is not printed over a screen."""
+    text = written(value)
+    if len(text) <= MOST_SHOWN:
+        return text
+    if isinstance(value, Mapping):
+        return f"a mapping of {', '.join(map(str, value))}"[:MOST_SHOWN]
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}"
+    return f"{text[:MOST_SHOWN]}..."
+
+
+def written(value: object) -> str:
+    """Return a value as people write it in YAML."""
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float) and not isfinite(value):
+        return {"nan": ".nan", "inf": ".inf", "-inf": "-.inf"}[str(value)]
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(f'{key}: {written(each)}' for key, each in value.items())}}}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(written, value))}]"
+    return repr(value)
+
+
+def _how_many(error: ErrorDetails) -> str:
+    about = error.get("ctx", {})
+    if error["type"] == "too_short":
+        return f"it needs at least {about.get('min_length')}"
+    return f"it can have at most {about.get('max_length')}"
+
+
+def _is_member(step: object) -> bool:
+    """Whether part of pydantic's location is its name for a member of a union."""
+    return isinstance(step, str) and bool(_MEMBER.search(step))
+
+
+def _keys(model: type[BaseModel], place: Place) -> list[str]:
+    inside = _model_at(model, place)
+    return list(inside.model_fields) if inside else []
+
+
+def _field(model: type[BaseModel], loc: Place) -> FieldInfo | None:
+    """Return the field of the last key of a place; None where it is no model's."""
+    keys = [at for at, step in enumerate(loc) if isinstance(step, str) and not _is_member(step)]
+    holder = _model_at(model, loc[: keys[-1]]) if keys else None
+    return holder.model_fields.get(str(loc[keys[-1]])) if holder else None
+
+
+def _model_at(model: type[BaseModel], place: Place) -> type[BaseModel] | None:
+    fields: Any = model
+    for step in place:
+        if isinstance(step, int) or _is_member(step):
+            continue
+        annotation = fields.model_fields[step].annotation if step in fields.model_fields else None
+        nested = [a for a in (annotation, *getattr(annotation, "__args__", ())) if _is_model(a)]
+        if not nested:
+            return None
+        fields = nested[0]
+    return fields  # type: ignore[no-any-return]  # a model, or one in a field of it
+
+
+def _is_model(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+def named(place: Place) -> str:
+    """Return a place as a message names it: ``sessions[1].steps[2]``, items from 1."""
+    text = ""
+    for step in place:
+        text += f"[{step + 1}]" if isinstance(step, int) else f".{step}" if text else str(step)
+    return text or "the file"

@@ -1,0 +1,169 @@
+"""Units of numbers in a file: a plain number has the key's own, any other is written beside it.
+
+``width: 0.5`` and ``width: 50 cm`` are the same where metres are asked for. What a key asks for is
+said by a mark on its type, or by the end of its name: ``limit_s``, ``size_m``, ``alpha_deg``.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import pint
+
+KINDS: Mapping[str, str] = {
+    "m": "a length",
+    "s": "a time",
+    "deg": "an angle",
+    "rad": "an angle",
+    "Hz": "a rate",
+    "kg": "a mass",
+    "N": "a force",
+    "N m": "a torque",
+    "m/s": "a speed",
+    "deg/s": "an angular speed",
+    "1/s": "a rate",
+    "day": "a time",
+    "ppm": "a share",
+    "uV": "a voltage",
+}
+"""What is measured in the units that keys ask for."""
+
+ENDINGS: Mapping[str, str] = {
+    "_deg_s": "deg/s",
+    "_m_s": "m/s",
+    "_per_s": "1/s",
+    "_s": "s",
+    "_m": "m",
+    "_deg": "deg",
+    "_hz": "Hz",
+    "_kg": "kg",
+    "_n": "N",
+    "_uv": "uV",
+    "_days": "day",
+}
+"""Units by the end of a key's name; the first that fits holds."""
+
+EXAMPLES: Mapping[str, str] = {
+    "m": "50 cm",
+    "s": "200 ms",
+    "deg": "0.5 rad",
+    "Hz": "1 kHz",
+    "kg": "500 g",
+    "N": "1 kN",
+    "N m": "1 kN m",
+    "rad": "90 deg",
+    "1/s": "2 Hz",
+    "ppm": "0.01 %",
+    "m/s": "30 cm/s",
+    "deg/s": "0.2 rad/s",
+    "day": "2 weeks",
+    "uV": "0.1 mV",
+}
+"""How the same could be written in another unit."""
+
+SPELT = r"^[-+]?[0-9.]+(e[-+]?[0-9]+)? *[A-Za-zµ°Ω][^\n]{0,29}$"
+"""A quantity, for a schema."""
+
+_QUANTITY = re.compile(
+    r"\s*(?P<number>[-+]?[\d.,]+(?:e[-+]?\d+)?)\s*(?P<unit>[A-Za-zµμ°Ω%].{0,29})?\s*", re.I
+)
+_CLOCK = re.compile(r"\s*(\d{1,4}):(\d\d)\s*")
+_UNIT = re.compile(r"[A-Za-zµμ°Ω]+[A-Za-z²³\^\d\s*/·-]*")
+_MORE = re.compile(r"\d{3}|\^[^\d-]|\*\*")
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A mark on a key's type: the unit of its numbers, as in ``Annotated[float, Unit("m")]``.
+
+    Attributes
+    ----------
+    name
+        One of :data:`KINDS`.
+    """
+
+    name: str
+
+
+def unit_of(key: str, metadata: list[Any]) -> str | None:
+    """Return the unit that a key's numbers have; None where it says none."""
+    for mark in metadata:
+        if isinstance(mark, Unit):
+            return mark.name
+    return next((unit for end, unit in ENDINGS.items() if key.endswith(end)), None)
+
+
+def in_unit(text: str, unit: str) -> float | None:
+    """Return a quantity, ``50 cm``, as a number of ``unit``; None where there is none to be seen.
+
+    Raises
+    ------
+    ValueError
+        Its unit is unknown, or measures something else.
+    """
+    if unit == "s" and (clock := _CLOCK.fullmatch(text)):
+        seconds = 60 * int(clock[1]) + int(clock[2])
+        raise ValueError(
+            f"{text!r} is no number of seconds; write {seconds} for {text} minutes, or {seconds} s"
+        )
+    found = _QUANTITY.fullmatch(text)
+    if found is None or found["unit"] is None:
+        return None
+    written, of = found["number"], found["unit"].strip()
+    if "," in written:
+        raise ValueError(
+            f"{text!r} has a comma; write decimals with a point: {written.replace(',', '.')} {of}"
+        )
+    try:
+        number = float(written)
+    except ValueError:
+        return None
+    asked = (
+        f"where {KINDS[unit]} is asked for; write a plain number, in {unit}, or {KINDS[unit]} with "
+        f"its unit, as {EXAMPLES[unit]}"
+    )
+    if not _UNIT.fullmatch(of) or _MORE.search(of):
+        raise ValueError(f"{text!r} has no unit that is known, {asked}")
+    import pint  # noqa: PLC0415 - most files have plain numbers
+
+    units = _registry()
+    try:
+        quantity = units.Quantity(number, units.parse_units(of.replace("°", "deg")))
+        if _root(quantity.units) != _root(unit):
+            kinds = (kind for name, kind in KINDS.items() if _root(name) == _root(quantity.units))
+            raise ValueError(f"{text!r} is {next(kinds, 'something else')}, {asked}")
+        return float(f"{quantity.to(unit).magnitude:.12g}")
+    except (pint.errors.PintError, ArithmeticError, AttributeError, TypeError) as error:
+        raise ValueError(f"{text!r} has no unit that is known, {asked}") from error
+
+
+@cache
+def _registry() -> "pint.UnitRegistry[float]":
+    import pint  # noqa: PLC0415
+
+    return pint.UnitRegistry()
+
+
+def _root(unit: Any) -> Any:
+    """Return what a unit is made of at the root: a radian is not nothing, and no cycle."""
+    units = _registry()
+    return units.get_root_units(units.parse_units(unit) if isinstance(unit, str) else unit)[1]
+
+
+def read_quantities(value: Any, unit: str, *, several: bool) -> Any:
+    """Return a key's value with every quantity in it as a number of ``unit``.
+
+    Parameters
+    ----------
+    several
+        Whether a list of numbers is asked for; otherwise one is.
+    """
+    if isinstance(value, str) and not several:
+        number = in_unit(value, unit)
+        return value if number is None else number
+    if isinstance(value, list) and several:
+        return [read_quantities(each, unit, several=isinstance(each, list)) for each in value]
+    return value

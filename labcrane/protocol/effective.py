@@ -1,0 +1,52 @@
+"""Effective values: numbers that a protocol writes with a unit, as they are used and recorded."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from labcrane.files.model import quantities
+from labcrane.files.yaml import Place
+from labcrane.protocol.study import Study
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A number with a unit in a protocol.
+
+    Attributes
+    ----------
+    place
+        Where it is written.
+    value, unit
+        What is used.
+    written
+        What stands there; a plain number, or one with a unit of its own.
+    """
+
+    place: Place
+    value: float
+    unit: str
+    written: Any
+
+
+def written_quantities(study: Study) -> Iterator[Quantity]:
+    """Yield every number with a unit that the protocol itself writes."""
+    parts: dict[Place, Any] = {
+        (): study.protocol,
+        ("operator",): study.operator.settings,
+        **{tuple(part.split(".", 1)): choice.settings for part, choice in study.choices.items()},
+    }
+    data = study.source.data if study.source else {}
+    for place, settings in parts.items():
+        for at, unit, value in quantities(settings):
+            where = (*place, *at)
+            yield Quantity(where, value, unit, _at(data, where))
+
+
+def _at(node: Any, place: Place) -> Any:
+    for step in place:
+        try:
+            node = node[step]
+        except (KeyError, IndexError, TypeError):  # read from a file that the protocol names
+            return None
+    return node

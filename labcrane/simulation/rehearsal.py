@@ -1,0 +1,251 @@
+"""Rehearsal: one trial of every block for every group, without people, equipment or a record.
+
+What only running finds is found before anybody sits down: the study's own plugins are built and
+called as in a session, in its order, on a clock that does not wait.
+"""
+
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import count, islice
+from pathlib import Path
+
+from labcrane.core.clock import ManualClock
+from labcrane.core.records import Event, Frame, Phase, Run, Trial
+from labcrane.core.roles import Cue
+from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan, plan_session
+from labcrane.design.pseudonyms import pseudonyms
+from labcrane.design.slots import group_of
+from labcrane.errors import LabcraneError, ProtocolError
+from labcrane.protocol.components import ComponentSpec
+from labcrane.protocol.questions import Question
+from labcrane.protocol.rig import Rig
+from labcrane.protocol.study import Study
+from labcrane.recording.frame_log import BatchLog, columns
+from labcrane.recording.journal import SessionJournal
+from labcrane.registry.call_monitor import promised
+from labcrane.registry.proxies import hurried
+from labcrane.session import loop
+from labcrane.session.commands import Command, Order
+from labcrane.session.metadata import context
+from labcrane.session.sequencer import Sequencer
+from labcrane.session.visit import Visit
+
+PATIENCE_S = 60.0
+"""How much longer than expected a trial may take, at least, before it is cut off."""
+
+PATIENCE = 5.0
+"""The same, as a multiple of what is expected."""
+
+BREAK_S = 0.1
+"""What is left of a break."""
+
+DRAWN = 200
+"""Frames of a session that cues are given: whatever they do wrong, they do soon."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rehearsed:
+    """What a rehearsal did.
+
+    Attributes
+    ----------
+    sessions, trials
+        How many were run.
+    questions
+        What should be known of them: a trial that nobody could end, or that runs out of time.
+    """
+
+    sessions: int
+    trials: int
+    questions: tuple[Question, ...]
+
+
+def rehearse(study: Study) -> Rehearsed:
+    """Run one trial of each block of each session for every group, on the simulated operator.
+
+    Raises
+    ------
+    ProtocolError
+        With a line for whatever would end a session: its message says in which, and in what.
+    """
+    study.check_installed(simulated=True, feedback=False)
+    _build_displays(study)
+    questions: dict[str, Question] = {}
+    wrong: list[str] = []
+    sessions = trials = 0
+    for name, slot in _one_of_each_group(study):
+        for number in range(1, len(study.protocol.sessions) + 1):
+            whole = plan_session(study, name, number, slot)
+            plan = replace(whole, steps=tuple(_shortened(whole.steps)))
+            group = f", group {plan.group!r}" if plan.group else ""
+            where = f"{study.path}: rehearsal, session {plan.name!r}{group}"
+            sessions += 1
+            try:
+                seen = _run(study, plan)
+            except LabcraneError as error:
+                wrong.append(f"{where}: {error}")
+                continue
+            trials += seen.ended
+            for each in seen.questions:
+                questions.setdefault(each.key, each)
+    if wrong:
+        raise ProtocolError("\n".join(dict.fromkeys(wrong)))
+    return Rehearsed(sessions, trials, tuple(questions.values()))
+
+
+def _build_displays(study: Study) -> None:
+    """Build the views and sounds that are installed; to be opened they need people's devices."""
+    for choice in (study.views | study.sounds).values():
+        if not choice.offer.missing:
+            choice.build(study.machine)
+
+
+def _one_of_each_group(study: Study) -> Iterator[tuple[str, int]]:
+    """Yield a pseudonym and a slot for every group; once for a study without."""
+    groups = tuple(study.protocol.design.groups)
+    slots: dict[str, int] = {}
+    for slot in islice(count(1), max(1, len(groups))):  # each run of slots has every group once
+        slots.setdefault(group_of(study.protocol.study, groups, slot), slot)
+    names = pseudonyms(study.protocol.participants.pattern, 1)
+    for slot in slots.values():
+        yield names[0], slot
+
+
+def _shortened(steps: Sequence[PlannedStep]) -> Iterator[PlannedStep]:
+    """Yield what is left of a session: a trial of each block, the first of its repetitions."""
+    seen: set[tuple[object, ...]] = set()
+    for step in steps:
+        if step.block is None:
+            yield replace(step, seconds=min(step.seconds, BREAK_S))
+            continue
+        block = step.block
+        kind = (block.name, block.task, block.practice, block.reference, block.ask)
+        if kind not in seen:
+            seen.add(kind)
+            yield replace(step, block=replace(block, trials=_until_counted(block.trials)))
+
+
+def _until_counted(trials: Sequence[Trial]) -> tuple[Trial, ...]:
+    """Return the first counted trial, and those that only lead to it."""
+    kept: list[Trial] = []
+    for trial in trials:
+        kept.append(trial)
+        if trial.planned.counted:
+            break
+    return tuple(kept)
+
+
+class _Examiner:
+    """Somebody who skips a trial that nobody ends, and remembers which."""
+
+    def __init__(self, plan: SessionPlan, rate_hz: float) -> None:
+        self._blocks = {block.number: block for block in plan.blocks}
+        self._rate_hz = rate_hz
+        self._patience: float | None = None
+        self._skipped = False
+        self._running: PlannedBlock | None = None
+        self.ended = 0
+        self.questions: list[Question] = []
+
+    def commands(self) -> list[Command]:
+        if self._patience is None:
+            return []
+        self._patience -= 1.0 / self._rate_hz
+        if self._patience > 0.0:
+            return []
+        self._patience, self._skipped = None, True
+        return [Command(Order.SKIP)]
+
+    def report(self, event: Event) -> None:
+        if event.name == "trial.start":
+            self._running = self._blocks.get(int(str(event.data["block"])))
+            trials = self._running.trials if self._running else ()
+            longest = max((trial.planned.expected_s for trial in trials), default=0.0)
+            self._patience, self._skipped = PATIENCE_S + PATIENCE * longest, False
+        elif event.name == "trial.end":
+            self._patience = None
+            self.ended += 1
+            self._judge(str(event.data.get("outcome")))
+
+    def _judge(self, outcome: str) -> None:
+        block = self._running
+        if block is None or not (self._skipped or outcome == Phase.TIMEOUT):
+            return
+        took = "does not end it" if self._skipped else "runs out of time"
+        self.questions.append(
+            Question(
+                f"rehearsal.{block.name}",
+                (),
+                f"in a trial of block {block.name!r} the simulated operator {took}; is that meant?",
+            )
+        )
+
+
+def _run(study: Study, plan: SessionPlan) -> _Examiner:
+    """Run a plan as a session is run, and throw away what it records."""
+    with tempfile.TemporaryDirectory(prefix="labcrane-rehearsal-") as place:
+        visit = Visit(study, plan.participant, plan.number, Path(place), simulated=True, fast=True)
+        rig = Rig.build(study, simulated=True)
+        examiner = _Examiner(plan, study.protocol.rate_hz)
+        with (
+            hurried((*rig.components, *rig.tasks.values())),
+            rig.opened(study, plan.seed) as run,
+        ):
+            opening = Event("session.start", 0.0, context(visit, plan, rig, run))
+            drawing = _Drawing(study, run)
+            visit.folder.make()
+            held = columns(run)
+            journal = SessionJournal(visit.journal, held, run.rate_hz, now=lambda: 0.0)
+            log = BatchLog(journal, run)
+            try:
+                log.note(opening)
+                course = Sequencer(study, plan, rig, waits=False)
+                told = [drawing.draw, lambda frame: _tell(examiner, frame)]
+                loop.run(rig, run, course, ManualClock(), examiner, log, told)
+            finally:
+                log.close()
+                drawing.close()
+    return examiner
+
+
+def _tell(examiner: _Examiner, frame: Frame) -> None:
+    for event in frame.events:
+        examiner.report(event)
+
+
+class _Drawing:
+    """The cues of a study, drawn without a view."""
+
+    def __init__(self, study: Study, run: Run) -> None:
+        self._left = DRAWN
+        self._oversight = study.oversight
+        self._cues: list[tuple[str, Cue, tuple[int, int]]] = []
+        for name, choice in study.cues.items():
+            cue = choice.build(study.machine)
+            assert isinstance(cue, Cue)  # noqa: S101 - the registry filed its offer under its role
+            self._call(name, choice, cue.open, run)
+            watched = (self._number(name, choice, cue.draw), self._number(name, choice, cue.values))
+            self._cues.append((f"cue {name!r}", cue, watched))
+
+    def draw(self, frame: Frame) -> None:
+        """Let every cue draw a frame of a trial, and say the numbers behind it."""
+        if not frame.trial or not self._left:
+            return
+        self._left -= 1
+        for called, cue, (draw, values) in self._cues:
+            self._oversight.call(draw, cue.draw, frame)
+            self._oversight.call(values, promised, called, cue.signals, cue.values, frame)
+
+    def close(self) -> None:
+        """Close them all."""
+        for _, cue, _ in self._cues:
+            cue.close()
+
+    def _number(self, name: str, choice: ComponentSpec, method: Callable[..., object]) -> int:
+        return self._oversight.place(f"cue {name!r}", choice.plugin, method.__name__, method)
+
+    def _call(
+        self, name: str, choice: ComponentSpec, method: Callable[[Run], object], run: Run
+    ) -> None:
+        self._oversight.call(self._number(name, choice, method), method, run)

@@ -1,0 +1,114 @@
+"""Wrong protocols, drawn from right ones: each is refused or questioned in its line, or runs."""
+
+import random
+import re
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+from wrong_protocols import PROTOCOLS, REMOVED, Wrong, everything, faults, texts
+
+from labcrane import ProtocolError
+from labcrane.protocol.questions import questions
+from labcrane.protocol.study import Study, load
+from labcrane.registry.registry import Registry, discover
+from labcrane.simulation import rehearsal
+
+STUDIES = ("aiming", "retrieval", "everything")
+
+
+@pytest.fixture(scope="module")
+def registry() -> Registry:
+    return discover()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("wrong")
+    for study in STUDIES:
+        source = PROTOCOLS / ("aiming" if study == "everything" else study)
+        shutil.copytree(source, place / study)
+    return place
+
+
+def right(study: str, registry: Registry) -> str:
+    if study == "everything":
+        return everything(registry)
+    return (PROTOCOLS / study / "protocol.yaml").read_text()
+
+
+JARGON = re.compile(
+    r"valid (tuple|list|dict|boolean)|literal\[|[Ii]nput should|codec|function-|NoneType|<class|"
+    r"Unable to|String should|Traceback|ScannerError|<block|None\b|(?<!\.)\bnan\b"
+)
+"""Words of programmers."""
+
+REMEDY = re.compile(
+    r"; |must be|did you mean|is it what|there is no .*; |needs |possible:|is that meant"
+)
+LONGEST = 700
+"""Characters of a message: all events of a session are named in one."""
+
+
+def judge(wrong: Wrong, path: Path, registry: Registry) -> Study | None:
+    """Judge what a check says of a fault; return the study where it passes."""
+    path.write_bytes(wrong.text)
+    try:
+        study = load(path, registry)
+    except ProtocolError as error:
+        lines = str(error).replace(f"{path}:", "").splitlines()
+        at = [int(found[0]) for line in lines if (found := re.match(r"\d+", line))]
+        assert lines, wrong
+        assert len(at) == len(lines), (str(wrong), lines)
+        # What is missed is told where it is missed, which may be elsewhere.
+        missed = wrong.fault == REMOVED or wrong.fault.endswith((" {}", " []", " null"))
+        missed = missed or "undefined alias" in lines[0]
+        assert wrong.line in at or wrong.line == 0 or missed, (str(wrong), wrong.line, lines)
+        for line in lines:
+            assert REMEDY.search(line), (str(wrong), line)
+            assert not JARGON.search(line), (str(wrong), line)
+            assert len(line) < LONGEST, (str(wrong), line)
+        return None
+    asked = questions(study)
+    assert asked or not wrong.must, f"{wrong}: passed"
+    return study
+
+
+def drawn(study: str, registry: Registry, count: int, seed: int) -> Sequence[Wrong]:
+    text = right(study, registry)
+    every = [*texts(study, text), *faults(study, text, seed)]
+    return random.Random(f"{study} {seed}").sample(every, min(count, len(every)))
+
+
+@pytest.mark.parametrize("study", STUDIES)
+def test_a_fault_drawn_at_random_is_told_in_its_line_with_its_remedy(
+    study: str, folder: Path, registry: Registry
+) -> None:
+    for wrong in drawn(study, registry, 20, seed=1):
+        judge(wrong, folder / study / "protocol.yaml", registry)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("study", STUDIES)
+def test_a_hundred_faults_of_each_protocol_are_told_or_run(
+    study: str, folder: Path, registry: Registry, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rehearsal, "PATIENCE_S", 0.2)
+    monkeypatch.setattr(rehearsal, "PATIENCE", 0.0)
+    passed = 0
+    for wrong in drawn(study, registry, 100, seed=2):
+        found = judge(wrong, folder / study / "protocol.yaml", registry)
+        if found is not None and passed < 5:
+            passed += 1
+            rehearsal.rehearse(found)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("study", STUDIES)
+def test_every_fault_of_every_protocol_is_told(
+    study: str, folder: Path, registry: Registry
+) -> None:
+    text = right(study, registry)
+    for wrong in [*texts(study, text), *faults(study, text)]:
+        judge(wrong, folder / study / "protocol.yaml", registry)

@@ -1,0 +1,206 @@
+"""What a check asks, how it is answered, and what a rehearsal finds."""
+
+# ruff: noqa: E501 - a case is one line
+
+import json
+from pathlib import Path
+
+import pytest
+from rehearsal import SHORT
+
+from labcrane import ProtocolError
+from labcrane.cli.app import main
+from labcrane.files.units import in_unit
+from labcrane.protocol.effective import written_quantities
+from labcrane.protocol.questions import questions
+from labcrane.protocol.study import Study, load
+from labcrane.registry.registry import discover
+from labcrane.simulation.rehearsal import rehearse
+
+
+def a_study(folder: Path, *changes: tuple[str, str]) -> Study:
+    text = SHORT
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    path = folder / "study.yaml"
+    path.write_text(text)
+    return load(path, discover(study=path))
+
+
+BLOCK = "      - block: {task: aiming, pairs: 1}\n"
+BALL = "feedback: {ball: {use: sphere}, tone: {use: sphere}}\nsessions:"
+GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "said"),
+    [
+        ([("movements: 2", "movements: 2, limit_s: 0.3")], "tasks.aiming.limit_s", "at full speed"),
+        ([("movements: 2", "movements: 2, limit_s: 5e6")], "tasks.aiming.limit_s", "5e+06 s"),
+        ([(BLOCK, f"{BLOCK}      - break: {{seconds: 3 days}}\n")],
+         "sessions.1.steps.2.break.seconds", "a break of 72 hours"),
+        ([("movements: 2", "movements: 900"), (BLOCK, BLOCK.replace("pairs: 1", "repeat: 9"))], "sessions.1", "is likely to take"),
+        ([("    steps:", "    after_days: [1, 2]\n    steps:")], "sessions.1.after_days", "no other"),
+        ([("rate_hz: 240", "rate_hz: 1500")], "rate_hz", "few computers hold"),
+        ([("rate_hz: 240", "rate_hz: 10")], "rate_hz", "seen to jump"),
+        ([("sessions:", BALL), (BLOCK, BLOCK.replace("pairs", "feedback: [ball], pairs"))],
+         "feedback.tone", "never switched on"),
+        ([("sessions:", GROUPS)], "design.groups", "no block has feedback: group"),
+        ([("sessions:", f"participants: {{planned: 1}}\n{GROUPS}")], "participants.planned",
+         "some have no participants"),
+        ([("sessions:", f"participants: {{planned: 9}}\n{GROUPS}")], "participants.planned",
+         "a multiple of 2 is"),
+        ([("sessions:", "participants: {planned: 3}\ndesign: {order: {pairs: williams}}\nsessions:")],
+         "design.order.pairs", "which has 2 rows; a multiple of 2 does"),
+    ],
+)  # fmt: skip
+def test_a_number_that_nobody_means_is_asked_about_until_it_is_answered(
+    tmp_path: Path, changes: list[tuple[str, str]], key: str, said: str
+) -> None:
+    asked = {each.key: each.text for each in questions(a_study(tmp_path, *changes))}
+    assert said in asked[key]
+    assert asked[key].endswith("is that meant?")
+    answer = ("sessions:", f"expected: [{', '.join(asked)}]\nsessions:")
+    assert questions(a_study(tmp_path, *changes, answer)) == ()
+
+
+def test_an_answer_to_nothing_is_told_with_the_nearest_question(tmp_path: Path) -> None:
+    study = a_study(tmp_path, ("rate_hz: 240", "rate_hz: 10\nexpected: [rate_hs]"))
+    assert [each.text for each in questions(study)][-1] == (
+        "expected has 'rate_hs', which nothing asks; did you mean 'rate_hz'?"
+    )
+
+
+def test_people_and_programs_are_asked_the_same_with_the_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    a_study(tmp_path, ("rate_hz: 240", "rate_hz: 10"))
+    path = str(tmp_path / "study.yaml")
+    assert main(["check", path]) == 0
+    said = capsys.readouterr().err
+    assert said.startswith(f"{path}:4: question: rate_hz is 10 Hz, at which")
+    assert "(if it is, write expected: [rate_hz])" in said
+    assert main(["check", path, "--json"]) == 0
+    (finding,) = json.loads(capsys.readouterr().out)["findings"]
+    assert finding["whole"] == said.strip()
+    assert (finding["kind"], finding["line"], finding["key"]) == ("question", 4, "rate_hz")
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "number"),
+    [
+        ("50 cm", "m", 0.5), ("2 m", "m", 2.0), ("1.5e3 mm", "m", 1.5), ("90 deg", "deg", 90.0),
+        ("0.25 turn", "deg", 90.0), ("90°", "deg", 90.0), ("200ms", "s", 0.2), ("2 min", "s", 120.0),
+        ("1 kHz", "Hz", 1000.0), ("30 rpm", "deg/s", 180.0), ("2 weeks", "day", 14.0),
+        ("36 km/h", "m/s", 10.0), ("0.1 mV", "uV", 100.0), ("much", "m", None), ("1_0", "m", None),
+    ],
+)  # fmt: skip
+def test_a_quantity_is_read_in_the_unit_that_is_asked_for(
+    text: str, unit: str, number: float | None
+) -> None:
+    assert in_unit(text, unit) == (None if number is None else pytest.approx(number, rel=1e-12))
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "said"),
+    [
+        ("5 kg", "m", "'5 kg' is a mass, where a length is asked for; write a plain number, in m, or a length with its unit, as 50 cm"),
+        ("90 deg", "m", "is an angle, where a length is asked for"),
+        ("30 %", "deg", "where an angle is asked for"),
+        ("3 foos", "s", "has no unit that is known, where a time is asked for"),
+        ("1,5 m", "m", "write decimals with a point: 1.5 m"),
+        ("1:30", "s", "is no number of seconds; write 90"),
+        ("9 m**9**9**9", "m", "has no unit that is known"),
+    ],
+)  # fmt: skip
+def test_a_quantity_of_another_kind_is_told_with_what_is_asked_for(
+    text: str, unit: str, said: str
+) -> None:
+    with pytest.raises(ValueError, match=r"[a-z]") as told:
+        in_unit(text, unit)
+    assert said in str(told.value)
+
+
+def test_a_protocol_with_units_is_the_one_with_plain_numbers(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    units = "distances: [200 cm], width: 40 cm, diagonal_deg: 0.25 rad, limit_s: 0.5 min"
+    study = a_study(tmp_path, ("distances: [2]", units))
+    settings = study.task_choices["aiming"].settings.model_dump()
+    assert settings["distances"] == (2.0,)
+    assert settings["width"] == 0.4
+    assert settings["limit_s"] == 30.0
+    assert settings["diagonal_deg"] == pytest.approx(14.3239448783)
+    recorded = study.task_choices["aiming"].described(tmp_path)["settings"]
+    assert (recorded["width"], recorded["distances"]) == (0.4, [2.0])
+    assert main(["plan", str(study.path), "--participants", "1"]) == 0
+    assert "tasks.aiming.width: 40 cm is 0.4 m" in capsys.readouterr().out
+    written = {each.place[-1]: each.written for each in written_quantities(study)}
+    assert written["width"] == "40 cm"
+
+
+def test_a_wrong_unit_is_told_with_its_line(tmp_path: Path) -> None:
+    with pytest.raises(ProtocolError) as told:
+        a_study(tmp_path, ("distances: [2]", "distances: [2], width: 50 kg"))
+    assert "study.yaml:12: tasks.aiming.width: '50 kg' is a mass, where a length" in str(told.value)
+
+
+def test_a_truth_is_no_number_unless_it_was_recorded_as_one(tmp_path: Path) -> None:
+    with pytest.raises(ProtocolError, match=r"movements: true is no number; write one"):
+        a_study(tmp_path, ("movements: 2", "movements: true"))
+    path = tmp_path / "study.yaml"
+    assert load(path, discover(), recorded=True).tasks
+
+
+def test_a_rehearsal_runs_a_trial_of_each_block_for_every_group(tmp_path: Path) -> None:
+    grouped = BLOCK.replace("pairs", "feedback: group, pairs")
+    more = f"{grouped}{BLOCK.replace('pairs', 'name: again, repeat: 3, pairs')}"
+    done = rehearse(a_study(tmp_path, ("sessions:", GROUPS), (BLOCK, more)))
+    # An approach and a counted movement of each block, for each of two groups.
+    assert (done.sessions, done.trials, done.questions) == (2, 8, ())
+
+
+BROKEN = '''\
+"""A cue that fails when it is drawn."""
+
+from labcrane import Cue, Settings, hookimpl, offer
+
+
+class Broken(Cue):
+    def __init__(self, settings, machine):
+        pass
+
+    def draw(self, frame):
+        return [1 / 0]
+
+
+@hookimpl
+def labcrane_cues():
+    return [offer("broken", Settings, Broken)]
+'''
+
+
+def test_a_rehearsal_finds_what_a_check_cannot(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "plugins").mkdir()
+    (tmp_path / "plugins" / "broken.py").write_text(BROKEN)
+    study = a_study(tmp_path, ("sessions:", "feedback: {ball: {use: broken}}\nsessions:"))
+    path = str(study.path)
+    assert main(["check", path]) == 0
+    assert main(["check", path, "--rehearse"]) == 2
+    said = " ".join(capsys.readouterr().err.split())
+    assert "rehearsal, session 'only': cue 'ball'" in said
+    assert "ZeroDivisionError" in said
+    granted = ["--board", "B", "--reference", "R", "--valid-until", "2099-01-01", "--consent", "c"]
+    assert main(["approve", path, *granted]) == 2
+    assert "rehearsal, session 'only': cue 'ball'" in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "study.lock.json").exists()
+
+
+def test_a_trial_that_runs_out_of_time_is_asked_about(tmp_path: Path) -> None:
+    done = rehearse(a_study(tmp_path, ("movements: 2", "movements: 2, limit_s: 1.5")))
+    (question,) = done.questions
+    assert question.key == "rehearsal.aiming"
+    assert "the simulated operator runs out of time" in question.text
