@@ -9,8 +9,9 @@ import pytest
 from rehearsal import SHORT, ScriptedConsole, a_study
 from rich.console import Console
 
-from labcrane import Event, ProtocolError
+from labcrane import ProtocolError
 from labcrane.cli.terminal import Terminal
+from labcrane.core import Event
 from labcrane.core.records import SessionState, is_done
 from labcrane.design.counts import TrialCounts, numbers, spans
 from labcrane.design.plan import SessionPlan, plan_session
