@@ -1,8 +1,7 @@
 """Makes the pages that are read off the program itself: every key, every plugin, all decisions.
 
-mkdocs calls :func:`on_files` while it builds the site, so these pages are never out of date. In the
-repository there is a page for each that says so, to which links lead. ``python docs/generate.py
-FOLDER`` writes them for reading.
+mkdocs calls :func:`on_files` while it builds the site, so these pages are never out of date there.
+In the repository they stand as ``python docs/generate.py docs`` wrote them; a test compares.
 """
 
 import ast

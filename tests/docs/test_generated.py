@@ -32,6 +32,15 @@ def pages(generate: ModuleType) -> dict[str, str]:
     return generate.pages()
 
 
+def test_the_pages_in_the_repository_are_those_of_the_program(pages: dict[str, str]) -> None:
+    behind = [
+        name
+        for name, text in pages.items()
+        if (ROOT / "docs" / name).read_text(encoding="utf-8") != text
+    ]
+    assert behind == [], "run python docs/generate.py docs"
+
+
 def rows(text: str) -> list[list[str]]:
     lines = [line for line in text.splitlines() if line.startswith("| `")]
     return [re.split(r"(?<!\\) \| ", line.strip("| ")) for line in lines]
