@@ -269,17 +269,6 @@ def _huynh_feldt(epsilon: float, free: int, size: int) -> float:
     return min(1.0, ((free + 1.0) * size * epsilon - 2.0) / (size * (free - size * epsilon)))
 
 
-def greenhouse_geisser(values: FloatArray) -> float:
-    """Return epsilon of a table with participants as rows and levels as columns.
-
-    tr(S)² / ((k - 1) tr(S²)), S being the levels' covariance, centred in rows and columns.
-    """
-    levels = values.shape[1]
-    centring = np.eye(levels) - 1.0 / levels
-    covariance = centring @ np.cov(values, rowvar=False) @ centring
-    return float(np.trace(covariance) ** 2 / ((levels - 1) * (covariance**2).sum()))
-
-
 def compare(
     table: "pd.DataFrame",
     measure: str,
