@@ -61,7 +61,7 @@ def commit(root: Path) -> str:
     ]
     try:
         done = subprocess.run(  # noqa: S603 - git itself
-            command, check=False, capture_output=True, text=True, timeout=GIT_S
+            command, check=False, capture_output=True, encoding="utf-8", timeout=GIT_S
         )
     except subprocess.TimeoutExpired:
         return f", a clone of which git did not tell the commit within {GIT_S:g} s"

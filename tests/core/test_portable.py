@@ -47,6 +47,9 @@ TWINS = {
         "os.geteuid", "os.sched_getaffinity", "resource",
     ),  # Linux's priorities; elsewhere nothing is said of them
     "labcrane/files/lock.py": ("fcntl",),  # msvcrt
+    "labcrane/streams/recorder/own_clock.py": (
+        "time.CLOCK_MONOTONIC", "time.CLOCK_MONOTONIC_RAW", "time.clock_gettime",
+    ),  # elsewhere there is no clock that nothing turns, and none is logged
     "labcrane/web/service.py": ("os.nice",),  # where there is none the page has the same priority
     "plugins/labcrane_joystick/kernel.py": ("fcntl", "os.O_NONBLOCK"),  # "not read" elsewhere
     "plugins/labcrane_sonification/real_time.py": (
