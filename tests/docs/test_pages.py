@@ -85,7 +85,7 @@ def test_what_begins_on_a_bare_machine_is_run_by_the_gate() -> None:
     assert sorted(commands()) == sorted(marked)
     gate = (ROOT / ".ci" / "run").read_text()
     assert 'tests/docs/bare_machine.py >"$work/commands"\n' in gate
-    assert 'bash -euo pipefail "$work/commands"\n' in gate
+    assert 'bash -euo pipefail "$work/commands" | tee "$work/said"\n' in gate
 
 
 def test_few_blocks_are_not_run_and_each_says_why(record_property) -> None:
