@@ -77,7 +77,7 @@ class ArmSettings(Settings):
     """The jaws, if the arm has any."""
 
     overload: OverloadSettings = OverloadSettings()
-    """When a joint counts as overloaded."""
+    """Under which load, and until when, a joint of this arm is overloaded."""
 
     window_s: PositiveFloat = 0.05
     """Force is the contact impulse over this time divided by it, and load its mean, in seconds."""
