@@ -67,6 +67,8 @@ class Inlet:
         self._stop = threading.Event()
         self._give_up = threading.Event()
         self._companions: RecordedStreamWriter | None = None
+        self._nothing_since: int | None = None
+        """Where the source was replaced, as long as no sample of another one is known."""
         self.signals = None if feed is None else SignalTap(feed, self.note)
         name = info.name()
         self._threads = [
@@ -187,8 +189,11 @@ class Inlet:
         if reset := was_reset(inlet):
             first = self.flow.samples
             where = [first, first + sum(len(stamps) for _, stamps, _ in chunks)]
-            self.flow.resets += 1
-            self.note(RESET, samples=where)
+            # liblsl may try twice until it has a source: one break, when nothing came between.
+            if self._nothing_since != first:
+                self.flow.resets += 1
+                self.note(RESET, samples=where)
+            self._nothing_since = first if where[0] == where[1] else None
             if counter is not None:
                 counter.forget()
         for arrival, stamps, data in chunks:
