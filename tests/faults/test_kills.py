@@ -6,6 +6,7 @@ Two witnesses see every sample of the session, and two more those of a device be
 import itertools
 import json
 import random
+import re
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
@@ -244,7 +245,10 @@ def kill_and_go_on(lab: Lab, data: Path, victims: tuple[str, ...], seed: int) ->
     killed = kill(lab, data, victims, random.Random(seed))
     said = go_on(lab, data)
     if killed & {"session", "launcher"} and len(said) > 1:
-        assert "repeated, as new attempts (redo_trial): trials" in said[0]
+        unbegun = "left to do: step 1: practice 'aiming', practice trials 1-2;" in said[0]
+        which = "nothing" if unbegun else r"(practice trials \d|trials \d|no trial that is counted)"
+        again = rf"repeated, as new attempts \(redo_trial\): {which}"
+        assert re.search(again, said[0]), said[0]
     lost = check(lab, data, began, time.perf_counter())
     assert max(lost, default=0.0) <= (BOTH_S if killed >= set(BOTH) else CHUNK / RATE_HZ)
     return killed
