@@ -63,7 +63,7 @@ def judge(wrong: Wrong, path: Path, registry: Registry) -> Study | None:
         assert len(at) == len(lines), (str(wrong), lines)
         # What is missed is told where it is missed, which may be elsewhere.
         missed = wrong.fault == REMOVED or wrong.fault.endswith((" {}", " []", " null"))
-        missed = missed or "undefined alias" in lines[0]
+        missed = missed or "undefined alias" in lines[0] or wrong.place[-1:] == ("name",)
         assert wrong.line in at or wrong.line == 0 or missed, (str(wrong), wrong.line, lines)
         for line in lines:
             assert REMEDY.search(line), (str(wrong), line)

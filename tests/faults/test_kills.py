@@ -246,7 +246,8 @@ def kill_and_go_on(lab: Lab, data: Path, victims: tuple[str, ...], seed: int) ->
     said = go_on(lab, data)
     if killed & {"session", "launcher"} and len(said) > 1:
         unbegun = "left to do: step 1: practice 'aiming', practice trials 1-2;" in said[0]
-        which = "nothing" if unbegun else r"(practice trials \d|trials \d|no trial that is counted)"
+        none, some = "nothing|no trial that is counted", r"practice trials \d|trials \d"
+        which = f"({none})" if unbegun else f"({some}|no trial that is counted)"
         again = rf"repeated, as new attempts \(redo_trial\): {which}"
         assert re.search(again, said[0]), said[0]
     lost = check(lab, data, began, time.perf_counter())

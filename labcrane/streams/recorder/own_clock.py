@@ -60,17 +60,18 @@ NANO = 0x2000
 
 def read_own_clock() -> Reading | None:
     """Return how the clocks stand now; None on a system without one that nothing turns."""
-    if not sys.platform.startswith("linux"):
+    if sys.platform.startswith("linux"):
+        pairs = []
+        for _ in range(TRIES):  # the one that nothing came between
+            before = time.clock_gettime(time.CLOCK_MONOTONIC)
+            raw = time.clock_gettime(time.CLOCK_MONOTONIC_RAW)
+            after = time.clock_gettime(time.CLOCK_MONOTONIC)
+            pairs.append((after - before, (before + after) / 2.0, raw))
+        _, now, raw = min(pairs)
+        asked = _Timex()
+        if ctypes.CDLL(None).adjtimex(ctypes.byref(asked)) < 0:
+            return Reading(now, raw, float("nan"), float("nan"), float("nan"))
+        unit = 1e-9 if asked.status & NANO else 1e-6
+        return Reading(now, raw, asked.freq / PPM, float(asked.tick), unit * asked.offset)
+    else:  # noqa: RET505 - mypy takes what follows a return for unreachable elsewhere
         return None
-    pairs = []
-    for _ in range(TRIES):  # the one that nothing came between
-        before = time.clock_gettime(time.CLOCK_MONOTONIC)
-        raw = time.clock_gettime(time.CLOCK_MONOTONIC_RAW)
-        after = time.clock_gettime(time.CLOCK_MONOTONIC)
-        pairs.append((after - before, (before + after) / 2.0, raw))
-    _, now, raw = min(pairs)
-    asked = _Timex()
-    if ctypes.CDLL(None).adjtimex(ctypes.byref(asked)) < 0:
-        return Reading(now, raw, float("nan"), float("nan"), float("nan"))
-    unit = 1e-9 if asked.status & NANO else 1e-6
-    return Reading(now, raw, asked.freq / PPM, float(asked.tick), unit * asked.offset)
