@@ -248,12 +248,11 @@ def _continued(before: RecordedStream, after: RecordedStream) -> RecordedStream:
             for place, row in zip(places.tolist(), stream.texts, strict=True):
                 texts[place] = row
     late = after.probes[:, 3] > ended if overlap else slice(None)
-    notes = [_moved(note, found.first) for note in before.notes]
-    notes += [
-        _moved(note, found.second)
-        for note in after.notes
-        if not overlap or note.time > ended or note.data.get("event") == OPENED
-    ]
+    ours, theirs = list(before.notes), list(after.notes)
+    if overlap and opened is not None:
+        ours, theirs = _told_once(ours, theirs, opened, ended)
+    notes = [_moved(note, found.first) for note in ours]
+    notes += [_moved(note, found.second) for note in theirs]
     goes_on = () if overlap else (len(before.time_raw),)
     return replace(
         before,
@@ -267,6 +266,30 @@ def _continued(before: RecordedStream, after: RecordedStream) -> RecordedStream:
         starts=(*before.starts, *goes_on),
         own_clock=both_clocks(before.own_clock, after.own_clock),
     )
+
+
+def _told_once(
+    ours: Sequence[Note], theirs: Sequence[Note], opened: float, ended: float
+) -> tuple[list[Note], list[Note]]:
+    """Return which notes of two recorders count, where both have recorded the same.
+
+    What the first says counts, but for its signals: monitors are processes of their own, and the
+    first's may have begun late or died. The one whose monitors told more is believed.
+    """
+
+    def both(note: Note) -> bool:
+        return opened <= note.time <= ended
+
+    def signals(notes: Sequence[Note]) -> list[Note]:
+        return [note for note in notes if note.data.get("event") == SIGNAL and both(note)]
+
+    kept, other = list(ours), signals(theirs)
+    if len(other) > len(signals(ours)):
+        kept = [note for note in ours if not (note.data.get("event") == SIGNAL and both(note))]
+    else:
+        other = []
+    later = [note for note in theirs if note.time > ended or note.data.get("event") == OPENED]
+    return kept, [*other, *later]
 
 
 def both_clocks(one: FloatArray, other: FloatArray) -> FloatArray:

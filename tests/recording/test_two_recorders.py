@@ -3,10 +3,11 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from labcrane.recording.foreign_streams import OPENED, RESET, read_streams
+from labcrane.recording.foreign_streams import OPENED, RESET, SIGNAL, read_streams
 from labcrane.recording.paths import part_path
 from labcrane.recording.xdf.header import Channel, StreamHeader
 from labcrane.recording.xdf.writer import XdfWriter
@@ -95,6 +96,23 @@ def test_what_any_recorder_had_is_there_once_and_in_order(tmp_path_factory, seed
             assert stamps[there][high - 1] < note.time
     resets = raw_of(stream).resets
     assert all(0 <= low < high <= len(there) for _, low, high in resets)
+
+
+@pytest.mark.parametrize("told", [(0, 2), (2, 0), (2, 2), (1, 2)])
+def test_signal_faults_are_told_once_by_the_monitors_that_told_more(tmp_path, told) -> None:
+    first = tmp_path / "ses-01_streams.xdf"
+    for number, count in enumerate(told, start=1):
+        with XdfWriter(part_path(first, number)) as writer:
+            stream = RecordedStreamWriter(writer, EEG)
+            stream.note(0.001 * number, OPENED)
+            stream.samples(np.arange(10.0), np.zeros((10, 2)))
+            stream.arrival(10, 10.0)
+            for bad in (True, False)[:count]:
+                stream.note(4.0 if bad else 6.0, SIGNAL, bad=bad, samples=[3, 4])
+    (stream,), _ = read_streams([part_path(first, number) for number in (1, 2)])
+    said = [note.data["bad"] for note in stream.notes if note.data["event"] == SIGNAL]
+    assert said == [True, False]
+    assert [note.data["event"] for note in stream.notes].count(OPENED) == 2
 
 
 def test_recorders_one_after_the_other_are_joined_as_they_are(tmp_path) -> None:
