@@ -1,7 +1,8 @@
 """Writes down every state sample that reaches it, of every session of one study, as it comes.
 
 Argument: the study. Output: a JSON line per sample: its stamp and its values. Asked to end
-(SIGTERM), it does so when all that was sent has come: when every stream that it knows has ended.
+(SIGTERM), it does so when all that was sent has come: when every stream that it knows has ended, or
+does not answer any more and has nothing left.
 """
 
 import json
@@ -18,8 +19,11 @@ inlets = {}
 asked = []
 signal.signal(signal.SIGTERM, lambda *_: asked.append(True))
 sys.stdout.write("ready\n")
-while not asked or any(inlets.values()):
-    for info in resolver.results():
+going_on = {""}
+while not asked or going_on:
+    found = resolver.results()
+    going_on = {info.uid() for info in found} & {uid for uid, inlet in inlets.items() if inlet}
+    for info in found:
         if info.source_id().startswith(f"labcrane/{study}/") and info.uid() not in inlets:
             inlets[info.uid()] = pylsl.StreamInlet(info, recover=False)
     for uid, inlet in list(inlets.items()):
@@ -28,6 +32,8 @@ while not asked or any(inlets.values()):
         except LostError:
             inlets[uid] = None
             continue
+        if samples:
+            going_on.add(uid)
         for sample, stamp in zip(samples, stamps, strict=True):
             sys.stdout.write(json.dumps([stamp, sample]) + "\n")
     sys.stdout.flush()
