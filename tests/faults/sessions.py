@@ -116,7 +116,8 @@ def kill_all(launcher: "subprocess.Popen[str]") -> None:
     processes = [psutil.Process(launcher.pid)]
     processes += processes[0].children(recursive=True)
     for process in processes:
-        process.kill()
+        with suppress(psutil.NoSuchProcess):  # it ends by itself when its launcher has gone
+            process.kill()
     psutil.wait_procs(processes, timeout=240)
     launcher.communicate()
 
