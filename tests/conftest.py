@@ -22,8 +22,14 @@ from labcrane.streams.network import LOOPBACK
 _FOLDER = Path(tempfile.mkdtemp(prefix="labcrane-tests-"))
 atexit.register(shutil.rmtree, _FOLDER, ignore_errors=True)
 _CONFIG = _FOLDER / "lsl_api.cfg"
+# Ports of their own, not only a session: when a source is gone, liblsl takes any stream that looks
+# like it, of whatever session (see labcrane.streams.recorder.recorder).
+_FIRST_PORT = 16_800 + 140 * (os.getpid() % 110)
 _CONFIG.write_text(
-    LOOPBACK.replace("[lab]", f"[lab]\nSessionID = labcrane-tests-{os.getpid()}"), encoding="utf-8"
+    LOOPBACK.replace("[lab]", f"[lab]\nSessionID = labcrane-tests-{os.getpid()}").replace(
+        "[ports]", f"[ports]\nMulticastPort = {_FIRST_PORT}\nBasePort = {_FIRST_PORT + 1}"
+    ),
+    encoding="utf-8",
 )
 os.environ["LSLAPICFG"] = str(_CONFIG)
 # One thread each: the processes would take the cores from each other.

@@ -1,6 +1,7 @@
 """The recorder process, with real sources that come, go, come back and misbehave."""
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -15,6 +16,7 @@ from labcrane.errors import StreamError
 from labcrane.recording.paths import parts
 from labcrane.recording.xdf.reader import read_xdf
 from labcrane.streams.discovery import discover
+from labcrane.streams.network import VARIABLE
 from labcrane.streams.request import StreamRequest
 
 EEG = {"label": "EEG", "type": "EEG"}
@@ -134,6 +136,44 @@ def test_two_programs_with_one_source_id_are_warned_of(lab):
     assert "2 programs" in found[0].warnings[-1]
     assert stop(recorder) == 0
     assert events(lab.streams()["Amplifier"]) == ["opened", "warning"]
+
+
+def test_a_source_that_comes_back_from_another_session_is_warned_of(lab, tmp_path, monkeypatch):
+    ours = Path(os.environ[VARIABLE])
+    theirs = tmp_path / "theirs.cfg"
+    lines = (line for line in ours.read_text("utf-8").splitlines() if "SessionID" not in line)
+    theirs.write_text("\n".join(lines), encoding="utf-8")
+    first = lab.sender("Amplifier", "EEG", "amplifier-1")
+    recorder = lab.recorder(EEG)
+    until_ready(recorder)
+    first.kill()
+    with monkeypatch.context() as patch:
+        patch.setenv(VARIABLE, str(theirs))
+        lab.sender("Amplifier", "EEG", "amplifier-1")
+    status = until(
+        recorder,
+        lambda status: "not in this LSL session" in " ".join(status["streams"][0]["warnings"]),
+    )
+    assert "another laboratory's; give every device a source_id" in " ".join(
+        status["streams"][0]["warnings"]
+    )
+    assert stop(recorder) == 0
+    assert "warning" in events(lab.streams()["Amplifier"])
+
+
+def test_a_source_that_comes_back_in_this_session_is_not_warned_of(lab):
+    first = lab.sender("Amplifier", "EEG", "amplifier-1")
+    recorder = lab.recorder(EEG)
+    until_ready(recorder)
+    first.kill()
+    until(recorder, lambda status: status["streams"][0]["condition"] == "silent")
+    lab.sender("Amplifier", "EEG", "amplifier-1")
+    status = until(recorder, lambda status: status["streams"][0]["resets"] == 1)
+    before = status["streams"][0]["samples"]
+    status = until(recorder, lambda status: status["streams"][0]["samples"] > before + 1000)
+    assert status["streams"][0]["warnings"] == []
+    assert stop(recorder) == 0
+    assert "warning" not in events(lab.streams()["Amplifier"])
 
 
 def test_a_required_stream_that_is_not_what_was_expected_holds_the_session_back(lab):

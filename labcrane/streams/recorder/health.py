@@ -25,7 +25,8 @@ WINDOW_S = 5.0
 class Flow:
     """What has come so far; read by the watchdog while the inlet's threads write it.
 
-    Times are ours, in seconds; ``last`` is NaN before the first sample.
+    Times are ours, in seconds; ``last`` is NaN before the first sample, ``reset_at`` before the
+    source was replaced.
     """
 
     samples: int = 0
@@ -34,6 +35,7 @@ class Flow:
     probe: Probe | None = None
     probes: int = 0
     resets: int = 0
+    reset_at: float = float("nan")
     missing: int = 0
     fault: str | None = None
 

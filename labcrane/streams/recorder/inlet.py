@@ -192,6 +192,7 @@ class Inlet:
             # liblsl may try twice until it has a source: one break, when nothing came between.
             if self._nothing_since != first:
                 self.flow.resets += 1
+                self.flow.reset_at = _now()
                 self.note(RESET, samples=where)
             self._nothing_since = first if where[0] == where[1] else None
             if counter is not None:

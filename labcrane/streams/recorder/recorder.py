@@ -34,6 +34,12 @@ class _Recorded:
     misfits: list[str]
     warnings: list[str]
 
+    def warn(self, text: str) -> None:
+        """Say from now on, and note once beside the stream, what is wrong with it."""
+        if text not in self.warnings:
+            self.warnings.append(text)
+            self.inlet.note("warning", text=text)
+
 
 class Recorder:
     """Records what is asked for as soon as it is there. Call ``look`` several times a second.
@@ -64,6 +70,8 @@ class Recorder:
         self._latest: dict[tuple[str, str, str], pylsl.StreamInfo] = {}
         self._there: set[tuple[str, str, str]] = set()
         self._since: dict[str, float] = {}
+        self._unseen: dict[tuple[str, str, str], float] = {}
+        """Since when no search finds a stream, on our clock."""
         self._fault: str | None = None
         self._feed = None if monitors is None else SignalFeed(monitors)
         self.know(known)
@@ -86,6 +94,7 @@ class Recorder:
             self._latest[_key(info)] = info  # a program that was started again has other ports
             self._start(info)
         self._find_duplicates(found, now)
+        self._find_strangers(found)
         if self._feed is not None:
             self._feed.look()
 
@@ -178,10 +187,39 @@ class Recorder:
             ]
             if len(alike) > 1:
                 hosts = " and ".join(sorted(info.hostname() for info in alike))
-                warning = f"has source_id {key[0]!r} in {len(alike)} programs, on {hosts}: stop one"
-                if warning not in recorded.warnings:
-                    recorded.warnings.append(warning)
-                    recorded.inlet.note("warning", text=warning)
+                recorded.warn(
+                    f"has source_id {key[0]!r} in {len(alike)} programs, on {hosts}: stop one"
+                )
+
+    def _find_strangers(self, found: "list[pylsl.StreamInfo]") -> None:
+        """Warn of a source that came back and may be another: liblsl takes any that looks alike.
+
+        What it searches for when it has lost a source is the name, the type and the source_id, in
+        every LSL session and on every computer.
+        """
+        for key, recorded in self._streams.items():
+            flow = recorded.inlet.flow
+            if (now_on := self._alike(recorded, found)) is None:
+                since = max(self._unseen.setdefault(key, time.perf_counter()), flow.reset_at)
+                if flow.resets and flow.last - since > 2 * FORGET_S:
+                    recorded.warn(
+                        "came back, but not in this LSL session: it may be another laboratory's; "
+                        "give every device a source_id that no other one has"
+                    )
+                continue
+            self._unseen.pop(key, None)
+            if flow.resets and now_on != (was := recorded.inlet.info.hostname()):
+                recorded.warn(
+                    f"was sent by {was} and came back from {now_on}: see that it is the same device"
+                )
+
+    @staticmethod
+    def _alike(recorded: _Recorded, found: "list[pylsl.StreamInfo]") -> str | None:
+        """Return the computer that sends such a stream now; None when no search finds one."""
+        was = recorded.inlet.info
+        looks = was.source_id(), was.name(), was.type()
+        alike = (one for one in found if (one.source_id(), one.name(), one.type()) == looks)
+        return next((one.hostname() for one in alike), None)
 
 
 def _key(info: "pylsl.StreamInfo") -> tuple[str, str, str]:
