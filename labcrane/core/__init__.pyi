@@ -3,7 +3,7 @@
 from .crane import Crane
 from .crane_settings import CraneSettings, GrappleSettings, LoadedCraneSettings
 from .findings import Finding, Verdict
-from .hanging import HangingLoad
+from .hanging import LoadedCrane
 from .items import AnswerError, Answers, Item, Score, numeric_answers
 from .primitives import Cylinder, Shape, Sphere, TargetFinder
 from .records import (
@@ -29,12 +29,13 @@ from .references import (
     SignalName,
     ViewName,
 )
-from .settings import Names, StudyPath, Unit, read_csv_text, read_yaml, was_run
+from .settings import AtMost, Names, StudyPath, Unit, read_csv_text, read_yaml, was_run
 from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
 
 __all__ = [
     "AnswerError",
     "Answers",
+    "AtMost",
     "AxisName",
     "ButtonName",
     "CameraImage",
@@ -47,11 +48,11 @@ __all__ = [
     "EventName",
     "Finding",
     "GrappleSettings",
-    "HangingLoad",
     "Item",
     "JointName",
     "Layout",
     "LinkName",
+    "LoadedCrane",
     "LoadedCraneSettings",
     "Names",
     "Once",

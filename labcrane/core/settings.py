@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import AfterValidator, ValidationInfo
 
 from labcrane.core.references import Reference
+from labcrane.files.model import AtMost as AtMost  # noqa: PLC0414 - public here
 from labcrane.files.model import StrictModel
-from labcrane.files.model import was_run as was_run  # noqa: PLC0414 - public here
+from labcrane.files.model import was_run as was_run  # noqa: PLC0414
 from labcrane.files.table import read_csv_text as read_csv_text  # noqa: PLC0414 - public here
 from labcrane.files.units import Unit as Unit  # noqa: PLC0414 - public here
 from labcrane.files.yaml import read_yaml as read_yaml  # noqa: PLC0414 - public here

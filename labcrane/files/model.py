@@ -1,12 +1,20 @@
 """Models of YAML: strict, with units, and a schema that says what is written under a key."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationInfo, field_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    ValidationInfo,
+    field_validator,
+)
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
+from pydantic_core import CoreSchema, PydanticKnownError, core_schema
 
 from labcrane.files.units import read_quantities, unit_of
 
@@ -103,6 +111,36 @@ def was_run(info: ValidationInfo) -> bool:
     ...         return colours
     """
     return bool(info.context and info.context.get("recorded"))
+
+
+@dataclass(frozen=True, slots=True)
+class AtMost:
+    """A mark of a number that may not be larger before a session is run; a record may hold more.
+
+    Examples
+    --------
+    >>> class Drill(Settings):
+    ...     rounds: Annotated[PositiveInt, AtMost(1000)] = 1
+    """
+
+    limit: int
+
+    def __get_pydantic_core_schema__(
+        self, source: type, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Judge a number that is otherwise right."""
+        return core_schema.with_info_after_validator_function(self._judge, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, core: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Say the limit in the schema."""
+        return handler(core) | {"maximum": self.limit}
+
+    def _judge(self, value: int, info: ValidationInfo) -> int:
+        if value > self.limit and not was_run(info):
+            raise PydanticKnownError("less_than_equal", {"le": self.limit})
+        return value
 
 
 def quantities(model: BaseModel) -> Iterator[tuple[tuple[str | int, ...], str, float]]:

@@ -5,6 +5,7 @@ from typing import Annotated, Any
 from pydantic import Field, PositiveInt, field_validator
 
 from labcrane.core.settings import Settings
+from labcrane.files.model import AtMost
 
 RULES = ("as_written", "blocked", "latin_square", "shuffled", "williams")
 """What a protocol may say under ``design: order:``; :mod:`labcrane.design.order` follows it."""
@@ -20,7 +21,7 @@ class Order(Settings):
     """``as_written``; ``shuffled``: all repetitions together; ``blocked``: each repetition by
     itself; ``latin_square`` or ``williams``: each participant has a row of the square."""
 
-    times: PositiveInt = Field(default=1, le=1000)
+    times: Annotated[PositiveInt, AtMost(1000)] = 1
     """How often each level comes in a block."""
 
     in_a_row: PositiveInt | None = None
@@ -69,5 +70,5 @@ class Criterion(Settings):
     successes: PositiveInt
     """How many counted trials in a row must succeed."""
 
-    rounds: PositiveInt = Field(default=1, le=1000)
+    rounds: Annotated[PositiveInt, AtMost(1000)] = 1
     """How many times the block is run at most; whether it was enough is recorded."""

@@ -17,7 +17,7 @@ from pydantic import (
 )
 
 from labcrane.analysis.indicator_settings import IndicatorSettings
-from labcrane.files.model import was_run
+from labcrane.files.model import AtMost, was_run
 from labcrane.files.names import misfit
 from labcrane.files.yaml import YamlFile
 from labcrane.protocol.design import Design
@@ -60,7 +60,7 @@ class Participants(Section):
     pattern: str = r"P\d{3,4}"
     """Regular expression that a participant's pseudonym matches as a whole."""
 
-    planned: PositiveInt = Field(default=1, le=100_000)
+    planned: Annotated[PositiveInt, AtMost(100_000)] = 1
     """How many participants are planned."""
 
     @field_validator("pattern")

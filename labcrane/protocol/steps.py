@@ -14,6 +14,7 @@ from pydantic import (
 from labcrane.core.settings import Settings
 from labcrane.errors import ProtocolError, suggestion
 from labcrane.files.complaints import shown
+from labcrane.files.model import AtMost
 from labcrane.files.units import Unit
 from labcrane.files.yaml import Place, YamlFile, read_text
 from labcrane.protocol.design import Criterion
@@ -48,7 +49,7 @@ class Block(Section):
     """Share of the trials with feedback, part by part: ``[1, 0.5, 0]`` is all of the first third,
     every second trial of the second, none of the last."""
 
-    repeat: PositiveInt = Field(default=1, le=1000)
+    repeat: Annotated[PositiveInt, AtMost(1000)] = 1
     """How many times the block is run, each time in a new order."""
 
     until: Criterion | None = None

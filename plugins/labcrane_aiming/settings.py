@@ -14,7 +14,7 @@ from pydantic import (
 )
 
 from labcrane import Machine, Settings
-from labcrane.core import ButtonName, Names, Unit, was_run
+from labcrane.core import AtMost, ButtonName, Names, Unit, was_run
 
 EVENTS = ("targets.shown", "target.entered", "command.onset", "movement.onset", "movement.offset")
 """What a movement tells beside its beginning and end."""
@@ -38,7 +38,7 @@ class AimingSettings(Settings):
     width: Annotated[PositiveFloat, Unit("m")] = 0.5
     """Diameter of a circle, in metres."""
 
-    movements: PositiveInt = Field(default=4, le=1000)
+    movements: Annotated[PositiveInt, AtMost(1000)] = 4
     """Counted movements per pair of circles."""
 
     centre: Annotated[tuple[float, float, float], Unit("m")] = (5.5, 0.0, 0.8)

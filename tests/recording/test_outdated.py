@@ -48,6 +48,20 @@ def no_writing(text: str, dice: Dice) -> str:
     )
 
 
+def many(text: str, dice: Dice) -> str:
+    return text.replace("movements: 1", f"movements: {dice.randint(1001, 9999)}")
+
+
+def planned(text: str, dice: Dice) -> str:
+    return text.replace("planned: 4", f"planned: {dice.randint(100_001, 10**9)}")
+
+
+def rounds(text: str, dice: Dice) -> str:
+    count, key = dice.randint(1001, 9999), dice.choice(["repeat", "until"])
+    value = count if key == "repeat" else f"{{successes: 1, rounds: {count}}}"
+    return text.replace("block: {task", f"block: {{{key}: {value}, task")
+
+
 def anchors(text: str, dice: Dice) -> str:
     return text.replace("distances: [2]", "distances: &it [2]").replace(
         "name: first", f"name: &it {dice.choice(['first', 'one'])}"
@@ -68,6 +82,7 @@ FAULTS: dict[str, Callable[[str, Dice], str]] = {
     each.__name__: each
     for each in (
         wide, twice, two_of_a_name, device, stream_device, no_writing, anchors, no_view, no_bus,
+        many, planned, rounds,
     )
 }  # fmt: skip
 
