@@ -1,14 +1,16 @@
-"""Load that hangs from a crane's tip: its signals, its links as URDF, and where it is."""
+"""Load that hangs from a crane's tip, and cranes that bear one, in whatever engine."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from labcrane.core.crane import Crane
 from labcrane.core.crane_settings import GrappleSettings, LoadedCraneSettings
+from labcrane.core.records import Value
 from labcrane.core.signals import Signal
 from labcrane.machines.machine import Body, Machine
-from labcrane.machines.urdf import urdf_link
+from labcrane.machines.urdf import urdf_link, urdf_of
 from labcrane.types import FloatArray
 
 SWIVEL_KG = 0.01
@@ -129,6 +131,36 @@ class HangingLoad:
             values += [*swing, *rate, *_place(self._grapple, tip, bearing, *swing)]
         self.values[:] = values
         return self.values
+
+
+class LoadedCrane(Crane):
+    """A crane's state with the load of every joint, and where the grapple is.
+
+    An engine's crane becomes one with a load by this class before its own:
+    ``class LoadedBulletCrane(LoadedCrane, BulletCrane)``. It fills the state by ``self._load``.
+    """
+
+    def __init__(self, settings: LoadedCraneSettings, machine: Machine) -> None:
+        super().__init__(settings, machine)
+        self._loaded = settings
+        self._load = HangingLoad(machine, settings, self.signals)
+        self.signals = self._load.signals
+
+    def state(self) -> FloatArray:
+        return self._load.values
+
+    def reset(self, pose: Sequence[float]) -> None:
+        super().reset(pose)
+        self._load.fill(self._state.values, [0.0] * len(self._machine.joints))
+
+    def bodies(self) -> Sequence[Body]:
+        return (*super().bodies(), *self._load.bodies())
+
+    def metadata(self) -> Mapping[str, Value]:
+        return {**super().metadata(), "hanging.mass_kg": self._loaded.hanging_kg}
+
+    def _urdf(self) -> str:
+        return urdf_of(self._machine, beyond=self._load.urdf())
 
 
 def _place(

@@ -22,9 +22,9 @@ def labcrane_dynamics() -> list[Offer[Dynamics]]:
 
 def _bullet_crane(settings: LoadedCraneSettings, machine: Machine) -> Dynamics:
     from labcrane_bullet.bullet_crane import BulletCrane
-    from labcrane_bullet.loaded_crane import LoadedCrane
+    from labcrane_bullet.loaded_crane import LoadedBulletCrane
 
-    return (LoadedCrane if settings.loaded else BulletCrane)(settings, machine)
+    return (LoadedBulletCrane if settings.loaded else BulletCrane)(settings, machine)
 
 
 def _kinematic_crane(settings: CraneSettings, machine: Machine) -> Dynamics:

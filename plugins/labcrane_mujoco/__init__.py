@@ -17,9 +17,9 @@ def labcrane_dynamics() -> list[Offer[Dynamics]]:
 
 
 def _mujoco_crane(settings: LoadedCraneSettings, machine: Machine) -> Dynamics:
-    from labcrane_mujoco.loaded_crane import GrappleCrane, LoadedCrane
+    from labcrane_mujoco.loaded_crane import GrappleCrane, LoadedMujocoCrane
     from labcrane_mujoco.mujoco_crane import MujocoCrane
 
     if settings.grapple is not None:
         return GrappleCrane(settings, machine)
-    return (LoadedCrane if settings.loaded else MujocoCrane)(settings, machine)
+    return (LoadedMujocoCrane if settings.loaded else MujocoCrane)(settings, machine)

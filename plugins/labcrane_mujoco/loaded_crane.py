@@ -1,40 +1,17 @@
 """A crane with something on its tip: a payload, or a grapple that swings."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
-from labcrane import FloatArray, Machine, Run
-from labcrane.core import HangingLoad, LoadedCraneSettings, Value
-from labcrane.machines import Body, urdf_of
+from labcrane import FloatArray, Run
+from labcrane.core import LoadedCrane
 from labcrane_mujoco.mujoco_crane import MujocoCrane
 
 
-class LoadedCrane(MujocoCrane):
-    """The crane's state with the load of every joint, and where the grapple is."""
-
-    def __init__(self, settings: LoadedCraneSettings, machine: Machine) -> None:
-        super().__init__(settings, machine)
-        self._loaded = settings
-        self._load = HangingLoad(machine, settings, self.signals)
-        self.signals = self._load.signals
-
-    def state(self) -> FloatArray:
-        return self._load.values
-
-    def reset(self, pose: Sequence[float]) -> None:
-        super().reset(pose)
-        self._load.fill(self._state.values, [0.0] * self._joints)
-
-    def bodies(self) -> Sequence[Body]:
-        return (*super().bodies(), *self._load.bodies())
-
-    def metadata(self) -> Mapping[str, Value]:
-        return {**super().metadata(), "hanging.mass_kg": self._loaded.hanging_kg}
-
-    def _urdf(self) -> str:
-        return urdf_of(self._machine, beyond=self._load.urdf())
+class LoadedMujocoCrane(LoadedCrane, MujocoCrane):
+    """The engine's crane with the load of every joint, and where the grapple is."""
 
     def _move(self, speeds: Sequence[float]) -> FloatArray:
         joints = self._joints
@@ -45,7 +22,7 @@ class LoadedCrane(MujocoCrane):
         return self._load.fill(crane, loads, angles[joints:] or None, turning[joints:])
 
 
-class GrappleCrane(LoadedCrane):
+class GrappleCrane(LoadedMujocoCrane):
     """Drives that also bear what a swinging grapple does to the joints."""
 
     def open(self, run: Run) -> None:
