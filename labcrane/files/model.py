@@ -149,6 +149,11 @@ def was_run(info: ValidationInfo) -> bool:
 class AtMost:
     """A mark of a number that may not be larger before a session is run; a record may hold more.
 
+    Attributes
+    ----------
+    limit
+        The largest number.
+
     Examples
     --------
     >>> class Drill(Settings):
