@@ -3,13 +3,15 @@
 import sys
 from functools import lru_cache
 from importlib.metadata import EntryPoints, entry_points
+from typing import Any
 
 
 def entry_points_of(group: str) -> EntryPoints:
     """Return the entry points of a group, of all that can be imported now from ``sys.path``."""
-    return _all(tuple(sys.path)).select(group=group)
+    found: EntryPoints = _all(tuple(sys.path)).select(group=group)
+    return found
 
 
 @lru_cache(maxsize=1)
-def _all(path: tuple[str, ...]) -> EntryPoints:
+def _all(path: tuple[str, ...]) -> Any:  # SelectableGroups before Python 3.12, EntryPoints since
     return entry_points()
