@@ -8,6 +8,8 @@ from .library import load_machine
 from .links import link_boxes
 from .machine import Body, Joint
 from .mesh import MeshFile
+from .meshes.reader import read_surfaces
+from .meshes.surface import MeshError, Surface
 from .scene import Geom, PlacedObject, Scene, ShapeKind, load_scene, place_objects
 from .scene_codec import SCENE_PLACED, read_placed, write_placed
 from .scene_part import Part, load_part
@@ -23,12 +25,14 @@ __all__ = [
     "Geom",
     "Hinge",
     "Joint",
+    "MeshError",
     "MeshFile",
     "Part",
     "PlacedObject",
     "Scene",
     "Segment",
     "ShapeKind",
+    "Surface",
     "beside",
     "jacobian",
     "link_boxes",
@@ -39,6 +43,7 @@ __all__ = [
     "place_objects",
     "reach",
     "read_placed",
+    "read_surfaces",
     "segments",
     "stands",
     "urdf_joint",
