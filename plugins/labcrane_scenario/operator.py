@@ -16,6 +16,7 @@ from labcrane import (
     Trial,
 )
 from labcrane.core import Phase
+from labcrane_scenario.lapses import Lapses
 from labcrane_scenario.settings import OperatorSettings
 
 NEAR = 0.6
@@ -28,7 +29,8 @@ CLOSE_RAD = 0.02
 class ScenarioOperator(InputDevice):
     """Hands that take the tip to the task's target, and then open or shut the jaws as it asks.
 
-    They see the frame before, like a person, and know the valves as ``run.inverse`` does.
+    They see the frame before, like a person, and know the valves as ``run.inverse`` does. Where the
+    settings say so they err.
     """
 
     def __init__(self, settings: OperatorSettings, machine: Machine) -> None:
@@ -53,10 +55,17 @@ class ScenarioOperator(InputDevice):
             self._target = run.task.find("target.position")
             self._radius = run.task.index("target.radius")
             self._jaws = run.task.index("target.jaws")
+        columns = run.state.columns
+        self._grip = columns.index("grip.thing") if "grip.thing" in columns else None
         self._wait = 0
+        self._first: float | None = None
+        self._lapses: Lapses | None = None
 
     def begin_trial(self, trial: Trial) -> None:
         self._trial = trial.number
+        if self._settings.errs is not None:
+            seeds = (self._run.participant_seed, trial.seed)
+            self._lapses = Lapses(self._settings.errs, self._run.rate_hz, seeds)
         self._wait = round(self._settings.reaction_s * self._run.rate_hz)
 
     def read(self, tick: Tick, seen: Frame) -> FloatArray:
@@ -71,15 +80,27 @@ class ScenarioOperator(InputDevice):
             return out
         away = seen.task[self._target] - seen.state[self._tip]
         distance = float(np.linalg.norm(away))
+        if self._first is None:
+            self._first = tick.due
+        lapses = self._lapses
+        fresh = 1.0 if lapses is None else lapses.tire(tick.due - self._first)
         if distance > NEAR * seen.task.item(self._radius):
             settings = self._settings
-            speed = min(settings.gain_per_s * distance, settings.speed_m_s)
-            out[:] = self._run.inverse(away / distance * speed, seen.state)
+            speed = fresh * min(settings.gain_per_s * distance, settings.speed_m_s)
+            asked = away / distance * speed
+            if lapses is not None and (sinking := lapses.sinks()):
+                asked = np.array([0.0, 0.0, -sinking])
+            out[:] = self._run.inverse(asked, seen.state)
             out[-1] = 1.0
             out[self._joint] = 0.0
         if distance <= seen.task.item(self._radius):
             self._move_jaws(seen, out)
+        if lapses is not None and lapses.presses_on(held=self._holds(seen)):
+            out[self._joint] = -self._settings.signal
         return out
+
+    def _holds(self, seen: Frame) -> bool:
+        return self._grip is not None and seen.state.item(self._grip) > 0.0
 
     def _move_jaws(self, seen: Frame, out: FloatArray) -> None:
         wanted = seen.task.item(self._jaws)

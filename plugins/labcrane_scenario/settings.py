@@ -48,6 +48,29 @@ class ScenarioSettings(Settings):
         return {"object": ["target", *sorted(things), *figure], "event": EVENTS}
 
 
+class ErrorSettings(Settings):
+    """How a simulated operator errs. All is drawn from the participant's and the trial's seed."""
+
+    bumps_per_min: NonNegativeFloat = 0.0
+    """How often it bumps into something, in a minute of movement: it lets the arm sink."""
+
+    bump_s: PositiveFloat = 1.0
+    """For how long it does so then, in seconds."""
+
+    bump_m_s: PositiveFloat = 0.15
+    """How fast the tip sinks then, in m/s."""
+
+    over_grip: float = Field(default=0.0, ge=0.0, le=1.0)
+    """Probability of pressing on after a grip has formed, once for each grip."""
+
+    over_grip_s: PositiveFloat = 3.0
+    """For how long it presses on then, in seconds."""
+
+    fatigue_per_min: NonNegativeFloat = 0.0
+    """Share of its speed that is lost in a minute of the session, and by which it errs more often:
+    after t minutes it has exp(-fatigue t) of its speed, and 1 / that of its rates."""
+
+
 class OperatorSettings(Settings):
     """A simulated operator at a control panel. Its values are ours, and never a result."""
 
@@ -65,6 +88,9 @@ class OperatorSettings(Settings):
 
     signal: float = Field(default=0.5, gt=0.0, le=1.0)
     """Share of full signal with which the jaws are moved."""
+
+    errs: ErrorSettings | None = None
+    """How it errs, so that counts and stop rules can be rehearsed; never, by default."""
 
     def provides(self, machine: Machine) -> Names:
         return {"axis": [*(f"valve.{name}" for name in machine.names), "panel.connected"]}

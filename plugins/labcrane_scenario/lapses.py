@@ -1,0 +1,54 @@
+"""Lapses of a simulated operator: when it bumps, presses on, and how tired it is."""
+
+import math
+
+import numpy as np
+
+from labcrane_scenario.settings import ErrorSettings
+
+SECONDS = 60.0
+
+
+class Lapses:
+    """Draws one trial's lapses, tick by tick; the same seeds and frames, the same lapses.
+
+    Parameters
+    ----------
+    seeds
+        Of the participant and of the trial.
+    """
+
+    def __init__(self, settings: ErrorSettings, rate_hz: float, seeds: tuple[int, int]) -> None:
+        self._settings = settings
+        self._dt = 1.0 / rate_hz
+        self._random = np.random.default_rng([*seeds, 0xE44])
+        self._bump_left = self._press_left = 0.0
+        self._held = False
+        self._sense = 1.0
+
+    def tire(self, since_start: float) -> float:
+        """Take the session's time in s; return which share of its speed the operator still has."""
+        self._sense = math.exp(-self._settings.fatigue_per_min * since_start / SECONDS)
+        return self._sense
+
+    def sinks(self) -> float:
+        """Take a tick in which the arm is moved; return how fast it is let sink, in m/s."""
+        rate = self._settings.bumps_per_min / SECONDS / self._sense
+        if self._random.random() < rate * self._dt and self._bump_left <= 0.0:
+            self._bump_left = self._settings.bump_s
+        if self._bump_left <= 0.0:
+            return 0.0
+        self._bump_left -= self._dt
+        return self._settings.bump_m_s
+
+    def presses_on(self, *, held: bool) -> bool:
+        """Take whether something is in the grip; return whether the jaws go on to be shut."""
+        if held and not self._held:
+            chance = min(1.0, self._settings.over_grip / self._sense)
+            if self._random.random() < chance:
+                self._press_left = self._settings.over_grip_s
+        self._held = held
+        if not held or self._press_left <= 0.0:
+            return False
+        self._press_left -= self._dt
+        return True
