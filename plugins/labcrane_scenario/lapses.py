@@ -22,7 +22,9 @@ class Lapses:
         self._settings = settings
         self._dt = 1.0 / rate_hz
         self._random = np.random.default_rng([*seeds, 0xE44])
-        self._bump_left = self._press_left = 0.0
+        self._bump = round(settings.bump_s * rate_hz)
+        self._press = round(settings.over_grip_s * rate_hz)
+        self._bump_left = self._press_left = 0  # ticks
         self._held = False
         self._sense = 1.0
 
@@ -34,11 +36,11 @@ class Lapses:
     def sinks(self) -> float:
         """Take a tick in which the arm is moved; return how fast it is let sink, in m/s."""
         rate = self._settings.bumps_per_min / SECONDS / self._sense
-        if self._random.random() < rate * self._dt and self._bump_left <= 0.0:
-            self._bump_left = self._settings.bump_s
-        if self._bump_left <= 0.0:
+        if self._random.random() < rate * self._dt and self._bump_left == 0:
+            self._bump_left = self._bump
+        if self._bump_left == 0:
             return 0.0
-        self._bump_left -= self._dt
+        self._bump_left -= 1
         return self._settings.bump_m_s
 
     def presses_on(self, *, held: bool) -> bool:
@@ -46,9 +48,9 @@ class Lapses:
         if held and not self._held:
             chance = min(1.0, self._settings.over_grip / self._sense)
             if self._random.random() < chance:
-                self._press_left = self._settings.over_grip_s
+                self._press_left = self._press
         self._held = held
-        if not held or self._press_left <= 0.0:
+        if not held or self._press_left == 0:
             return False
-        self._press_left -= self._dt
+        self._press_left -= 1
         return True

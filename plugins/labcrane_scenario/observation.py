@@ -40,7 +40,8 @@ MOVING, FIXED = "moving", "fixed"
 class Observation:
     """Watches one trial's scene, and turns what goes wrong into events.
 
-    An object's limit also holds for what it is set down with: its support beyond its own weight. A
+    An object's limit also holds for what it is set down with: its support beyond its own weight,
+    once for the whole of it, by the limit of its first part. A
     person's limits hold for what presses on a limb and for what is fixed and the limb is pressed
     against; an obstacle's for what the machine presses on it with.
     """
@@ -57,7 +58,7 @@ class Observation:
                 "body" if thing.kind == "body" else "object",
                 against,
                 run.state.index(f"scene.{thing.name}.{word}.{part}"),
-                _support(run, thing),
+                _support(run, thing) if part == next(iter(thing.limits)) else None,
                 limit,
                 Episode(limit, settings.release, hold),
             )
