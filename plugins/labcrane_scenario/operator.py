@@ -34,7 +34,12 @@ class ScenarioOperator(InputDevice):
     """
 
     def __init__(self, settings: OperatorSettings, machine: Machine) -> None:
-        self.signals = (Signal("valve", "1", machine.names), Signal("panel.connected", "1"))
+        button = (Signal(settings.button, "1"),) if settings.button else ()
+        self.signals = (
+            Signal("valve", "1", machine.names),
+            Signal("panel.connected", "1"),
+            *button,
+        )
         if settings.jaws not in machine.names:
             raise ProtocolError(
                 f"jaws is {settings.jaws!r}; the machine has {', '.join(machine.names)}"
@@ -42,7 +47,8 @@ class ScenarioOperator(InputDevice):
         self._settings = settings
         self._joint = machine.names.index(settings.jaws)
         self._limits = machine.limits[self._joint]
-        self._out = np.zeros(len(machine.names) + 1)
+        self._connected = len(machine.names)
+        self._out = np.zeros(self._connected + 1 + len(button))
         self._trial = 0
 
     def open(self, run: Run) -> None:
@@ -71,10 +77,12 @@ class ScenarioOperator(InputDevice):
     def read(self, tick: Tick, seen: Frame) -> FloatArray:
         out = self._out
         out[:] = 0.0
-        out[-1] = 1.0
+        out[self._connected] = 1.0
         going = seen.trial == self._trial and seen.phase is Phase.RUNNING and not seen.paused
         if not (self._shown and going) or math.isnan(seen.task.item(self._radius)):
             return out
+        if self._settings.button and any(event.name == "goal.reached" for event in seen.events):
+            out[self._connected + 1] = 1.0
         if self._wait > 0:
             self._wait -= 1
             return out
@@ -91,7 +99,7 @@ class ScenarioOperator(InputDevice):
             if lapses is not None and (sinking := lapses.sinks()):
                 asked = np.array([0.0, 0.0, -sinking])
             out[:] = self._run.inverse(asked, seen.state)
-            out[-1] = 1.0
+            out[self._connected] = 1.0
             out[self._joint] = 0.0
         if distance <= seen.task.item(self._radius):
             self._move_jaws(seen, out)

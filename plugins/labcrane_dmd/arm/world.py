@@ -103,7 +103,7 @@ class World:
             jaws = (joints - 2, joints - 1)
             self._most = self._efforts[-1] / settings.jaws.length_m
             # Each jaw turns by half the opening.
-            self._tightening = 0.5 * dt * settings.jaws.length_m * settings.jaws.squeeze_n_m
+            self._tightening = 0.5 * dt * settings.jaws.length_m * 1000.0 * settings.jaws.squeeze_n
             self.grip = Grip(self.arm, jaws, client, settings.jaws.grip_n, release, ticks)
 
     def step(self, speeds: Sequence[float]) -> tuple[list[float], list[float], list[float]]:

@@ -1,0 +1,66 @@
+"""Pictures of the retrieval scenarios, from the operator's and from the side view.
+
+python docs/scenes.py            # into docs/scenes, two of each: on the way, and at the end
+python docs/scenes.py casualty   # of one
+"""
+
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+from labcrane.core import SessionState
+from labcrane.feedback.preview import chosen
+from labcrane.protocol.rig import Rig
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
+from labcrane_view.settings import ViewSettings
+from labcrane_view.view import View
+
+HERE = Path(__file__).parent
+RETRIEVAL = HERE.parent / "protocols" / "retrieval"
+MOMENTS = {"way": 0.55, "end": 1.0}
+"""Shares of a run."""
+
+SIZE = (1200, 450)
+
+
+def study_of(name: str, folder: Path) -> Path:
+    """Return a copy of the study with one scenario, and no learning before it."""
+    shutil.copytree(RETRIEVAL, folder, ignore=shutil.ignore_patterns("hydraulic_arm"))
+    path = folder / "protocol.yaml"
+    lines = path.read_text(encoding="utf-8").splitlines()
+    others = [line for line in lines if line.strip().startswith("- scenes/") and name not in line]
+    stages = [line for line in lines if line.strip().startswith(("- practice", "- reference"))]
+    left = [line for line in lines if line not in {*others, *stages}]
+    path.write_text("\n".join([*left, ""]), encoding="utf-8")
+    return path
+
+
+def draw(name: str) -> None:
+    """Run a scenario with the simulated operator, and write its pictures."""
+    with tempfile.TemporaryDirectory(prefix="labcrane-") as place:
+        path = study_of(name, Path(place) / "study")
+        study = load(path, discover())
+        frames, scene = chosen(study, None, 1, None)
+        run = Rig.build(study, simulated=True).describe(study, participant_seed=0)
+        settings = study.choices["views.operator"].settings
+        if not isinstance(settings, ViewSettings):
+            raise TypeError(f"the operator sees {settings}; pictures need a view")
+        view = View(settings.model_copy(update={"display": "hidden", "size": SIZE}), run.machine)
+        view.open(run)
+        try:
+            view.update(SessionState(scene=scene))
+            for moment, share in MOMENTS.items():
+                frame = frames[round(share * (len(frames) - 1))]
+                view.present(frame)
+                view.present(frame)  # the first picture is drawn while textures are made
+                view.save(HERE / "scenes" / f"{name}-{moment}.png")
+        finally:
+            view.close()
+
+
+if __name__ == "__main__":
+    (HERE / "scenes").mkdir(exist_ok=True)
+    for each in sys.argv[1:] or sorted(path.stem for path in (RETRIEVAL / "scenes").glob("*.yaml")):
+        draw(each)
