@@ -12,7 +12,7 @@ from pages.room import a_room, photograph, press, shown
 from selenium import webdriver
 
 from labcrane import open_recording
-from labcrane.machines import read_placed
+from labcrane.machines import read_placed, segments, stands
 
 ROOT = Path(__file__).parents[2]
 SEEN = """
@@ -36,7 +36,11 @@ def test_what_stands_around_the_machine_is_drawn_where_the_session_has_it(
     protocol = folder / "protocol.yaml"
     text = protocol.read_text()
     start = text.index("input:")
-    text = text[:start] + "input: {use: scenario_operator}\n" + text[text.index("operator:") :]
+    text = (
+        text[:start]
+        + "input: {use: scenario_operator, button: float.base}\n"
+        + text[text.index("operator:") :]
+    )
     text = re.sub(r"views:\n( .*\n)*", "", text)  # windows need a screen
     protocol.write_text(text.replace("study: retrieval", f"study: {unique('rescue')}"))
     edit(protocol, r"pattern: 'R\d{3}'", r"pattern: 'P\d{3}'")
@@ -57,13 +61,14 @@ def test_what_stands_around_the_machine_is_drawn_where_the_session_has_it(
     session = open_recording(room.folder / "P001-PILOT.h5").session(1)
     events = session.events
     placed = read_placed(events[events["name"] == "scene.placed"]["data"].iloc[0]["things"])
-    assert {each.name: len(each.parts) for each in placed} == {
+    drawn = [(each, segment) for each in placed for segment in segments(each)]
+    assert {segment.name: len(segment.parts) for _, segment in drawn} == {
         name: parts for name, (*_, parts) in seen.items()
     }
     state = session.streams["state"].data
-    stands = {each.name: each.position for each in placed}
+    placed_at = {segment.name: stands(each, segment.parts[0])[0] for each, segment in drawn}
     for name, (*where, _) in seen.items():
         columns = [f"scene.{name}.position.{axis}" for axis in "xyz"]
         moves = columns[0] in state  # what is fixed is where it was placed
-        recorded = state[columns].to_numpy() if moves else np.array([stands[name]])
+        recorded = state[columns].to_numpy() if moves else np.array([placed_at[name]])
         assert np.nanmin(np.linalg.norm(recorded - where, axis=1)) < 0.001

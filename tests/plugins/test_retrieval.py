@@ -170,3 +170,33 @@ def test_the_page_reads_a_running_tests_mistakes_off_its_frames(session) -> None
     assert lines[0] == f"test in {row['scenario']}, running"
     assert lines[1].startswith(f"time: {100 / 240:.1f} s, reference ")
     assert "k 1 (if it is completed)" in lines[-1]
+
+
+def test_the_casualty_is_carried_three_metres_onto_the_stretcher_within_its_forces(session) -> None:
+    state, loop = session.streams["state"].data, session.streams["loop"].data
+    figure = SCENES["casualty"].figure
+    stretcher = SCENES["casualty"].things["stretcher"]
+    heading = np.radians(stretcher.yaw_deg)
+    along = np.array([np.cos(heading), np.sin(heading)])
+    rows = session.trials[session.trials["scenario"] == "casualty"]
+    assert len(rows) >= 3
+    for _, row in rows.iterrows():
+        own = state[(loop["trial"] == row["trial"]).to_numpy()]
+        where = {
+            part: own[[f"scene.figure{part}.position.{axis}" for axis in "xy"]].to_numpy()
+            for part in ("", ".pelvis")
+        }
+        assert np.linalg.norm(where[""][-1] - where[""][0]) > 3.0
+        for path in where.values():  # chest and pelvis lie on the bed, 2 m by 0.5 m
+            away = path[-1] - stretcher.position[:2]
+            assert abs(away @ along) < 1.0
+            assert abs(away @ (-along[1], along[0])) < 0.25
+        assert own["grip.force"].max() < figure.slip_n
+        for limb, limit in figure.limits_n.items():
+            assert own[f"scene.figure.force.{limb}"].max() <= limit
+            assert own[f"scene.figure.hit.{limb}"].max() <= limit
+
+
+def test_every_scenario_has_room_in_its_time(session) -> None:
+    for _, row in session.trials.iterrows():
+        assert row["time"] < 0.5 * SCENES[row["scenario"]].limit_s
