@@ -128,7 +128,18 @@ LIMITS: Mapping[str, Limit] = {
         "files.table",
         ERROR,
     ),
-    "mesh": Limit(100_000_000, "bytes", 0, "STL, OBJ or glTF", "machines.mesh", ERROR),
+    "mesh": Limit(100_000_000, "bytes", 0, "STL, OBJ or glTF 2", "machines.meshes.reader", ERROR),
+    "triangles of a mesh": Limit(
+        2_000_000,
+        "triangles",
+        0,
+        "finite points, corners that are there",
+        "machines.meshes.surface",
+        ERROR,
+    ),
+    "values of a mesh": Limit(
+        1_000_000, "values", 0, "JSON of glTF 2", "machines.meshes.gltf", ERROR
+    ),
     "participant file": Limit(
         5_000_000, "values a column", 0, "HDF5 without links and data outside", "recording", ERROR
     ),

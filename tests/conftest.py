@@ -36,6 +36,10 @@ os.environ["LSLAPICFG"] = str(_CONFIG)
 for _library in ("OMP", "OPENBLAS", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
+# Tests start over a thousand Python processes: what they import is compiled once.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
 # What a shell starts in the background ignores interrupts, and so does all that it starts itself:
 # tests interrupt programs as a person does.
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -271,6 +271,8 @@ def test_what_has_become_slower_since_a_commit_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     since = importlib.import_module("benchmarks.since")
+    # Of two versions of one second and one size, the first would be kept.
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
     monkeypatch.setattr(since, "ROOT", tmp_path)
     program = tmp_path / "benchmarks" / "step.py"
     program.parent.mkdir()

@@ -110,7 +110,10 @@ def _named_in(path: Path) -> Any:
     if path.suffix in DATA:
         return _parsed(path.read_text(encoding="utf-8"))
     if path.suffix == ".gltf":  # names its textures and its numbers
-        return json.loads(path.read_text(encoding="utf-8"))
+        try:
+            return json.loads(path.read_text(encoding="utf-8"))
+        except (ValueError, RecursionError) as error:
+            raise ProtocolError(f"{path} is no glTF file: {str(error)[:100]}; export it") from error
     return None
 
 

@@ -4,12 +4,12 @@ import re
 import sys
 from collections.abc import Callable, Mapping
 from importlib.machinery import ModuleSpec
-from importlib.metadata import entry_points
 
 import typer
 
 from labcrane.cli.help import Plain
 from labcrane.errors import PluginError
+from labcrane.registry.entry_points import entry_points_of
 
 GROUP = "labcrane.commands"
 """Entry points that name a group of commands, and the module with its hook: known without importing
@@ -28,7 +28,7 @@ def extend(app: typer.Typer, first: str, *, everything: bool) -> None:
     # Two plugins can share a group; its help is by the one that is found first.
     modules = {
         point.name: point.value.partition(":")[0]
-        for point in reversed(list(entry_points(group=GROUP)))
+        for point in reversed(list(entry_points_of(GROUP)))
     }
     for group, module in sorted(modules.items()):
         if group in own:
@@ -80,11 +80,9 @@ def description(module: str) -> str:
 
 
 def _offered(group: str) -> dict[str, Callable[..., None]]:
-    from importlib.metadata import entry_points
-
     from labcrane.registry.commands import plugin_commands
 
-    points = entry_points(group=GROUP, name=group)
+    points = entry_points_of(GROUP).select(name=group)
     return {
         name: offer.run
         for (its_group, name), offer in plugin_commands(points).items()

@@ -1,7 +1,12 @@
 """Models of YAML: strict, with units, and a schema that says what is written under a key."""
 
+import ast
+import inspect
+import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
 from types import UnionType
 from typing import Any, Literal, Union, get_args, get_origin
 
@@ -26,12 +31,11 @@ UNIT = "x-unit"
 class StrictModel(BaseModel):
     """A part of a file: unknown keys are errors, values never change.
 
-    The docstring under a key describes it in the JSON Schema.
+    The docstring under a key describes it in the JSON Schema: read when a schema is made, and not,
+    as by pydantic's ``use_attribute_docstrings``, by every command that imports a model.
     """
 
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     @field_validator("*", mode="before")
     @classmethod
@@ -52,14 +56,42 @@ class StrictModel(BaseModel):
     def __get_pydantic_json_schema__(
         cls, core: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
-        """Say the unit of every key that has one."""
+        """Say of every key what it is, and its unit."""
         written = handler(core)
         keys = handler.resolve_ref_schema(written).get("properties", {})
+        said = descriptions(cls)
         for name, field in cls.model_fields.items():
             unit, key = unit_of(name, field.metadata), field.alias or name
+            if key in keys and name in said:
+                keys[key].setdefault("description", said[name])
             if unit is not None and key in keys and _shape(field.annotation) is not None:
                 keys[key][UNIT] = unit
         return written
+
+
+@cache
+def descriptions(model: type[BaseModel]) -> Mapping[str, str]:
+    """Return the docstrings under a model's keys; none of a class whose source is not there."""
+    found: dict[str, str] = {}
+    for base in reversed(model.__mro__):
+        if issubclass(base, BaseModel) and base.__module__.partition(".")[0] != "pydantic":
+            found |= dict(_docstrings(base))
+    return {name: text for name, text in found.items() if name in model.model_fields}
+
+
+def _docstrings(of: type) -> Iterator[tuple[str, str]]:
+    try:
+        tree = ast.parse(textwrap.dedent(inspect.getsource(of)))
+    except (OSError, TypeError, SyntaxError):
+        return
+    body = tree.body[0].body if isinstance(tree.body[0], ast.ClassDef) else []
+    for key, under in pairwise(body):
+        match key, under:
+            case (
+                ast.AnnAssign(target=ast.Name(id=name)),
+                ast.Expr(value=ast.Constant(value=str(text))),
+            ):
+                yield name, inspect.cleandoc(text)
 
 
 def _no_truth(annotation: Any, value: Any) -> Any:
@@ -121,6 +153,11 @@ def was_run(info: ValidationInfo) -> bool:
 @dataclass(frozen=True, slots=True)
 class AtMost:
     """A mark of a number that may not be larger before a session is run; a record may hold more.
+
+    Attributes
+    ----------
+    limit
+        The largest number.
 
     Examples
     --------

@@ -7,6 +7,8 @@ from .library import load_machine
 from .links import link_boxes
 from .machine import Body, Joint
 from .mesh import MeshFile
+from .meshes.reader import read_surfaces
+from .meshes.surface import MeshError, Surface
 from .scene import Geom, PlacedObject, Scene, ShapeKind, load_scene, place_objects
 from .scene_codec import SCENE_PLACED, read_placed, write_placed
 from .urdf import urdf_joint, urdf_link, urdf_of
@@ -20,10 +22,12 @@ __all__ = [
     "Body",
     "Geom",
     "Joint",
+    "MeshError",
     "MeshFile",
     "PlacedObject",
     "Scene",
     "ShapeKind",
+    "Surface",
     "jacobian",
     "link_boxes",
     "link_frames",
@@ -32,6 +36,7 @@ __all__ = [
     "place_objects",
     "reach",
     "read_placed",
+    "read_surfaces",
     "urdf_joint",
     "urdf_link",
     "urdf_of",

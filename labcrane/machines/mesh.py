@@ -6,9 +6,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, PositiveFloat, ValidationInfo
 
 from labcrane.files.model import StrictModel, was_run
-from labcrane.limits import check_size
-
-FORMATS = (".stl", ".obj", ".gltf", ".glb")
+from labcrane.machines.meshes.reader import FORMATS, read_surfaces
 
 Triple = tuple[float, float, float]
 
@@ -22,7 +20,7 @@ def _beside(path: Path, info: ValidationInfo) -> Path:
         raise ValueError(f"{str(path)!r} is no mesh; {', '.join(FORMATS)} can be shown")
     if not file.is_file():
         raise ValueError(f"there is no mesh {str(file)!r}; a path counts from the file naming it")
-    check_size(file.stat().st_size, "mesh", f"the mesh {str(path)!r}")
+    read_surfaces(file)  # what is damaged is refused before anybody sits down
     return file
 
 

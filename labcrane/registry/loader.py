@@ -4,7 +4,7 @@ import hashlib
 import sys
 from collections.abc import Callable, Collection, Iterable, Set
 from importlib.machinery import SourceFileLoader
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import CodeType, ModuleType
@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, TypeVar
 import pluggy
 
 from labcrane.errors import PluginError, suggestion
+from labcrane.registry.entry_points import entry_points_of
 from labcrane.registry.hookspecs import PROJECT, ROLES, labcrane_commands
 from labcrane.registry.offers import API
 from labcrane.registry.traceback import told
@@ -61,8 +62,8 @@ class PluginModules:
         self.local = own_plugins(study) if study else {}
         offers: dict[str, set[str]] = {}
         if installed is None:
-            installed = entry_points(group=PROJECT)
-            for point in entry_points(group=OFFERS):
+            installed = entry_points_of(PROJECT)
+            for point in entry_points_of(OFFERS):
                 offers.setdefault(point.value, set()).add(point.name)
         self._waiting = [
             _Waiting(point.name, point.load, offers.get(point.value)) for point in installed

@@ -7,6 +7,7 @@ from labcrane.core.records import Event
 from labcrane.design.counts import TrialCounts
 from labcrane.protocol.questions import about, questions
 from labcrane.session.commands import Order
+from labcrane.web.assessment import PerformancePanel
 from labcrane.web.door.access import SUPERVISOR
 from labcrane.web.form import ConsentCard, Form
 from labcrane.web.page import PRIMARY, PageContext
@@ -38,6 +39,7 @@ def supervisor_page(context: PageContext) -> None:
         build_questions(context)
         ConsentCard(context, SUPERVISOR).build()
         _orders(context)
+        PerformancePanel(context).build()
         with ui.element("div").classes("grid grid-cols-1 lg:grid-cols-2 gap-3 w-full"):
             with ui.card().classes("w-full"):
                 Scene(context).build()

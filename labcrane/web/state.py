@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from labcrane.core.records import Event, Value, is_done
+from labcrane.web.assessment import Assessment
 
 KEPT = 200
 """Newest events that a page can show."""
@@ -38,6 +39,8 @@ class SessionView:
         What is asked before the session: file, version and text; nothing when none is.
     sync_report
         Lines of the session's sync report, at its end.
+    assessment
+        The performance indicator as it stands.
     """
 
     def __init__(self) -> None:
@@ -59,10 +62,12 @@ class SessionView:
         self.last_trial: Mapping[str, Value] = {}
         self.alarm = ""
         self.consent: Mapping[str, Value] = {}
+        self.assessment = Assessment()
 
     def take(self, event: Event) -> None:
         """Take in the next event."""
         self.events.append(event)
+        self.assessment.take(event)
         kind, _, what = event.name.partition(".")
         match kind:
             case "questionnaire":

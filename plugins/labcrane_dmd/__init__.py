@@ -31,6 +31,7 @@ def labcrane_commands() -> list[CommandOffer]:
         CommandOffer(("dmd", "fit"), commands.fit),
         CommandOffer(("dmd", "validate"), commands.validate),
         CommandOffer(("dmd", "plot"), commands.plot),
+        CommandOffer(("dmd", "record"), commands.record),
     ]
 
 

@@ -1,7 +1,7 @@
-"""The commands ``labcrane dmd fit``, ``validate`` and ``plot``."""
+"""The commands ``labcrane dmd fit``, ``validate``, ``plot`` and ``record``."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import typer
 from pydantic import ValidationError
@@ -11,9 +11,12 @@ from rich.table import Table
 from labcrane import ProtocolError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
+    from labcrane_dmd.bench.steps import Sample
+    from labcrane_dmd.fit.recordings import SegmentRecording
     from labcrane_dmd.fit.validation import Level
+    from labcrane_dmd.model.model import Model
 
 RecordingsPath = Annotated[
     Path, typer.Argument(metavar="RECORDINGS", help="a CSV file of a segment, or a folder of them")
@@ -50,6 +53,10 @@ def fit(
         str | None,
         typer.Option(help="further signals for the edge of the dead band; '' for none"),
     ] = None,
+    dead_band: Annotated[
+        Literal["found", "none"],
+        typer.Option(help="none: speed rises from signal 0, as in the paper"),
+    ] = "found",
 ) -> None:
     """Make a Dynamic Model Description from recordings of joints."""
     from labcrane_dmd.fit.fitting import fit_model
@@ -61,7 +68,12 @@ def fit(
     signals = {name: _signals(name, text) for name, text in given.items() if text is not None}
     try:
         settings = FitSettings.model_validate(
-            {"between": between, "max_degree": max_degree, **signals}
+            {
+                "between": between,
+                "max_degree": max_degree,
+                "dead_band": dead_band,
+                **signals,
+            }
         )
     except ValidationError as error:
         raise ProtocolError(str(error.errors()[0]["msg"]).removeprefix("Value error, ")) from None
@@ -106,18 +118,34 @@ def validate(
         Literal["linear", "pchip"] | None,
         typer.Option(help="another rule between layers than the model's own"),
     ] = None,
+    *,
+    drive: Annotated[
+        bool,
+        typer.Option(help="drive every segment of the simulated arm through the engine's steps"),
+    ] = False,
+    machine: Annotated[
+        str | None, typer.Option(help="with --drive: the machine, or its YAML file")
+    ] = None,
+    rate_hz: Annotated[float, typer.Option(help="with --drive: steps per second", min=20)] = 240.0,
 ) -> None:
-    """Compare a model with recordings at signals that it was not fitted to.
+    """Compare a model with recordings at signals that it was not fitted to, and at 0.
 
     Tables and figures for the other rule between layers are saved beside those of the model's own.
     """
     from labcrane_dmd.fit.figures import draw_validation
+    from labcrane_dmd.fit.printed import write_printed
     from labcrane_dmd.fit.recordings import read_recordings
     from labcrane_dmd.fit.validation import summary, write_table
     from labcrane_dmd.fit.validation import validate as compare
     from labcrane_dmd.model.model_file import load
     from labcrane_dmd.model.output import written
 
+    if drive and machine is None:
+        raise ProtocolError(
+            "--drive moves the segments of a machine; say of which: --machine ied_arm.yaml"
+        )
+    if machine is not None and not drive:
+        raise ProtocolError(f"--machine {machine} is only driven with --drive; add it")
     loaded = load(model, between)
     folder = to or model.with_suffix("").with_name(f"{model.stem}-validation")
     with written(folder):
@@ -129,9 +157,44 @@ def validate(
         ending = "" if rule == own else f"_{rule}"
         write_table((level.row() for level in levels), folder / f"validation{ending}.csv")
         write_table(summary(levels), folder / f"summary{ending}.csv")
+        write_printed(levels, folder, ending)
         draw_validation(levels, rule, folder / f"validation{ending}.png")
         _print(levels, rule)
+    if drive and machine is not None:
+        _drive(loaded, model, machine, read, rate_hz, folder)
     out.print(f"tables and figures: {folder}", markup=False)
+
+
+def _drive(
+    model: "Model",
+    file: Path,
+    machine: str,
+    recordings: "Sequence[SegmentRecording]",
+    rate_hz: float,
+    folder: Path,
+) -> None:
+    """Drive the arm with the model's own rule between layers; leave its tables and figure."""
+    from labcrane.machines import load_machine
+    from labcrane_dmd.bench.driven import arm_settings
+    from labcrane_dmd.bench.driven import drive as measure
+    from labcrane_dmd.fit.figures import draw_validation
+    from labcrane_dmd.fit.printed import write_printed
+    from labcrane_dmd.fit.validation import summary, write_table
+
+    operated = load_machine(machine)
+    settings = arm_settings(operated, model, file)
+    driven = measure(
+        settings, model, operated, recordings, rate_hz, lambda text: out.print(text, markup=False)
+    )
+    levels = [each.level for each in driven]
+    write_table((each.row() for each in driven), folder / "driven.csv")
+    write_table(summary(levels), folder / "driven_summary.csv")
+    write_printed(levels, folder, "_driven")
+    rule = model.settings.between
+    draw_validation(levels, f"{rule}, driven at {rate_hz:g} Hz", folder / "driven.png")
+    _print(levels, f"{rule}, driven at {rate_hz:g} Hz")
+    worst = max(each.formula_error for each in driven)
+    out.print(f"driven speeds differ from the formula's by {worst:.2g} deg/s at most", markup=False)
 
 
 def _print(levels: "Sequence[Level]", rule: str) -> None:
@@ -161,11 +224,94 @@ def plot(
     to: Annotated[
         Path | None, typer.Option("--out", help="PNG file; the model's name by default")
     ] = None,
+    recordings: Annotated[
+        Path | None,
+        typer.Option(help="recordings that it was fitted to: their angles and speeds, too"),
+    ] = None,
 ) -> None:
-    """Draw a model's layers."""
-    from labcrane_dmd.fit.figures import draw_model
+    """Draw a model's layers, and on request the angles and speeds that they come from."""
+    from labcrane_dmd.fit.figures import draw_angles, draw_model, draw_speeds
+    from labcrane_dmd.fit.recordings import read_recordings
     from labcrane_dmd.model.model_file import load
 
     path = to or model.with_suffix(".png")
-    draw_model(load(model), path)
-    out.print(f"figure: {path}", markup=False)
+    loaded = load(model)
+    drawn = [path]
+    draw_model(loaded, path)
+    if recordings is not None:
+        read = read_recordings(recordings)
+        drawn += [path.with_stem(f"{path.stem}_{what}") for what in ("angle", "speed")]
+        draw_angles(read, drawn[1])
+        draw_speeds(loaded, read, drawn[2])
+    for each in drawn:
+        out.print(f"figure: {each}", markup=False)
+
+
+def record(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="where recordings are kept")],
+    segment: Annotated[str, typer.Option(help="the joint that is recorded")],
+    signal: Annotated[
+        str,
+        typer.Option(help="valve number or Message.Signal on CAN; STREAM or STREAM:CHANNEL in LSL"),
+    ],
+    angle: Annotated[
+        str, typer.Option(help="Message.Signal on CAN; STREAM or STREAM:CHANNEL in LSL")
+    ],
+    bus: Annotated[
+        str | None, typer.Option(help="a CAN bus, interface:channel, as slcan:/dev/ttyUSB0")
+    ] = None,
+    log: Annotated[
+        Path | None, typer.Option(help="a candump, asc or blf log, or a raw CSV of this command")
+    ] = None,
+    *,
+    lsl: Annotated[bool, typer.Option("--lsl", help="streams of Lab Streaming Layer")] = False,
+    map_: Annotated[
+        Path | None, typer.Option("--map", help="DBC file of what is on the bus or in the log")
+    ] = None,
+    full: Annotated[float, typer.Option(help="value of a DBC signal that is full flow")] = 100.0,
+    bitrate: Annotated[int, typer.Option(help="bits per second of the bus")] = 250_000,
+    seconds: Annotated[float | None, typer.Option(help="stop after this time")] = None,
+) -> None:
+    """Record a joint's steps for ``dmd fit``: from a CAN bus, a log of one, or LSL.
+
+    Every value is kept in raw/SEGMENT.csv as it comes. At the end, or at Ctrl-C, it is cut into
+    runs: SEGMENT.csv has them, steps/SEGMENT.csv every step and why one is no run.
+    """
+    from labcrane_dmd.bench.sources import CanValues, kept, read_bus, read_log, read_lsl, read_raw
+    from labcrane_dmd.bench.steps import cut, write_runs
+
+    if sum((bus is not None, log is not None, lsl)) != 1:
+        raise ProtocolError("say where the values come from: one of --bus, --log and --lsl")
+    if (folder / f"{segment}.csv").exists() and (log is None or log.suffix != ".csv"):
+        raise ProtocolError(
+            f"{folder / f'{segment}.csv'} is there already, and recordings are not written over; "
+            "give another folder"
+        )
+    samples: Iterator[Sample]
+    raw = folder / "raw" / f"{segment}.csv"
+    if lsl:
+        samples = kept(read_lsl(signal, angle, segment, seconds), raw)
+    elif log is not None and log.suffix == ".csv":
+        samples = read_raw(log)
+    elif map_ is None:
+        raise ProtocolError("what is on a CAN bus only a DBC file explains; give it with --map")
+    else:
+        values = CanValues(signal, angle, map_, full)
+        if bus is not None:
+            samples = kept(read_bus(bus, bitrate, values, seconds), raw)
+        else:
+            samples = kept(read_log(cast("Path", log), values), raw)
+    found: list[Sample] = []
+    try:
+        for sample in samples:
+            found.append(sample)  # noqa: PERF402 - Ctrl-C keeps what has come
+    except KeyboardInterrupt:
+        out.print("stopped")
+    steps = cut(found)
+    path = write_runs(steps, folder, segment)
+    table = _table("signal", "seconds", "from", "to", "left out", title=segment)
+    for step in steps:
+        ends = (f"{step.angle[0]:.2f} deg", f"{step.angle[-1]:.2f} deg")
+        table.add_row(f"{step.signal:+d}", f"{step.time[-1]:.2f}", *ends, step.left_out)
+    out.print(table)
+    out.print(f"runs: {path}", markup=False)

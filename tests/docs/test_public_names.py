@@ -21,6 +21,7 @@ from pydantic import BaseModel
 
 import labcrane
 import labcrane.testing
+from labcrane.files.model import descriptions
 
 NOT_ASKED = {
     "ES01": "a summary that says all needs no more",
@@ -171,8 +172,7 @@ def texts_below(body: list[ast.stmt]) -> Iterator[tuple[str, str]]:
 
 @pytest.mark.parametrize("name", [n for n, c in CLASSES.items() if issubclass(c, BaseModel)])
 def test_every_key_of_a_model_is_described(name: str) -> None:
-    fields = CLASSES[name].model_fields
-    written = {key: field.description for key, field in fields.items() if field.description}
+    written = descriptions(CLASSES[name])
     for key, field in CLASSES[name].model_fields.items():
         assert key in written, f"{name}.{key} is not described"
         if field.annotation is float:

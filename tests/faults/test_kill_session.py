@@ -30,8 +30,10 @@ from labcrane.session.resume import progress
 SIXTY = [pytest.mark.soak, pytest.mark.timeout(1500)]
 """The first of these tests waits for all sessions to be killed and recovered."""
 
+NUMBERS = [6, pytest.param(18, marks=pytest.mark.long), pytest.param(60, marks=SIXTY)]
 
-@pytest.fixture(scope="module", params=[18, pytest.param(60, marks=SIXTY)])
+
+@pytest.fixture(scope="module", params=NUMBERS)
 def killed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory):
     """Kill a session at many moments, with a witness; return what became of it."""
     folder = tmp_path_factory.mktemp("killed")

@@ -246,8 +246,9 @@ def kill_and_go_on(lab: Lab, data: Path, victims: tuple[str, ...], seed: int) ->
     said = go_on(lab, data)
     if killed & {"session", "launcher"} and len(said) > 1:
         unbegun = "left to do: step 1: practice 'aiming', practice trials 1-2;" in said[0]
-        none, some = "nothing|no trial that is counted", r"practice trials \d|trials \d"
-        which = f"({none})" if unbegun else f"({some}|no trial that is counted)"
+        # All trials are left where the first was reached, or not: it is repeated, or nothing is.
+        none, some = r"nothing|practice trials 1\b(?!-)", r"practice trials \d|trials \d"
+        which = f"({none if unbegun else some}|no trial that is counted)"
         again = rf"repeated, as new attempts \(redo_trial\): {which}"
         assert re.search(again, said[0]), said[0]
     lost = check(lab, data, began, time.perf_counter())

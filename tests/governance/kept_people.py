@@ -92,7 +92,7 @@ def killed_at(number: int, work: Callable[[], object]) -> bool:
 
 
 # Everywhere on request; here and there, at all kinds of writes, with every change.
-KILLS = [pytest.param(1, marks=pytest.mark.soak), 7]
+KILLS = [pytest.param(1, marks=pytest.mark.soak), pytest.param(7, marks=pytest.mark.long)]
 
 
 def at_every_write(recorded: Lab, folder: Path, work, check, step: int) -> int:

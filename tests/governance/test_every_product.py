@@ -66,7 +66,9 @@ def says_name(path: Path, name: str) -> bool:
     return bool(words & set(re.split(r"[^A-Za-z0-9-]+", path.name)))
 
 
-@pytest.mark.parametrize("name", PEOPLE)
+@pytest.mark.parametrize(
+    "name", [PEOPLE[0], *(pytest.param(name, marks=pytest.mark.long) for name in PEOPLE[1:])]
+)
 def test_nothing_of_an_erased_person_is_left_and_nothing_of_others_is_touched(
     made: Snapshot, name: str
 ) -> None:
@@ -95,6 +97,7 @@ def test_the_shared_files_that_stay_work(made: Snapshot) -> None:
     assert said.stdout.split() == ["P0011", "VP-001"]
 
 
+@pytest.mark.long
 def test_an_erasure_killed_at_random_writes_is_finished_by_the_next_call(made: Snapshot) -> None:
     lab = made.put_back()
     before = {other: own(root_of(lab), other) for other in PEOPLE}
@@ -149,6 +152,7 @@ def test_after_relabelling_the_old_name_is_nowhere_but_on_record(made: Snapshot)
     relabelled(lab, before)
 
 
+@pytest.mark.long
 def test_a_relabelling_killed_at_random_writes_is_finished_by_the_next_call(
     made: Snapshot,
 ) -> None:

@@ -2,6 +2,7 @@
 
 import gzip
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -257,11 +258,16 @@ def test_the_commands_leave_model_tables_and_figures(tmp_path: Path, capsys) -> 
     table = pd.read_csv(tmp_path / "out" / "validation.csv")
     named = ["segment", "direction", "signal", "mean_speed", "mse", "rmse", "mae", "max_abs_error"]
     assert list(table)[:8] == named
-    assert len(table) == 36
+    assert len(table) == 39  # six signals in both directions, and 0, of three segments
     assert {path.name for path in (tmp_path / "out").iterdir()} == {
         f"{name}{rule}.{kind}"
         for rule in ("", "_linear")
         for name, kind in (("validation", "csv"), ("validation", "png"), ("summary", "csv"))
+    } | {
+        f"table_{number}{rule}.{kind}"
+        for number in (3, 4)
+        for rule in ("", "_linear")
+        for kind in ("md", "tex")
     }
     assert (tmp_path / "arm.png").read_bytes().startswith(b"\x89PNG")
     assert main(["dmd", "validate", str(tmp_path / "no.yaml"), str(FOLDER)]) == 2
@@ -287,7 +293,32 @@ def test_the_command_fits_other_grids_as_a_line_through_two_sets_of_speeds(
         assert boom.speed(signal, angle) == pytest.approx(line, rel=1e-9)
     assert main(["dmd", "validate", str(arm), str(FOLDER), "--out", str(tmp_path / "out")]) == 0
     table = pd.read_csv(tmp_path / "out" / "validation.csv")
-    assert sorted(table["signal"].abs().unique()) == [160, 200, 220]
+    assert sorted(table["signal"].abs().unique()) == [0, 160, 200, 220]
+
+
+def test_the_papers_own_rule_is_a_line_from_0_that_other_runs_do_not_bend(
+    recordings, tmp_path: Path
+) -> None:
+    arm = tmp_path / "arm.yaml"
+    words = ["--edge", "", "--dead-band", "none", "--between", "linear"]
+    assert main(["dmd", "fit", str(FOLDER), "--out", str(arm), *words]) == 0
+    model = labcrane_dmd.load(arm)
+    random = np.random.default_rng(2)
+    for segment in model.values():
+        for sign in (1, -1):
+            assert segment.direction(sign).dead_band == 0.0
+            for angle in random.uniform(*segment.limits, 5).tolist():
+                grid = {size: segment.speed(sign * size, angle) for size in (40, 80)}
+                assert segment.speed(sign * 20, angle) == pytest.approx(grid[40] / 2, rel=1e-9)
+                assert segment.speed(sign * 60, angle) == pytest.approx(
+                    (grid[40] + grid[80]) / 2, rel=1e-9
+                )
+    other = [
+        replace(each, runs=tuple(run for run in each.runs if abs(run.signal) not in {10, 30, 50}))
+        for each in recordings
+    ]
+    settings = FitSettings(edge=(), dead_band="none")
+    assert dict(fit_model(other, settings)) == dict(fit_model(recordings, settings))
 
 
 @pytest.mark.parametrize(

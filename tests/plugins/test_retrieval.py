@@ -9,8 +9,13 @@ import pytest
 from cranes import needs_bullet
 
 import labcrane
+from labcrane.analysis.cohort import find_cohort
+from labcrane.analysis.indicator_settings import IndicatorSettings
+from labcrane.analysis.operator_tests import operator_tests
+from labcrane.core.records import Event
 from labcrane.machines.library import load_machine
 from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.web.assessment import Assessment
 
 pytestmark = [needs_bullet, pytest.mark.long]
 
@@ -128,3 +133,40 @@ def test_the_study_can_be_scored(data: Path, session, tmp_path: Path) -> None:
         assert test["points accuracy"] == pytest.approx(10.0 * test["s_accuracy"])
         assert test["points awareness"] == pytest.approx(10.0 * test["s_awareness"])
         assert test["k"] == 1
+
+
+def test_the_supervisor_saw_of_each_test_what_it_is_scored_with(data: Path, session) -> None:
+    settings = IndicatorSettings()
+    tests = operator_tests(find_cohort(data, ["simulated"]))
+    seen: dict[int, str] = {}
+    followed, running = Assessment(), 0
+    for _, event in session.events.iterrows():
+        if event["name"] == "trial.start" and running:
+            seen[running] = followed.lines({}, settings)[-1]
+        followed.take(Event(event["name"], event["time"], event["data"]))
+        running = event["data"]["trial"] if event["name"] == "trial.start" else running
+    seen[running] = followed.lines({}, settings)[-1]
+    assert len(tests) == len(SCENES)
+    for test in tests:
+        found = test.indicator
+        assert seen[test.trial] == (
+            f"indicator: {found.raw:.1f}, {found.percent:.1f} %; k 1 ({test.why})"
+        )
+
+
+def test_the_page_reads_a_running_tests_mistakes_off_its_frames(session) -> None:
+    streams = [session.streams[name].data for name in ("loop", "task")]
+    row = session.trials.iloc[-1]
+    at = int((streams[0]["trial"] == row["trial"]).to_numpy().nonzero()[0][100])
+    newest = {
+        f"{'' if number == 0 else 'task.'}{name}": float(value)
+        for number, stream in enumerate(streams)
+        for name, value in stream.iloc[at].items()
+    }
+    followed = Assessment()
+    for _, event in session.events[session.events["time"] <= newest["due"]].iterrows():
+        followed.take(Event(event["name"], event["time"], event["data"]))
+    lines = followed.lines(newest, IndicatorSettings())
+    assert lines[0] == f"test in {row['scenario']}, running"
+    assert lines[1].startswith(f"time: {100 / 240:.1f} s, reference ")
+    assert "k 1 (if it is completed)" in lines[-1]

@@ -111,8 +111,8 @@ def test_a_mesh_with_what_is_no_number_is_refused_in_words(broken: str, tmp_path
     corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
     more = "v 0 0 1\n" if broken.startswith("vn") else "vn 0 0 1\n"
     path.write_text(f"{corners}{more}{broken}\nf 1//1 2//1 3//1\nf 1//1 2//1 4//1\n")
-    with pytest.raises(DeviceError, match=r"broken\.obj' has points or normals that are no finite"):
-        read_mesh(MeshFile(file=path))
+    with pytest.raises(ValueError, match=r"broken\.obj' has points or normals that are no finite"):
+        MeshFile(file=path)
 
 
 def test_a_mesh_is_scaled_turned_and_put_in_its_place(tmp_path: Path) -> None:
@@ -128,16 +128,22 @@ def test_a_mesh_is_scaled_turned_and_put_in_its_place(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "content", "why"),
     [
-        ("x.stl", b"nonsense" * 20, r"^mesh '.*x\.stl' cannot be read; write it again as STL, OBJ"),
-        ("x.obj", b"v 0 0 0\nv 1 0 0\nl 1 2\n" * 20, r"^mesh '.*x\.obj' (holds no|cannot be)"),
+        (
+            "a.stl",
+            b"nonsense" * 20,
+            r"^mesh '.*a\.stl' says that it has \d+ triangles and has room",
+        ),
+        ("c.obj", b"v 0 0 0\nv 1 0 0\nl 1 2\n" * 20, r"^mesh '.*c\.obj' holds no triangles"),
     ],
+    ids=["stl", "obj"],
 )
-def test_a_mesh_that_cannot_be_read_is_named(
+def test_a_mesh_that_is_damaged_after_it_was_checked_is_named_by_the_view(
     name: str, content: bytes, why: str, tmp_path: Path
 ) -> None:
-    (tmp_path / name).write_bytes(content)
+    asked = MeshFile(file=written(tmp_path, name))
+    asked.file.write_bytes(content)
     with pytest.raises(DeviceError, match=why):
-        read_mesh(MeshFile(file=tmp_path / name))
+        read_mesh(asked)
 
 
 CRANE = Path(__file__).parents[2] / "labcrane" / "machines" / "data" / "ch8.yaml"
@@ -161,6 +167,10 @@ def a_machine_study(folder: Path, mesh: str) -> Path:
             "no.stl",
             r"mine\.yaml:\d+: joints\[4\]\.mesh.*there is no mesh '.*no\.stl'; a path",
         ),
+        (
+            "cut.stl",
+            r"mine\.yaml:\d+: .*cut\.stl' says that it has 4 triangles and has room for 3.96",
+        ),
         ("arm.step", r"'.*arm\.step' is no mesh; \.stl, \.obj, \.gltf, \.glb can be shown"),
         ("{file: a.stl, scale: -1}", r"mesh\.scale is -1; it must be greater than 0"),
     ],
@@ -168,6 +178,7 @@ def a_machine_study(folder: Path, mesh: str) -> Path:
 def test_a_protocol_with_a_wrong_mesh_is_refused(mesh: str, why: str, tmp_path: Path) -> None:
     (tmp_path / "cranes").mkdir()
     written(tmp_path / "cranes", "a.stl")
+    (tmp_path / "cranes" / "cut.stl").write_bytes(stl()[:-2])
     with pytest.raises(ProtocolError, match=why):
         a_machine_study(tmp_path, mesh)
 

@@ -62,7 +62,7 @@ def windows(display: str) -> dict[str, tuple[int, int]]:
     return found
 
 
-@pytest.mark.parametrize("renderer", ["auto", "software"])
+@pytest.mark.parametrize("renderer", [pytest.param("auto", marks=pytest.mark.long), "software"])
 def test_every_grab_of_two_windows_shows_whole_pictures_while_the_crane_moves(
     renderer: str,
 ) -> None:

@@ -143,6 +143,16 @@ def test_garbage_in_the_middle_ends_no_recording(
         np.testing.assert_array_equal(rows(file)[:before], TRUE[:before])
 
 
+def test_a_signalling_nan_anywhere_is_damage_and_no_error(data: bytes, tmp_path: Path) -> None:
+    nan = np.array([0x7FF0_0000_0000_0001], "<u8").tobytes()
+    for at in range(len(data) - 600, len(data) - 8):
+        try:
+            file = read(tmp_path, data[:at] + nan + data[at + 8 :])
+        except RecordingError:
+            continue
+        assert_true(file)
+
+
 def ends_of_frames(data: bytes) -> list[int]:
     """Where each frame ends, found by its bytes."""
     return [data.index(row.tobytes()) + row.nbytes for row in FRAMES]

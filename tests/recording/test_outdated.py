@@ -196,7 +196,10 @@ def test_a_record_of_a_machine_whose_meshes_are_gone_is_read_as_before(tmp_path:
     """Only those who draw it need them; who reads the record is on another computer."""
     lab = tmp_path / "lab"
     lab.mkdir()
-    (lab / "foot.stl").write_text("solid foot")
+    corners = "vertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+    (lab / "foot.stl").write_text(
+        f"solid\nfacet normal 0 0 1\nouter loop\n{corners}endloop\nendfacet\nendsolid\n"
+    )
     crane = find_machine("ch8").read_text().replace("joints:", "base_mesh: foot.stl\njoints:", 1)
     (lab / "crane.yaml").write_text(crane)
     path = lab / "study.yaml"

@@ -247,7 +247,11 @@ def test_a_cluster_makes_the_same_bits_even_when_a_worker_is_killed(
     assert digests(data) == local
 
 
-@pytest.mark.parametrize("words", [["report"], ["export", "--to", "tables"]], ids=" ".join)
+@pytest.mark.parametrize(
+    "words",
+    [pytest.param(["report"], marks=pytest.mark.long), ["export", "--to", "tables"]],
+    ids=" ".join,
+)
 def test_two_cores_report_and_export_the_same(
     study: Path, cohort: Path, tmp_path: Path, words: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -1,5 +1,7 @@
 """Corrected times against clocks whose truth is known in closed form."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from streams.synthetic import SourceClock, after_one_another, arrivals, probe, source
@@ -7,8 +9,9 @@ from streams.synthetic import SourceClock, after_one_another, arrivals, probe, s
 from labcrane.errors import RecordingError
 from labcrane.streams.sync.correction import Treatment, correct
 from labcrane.streams.sync.dejitter import Dejitter
+from labcrane.streams.sync.offset import fit
 from labcrane.streams.sync.quality import Basis
-from labcrane.streams.sync.raw import RawStream
+from labcrane.streams.sync.raw import REMOTE, RTT, RawStream
 
 REGULAR = Treatment(rate_hz=500.0, dejitter=Dejitter.NONE)
 MARKERS = Treatment()
@@ -198,6 +201,30 @@ def test_a_stray_probe_is_left_out(random):
     corrected = correct(raw, REGULAR)
     assert len(corrected.segments) == 1
     assert p95(corrected, times) < 3e-6
+
+
+@pytest.mark.parametrize("kind", ["regular", "irregular"])
+def test_a_clock_whose_stamps_go_on_evenly_was_turned_and_did_not_step(random, kind):
+    """Two probes alone tell nothing of how it came from one offset to the next."""
+    times = regular() if kind == "regular" else irregular(random)
+    clock = SourceClock()
+    raw = source(lambda t: clock(t) + 0.01 * np.clip(t - 160.0, 0.0, 2.0), times, random)
+    turned = (raw.probes[:, 3] > 159.0) & (raw.probes[:, 3] < 163.5)
+    corrected = correct(
+        RawStream.of(raw.stamps, raw.probes[~turned], raw.arrivals),
+        REGULAR if kind == "regular" else MARKERS,
+    )
+    assert corrected.quality.steps == (0 if kind == "regular" else 1)
+    assert np.mean(np.abs(corrected.time - times) <= corrected.error) >= 0.95
+
+
+def test_a_curve_that_no_ways_of_its_probes_allow_says_so(random):
+    """A probe bounds the offset by half its round trip, whatever is thought of the clock."""
+    probes = source(SourceClock(), regular(), random).probes
+    curve = fit(probes, 0.0)
+    moved = replace(curve, smoothed=replace(curve.smoothed, offset=curve.smoothed.offset + 2e-3))
+    least = 2e-3 - np.abs(curve.residuals) - probes[:, RTT] / 2.0
+    assert (moved.with_error(probes[:, REMOTE])[1] >= least).all()
 
 
 def test_a_long_time_without_probes_is_no_step(random):

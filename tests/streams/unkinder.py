@@ -119,6 +119,31 @@ def bad_wireless(random):
     )  # fmt: skip
 
 
+def busy_and_slewed(random):
+    """NTP turns the clock of a computer that is busy: most exchanges wait for one of two programs.
+
+    How often, for how long and for which of them is drawn; at times all of them wait as long
+    as the clock is turned.
+    """
+    clock = Clock(random)
+    begin, length = START + random.uniform(15, 60), random.uniform(5, 30)
+    clock.slew(random.choice([-1, 1]) * random.uniform(500e-6, 5e-3), begin, begin + length)
+    seldom, size = random.uniform(0.1, 0.8), np.exp(random.uniform(np.log(1e-3), np.log(0.03)))
+    lean, all_along, busy = random.uniform(0.0, 1.0), random.random() < 0.3, False
+
+    def waits(t, random):
+        nonlocal busy
+        busy = random.random() < (0.6 if busy else seldom)
+        if not busy and not (all_along and begin - 5.0 < t < begin + length + 5.0):
+            return tuple(random.exponential(1e-5, (2, 8)))
+        return tuple(random.exponential(size, (2, 8)) * [[lean], [1.0 - lean]])
+
+    return received(
+        random, clock, regular(random, 250.0, 80, 200), 250.0, way=random.uniform(1.5e-5, 1e-4),
+        congestion=waits, clean=False, perhaps=frozenset({Fault.CONGESTED, Fault.SLEWED}),
+    )  # fmt: skip
+
+
 def own_slewed(random, *, logged):
     """NTP turns the recorder's own clock for a minute; on Linux its recorder logs that."""
     begin = START + random.uniform(50, 120)
@@ -206,6 +231,7 @@ MORE: dict[str, Callable] = {
     "wireless that comes and goes": bad_wireless,
     "our own clock slewed, logged": lambda r: own_slewed(r, logged=True),
     "our own clock slewed, not logged": lambda r: own_slewed(r, logged=False),
+    "slewed, and its computer busy": busy_and_slewed,
     "small steps of its clock": lambda r: stepping(r, 5e-3, 5e-2, 1, faults=STEPPED),
     "steps too small to tell": lambda r: stepping(r, 5e-4, 5e-3, 3, clean=False, perhaps=EITHER),
     "steps again and again": lambda r: stepping(r, 0.05, 5.0, 8, faults=STEPPED),

@@ -94,10 +94,15 @@ def _by_phase(movements: "pd.DataFrame", table: "pd.DataFrame") -> "list[pd.Data
 
 
 def by_distance(movements: "pd.DataFrame") -> Drawing:
-    """Draw movement time and accuracy over the sequence for each distance."""
-    figure, axes = new_figure(2)
+    """Draw times and accuracy over the sequence for each distance."""
+    shown = [
+        name
+        for name in ("circle_to_circle", "movement_time", "absolute_error")
+        if name in movements and movements[name].notna().any()
+    ]
+    figure, axes = new_figure(len(shown))
     tables = []
-    for one, measure in zip(axes, ("movement_time", "absolute_error"), strict=True):
+    for one, measure in zip(axes, shown, strict=True):
         table = over(movements, measure, ["distance", "sequence"])
         for number, (distance, part) in enumerate(table.groupby("distance")):
             _with_ci(one, part["sequence"], part, f"C{number}", f"{distance:g} m")
@@ -106,7 +111,7 @@ def by_distance(movements: "pd.DataFrame") -> Drawing:
     axes[0].legend(title="distance", fontsize="small")
     import pandas as pd
 
-    caption = "movement time and accuracy over the sequence, per distance; means with 95 % CI"
+    caption = "times and accuracy over the sequence, per distance; means with 95 % CI"
     return Drawing("sequence_by_distance", caption, figure, pd.concat(tables))
 
 

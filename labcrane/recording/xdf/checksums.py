@@ -180,8 +180,10 @@ def _block(data: bytes, start: int) -> _Block | None:
         return None
     entries = np.frombuffer(data, _ENTRY_DTYPE, count, body)
     values = entries["values"]
-    if not np.array_equal(values, np.floor(values)) or values.min() < 0 or values.max() >= 2**53:
-        return None  # NaN included: it equals nothing
+    if not np.isfinite(values).all() or values.min() < 0 or values.max() >= 2**53:
+        return None
+    if not np.array_equal(values, np.floor(values)):
+        return None
     ends, crcs = values.astype(np.int64).T.tolist()
     if ends[-1] != start or any(b <= a for a, b in itertools.pairwise(ends)):
         return None

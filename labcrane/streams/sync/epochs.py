@@ -79,6 +79,8 @@ def epochs(raw: RawStream, *, regular: bool) -> list[Epoch]:
     probes = in_order(raw.probes)
     jumps = _jumps(probes)
     probes, jumps = _without_strays(probes, jumps)
+    if regular:
+        jumps = [k for k in jumps if not _goes_on(raw, probes[k - 1], probes[k])]
     changes = _changes(raw, probes, jumps, regular=regular)
     bounds = [_Change(0, 0), *changes, _Change(len(probes), len(raw.stamps))]
     found = []
@@ -190,6 +192,18 @@ def _within(raw: RawStream, low: int, high: int) -> int:
         return low
     steps = np.abs(np.diff(raw.stamps[first - 1 : last + 1]))
     return first + int(np.argmax(steps))
+
+
+def _goes_on(raw: RawStream, before: FloatArray, after: FloatArray) -> bool:
+    """Whether stamps go on evenly where a step would show: then the clock was turned faster."""
+    step = abs(after[REMOTE] - before[REMOTE])
+    if abs(after[OFFSET] - before[OFFSET]) > FASTEST_SLEW * step:
+        return False
+    low, high = _window(raw, before, after)
+    if high <= low or high >= len(raw.stamps):
+        return False
+    jump = before[OFFSET] - after[OFFSET]
+    return _step_between_stamps(raw.stamps, low, high, jump) is None
 
 
 def _step(

@@ -53,7 +53,13 @@ class OffsetCurve:
             np.column_stack([k := np.arange(len(self.probes)), k + 2 * AROUND]).ravel(),
         )[::2]
         held_up = ONE_WAY * np.interp(times, self.smoothed.time, around)
-        return offset, SURE * deviation + self.least_rtt / 2.0 + held_up
+        stray = np.interp(times, self.smoothed.time, self._outside())
+        return offset, SURE * deviation + self.least_rtt / 2.0 + held_up + stray
+
+    def _outside(self) -> FloatArray:
+        """Return by how much the curve is where no ways of its probes could lie, shape ``(n,)``."""
+        beyond = np.pad(np.maximum(np.abs(self.residuals) - self.probes[:, RTT] / 2.0, 0.0), 1)
+        return np.asarray(np.maximum(np.maximum(beyond[:-2], beyond[2:]), beyond[1:-1]))
 
     @property
     def slope(self) -> float:

@@ -48,6 +48,9 @@ TURN = 4.0
 KNEE = 8.0
 """How many times beyond its usual a change of slope is a knee, at which skew may change freely."""
 
+LEVELS_US = (30.0, 300.0, 3000.0, np.inf)
+"""Excess of round trips up to which slopes are looked at, in microseconds."""
+
 NEGLIGIBLE = 1e-3
 
 
@@ -151,22 +154,37 @@ def _with_knees(series: _Series) -> _Series:
     """Let skew change freely where neighbouring slopes differ as they do nowhere else.
 
     A clock that is slewed turns at once from one rate to another. A walk fast enough for that
-    would be too fast for all the rest.
+    would be too fast for all the rest. Where probes are held up, neighbours tell nothing of a
+    slope: it is looked for between those that were held up little, at each of some levels, and
+    skew is free wherever in between the clock may have turned.
     """
-    if len(series.offset) < 8:  # noqa: PLR2004
-        return series
-    step = np.maximum(series.step[1:], 1e-3)
-    slope = np.diff(series.offset) / step
-    noise = 5.0**2 + (0.5 * series.excess) ** 2
+    knee = np.zeros(len(series.offset))
+    time = np.cumsum(series.step)
+    seen = -1
+    for level in LEVELS_US:
+        clear = np.flatnonzero(series.excess <= level)
+        if len(clear) < 8 or len(clear) == seen:  # noqa: PLR2004
+            continue
+        seen = len(clear)
+        found = _knees(time[clear], series.offset[clear], series.excess[clear])
+        knee = np.maximum(knee, np.pad(found, (0, 1))[np.searchsorted(clear, np.arange(len(knee)))])
+    return _Series(series.step, series.offset, series.excess, knee, series.slope)
+
+
+def _knees(time: FloatArray, offset: FloatArray, excess: FloatArray) -> FloatArray:
+    """Return how freely skew may walk before each measurement, for knees that these show."""
+    step = np.maximum(np.diff(time), 1e-3)
+    slope = np.diff(offset) / step
+    noise = 5.0**2 + (0.5 * excess) ** 2
     doubt = (noise[1:] + noise[:-1]) / step**2
     turn, doubt = np.diff(slope), np.sqrt(doubt[1:] + doubt[:-1])
     usual = max(1.4826 * float(np.median(np.abs(turn) / doubt)), 1.0)
     clear = np.abs(turn) > KNEE * usual * doubt
-    free = np.where(clear, TURN * turn**2 / np.minimum(step[1:], step[:-1]), 0.0)
-    knee = np.zeros(len(series.offset))
-    knee[1:-1] = free
-    knee[2:] = np.maximum(knee[2:], free)
-    return _Series(series.step, series.offset, series.excess, knee, series.slope)
+    free = np.where(clear, TURN * turn**2, 0.0)
+    knee = np.zeros(len(offset))
+    knee[1:-1] = free / step[:-1]
+    knee[2:] = np.maximum(knee[2:], free / step[1:])
+    return knee
 
 
 def _forwards(series: _Series, models: _Models, *, keep: bool) -> tuple[FloatArray, _Pass]:

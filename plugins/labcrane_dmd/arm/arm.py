@@ -14,6 +14,7 @@ from labcrane_dmd.arm.state import ArmState, arm_signals, scene_parts
 from labcrane_dmd.arm.visual import boxes
 from labcrane_dmd.arm.world import World
 from labcrane_dmd.model.interpolation import FULL
+from labcrane_dmd.model.model import Model
 from labcrane_dmd.model.model_file import load
 
 ROUNDING_S = 1e-9
@@ -30,10 +31,10 @@ class DmdArm(Dynamics):
     leaves contact caches behind.
     """
 
-    def __init__(self, settings: ArmSettings, machine: Machine) -> None:
+    def __init__(self, settings: ArmSettings, machine: Machine, model: Model | None = None) -> None:
         self._settings = settings
         self._machine = machine
-        self._model = load(settings.model)
+        self._model = model or load(settings.model)
         self._scenes = {path.name.split(".")[0]: load_scene(path) for path in settings.scenes}
         self._parts = scene_parts(self._scenes.values())
         self.signals = arm_signals(machine, self._parts)

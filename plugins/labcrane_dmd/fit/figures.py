@@ -1,4 +1,4 @@
-"""Pictures of a model: its layers, and how it does at signals that it was not fitted to."""
+"""Pictures of a model: what it was fitted to, its layers, and how it does at other signals."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from labcrane import RecordingError
+from labcrane_dmd.fit.fitting import LAGS, curve_at
+from labcrane_dmd.fit.recordings import SegmentRecording
 from labcrane_dmd.fit.validation import Level
 from labcrane_dmd.model.interpolation import FULL
 from labcrane_dmd.model.model import Model, Segment
@@ -53,6 +56,57 @@ def _draw_signals(segment: Segment, axes: "Axes") -> None:
     axes.set(xlabel="signal (0.4 %)", ylabel="speed (deg/s)")
     axes.legend(fontsize="small")
     axes.grid(alpha=0.3)
+
+
+def draw_angles(recordings: Sequence[SegmentRecording], path: Path) -> None:
+    """Draw each run's angle over time, as the sensors gave it, into a PNG file."""
+    figure = _figure(4.5 * len(recordings), 4.0)
+    panels = figure.subplots(1, len(recordings), squeeze=False)[0]
+    for axes, recording in zip(panels, recordings, strict=True):
+        for run in recording.runs:
+            colour = ((run.signal + FULL) / (2.0 * FULL), 0.2, (FULL - run.signal) / (2.0 * FULL))
+            axes.plot(run.time, np.degrees(run.angle), lw=0.7, color=colour)
+        axes.set(title=recording.name, xlabel="time (s)", ylabel="angle (deg)")
+        axes.grid(alpha=0.3)
+    figure.suptitle(f"angles as recorded; blue {-FULL:g} to red {FULL:g}")
+    with written(path):
+        figure.savefig(path, dpi=110)
+
+
+def draw_speeds(model: Model, recordings: Sequence[SegmentRecording], path: Path) -> None:
+    """Draw recorded speed by angle and each layer's polynomial through it, into a PNG file.
+
+    Raises
+    ------
+    RecordingError
+        A segment of the model was not recorded.
+    """
+    named = {recording.name: recording for recording in recordings}
+    if missing := [name for name in model if name not in named]:
+        raise RecordingError(
+            f"there is no recording of {', '.join(missing)}, which the model has; there is "
+            f"{', '.join(named)}"
+        )
+    figure = _figure(4.5 * len(model), 4.5)
+    panels = figure.subplots(1, len(model), squeeze=False)[0]
+    for axes, (name, segment) in zip(panels, model.items(), strict=True):
+        for number, layer in enumerate(segment.layers()):
+            direction = segment.direction(layer.signal)
+            run_up = direction.dead_time + LAGS * direction.lag
+            curve = curve_at(named[name], layer.signal, run_up)
+            colour = f"C{number % 10}"
+            if curve is not None:
+                recorded = np.degrees(curve.angle), np.degrees(curve.speed)
+                axes.plot(*recorded, ".", ms=2, color=colour)
+            angle = np.linspace(*layer.covers, 100)
+            speed = np.degrees([layer.speed(place) for place in angle.tolist()])
+            axes.plot(np.degrees(angle), speed, lw=1.0, color=colour, label=f"{layer.signal:+g}")
+        axes.set(title=name, xlabel="angle (deg)", ylabel="speed (deg/s): dots recorded")
+        axes.legend(title="signal", fontsize="x-small", ncols=2)
+        axes.grid(alpha=0.3)
+    figure.suptitle("speed by angle, and the polynomial of each layer")
+    with written(path):
+        figure.savefig(path, dpi=110)
 
 
 def draw_validation(levels: Sequence[Level], between: str, path: Path) -> None:

@@ -76,7 +76,8 @@ def _direction(
 ) -> Direction:
     signals = [sign * level for level in sorted(settings.levels)]
     _check(recording, signals)
-    dead_band = _dead_band(recording, sign, settings)
+    found_band = settings.dead_band == "found"
+    dead_band = _dead_band(recording, sign, settings) if found_band else 0.0
     found = Direction(
         dead_band, 0.0, 0.0, _layers(recording, signals, limits, FIRST_RUN_UP_S, settings)
     )

@@ -33,8 +33,8 @@ class Level:
 
     @property
     def direction(self) -> str:
-        """``extend`` for positive signals, ``retract`` for negative ones."""
-        return "extend" if self.signal > 0 else "retract"
+        """``extend`` for positive signals, ``retract`` for negative ones, ``none`` for 0."""
+        return "extend" if self.signal > 0 else "retract" if self.signal < 0 else "none"
 
     def row(self) -> dict[str, str | float]:
         """Return the level's line of the table.
@@ -62,7 +62,7 @@ class Level:
 
 
 def validate(model: Model, recordings: Sequence[SegmentRecording]) -> tuple[Level, ...]:
-    """Compare a model with the recordings at its validation signals, in both directions.
+    """Compare a model with the recordings at its validation signals, in both directions and at 0.
 
     Raises
     ------
@@ -79,14 +79,27 @@ def validate(model: Model, recordings: Sequence[SegmentRecording]) -> tuple[Leve
 
 
 def _levels(model: Model, segment: Segment, recording: SegmentRecording) -> Iterator[Level]:
+    for signal in validation_signals(model, recording):
+        yield _level(segment, recording, signal)
+
+
+def validation_signals(model: Model, recording: SegmentRecording) -> tuple[int, ...]:
+    """Return the signals at which a segment is validated, rising; 0 is among them (Typiak 2024).
+
+    Raises
+    ------
+    RecordingError
+        There is no run at one of them.
+    """
     sizes = sorted(model.settings.validation)
-    for signal in (*(-size for size in reversed(sizes)), *sizes):
+    signals = (*(-size for size in reversed(sizes)), 0, *sizes)
+    for signal in signals:
         if not recording.at(signal):
             raise RecordingError(
                 f"{recording.file} has no run at signal {signal}, at which the model is validated; "
                 "record it"
             )
-        yield _level(segment, recording, signal)
+    return signals
 
 
 def _level(segment: Segment, recording: SegmentRecording, signal: int) -> Level:

@@ -8,6 +8,8 @@ from labcrane import Settings
 
 Between = Literal["linear", "pchip"]
 
+DeadBand = Literal["found", "none"]
+
 
 class FitSettings(Settings):
     """What whoever fits a model may choose."""
@@ -20,6 +22,11 @@ class FitSettings(Settings):
 
     edge: tuple[PositiveInt, ...] = (10, 30, 50)
     """Signals from whose recordings, beside the layers', the edge of the dead band is found."""
+
+    dead_band: DeadBand = "found"
+    """``found``: the edge of the dead band is found from recordings at ``edge`` and ``levels``, and
+    speed rises from there; ``none``: it rises from signal 0, a set of known speeds that are all 0,
+    as in the paper, and ``edge`` is not used."""
 
     between: Between = "linear"
     """How speeds between two layers are found: by the straight line of the paper, or by a monotone

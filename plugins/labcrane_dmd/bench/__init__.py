@@ -1,0 +1,1 @@
+"""The bench: arms driven signal by signal, simulated or real, and measured."""

@@ -1,0 +1,294 @@
+"""Where a joint's signal and angle come from: a CAN bus, a log of one, LSL, or an earlier log."""
+
+import csv
+import math
+import time as clock
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from labcrane import DeviceError, RecordingError
+from labcrane_dmd.bench.steps import ANGLE, SAMPLE, SIGNAL, Sample
+from labcrane_dmd.model.interpolation import FULL
+
+if TYPE_CHECKING:
+    import can
+    from cantools.database.can import Message
+
+DEGREES = {"deg": 1.0, "degree": 1.0, "degrees": 1.0, "°": 1.0, "rad": math.degrees(1.0)}
+"""Degrees in one of the unit in which an angle may come."""
+
+VALVE_COMMAND = 0xFE30
+"""First of the parameter groups of J1939's auxiliary valve commands (ISO 11783-7)."""
+
+EXTEND, RETRACT = 1, 2
+WAIT_S = 0.2
+FIND_S = 10.0
+
+
+class CanValues:
+    """Reads signal and angle out of frames.
+
+    Parameters
+    ----------
+    signal
+        The number of an auxiliary valve, or ``Message.Signal`` of the DBC file.
+    angle
+        ``Message.Signal`` of the DBC file; its unit there must be deg or rad.
+    described
+        The DBC file.
+    full
+        Value of a DBC signal that is full flow.
+    """
+
+    def __init__(self, signal: str, angle: str, described: Path, full: float) -> None:
+        import cantools  # noqa: PLC0415 - loads for a moment
+
+        try:
+            database: Any = cantools.database.load_file(described)
+        except (OSError, UnicodeDecodeError, cantools.database.errors.Error) as error:
+            raise RecordingError(f"{described} cannot be read as a DBC file: {error}") from error
+        self._file, self._database = described, database
+        self._valve = int(signal) if signal.isdecimal() else None
+        self._full = full
+        self._signal = None if self._valve is not None else self._find(signal)
+        self._angle = self._find(angle)
+        message, name = self._angle
+        unit = str(message.get_signal_by_name(name).unit or "")
+        if unit not in DEGREES:
+            raise RecordingError(
+                f"{angle} has unit {unit!r} in {described}; an angle is in {', '.join(DEGREES)}: "
+                "write its unit into the DBC file"
+            )
+        self._degrees = DEGREES[unit]
+
+    def read(self, frame: "can.Message") -> Iterator[Sample]:
+        """Yield what a frame holds of the two; most hold nothing."""
+        at, data = frame.timestamp, bytes(frame.data)
+        if frame.is_error_frame or frame.is_remote_frame:
+            return
+        if self._valve is not None and frame.is_extended_id:
+            group = (frame.arbitration_id >> 8) & 0x3FFFF
+            if group == VALVE_COMMAND + self._valve and len(data) == 8 and data[0] <= FULL:  # noqa: PLR2004 - bytes
+                sign = {EXTEND: 1, RETRACT: -1}.get(data[2] & 0x0F, 0)
+                yield Sample(at, SIGNAL, float(sign * data[0]))
+        if self._signal is not None and (value := _decoded(self._signal, frame)) is not None:
+            yield Sample(at, SIGNAL, value / self._full * FULL)
+        if (value := _decoded(self._angle, frame)) is not None:
+            yield Sample(at, ANGLE, value * self._degrees)
+
+    def _find(self, written: str) -> "tuple[Message, str]":
+        message, _, name = written.partition(".")
+        there = {each.name: each for each in self._database.messages}
+        names = [each.name for each in there[message].signals] if message in there else []
+        if name not in names:
+            said = [f"{each.name}.{one.name}" for each in there.values() for one in each.signals]
+            raise RecordingError(
+                f"{written!r} is not in {self._file}, which has {', '.join(said[:12])}"
+                f"{' and more' if len(said) > 12 else ''}"  # noqa: PLR2004 - a line of them
+            )
+        return there[message], name
+
+
+def _decoded(which: "tuple[Message, str]", frame: "can.Message") -> float | None:
+    from cantools.database.errors import Error  # noqa: PLC0415 - loads for a moment
+
+    message, name = which
+    same = (message.frame_id, message.is_extended_frame)
+    if (frame.arbitration_id, frame.is_extended_id) != same:
+        return None
+    try:
+        found: Any = message.decode(bytes(frame.data), decode_choices=False)
+        value = float(found[name])
+    except (Error, KeyError, TypeError, ValueError):  # too short, or another multiplexed part
+        return None
+    return value if math.isfinite(value) else None
+
+
+def read_log(path: Path, values: CanValues) -> Iterator[Sample]:
+    """Yield what a candump, asc or blf log holds.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be read as one.
+    """
+    import can  # noqa: PLC0415 - loads for a moment
+
+    try:
+        with can.LogReader(path) as log:
+            for frame in log:
+                yield from values.read(frame)
+    except (OSError, ValueError, can.CanError) as error:
+        raise RecordingError(
+            f"{path} cannot be read as a candump, asc or blf log: {error}"
+        ) from error
+
+
+def read_bus(name: str, bitrate: int, values: CanValues, seconds: float | None) -> Iterator[Sample]:
+    """Yield what comes on a bus, until ``seconds`` have passed or for ever.
+
+    Raises
+    ------
+    DeviceError
+        The bus cannot be opened, or is lost.
+    """
+    import can  # noqa: PLC0415 - loads for a moment
+
+    interface, _, channel = name.partition(":")
+    try:
+        bus = can.Bus(interface=interface, channel=channel, bitrate=bitrate)
+    except (OSError, ValueError, ImportError, can.CanError) as error:
+        raise DeviceError(f"the bus {name!r} cannot be opened: {error}") from error
+    with closing(_Shut(bus)):
+        end = math.inf if seconds is None else clock.monotonic() + seconds
+        while clock.monotonic() < end:
+            try:
+                frame = bus.recv(WAIT_S)
+            except (OSError, can.CanError) as error:
+                raise DeviceError(f"the bus {name!r} is lost: {error}") from error
+            if frame is not None:
+                yield from values.read(frame)
+
+
+class _Shut:
+    """A bus that :func:`contextlib.closing` can close."""
+
+    def __init__(self, bus: "can.BusABC") -> None:
+        self.close = bus.shutdown
+
+
+def read_lsl(
+    signal: str, angle: str, segment: str, seconds: float | None, find_s: float = FIND_S
+) -> Iterator[Sample]:
+    """Yield the samples of two LSL streams on this computer's clock.
+
+    Parameters
+    ----------
+    signal, angle
+        A stream's name, or ``STREAM:CHANNEL``; without a channel it is labelled as the segment.
+        The angle's channel has a unit, deg or rad; the signal is -250 to 250.
+    segment
+        The joint.
+    seconds
+        How long; for ever when None.
+    find_s
+        How long a stream is looked for, in seconds.
+
+    Raises
+    ------
+    DeviceError
+        A stream is not there, is lost, or has no such channel.
+    """
+    import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
+
+    channels = [_Channel(signal, segment, find_s), _Channel(angle, segment, find_s)]
+    try:
+        degrees = channels[1].degrees()
+        end = math.inf if seconds is None else clock.monotonic() + seconds
+        while clock.monotonic() < end:
+            for channel, what, factor in zip(
+                channels, (SIGNAL, ANGLE), (1.0, degrees), strict=True
+            ):
+                try:
+                    for time, value in channel.pull():
+                        yield Sample(time, what, value * factor)
+                except pylsl.util.LostError as error:
+                    raise DeviceError(f"the stream {channel.stream!r} is lost") from error
+            clock.sleep(0.01)
+    finally:
+        for channel in channels:
+            channel.close()
+
+
+class _Channel:
+    """One channel of a stream."""
+
+    def __init__(self, written: str, segment: str, find_s: float) -> None:
+        import pylsl  # noqa: PLC0415
+
+        self.stream, _, label = written.partition(":")
+        label = label or segment
+        found = pylsl.resolve_byprop("name", self.stream, 1, find_s)
+        if not found:
+            raise DeviceError(f"no LSL stream is called {self.stream!r}; start its program")
+        self._inlet = pylsl.StreamInlet(
+            found[0], recover=False, processing_flags=pylsl.proc_clocksync
+        )
+        info = self._inlet.info(find_s)
+        labels = [str(each) for each in info.get_channel_labels() or []]
+        if label not in labels:
+            self.close()
+            raise DeviceError(
+                f"the stream {self.stream!r} has no channel {label!r}, it has "
+                f"{', '.join(labels) or 'none with a label'}; write STREAM:CHANNEL"
+            )
+        self._index = labels.index(label)
+        units = [str(each) for each in info.get_channel_units() or []]
+        self._unit = units[self._index] if self._index < len(units) else ""
+        self._inlet.open_stream(find_s)
+
+    def degrees(self) -> float:
+        """Return how many degrees one of the channel's unit is."""
+        if self._unit not in DEGREES:
+            raise DeviceError(
+                f"the angle of stream {self.stream!r} has unit {self._unit!r}; its description "
+                f"must say {', '.join(DEGREES)}"
+            )
+        return DEGREES[self._unit]
+
+    def pull(self) -> list[tuple[float, float]]:
+        """Return the samples that came: times in s, and values."""
+        samples, stamps = self._inlet.pull_chunk(timeout=0.0)
+        return [
+            (stamp, float(sample[self._index]))
+            for stamp, sample in zip(stamps, samples or [], strict=True)
+        ]
+
+    def close(self) -> None:
+        self._inlet.close_stream()
+
+
+def read_raw(path: Path) -> Iterator[Sample]:
+    """Yield what :func:`kept` wrote.
+
+    Raises
+    ------
+    RecordingError
+        It is no such file.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            for row in csv.DictReader(file):
+                yield Sample(float(row["time_s"]), row["what"], float(row["value"]))
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise RecordingError(
+            f"{path} cannot be read as a raw log, which has the columns {', '.join(SAMPLE)}: "
+            f"{error!r}"
+        ) from error
+
+
+def kept(samples: Iterator[Sample], path: Path) -> Iterator[Sample]:
+    """Yield the samples on, each written down before: whatever ends the program, they are there.
+
+    Raises
+    ------
+    RecordingError
+        There is such a file already.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        file = path.open("x", newline="", encoding="utf-8")
+    except FileExistsError:
+        raise RecordingError(
+            f"{path} is there already, and recordings are not written over; give another folder, "
+            f"or cut that one anew: --log {path}"
+        ) from None
+    with file:
+        writer = csv.writer(file)
+        writer.writerow(SAMPLE)
+        for sample in samples:
+            writer.writerow((repr(sample.time), sample.what, repr(sample.value)))
+            file.flush()
+            yield sample
