@@ -384,7 +384,7 @@ def test_runs_that_worsen_again_suggest_another_scenario() -> None:
 
 
 def visit(times: list[float], ratings: list[float]) -> list[OperatorTest]:
-    """Return one test of each scenario, which take longer from one to the next, as references do."""
+    """Return one test of each scenario; each takes longer than the one before, as references do."""
     tests = []
     for number, (share, rating) in enumerate(zip(times, ratings, strict=True), start=1):
         reference = 20.0 * number
