@@ -1,6 +1,6 @@
 """Pictures of the retrieval scenarios, from the operator's and from the side view.
 
-python docs/scenes.py            # into docs/scenes, two of each: on the way, and at the end
+python docs/scenes.py            # into docs/scenes: at the start, on the way, at the end
 python docs/scenes.py casualty   # of one
 """
 
@@ -8,6 +8,8 @@ import shutil
 import sys
 import tempfile
 from pathlib import Path
+
+from PIL import Image
 
 from labcrane.core import SessionState
 from labcrane.feedback.preview import chosen
@@ -19,10 +21,13 @@ from labcrane_view.view import View
 
 HERE = Path(__file__).parent
 RETRIEVAL = HERE.parent / "protocols" / "retrieval"
-MOMENTS = {"way": 0.55, "end": 1.0}
+MOMENTS = {"start": 0.0, "way": 0.55, "end": 1.0}
 """Shares of a run."""
 
 SIZE = (1200, 450)
+
+COLOURS = 96
+"""They are enough to see what is where, and the files a quarter of the size."""
 
 
 def study_of(name: str, folder: Path) -> Path:
@@ -55,7 +60,9 @@ def draw(name: str) -> None:
                 frame = frames[round(share * (len(frames) - 1))]
                 view.present(frame)
                 view.present(frame)  # the first picture is drawn while textures are made
-                view.save(HERE / "scenes" / f"{name}-{moment}.png")
+                picture = HERE / "scenes" / f"{name}-{moment}.png"
+                view.save(picture)
+                Image.open(picture).quantize(COLOURS).save(picture, optimize=True)
         finally:
             view.close()
 

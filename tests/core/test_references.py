@@ -63,7 +63,7 @@ def told(tmp_path: Path, registry: Registry):
         ("retrieval", "proportional: [base]", "proportional: [foo]", "17:18: dynamics.proportional[1] is 'foo', and there is no such joint; the machine has arm, base, boom, jaws"),
         ("retrieval", "boom: 3", "bom: 3", "11:72: input.valves.bom is 'bom', and there is no such joint; did you mean 'boom'?"),
         ("retrieval", "boom: 3, ", "", "13:9: scheme needs the axis 'valve.boom', and there is no such axis"),
-        ("retrieval", "fov_deg: 60}", "fov_deg: 60, on: bom}", "38:89: views.operator.camera.on is 'bom', and there is no such link; did you mean 'boom'?"),
+        ("retrieval", "fov_deg: 60}", "fov_deg: 60, on: bom}", "38:90: views.operator.camera.on is 'bom', and there is no such link; did you mean 'boom'?"),
         ("aiming", "end: rest_inside", "trigger: left.knob", "20:85: tasks.aiming.trigger is 'left.knob', and there is no such axis;"),
         ("aiming", "camera: cab_left", "areas: [targt]", "27:33: views.operator.areas[1] is 'targt', and there is no such object; did you mean 'target'?"),
         ("aiming", "camera: cab_left", "patch: {on: [trial.strat]}", "27:38: views.operator.patch.on[1] is 'trial.strat', and there is no such event; did you mean 'trial.start'?"),
