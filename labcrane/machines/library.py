@@ -4,6 +4,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from labcrane.errors import ProtocolError
+from labcrane.files.system import is_file
 from labcrane.files.yaml import YamlFile
 from labcrane.machines.machine import Machine
 
@@ -18,7 +19,7 @@ def find_machine(name: str, beside: Path | None = None) -> Path:
     """Return the file of machine ``name``; ``beside`` is the folder of the study that asks."""
     if name.endswith((".yaml", ".yml")):
         path = (beside or Path()) / name
-        if path.is_file():
+        if is_file(path):
             return path
         raise ProtocolError(
             f"machine file {str(path)!r} does not exist; a path counts from the protocol's folder"

@@ -11,6 +11,7 @@ from labcrane.core.references import EVENTS, Covers, Mark, Mentioned, Once, Refe
 from labcrane.core.roles import Component, Task
 from labcrane.core.settings import Settings
 from labcrane.errors import LabcraneError, suggestion
+from labcrane.files.system import is_folder, is_there
 from labcrane.files.yaml import Place, YamlFile
 from labcrane.machines.machine import Machine
 from labcrane.protocol.components import ComponentSpec
@@ -91,10 +92,11 @@ class ReferenceChecker:
         self._source.misnamed(at, message, key=mention.key)
 
     def _is_there(self, at: Place, path: Path) -> None:
-        if path.exists():
+        if is_there(path):
             return
-        beside = sorted(each.name for each in path.parent.glob("*")) if path.parent.is_dir() else []
-        near = suggestion(path.name, beside, f"{path.parent} has")
+        folder = path.parent
+        beside = sorted(each.name for each in folder.glob("*")) if is_folder(folder) else []
+        near = suggestion(path.name, beside, f"{folder} has")
         message = f"{_dotted(at)} is {path.name!r}, and there is no such file; {near}"
         self._source.misnamed(at, message)
 
