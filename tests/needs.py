@@ -36,6 +36,8 @@ PACKAGES = {
     "gcc": "gcc libc6-dev",
     "ufw": "ufw",
     "unshare": "util-linux",
+    "node": "nodejs",
+    "npm": "npm",
 }
 """Programs, and the Debian packages that they are in."""
 

@@ -99,17 +99,20 @@ def test_a_machine_beside_the_study_is_read_in_degrees_and_gives_radians(tmp_pat
         (
             "    range_deg: [-60, 60]",
             "    range_deg: [60, -60]",
-            "digger.yaml:5: joints[2]: range_deg must rise, but is 60.0 to -60.0 degrees",
+            "digger.yaml:5: joints[2]: range_deg must rise, but is 60.0 to -60.0 "
+            "degrees; write the lowest first",
         ),
         (
             "    effort: 9",
             "    effort: 9\n    rest_deg: 61",
-            "digger.yaml:5: joints[2]: rest_deg 61.0 is outside the joint's range, -60.0 to 60.0",
+            "digger.yaml:5: joints[2]: rest_deg 61.0 is outside the joint's range; it must "
+            "be -60.0 to 60.0",
         ),
         (
             "name: stick",
             "name: boom",
-            "digger.yaml:1: the file: joint names must differ, but are slew, boom, boom",
+            "digger.yaml:1: the file: joints are called slew, boom, boom; give each a name "
+            "of its own",
         ),
         (
             "alpha_deg: -90",

@@ -2,6 +2,7 @@
 
 import itertools
 import random
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from io import StringIO
@@ -265,7 +266,7 @@ def faults(study: str, text: str, seed: int = 0) -> Iterator[Wrong]:
     line_at = {entry.place: entry.line for entry in there}
     for entry in there:
         last, holder = entry.place[-1], entry.place[:-1]
-        if isinstance(last, str) and holder not in OF_LAB:
+        if isinstance(last, str) and holder not in OF_LAB and holder[-1:] != ("sums",):
             new = misspelt(rng, last)
             changed = text[: entry.begin] + new + text[entry.key_end :]
             yield Wrong(
@@ -341,8 +342,11 @@ def _twice(text: str) -> Iterator[Text]:
     lines = text.splitlines(keepends=True)
     tops = [at for at, line in enumerate(lines) if line[0].isalpha()] + [len(lines)]
     for begin, end in itertools.pairwise(tops):
-        new = [*lines[:end], *lines[begin:end], *lines[end:]]
-        yield f"{lines[begin].split(':')[0]} twice", "".join(new), end + 1, True
+        again = lines[begin:end]
+        new = [*lines[:end], *again, *lines[end:]]
+        # Where an anchor is in what is there twice, it is noticed before the key.
+        anchored = next((at for at, line in enumerate(again) if re.search(r" &\w", line)), 0)
+        yield f"{lines[begin].split(':')[0]} twice", "".join(new), end + 1 + anchored, True
 
 
 def _files(text: str) -> Iterator[Text]:

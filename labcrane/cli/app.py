@@ -23,6 +23,7 @@ MODULES = {
     "check": ("check", "plan"),
     "doctor": ("doctor",),
     "plugins": ("schema", "new_plugin"),
+    "language_server": ("language_server",),
     "record": ("streams", "record", "recover", "resync"),
     "score": ("score",),
     "results": ("export", "report", "replay"),

@@ -16,6 +16,13 @@ from labcrane.files.units import EXAMPLES, unit_of
 Place = tuple[str | int, ...]
 """The keys and indices that lead to a value: ``("sessions", 0, "steps", 2)``."""
 
+
+class Truth(str):
+    """``true`` or ``false`` where a number is asked for: pydantic would take it for 1 or 0."""
+
+    __slots__ = ()
+
+
 _MEMBER = re.compile(r"\[.*[\]'\"]|^(constrained-)?(str|int|float|bool)$")
 _COMMA = re.compile(r"\s*-?\d+,\d+\s*")
 
@@ -88,6 +95,8 @@ def explain(error: ErrorDetails, place: Place, model: type[BaseModel]) -> str:
     if error["type"] == "missing":
         return f"{named((*place, *loc[:-1]))} needs {str(key)!r}"
     name = named((*place, *(step for step in loc if not _is_member(step))))
+    if isinstance(error["input"], Truth):
+        return f"{name}: {error['input']} is no number; write one"
     what = error["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     if error["type"] == "value_error":
         return f"{name}: {what}"

@@ -4,8 +4,12 @@ A parser notices a mistake where it can go on no more, which is often a line lat
 """
 
 import re
+from collections.abc import Iterator
+from typing import Any
 
+from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError
+from ruamel.yaml.nodes import ScalarNode
 
 _WIDE = re.compile(r"[ \t]*[\u00a0\u2000-\u200b\u202f\u3000]")
 _NO_SPACE = re.compile(r"\s*(?:- +)?([A-Za-z_][\w-]*):([^\s/].*)?$")
@@ -35,17 +39,34 @@ def misread(error: MarkedYAMLError, text: str) -> tuple[int, str]:
             f"the key {found['key']!r} is there twice in what begins in line {first}; keep one"
         )
     if "flow" in context and error.context_mark and not problem.startswith("found undefined"):
-        opened = error.context_mark.line + 1
-        sign = lines[opened - 1][error.context_mark.column : error.context_mark.column + 1]
-        closing = {"[": "]", "{": "}"}.get(sign, "its end")
-        return opened, (
-            f"{sign!r} opens here and is not closed as it should be, by {closing!r}; add that, or "
-            f"a comma, before what stands in line {line}"
-        )
+        opened, sign = _opened(text, error.context_mark.index)
+        if sign:
+            return opened, (
+                f"{sign!r} opens here and is not closed as it should be, by {CLOSING[sign]!r}; add "
+                f"that, or a comma, before what stands in line {line}"
+            )
     if (at := _without_space(lines, line)) is not None:
         key = _NO_SPACE.match(lines[at - 1])
         return at, f"there is no space behind the colon of {key[1] if key else 'a key'!r}; add one"
     return line, _plain(problem)
+
+
+CLOSING = {"[": "]", "{": "}"}
+
+
+def _opened(text: str, at: int) -> tuple[int, str]:
+    """Return the line of the bracket that is open at a place, or begins there, and the bracket.
+
+    Brackets in quotation marks count as well, as a quotation mark may be what is missing.
+    """
+    open_at: list[tuple[int, str]] = []
+    for number, line in enumerate(text[: at + 1].split("\n"), start=1):
+        for sign in re.split(r"(?:^|\s)#", line)[0]:
+            if sign in CLOSING:
+                open_at.append((number, sign))
+            elif open_at and sign == CLOSING[open_at[-1][1]]:
+                open_at.pop()
+    return open_at[-1] if open_at else (1, "")
 
 
 def _without_space(lines: list[str], line: int) -> int | None:
@@ -67,6 +88,8 @@ SAID = {
     "but found another document": "a second document behind ---; write one file for each",
     "found undefined alias": "{problem}, whose anchor, &, is nowhere before it; write what it "
     "stands for",
+    "expected a mapping node": "a tag that asks for keys with values, before none; remove it",
+    "expected a sequence": "a tag that asks for a list, before none; remove it",
     "for merging": "<<: takes what an anchor names, as <<: *base, and nothing else; write keys out",
     "while scanning a quoted": "a quotation mark that is not closed; close it",
     "found unexpected end of stream": "a quotation mark that is not closed; close it",
@@ -83,3 +106,59 @@ def _plain(problem: str) -> str:
         if said in problem:
             return f"this is no YAML: {meant.replace('{problem}', problem)}"
     return f"this is no YAML: {problem}; look at indentation, colons and brackets here and above"
+
+
+TAGS = {"int": "a whole number", "float": "a number", "bool": "true or false", "null": "nothing"}
+"""What a tag of YAML asks for."""
+
+_TAG = "tag:yaml.org,2002:"
+
+
+def unreadable(text: str, error: Exception) -> str:
+    """Return the line of the first value that is not what it looks like, and what to do.
+
+    A parser that stumbles over such a value says no line. Where no value is found, what the parser
+    said is returned without one.
+    """
+    if (found := _first_unlike(text)) is not None:
+        return f":{found[0]}: {found[1]}"
+    return f": this is no YAML: {str(error) or repr(error)}"
+
+
+def _first_unlike(text: str) -> tuple[int, str] | None:
+    yaml = YAML(typ="rt", pure=True)
+    try:
+        for node in _values(yaml.compose(text)):
+            try:
+                yaml.constructor.construct_object(node, deep=True)
+            except Exception:  # noqa: BLE001 - ruamel.yaml does not say what it raises
+                return node.start_mark.line + 1, _unlike(node)
+    except Exception:  # noqa: BLE001 - as above; whatever it was is told without its line
+        return None
+    return None
+
+
+def _unlike(node: ScalarNode) -> str:
+    kind = str(node.tag).removeprefix(_TAG)
+    if kind == "timestamp":
+        return (
+            f"this is no YAML: {node.value!r} looks like a date or a time, and there is none such; "
+            "write one that is, or put it into quotation marks"
+        )
+    asked = TAGS.get(kind, "something else")
+    return (
+        f"this is no YAML: the tag !!{kind} asks for {asked}, which {node.value!r} is not; remove "
+        "the tag"
+    )
+
+
+def _values(node: Any, seen: set[int] | None = None) -> Iterator[ScalarNode]:
+    """Yield every plain value behind a node once, in the file's order, however many aliases."""
+    seen = set() if seen is None else seen
+    if isinstance(node, ScalarNode):
+        yield node
+    elif node is not None and id(node) not in seen:
+        seen.add(id(node))
+        for each in node.value:
+            for inside in each if isinstance(each, tuple) else (each,):
+                yield from _values(inside, seen)

@@ -21,6 +21,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticKnownError, core_schema
 
+from labcrane.files.complaints import Truth
 from labcrane.files.units import read_quantities, unit_of
 
 UNIT = "x-unit"
@@ -46,7 +47,7 @@ class StrictModel(BaseModel):
         unit = unit_of(info.field_name, field.metadata)
         shape = _shape(field.annotation)
         if not was_run(info):
-            _no_truth(field.annotation, value)
+            value = _no_truth(field.annotation, value)
         if unit is None or shape is None or not isinstance(value, str | list):
             return value
         return read_quantities(value, unit, several=shape is list)
@@ -93,20 +94,24 @@ def _docstrings(of: type) -> Iterator[tuple[str, str]]:
                 yield name, inspect.cleandoc(text)
 
 
-def _no_truth(annotation: Any, value: Any) -> None:
-    """Refuse ``true`` where a number is asked for: it would be taken for 1."""
+def _no_truth(annotation: Any, value: Any) -> Any:
+    """Refuse ``true`` where a number is asked for: it would be taken for 1.
+
+    It becomes what is no number, so that it is refused at its own place, in a list as well.
+    """
     origin, arguments = get_origin(annotation), get_args(annotation)
     if isinstance(value, bool):
         kinds = set(_plain_types(annotation))
         if kinds & {int, float} and not kinds & {bool, Any}:
-            said = str(value).lower()
-            raise ValueError(f"{said} is no number; write one")
+            if str not in kinds:
+                return Truth(str(value).lower())
+            raise ValueError(f"{str(value).lower()} is no number; write one")
     elif isinstance(value, list) and origin in {tuple, list}:
-        for each in value:
-            _no_truth(Union[arguments], each)  # noqa: UP007 - of what is only known now
+        of: Any = Union[arguments]  # noqa: UP007 - of what is only known now
+        return [_no_truth(of, each) for each in value]
     elif isinstance(value, dict) and origin is dict:
-        for each in value.values():
-            _no_truth(arguments[1], each)
+        return {key: _no_truth(arguments[1], each) for key, each in value.items()}
+    return value
 
 
 def _plain_types(annotation: Any) -> Iterator[Any]:

@@ -18,7 +18,7 @@ from ruamel.yaml.reader import ReaderError
 from labcrane.errors import ProtocolError
 from labcrane.files.complaints import Place as Place  # noqa: PLC0414 - public here
 from labcrane.files.complaints import named, shown, told
-from labcrane.files.misread import misread
+from labcrane.files.misread import misread, unreadable
 from labcrane.limits import LIMITS, LimitError, check_size, foreign
 
 DEEPEST = LIMITS["YAML file"].depth
@@ -90,8 +90,8 @@ class YamlFile:
         return line
 
     def problem(self, place: Place, message: str) -> None:
-        """Note a mistake at ``place``."""
-        self._problems.append((self.line(place), 0, message))
+        """Note a mistake at ``place``; those of another file, one a line, are all noted there."""
+        self._problems += [(self.line(place), 0, line) for line in message.splitlines()]
 
     def misnamed(self, place: Place, message: str, *, key: bool = False) -> None:
         """Note a mistake in the value at ``place``, or in its key, with line and column."""
@@ -244,20 +244,27 @@ def parse_yaml(text: str, name: str, *, recorded: bool = False) -> Any:
     return _plain(_load(text, name, recorded=recorded), name, recorded=recorded)
 
 
-def _scalar(node: Any, name: str, *, recorded: bool) -> Any:
+class _Misfit(Exception):  # noqa: N818 - it is told as an error of the protocol
+    """A value that no file may hold, and the line of what holds it, where that is known."""
+
+    line: int | None = None
+
+
+def _scalar(node: Any, *, recorded: bool) -> Any:
     if node is None or isinstance(node, bool | date | bytes):
         return node
     if isinstance(node, int) and node.bit_length() > MOST_BITS:
-        raise ProtocolError(f"{name} holds a whole number of {node.bit_length()} bits; write less")
+        raise _Misfit(f"holds a whole number of {node.bit_length()} bits; write less")
     if isinstance(node, str) and not recorded and (sign := foreign(node)) is not None:
-        raise ProtocolError(
-            f"{name} holds the character U+{ord(sign):04X} in {str(node)[:40]!r}, which is no "
+        raise _Misfit(
+            f"holds the character U+{ord(sign):04X} in {str(node)[:40]!r}, which is no "
             "writing; leave it out"
         )
     for kind in (int, float, str):
         if isinstance(node, kind):
             return kind(node)
-    raise ProtocolError(f"{name} holds {str(node)[:40]!r} with a tag; write plain values")
+    written = getattr(node, "value", node)
+    raise _Misfit(f"holds {str(written)[:40]!r} with a tag; write plain values")
 
 
 @lru_cache(maxsize=64)
@@ -306,7 +313,7 @@ def _load(text: str, name: str, *, recorded: bool = False) -> Any:
     # Impossible dates, numbers of too many digits, tags on what they do not fit, and whatever else
     # ruamel.yaml stumbles over: it does not say what it raises.
     except (YAMLError, *GARBLED) as error:
-        raise ProtocolError(f"{name}: this is no YAML: {str(error) or repr(error)}") from error
+        raise ProtocolError(f"{name}{unreadable(text, error)}") from error
 
 
 def _code(error: ReaderError) -> int:
@@ -340,10 +347,38 @@ def _plain(node: Any, name: str, *, recorded: bool = False) -> Any:
                 f"{name} holds more than {MOST_VALUES} values, or itself, behind its aliases; "
                 "write fewer of them"
             )
-        if isinstance(node, Mapping):
-            return {str(key): plain(value, depth + 1) for key, value in node.items()}
-        if isinstance(node, list | tuple | Set):
-            return [plain(value, depth + 1) for value in node]
-        return _scalar(node, name, recorded=recorded)
+        at: Any = None
+        try:
+            if isinstance(node, Mapping):
+                held: Any = {}
+                for at, value in node.items():
+                    held[str(at)] = plain(value, depth + 1)
+            elif isinstance(node, list | tuple | Set):
+                held = []
+                for value in node:
+                    at = len(held)
+                    held.append(plain(value, depth + 1))
+            else:
+                held = _scalar(node, recorded=recorded)
+        except _Misfit as error:
+            error.line = error.line or _line_in(node, at)
+            raise
+        return held
 
-    return plain(node, 0)
+    try:
+        return plain(node, 0)
+    except _Misfit as error:
+        where = f"{name}:{error.line}: it" if error.line else name
+        raise ProtocolError(f"{where} {error}") from None
+
+
+def _line_in(node: Any, at: Any) -> int | None:
+    """Return the line, from 1, of what a mapping or a list holds; None where it is not known."""
+    try:
+        if isinstance(node, CommentedMap):
+            return int(node.lc.value(at)[0]) + 1
+        if isinstance(node, CommentedSeq):
+            return int(node.lc.item(at)[0]) + 1
+    except KeyError:  # merged in from an anchor
+        pass
+    return None

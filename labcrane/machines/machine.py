@@ -62,10 +62,13 @@ class Joint(StrictModel):
     def _rest_is_within_range(self) -> "Joint":
         lowest, highest = self.range_deg
         if not lowest < highest:
-            raise ValueError(f"range_deg must rise, but is {lowest} to {highest} degrees")
+            raise ValueError(
+                f"range_deg must rise, but is {lowest} to {highest} degrees; write the lowest first"
+            )
         if not lowest <= self.rest_deg <= highest:
             raise ValueError(
-                f"rest_deg {self.rest_deg} is outside the joint's range, {lowest} to {highest}"
+                f"rest_deg {self.rest_deg} is outside the joint's range; it must be {lowest} to "
+                f"{highest}"
             )
         return self
 
@@ -118,7 +121,7 @@ class Machine(StrictModel):
         slew, *pitch = self.joints
         names = [joint.name for joint in self.joints]
         if len(set(names)) < len(names):
-            raise ValueError(f"joint names must differ, but are {', '.join(names)}")
+            raise ValueError(f"joints are called {', '.join(names)}; give each a name of its own")
         if slew.alpha_deg != UPWARD_TO_LEVEL or slew.a != 0.0:
             raise ValueError("the first joint slews: it needs alpha_deg -90 and a 0")
         for joint in pitch:

@@ -10,6 +10,7 @@ from labcrane.core.roles import Component
 from labcrane.core.settings import Settings
 from labcrane.files.model import UNIT
 from labcrane.files.units import EXAMPLES, SPELT
+from labcrane.machines.library import machine_names
 from labcrane.protocol.protocol import protocol_model
 from labcrane.protocol.steps import Block, Break, Session
 from labcrane.registry.hookspecs import roles_by_key
@@ -43,6 +44,10 @@ def protocol_schema(registry: Registry) -> Schema:
         for part in (place, *place.get("anyOf", ())):  # null may stand for a default
             if part.get("type") == "object":
                 part |= {"additionalProperties": _use(registry, of, named)}
+    protocol["properties"]["machine"]["anyOf"] = [
+        {"enum": machine_names()},
+        {"type": "string", "pattern": r"\.ya?ml$"},
+    ]
     named[Session]["properties"]["steps"]["items"] = _step(references[(Block, "validation")])
     made: Schema = _with_units(
         {

@@ -35,6 +35,7 @@ def _names_a_folder(name: str, info: ValidationInfo) -> str:
 
 
 FolderName = Annotated[str, AfterValidator(_names_a_folder)]
+STUDY_NAME = r"^[a-z][a-z0-9_-]*$"
 
 
 class Use(Section):
@@ -69,7 +70,10 @@ class Participants(Section):
         try:
             re.compile(pattern)
         except re.error as error:
-            raise ValueError(f"{pattern!r} is no regular expression: {error}") from None
+            raise ValueError(
+                f"{pattern!r} is no regular expression: {error}; write one, as P\\d{{3}} for "
+                "P001 to P999"
+            ) from None
         return pattern
 
     @property
@@ -108,7 +112,9 @@ class Protocol(Section):
     labcrane: Literal[1]
     """Version of the protocol format."""
 
-    study: Annotated[FolderName, Field(pattern=r"^[a-z][a-z0-9_-]*$")]
+    study: Annotated[
+        FolderName, Field(pattern=STUDY_NAME, json_schema_extra={"pattern": STUDY_NAME})
+    ]
     """Short name of the study, in lower case; part of every seed."""
 
     title: str

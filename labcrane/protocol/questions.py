@@ -85,8 +85,8 @@ def questions(study: Study) -> tuple[Question, ...]:
 
 
 Finding = dict[str, Any]
-"""What a check tells a program of one finding: kind, file, line, column, key, text and all in one
-line as people read it."""
+"""What a check tells a program of one finding: kind, file, line, column, key, text, the text with
+what answers a question, and all in one line as people read it."""
 
 
 def about(study: Study, question: Question) -> Finding:
@@ -99,6 +99,7 @@ def about(study: Study, question: Question) -> Finding:
         "column": 0,
         "key": question.key,
         "text": question.text,
+        "message": question.whole,
         "whole": f"{study.path}:{line}: question: {question.whole}",
     }
 
@@ -117,6 +118,7 @@ def problems(error: LabcraneError) -> list[Finding]:
                 "column": int(column or 0),
                 "key": "",
                 "text": text,
+                "message": text,
                 "whole": whole,
             }
         )

@@ -30,7 +30,10 @@ class Block(Section):
     Keys beside these limit how many levels of a factor are used: ``pairs: 2``.
     """
 
-    model_config = ConfigDict(extra="allow")
+    model_config = ConfigDict(
+        extra="allow",
+        json_schema_extra={"additionalProperties": {"type": "integer", "minimum": 1}},
+    )
 
     task: str
     """Which of the protocol's tasks."""
@@ -97,7 +100,10 @@ class Session(Section):
     @classmethod
     def _window_is_one(cls, days: tuple[int, int] | None) -> tuple[int, int] | None:
         if days is not None and days[0] > days[1]:
-            raise ValueError(f"the earliest day, {days[0]}, is after the latest, {days[1]}")
+            raise ValueError(
+                f"the earliest day, {days[0]}, is after the latest, {days[1]}; write the earliest "
+                "first"
+            )
         return days
 
 

@@ -5,9 +5,11 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeGuard
 
 from labcrane.core.roles import Controller, Dynamics, InputDevice, Questionnaire, Task
 from labcrane.errors import ProtocolError
+from labcrane.files.complaints import written
 from labcrane.files.names import check_name
 from labcrane.files.yaml import Place, YamlFile
 from labcrane.machines.machine import Machine
@@ -216,11 +218,16 @@ class Checker:
         for factor, count in limits.items():
             if factor not in factors:
                 message = f"{factor!r} is nothing the task varies; it varies {', '.join(factors)}"
-            elif not (isinstance(count, int) and 1 <= count <= len(factors[factor])):
-                message = f"{factor} is {count!r}; it must be 1 to {len(factors[factor])}"
+            elif not (self._is_count(count) and 1 <= count <= len(factors[factor])):
+                most = len(factors[factor])
+                message = f"{factor} is {written(count)}; it must be a whole number, 1 to {most}"
             else:
                 continue
             self._source.problem((*place, factor), message)
+
+    def _is_count(self, count: object) -> TypeGuard[int]:
+        """Whether a number is whole; ``true``, which Python takes for 1, is so in old records."""
+        return isinstance(count, int) and (self._source.recorded or not isinstance(count, bool))
 
     def _check_order(self, tasks: Mapping[str, Task]) -> None:
         """Note ordered factors that no task has."""

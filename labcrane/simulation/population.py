@@ -53,7 +53,9 @@ class Uniform(Section):
     @model_validator(mode="after")
     def _in_order(self) -> "Uniform":
         if self.lowest > self.highest:
-            raise ValueError(f"lowest is {self.lowest:g}, above highest, {self.highest:g}")
+            raise ValueError(
+                f"lowest is {self.lowest:g}, above highest, {self.highest:g}; exchange them"
+            )
         return self
 
     def draw(self, random: np.random.Generator) -> float:

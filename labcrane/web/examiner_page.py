@@ -7,11 +7,10 @@ from labcrane.core.records import Event
 from labcrane.design.counts import TrialCounts
 from labcrane.protocol.questions import about, questions
 from labcrane.session.commands import Order
-from labcrane.web.assessment import PerformancePanel
 from labcrane.web.door.access import SUPERVISOR
 from labcrane.web.form import ConsentCard, Form
 from labcrane.web.page import PRIMARY, PageContext
-from labcrane.web.panels import Cameras, Loads
+from labcrane.web.panels import Cameras, Loads, PerformancePanel
 from labcrane.web.scene import Scene
 
 BUTTONS: Mapping[str, tuple[Order, str, str]] = {
@@ -36,7 +35,7 @@ def supervisor_page(context: PageContext) -> None:
     ui.colors(primary=PRIMARY)
     with ui.column().classes("w-full max-w-7xl mx-auto p-3 gap-3"):
         _status(context)
-        _questions(context)
+        build_questions(context)
         ConsentCard(context, SUPERVISOR).build()
         _orders(context)
         PerformancePanel(context).build()
@@ -74,13 +73,13 @@ def _status(context: PageContext) -> None:
     ui.timer(RATE_S, update)
 
 
-def _questions(context: PageContext) -> None:
+def build_questions(context: PageContext) -> None:
     """Show what ``labcrane check`` asks of the protocol, and nobody has answered in it."""
     from nicegui import ui  # noqa: PLC0415
 
     for question in questions(context.study):
         said = about(context.study, question)
-        line = f"line {said['line']} of {context.study.path.name}: {said['text']}"
+        line = f"line {said['line']} of {context.study.path.name}: {said['message']}"
         ui.label(line).props(f'id="question-{question.key}"').classes("text-amber-900")
 
 

@@ -38,5 +38,5 @@ class KeyboardSettings(Settings):
             raise ValueError(f"a key can move one axis only; {', '.join(twice)} moves more")
         for name in axes:
             if not name.isidentifier() or not name.islower():
-                raise ValueError(f"an axis is named by a lower-case word, not {name!r}")
+                raise ValueError(f"{name!r} cannot name an axis; give a lower-case word")
         return axes

@@ -149,11 +149,11 @@ class Question(Settings):
     @model_validator(mode="after")
     def _can_be_answered(self) -> "Question":
         if self.kind == "choice" and not self.choices:
-            raise ValueError(f"question {self.name!r} is a choice and has no choices")
+            raise ValueError(f"question {self.name!r} is a choice and has no choices; list them")
         if not self.lowest < self.highest:
             raise ValueError(
                 f"question {self.name!r} must rise, but goes from {self.lowest:g} to "
-                f"{self.highest:g}"
+                f"{self.highest:g}; write a highest above the lowest"
             )
         return self
 
@@ -200,7 +200,9 @@ class FreeSettings(Settings):
                 "questions"
             )
         if twice := sorted({*found} & {*given}):
-            raise ValueError(f"{', '.join(twice)} is said in {given['file']!r} and in the protocol")
+            raise ValueError(
+                f"{', '.join(twice)} is said in {given['file']!r} and in the protocol; keep one"
+            )
         return {**found, **given, "file": None}
 
     @field_validator("questions")
@@ -209,16 +211,21 @@ class FreeSettings(Settings):
         names = [question.name for question in questions]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
-            raise ValueError(f"{', '.join(twice)} is the name of two questions")
+            raise ValueError(f"{', '.join(twice)} is the name of two questions; rename one")
         return questions
 
-    @model_validator(mode="after")
-    def _sums_add_numbers(self) -> "FreeSettings":
-        known = {each.name for each in self.questions if each.kind in {"scale", "number"}}
-        for score, names in self.sums.items():
+    @field_validator("sums")
+    @classmethod
+    def _sums_add_numbers(
+        cls, sums: dict[str, tuple[str, ...]], info: ValidationInfo
+    ) -> dict[str, tuple[str, ...]]:
+        if "questions" not in info.data:
+            return sums  # what is wrong with them is told
+        known = {each.name for each in info.data["questions"] if each.kind in {"scale", "number"}}
+        for score, names in sums.items():
             if wrong := [name for name in names if name not in known]:
                 raise ValueError(
                     f"sum {score!r} adds {', '.join(wrong)}; the questions with numbers are "
                     f"{', '.join(sorted(known)) or 'none'}"
                 )
-        return self
+        return sums

@@ -55,6 +55,8 @@ def mutated(data: Any, there: list[Entry], dice: random.Random) -> Any:
             value = holder[last]
         except (KeyError, IndexError, TypeError):
             continue  # gone with an earlier change
+        if isinstance(holder, str):
+            continue  # it was a list before an earlier change
         match dice.randrange(5):
             case 0:
                 del holder[last]

@@ -84,7 +84,7 @@ def test_the_protocol_of_these_tests_is_fine(complaint) -> None:
         ("hello.md", "goodbye.md", None),
         ("- break:", "- brake:", "22: 'brake' is not a step; did you mean 'break'?"),
         ("task: aiming, pairs: 2", "task: aimin, pairs: 2", "20: there is no task 'aimin'; there is aiming"),
-        ("task: aiming, pairs: 2", "task: aiming, pairs: 9", "20: pairs is 9; it must be 1 to 4"),
+        ("task: aiming, pairs: 2", "task: aiming, pairs: 9", "20: pairs is 9; it must be a whole number, 1 to 4"),
         ("task: aiming, pairs: 2", "task: aiming, circles: 2", "20: 'circles' is nothing the task varies; it varies pairs"),
         ("study: aiming", "study: Aiming Study", None),
         ("labcrane: 1", "labcrane: 2", "1: labcrane is 2; it must be 1"),

@@ -13,6 +13,8 @@ from labcrane.errors import LabcraneError
 
 if TYPE_CHECKING:
     from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan
+    from labcrane.protocol.questions import Question
+    from labcrane.protocol.study import Study
 
 
 def check(
@@ -27,14 +29,10 @@ def check(
     ] = False,
 ) -> None:
     """Check a protocol and everything it refers to, without running it."""
-    from labcrane.protocol.questions import about, problems, questions
-    from labcrane.protocol.study import load
-    from labcrane.registry.registry import discover
+    from labcrane.protocol.questions import about, problems
 
     try:
-        study = load(protocol, discover(study=protocol))
-        study.check_installed(simulated=simulated, feedback=not simulated)
-        asked = questions(study)
+        study, asked = examined(protocol, simulated=simulated)
         if rehearse:
             from labcrane.simulation.rehearsal import rehearse as rehearse_study
 
@@ -65,6 +63,23 @@ def check(
         f"{protocol}: study {study.protocol.study!r} is fine: {sessions} "
         f"session{'s' if sessions > 1 else ''} on the {study.machine.title}{done}"
     )
+
+
+def examined(protocol: Path, *, simulated: bool = False) -> "tuple[Study, tuple[Question, ...]]":
+    """Return a study, and what is asked of it: the same for a terminal, a program and an editor.
+
+    Raises
+    ------
+    LabcraneError
+        With one line for every mistake.
+    """
+    from labcrane.protocol.questions import questions
+    from labcrane.protocol.study import load
+    from labcrane.registry.registry import discover
+
+    study = load(protocol, discover(study=protocol))
+    study.check_installed(simulated=simulated, feedback=not simulated)
+    return study, questions(study)
 
 
 def plan(

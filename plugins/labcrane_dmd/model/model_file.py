@@ -43,7 +43,9 @@ class LayerText(Settings):
     @model_validator(mode="after")
     def _covers_something(self) -> "LayerText":
         if not self.covers_deg[0] < self.covers_deg[1]:
-            raise ValueError(f"covers_deg must rise, but is {self.covers_deg}")
+            raise ValueError(
+                f"covers_deg must rise, but is {self.covers_deg}; write the lowest angle first"
+            )
         return self
 
 
@@ -66,7 +68,9 @@ class DirectionText(Settings):
     def _layers_rise(self) -> "DirectionText":
         sizes = [abs(layer.signal) for layer in self.layers]
         if any(after <= before for before, after in pairwise(sizes)):
-            raise ValueError(f"layers must get stronger, but their signals are {sizes}")
+            raise ValueError(
+                f"layers must get stronger, but their signals are {sizes}; write the weakest first"
+            )
         return self
 
 
