@@ -197,7 +197,7 @@ def test_mistakes_in_another_file_are_marked_where_the_protocol_names_it(
     path, machine = tmp_path / "protocol.yaml", tmp_path / "digger.yaml"
     shutil.copy(PROTOCOLS / "aiming" / "instructions.md", tmp_path)
     path.write_text(AIMING.replace("machine: ch8", "machine: digger.yaml"), encoding="utf-8")
-    machine.write_text("titel: Digger\njoints: []\n")
+    machine.write_text("titel: Digger\njoints: 5\n")
     with Editor(own_server, tmp_path) as editor:
         marks = editor.open(path)
         assert {mark.line for mark in marks} == {place(AIMING, "machine:")[0]}
