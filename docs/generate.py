@@ -272,7 +272,9 @@ def floor_of(names: list[str]) -> str:
         path = package if package.exists() else package.parent.with_suffix(".py")
         text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
         said.append(cell(text.split("\n\n")[0]))
-    return " ".join(said)
+    if len(names) == 1:
+        return said[0]
+    return "<br>".join(f"`{name}`: {text}" for name, text in zip(names, said, strict=True))
 
 
 FLOORS = re.compile(r"(<!-- floors -->\n).*?(<!-- /floors -->)", re.DOTALL)

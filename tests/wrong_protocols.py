@@ -63,7 +63,7 @@ views:
     supervisor: {cameras: [cab, top]}
     patch: {on: [trial.start, target.entered]}
 streams:
-  brain: {type: EEG, required: false}
+  brain: {type: EEG, source_id: cap-7, required: false}
 monitors:
   brain: {use: eeg_signal}
 sync: {}

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labcrane.analysis.indicator import SUBJECTIVE
 from labcrane.analysis.operator_tests import OperatorTest
 
 WORDS = {
@@ -28,6 +29,9 @@ STEADY = 0.1
 
 FALL = 5.0
 """Percentage points by which the last three runs are below the best three: fatigue."""
+
+FELT = 0.1
+"""How much a rating, 0 to 1, must have fallen for an operator not to be at home after all."""
 
 WINDOW = 3
 
@@ -62,26 +66,48 @@ def suggest(tests: Sequence[OperatorTest]) -> Advice:
     )
 
 
-def familiarity(tests: Sequence[OperatorTest]) -> Advice:
-    """Return whether an operator is at home in a scenario: times are steady, below the first."""
-    times = [test.performance.duration_s for test in tests]
-    about = f"environmental familiarity, {tests[0].scenario}"
-    ratings = _first_and_last([test.performance.awareness for test in tests])
+def familiarity(tests: Sequence[OperatorTest], *, across: bool = False) -> Advice:
+    """Return whether an operator is at home: times are steady, below the first, and felt no worse.
+
+    Parameters
+    ----------
+    tests
+        One operator's, in the order in which they were run, of one scenario.
+    across
+        They are of several scenarios, perhaps one of each: times are then shares of each
+        scenario's reference time.
+    """
+    about = f"environmental familiarity, {_where(tests, across=across)}"
     if len(tests) < FEWEST:
         return Advice(tests[0].operator, about, "too few runs to say", f"{len(tests)} runs")
+    unit = "of the reference" if across else "s"
+    times = [test.performance.duration_s / (test.reference_s if across else 1.0) for test in tests]
     last = np.array(times[-WINDOW:])
     spread = float(np.ptp(last) / last.mean())
-    familiar = spread <= STEADY and last.mean() <= times[0]
+    steady = spread <= STEADY and last.mean() <= times[0]
+    worse = [name for name, (before, now) in _felt(tests).items() if before - now > FELT]
+    digits = 2 if across else 1
     evidence = (
-        f"last {WINDOW} times {', '.join(f'{t:.1f}' for t in last)} s spread {100 * spread:.0f} %, "
-        f"the first was {times[0]:.1f} s; {ratings}"
+        f"last {WINDOW} times {', '.join(f'{t:.{digits}f}' for t in last)} {unit} spread "
+        f"{100 * spread:.0f} %, the first was {times[0]:.{digits}f} {unit}; {_ratings(tests)}"
     )
-    return Advice(tests[0].operator, about, "familiar" if familiar else "still learning", evidence)
+    verdict = "familiar" if steady and not worse else "still learning"
+    if steady and worse:
+        verdict = f"still learning: felt {' and '.join(worse)} has fallen"
+    return Advice(tests[0].operator, about, verdict, evidence)
 
 
-def fatigue(tests: Sequence[OperatorTest]) -> Advice:
-    """Return whether a scenario is worn out: runs have become worse again after the best ones."""
-    about = f"scenario fatigue, {tests[0].scenario}"
+def fatigue(tests: Sequence[OperatorTest], *, across: bool = False) -> Advice:
+    """Return whether a scenario is worn out: runs have become worse again after the best ones.
+
+    The indicator that they are compared by holds times, relative to the reference, and ratings.
+
+    Parameters
+    ----------
+    tests, across
+        As for :func:`familiarity`.
+    """
+    about = f"scenario fatigue, {_where(tests, across=across)}"
     percent = np.array([test.indicator.percent for test in tests])
     percent = percent[~np.isnan(percent)]
     if len(percent) < FEWEST:
@@ -89,15 +115,37 @@ def fatigue(tests: Sequence[OperatorTest]) -> Advice:
     means = np.convolve(percent, np.ones(WINDOW) / WINDOW, mode="valid")
     best, last = float(means.max()), float(means[-1])
     tired = best - last >= FALL
-    verdict = "fatigue: give another scenario" if tired else "none"
-    evidence = f"best mean of {WINDOW} runs {best:.1f} %, last {last:.1f} %; " + _first_and_last(
-        [test.performance.awareness for test in tests]
-    )
+    other = "other scenarios, or a break" if across else "another scenario"
+    verdict = f"fatigue: give {other}" if tired else "none"
+    evidence = f"best mean of {WINDOW} runs {best:.1f} %, last {last:.1f} %; {_ratings(tests)}"
     return Advice(tests[0].operator, about, verdict, evidence)
 
 
-def _first_and_last(ratings: Sequence[float]) -> str:
-    given = [rating for rating in ratings if not math.isnan(rating)]
-    if not given:
-        return "no awareness was rated"
-    return f"rated awareness went from {given[0]:.2f} to {given[-1]:.2f}"
+def _where(tests: Sequence[OperatorTest], *, across: bool) -> str:
+    return "all scenarios" if across else tests[0].scenario
+
+
+def _felt(tests: Sequence[OperatorTest]) -> dict[str, tuple[float, float]]:
+    """Return the means of each rating's first and last few, where it was given often enough."""
+    found = {}
+    for name in SUBJECTIVE:
+        given = [
+            rating for test in tests if not math.isnan(rating := getattr(test.performance, name))
+        ]
+        if len(given) >= FEWEST:
+            found[name] = (float(np.mean(given[:WINDOW])), float(np.mean(given[-WINDOW:])))
+    return found
+
+
+def _ratings(tests: Sequence[OperatorTest]) -> str:
+    parts = []
+    for name in SUBJECTIVE:
+        given = [
+            rating for test in tests if not math.isnan(rating := getattr(test.performance, name))
+        ]
+        parts.append(
+            f"rated {name} went from {given[0]:.2f} to {given[-1]:.2f}"
+            if given
+            else f"no {name} was rated"
+        )
+    return ", ".join(parts)

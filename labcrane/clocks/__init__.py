@@ -1,4 +1,4 @@
-"""The correction of clocks for any recording: of plain arrays, and of any recorder's XDF file.
+"""Correction of clocks as in ``streams.sync``, for plain arrays and any recorder's XDF file.
 
 In come stamps of another clock, and what is known of it; out go times on the receiver's clock, and
 how far each may be off.

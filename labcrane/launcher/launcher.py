@@ -83,6 +83,7 @@ class Launcher:
         self._recorder: RecorderHandle | None = None
         self._crew: FeedbackProcesses | None = None
         self._lost: set[str] = set()
+        self._taken: set[str] = set()
         self._signals = SignalReporter(say)
         self._kept: list[Message] = []
         self._owes = False
@@ -112,7 +113,9 @@ class Launcher:
     def _run_all(self, admission: Admission) -> Outcome:
         visit = self._visit
         requests = [
-            need.request(label, required=not visit.simulated)
+            need.request(
+                label, required=not visit.simulated, expected=visit.study.protocol.expected
+            )
             for label, need in visit.study.protocol.streams.items()
         ]
         if visit.feedback:
@@ -155,7 +158,16 @@ class Launcher:
             if self._told_to_end():
                 return False
             time.sleep(LOOK_S)
+        self._say_what_was_taken()
         return True
+
+    def _say_what_was_taken(self) -> None:
+        """Say, once each, which stream was taken where any of its type would have been."""
+        taken = self._recorder.taken() if self._recorder else []
+        for line in taken:
+            if line not in self._taken:
+                self._taken.add(line)
+                self._say(line)
 
     def _told_to_end(self) -> bool:
         """Whether the run is to end before it has begun; what is for the record is kept for it."""
@@ -227,6 +239,7 @@ class Launcher:
             self._say("a recorder died: the other one has all streams, and a new one was started")
         for news in self._signals.news(recorder):
             send(news)
+        self._say_what_was_taken()
         lost = recorder.lost() if recorder.status else {RECORDER}
         for what in sorted(lost - self._lost):
             send(StreamLost(what))

@@ -2,6 +2,7 @@
 
 from .actuator import ACTUATOR_PRESETS, Actuator, ActuatorSettings
 from .inverse_kinematics import reach
+from .jointed_body import Hinge, Segment, beside, segments, stands
 from .kinematics import Arm, jacobian, link_frames
 from .library import load_machine
 from .links import link_boxes
@@ -11,6 +12,7 @@ from .meshes.reader import read_surfaces
 from .meshes.surface import MeshError, Surface
 from .scene import Geom, PlacedObject, Scene, ShapeKind, load_scene, place_objects
 from .scene_codec import SCENE_PLACED, read_placed, write_placed
+from .scene_part import Part, load_part
 from .urdf import urdf_joint, urdf_link, urdf_of
 
 __all__ = [
@@ -21,22 +23,29 @@ __all__ = [
     "Arm",
     "Body",
     "Geom",
+    "Hinge",
     "Joint",
     "MeshError",
     "MeshFile",
+    "Part",
     "PlacedObject",
     "Scene",
+    "Segment",
     "ShapeKind",
     "Surface",
+    "beside",
     "jacobian",
     "link_boxes",
     "link_frames",
     "load_machine",
+    "load_part",
     "load_scene",
     "place_objects",
     "reach",
     "read_placed",
     "read_surfaces",
+    "segments",
+    "stands",
     "urdf_joint",
     "urdf_link",
     "urdf_of",

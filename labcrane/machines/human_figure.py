@@ -15,12 +15,13 @@ Extent = tuple[float, float]
 
 
 class ShapeKind(StrEnum):
-    """What a part is; capsules lie along x."""
+    """What a part is; capsules lie along x, and a hull is the solid around its points."""
 
     BOX = "box"
     CYLINDER = "cylinder"
     SPHERE = "sphere"
     CAPSULE = "capsule"
+    HULL = "hull"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,11 +33,14 @@ class Geom:
     name
         The body region, or the thing's own name.
     size
-        Edge lengths in m; for a capsule its whole length, and twice its diameter.
+        Edge lengths in m; for a capsule its whole length, and twice its diameter; for a hull that
+        of the box around it.
     centre, yaw
         In the thing's frame, in m and rad.
     mesh
         What it looks like instead.
+    points
+        Corners of a hull, about its centre, in m.
     """
 
     name: str
@@ -45,6 +49,7 @@ class Geom:
     centre: Point
     yaw: float
     mesh: MeshFile | None = None
+    points: tuple[Point, ...] = ()
 
 
 LIMBS: dict[str, tuple[str | None, float, float, Point]] = {
@@ -91,6 +96,10 @@ class Figure(StrictModel):
     yaw_deg: float | Extent = 0.0
     """Turned to the left, in degrees: at 0 the feet point away from the machine. A pair is
     drawn."""
+
+    jointed: bool = False
+    """Whether head, pelvis and limbs move in joints, with friction and limits; one rigid body
+    otherwise."""
 
     mass_kg: PositiveFloat = 75.0
     """Mass of the whole, in kilograms."""

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, PositiveFloat, ValidationInfo
 
 from labcrane.files.model import StrictModel, was_run
-from labcrane.machines.meshes.reader import FORMATS, read_surfaces
+from labcrane.machines.meshes import FORMATS
 
 Triple = tuple[float, float, float]
 
@@ -20,6 +20,9 @@ def _beside(path: Path, info: ValidationInfo) -> Path:
         raise ValueError(f"{str(path)!r} is no mesh; {', '.join(FORMATS)} can be shown")
     if not file.is_file():
         raise ValueError(f"there is no mesh {str(file)!r}; a path counts from the file naming it")
+    # What is read with needs NumPy, which a protocol without meshes does without.
+    from labcrane.machines.meshes.reader import read_surfaces  # noqa: PLC0415
+
     read_surfaces(file)  # what is damaged is refused before anybody sits down
     return file
 

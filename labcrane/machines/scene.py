@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from labcrane.errors import ProtocolError
 from labcrane.files.model import StrictModel
 from labcrane.files.yaml import YamlFile
-from labcrane.machines.human_figure import Figure, Geom, ShapeKind, figure_parts
+from labcrane.machines.human_figure import REGIONS, Figure, Geom, ShapeKind, figure_parts
 from labcrane.machines.mesh import Looks
+from labcrane.machines.scene_part import Part, PartFile, load_part, lowest
 
 Point = tuple[float, float, float]
 Extent = tuple[float, float]
@@ -50,17 +51,21 @@ class Scatter(StrictModel):
 
 
 class SceneObject(StrictModel):
-    """An object, or an obstacle when it is fixed."""
+    """An object, or an obstacle when it is fixed: one shape, or a part of a library."""
 
-    shape: Literal["box", "cylinder", "sphere"]
-    """A cylinder stands upright."""
+    use: PartFile | None = None
+    """File of a library part, from beside the scene; it says all but place, turn and scatter."""
 
-    size: Point
+    shape: Literal["box", "cylinder", "sphere"] | None = None
+    """A cylinder stands upright; needed unless a part is used."""
+
+    size: Point | None = None
     """Edge lengths in metres; a cylinder's and a sphere's first is the diameter, a cylinder's last
-    the height."""
+    the height; needed unless a part is used."""
 
     position: Point
-    """Where its centre is, in the machine's base frame, in metres."""
+    """Where its centre is, or the origin of the part that is used, in the machine's base frame, in
+    metres."""
 
     yaw_deg: float = 0.0
     """Turned to the left, in degrees."""
@@ -86,6 +91,18 @@ class SceneObject(StrictModel):
     mesh: Looks | None = None
     """What it looks like instead of its shape, in a frame at its centre; its touch is the same."""
 
+    @model_validator(mode="after")
+    def _is_one_or_the_other(self) -> "SceneObject":
+        if self.use is None and (self.shape is None or self.size is None):
+            raise ValueError("a thing has shape and size, or uses a part (use: parts/car.yaml)")
+        beside = sorted(self.model_fields_set - {"use", "position", "yaw_deg", "scatter"})
+        if self.use is not None and beside:
+            raise ValueError(
+                f"a thing that uses a part has {', '.join(beside)} from there; leave it out here, "
+                "or write another part"
+            )
+        return self
+
 
 class Goal(StrictModel):
     """A region in which something must come to be, and the way there.
@@ -100,7 +117,8 @@ class Goal(StrictModel):
     """In metres."""
 
     what: str = "tip"
-    """What must come there: ``tip``, or the name of an object or of the figure."""
+    """What must come there: ``tip``, the name of an object or of the figure, or a part of a jointed
+    figure: ``figure.pelvis``."""
 
     jaws: float | None = None
     """How far the jaws are then to be opened, from 0 to 1; whatever they are by default."""
@@ -158,6 +176,10 @@ class PlacedObject:
         Largest force in N by part; a part without one may be pressed as one likes.
     deformed
         The part that is deformed, if any.
+    jointed
+        Whether parts of other names than the first move in joints.
+    carries
+        Whether what lies on it is carried by it, and does not hit it.
     """
 
     name: str
@@ -170,6 +192,8 @@ class PlacedObject:
     slip: float
     limits: dict[str, float]
     deformed: str | None = None
+    jointed: bool = False
+    carries: bool = False
 
 
 def load_scene(path: Path) -> Scene:
@@ -186,27 +210,43 @@ def load_scene(path: Path) -> Scene:
             f"{path}: a scene is a mapping of keys, beginning with labcrane_scene: 1"
         )
     scene = source.checked(Scene)
+    _check_parts(scene, source)
+    source.raise_problems()
     _check_ground(scene, source)
     _check_goals(scene, source)
     source.raise_problems()
     return scene
 
 
+def _check_parts(scene: Scene, source: YamlFile) -> None:
+    """Note library parts that cannot be read."""
+    for name, thing in scene.things.items():
+        try:
+            if thing.use is not None:
+                load_part(thing.use)
+        except ProtocolError as error:
+            source.problem(("things", name, "use"), f"{name!r} cannot be used: {error}")
+
+
 def _check_ground(scene: Scene, source: YamlFile) -> None:
     """Note things that stand in the ground."""
     for name, thing in scene.things.items():
-        low = thing.position[2] - _below(thing)
+        below = max(map(lowest, _parts(name, thing)))
+        low = thing.position[2] - below
         if low < -SUNK_M:
+            middle = "its centre" if thing.use is None else "its origin"
             source.problem(
                 ("things", name, "position"),
-                f"{name!r} is {-low:.3f} m deep in the ground; its centre must be "
-                f"{_below(thing):.3f} m high or more",
+                f"{name!r} is {-low:.3f} m deep in the ground; {middle} must be "
+                f"{below:.3f} m high or more",
             )
 
 
 def _check_goals(scene: Scene, source: YamlFile) -> None:
     """Note goals for what is not in the scene."""
     known = {"tip", *scene.things, *(("figure",) if scene.figure else ())}
+    if scene.figure is not None and scene.figure.jointed:
+        known |= {f"figure.{region}" for region in REGIONS if region != REGIONS[0]}
     for number, goal in enumerate(scene.goals):
         for word in (goal.what, goal.beside or "tip"):
             if word not in known:
@@ -234,6 +274,7 @@ def place_objects(scene: Scene, seed: int) -> tuple[PlacedObject, ...]:
                 slip=scene.figure.slip_n,
                 limits=dict(scene.figure.limits_n),
                 deformed=deformed,
+                jointed=scene.figure.jointed,
             )
         )
     return tuple(placed)
@@ -242,18 +283,30 @@ def place_objects(scene: Scene, seed: int) -> tuple[PlacedObject, ...]:
 def _placed(name: str, thing: SceneObject, random: np.random.Generator) -> PlacedObject:
     x, y, z = thing.position
     scatter = thing.scatter
+    said = thing if thing.use is None else load_part(thing.use)
     return PlacedObject(
         name=name,
-        kind="obstacle" if thing.fixed else "object",
-        parts=(Geom(name, ShapeKind(thing.shape), thing.size, (0.0, 0.0, 0.0), 0.0, thing.mesh),),
+        kind="obstacle" if said.fixed else "object",
+        parts=_parts(name, thing),
         position=(x + random.uniform(*scatter.x), y + random.uniform(*scatter.y), z),
         yaw=math.radians(thing.yaw_deg + random.uniform(*scatter.yaw_deg)),
-        mass=thing.mass_kg,
-        friction=thing.friction,
-        slip=thing.slip_n,
-        limits={} if thing.limit_n is None else {name: thing.limit_n},
+        mass=said.mass_kg,
+        friction=said.friction,
+        slip=said.slip_n,
+        limits=_limits(name, said),
+        carries=isinstance(said, Part) and said.carries,
     )
 
 
-def _below(thing: SceneObject) -> float:
-    return thing.size[0] / 2 if thing.shape == "sphere" else thing.size[2] / 2
+def _limits(name: str, said: SceneObject | Part) -> dict[str, float]:
+    if isinstance(said, Part):
+        return said.limits()
+    return {} if said.limit_n is None else {name: said.limit_n}
+
+
+def _parts(name: str, thing: SceneObject) -> tuple[Geom, ...]:
+    if thing.use is not None:
+        return load_part(thing.use).geoms()
+    if thing.shape is None or thing.size is None:
+        raise AssertionError("a thing without a part has shape and size, or was refused")
+    return (Geom(name, ShapeKind(thing.shape), thing.size, (0.0, 0.0, 0.0), 0.0, thing.mesh),)

@@ -148,6 +148,7 @@ def _doubts(study: Study) -> Doubts:
     yield from _of_squares(study)
     yield from _of_sessions(study)
     yield from _of_stop_rules(study)
+    yield from _of_streams(study)
     pattern = study.protocol.participants.pattern
     if len(re.findall(r"(?<!\\)\{", pattern)) != len(re.findall(r"(?<!\\)\}", pattern)):
         yield ("participants", "pattern"), f"the pattern {pattern!r} has a brace that stands alone"
@@ -273,6 +274,17 @@ def _of_sessions(study: Study) -> Doubts:
                 long += trials_of(step.block, study.protocol, study.tasks[step.block.task])[1]
         if long > LONGEST_SESSION_S:
             yield place, f"session {session.name!r} is likely to take {long / 3600:.3g} hours"
+
+
+def _of_streams(study: Study) -> Doubts:
+    for label, need in study.protocol.streams.items():
+        if need.any_of_type:
+            yield (
+                ("streams", label),
+                f"streams: {label} is asked for by its type alone, so that any {need.type} on the "
+                "network is taken, a neighbour's as well; give the source_id or the name that "
+                "labcrane streams shows",
+            )
 
 
 def _of_stop_rules(study: Study) -> Doubts:

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from labcrane.core.settings import Settings
+from labcrane.errors import ProtocolError
+from labcrane.files.yaml import parse_yaml
 
 
 def plain_settings(settings: Settings, folder: Path) -> Any:
@@ -20,12 +22,15 @@ def plain_settings(settings: Settings, folder: Path) -> Any:
 def named_files(every: Iterable[Settings], folder: Path) -> dict[str, dict[str, str | None]]:
     """Return what is in every file that settings name, by its name from ``folder``.
 
-    ``text`` is None for what is no text; ``sha256`` there is always.
+    So are the YAML files that these name under ``use``. ``text`` is None for what is no text;
+    ``sha256`` there is always.
     """
     found: dict[str, dict[str, str | None]] = {}
     for settings in every:
-        for path in _paths(settings.model_dump()):
-            if path.is_absolute() and path.is_file():
+        for named in _paths(settings.model_dump()):
+            for path in (named, *used(named)):
+                if not (path.is_absolute() and path.is_file()):
+                    continue
                 raw = path.read_bytes()
                 try:
                     text = raw.decode("utf-8")
@@ -34,6 +39,28 @@ def named_files(every: Iterable[Settings], folder: Path) -> dict[str, dict[str, 
                 digest = hashlib.sha256(raw).hexdigest()
                 found[_name(path, folder)] = {"sha256": digest, "text": text}
     return found
+
+
+def used(path: Path) -> list[Path]:
+    """Return the files that a YAML file of the study uses: ``use: parts/car.yaml``, beside it."""
+    if path.suffix not in {".yaml", ".yml"} or not path.is_file():
+        return []
+    try:
+        data = parse_yaml(path.read_text(encoding="utf-8", errors="replace"), str(path))
+    except ProtocolError:  # no YAML after all, which its reader says
+        return []
+    return [path.parent / name for name in dict.fromkeys(_names(data))]
+
+
+def _names(data: object) -> Iterator[str]:
+    if isinstance(data, Mapping):
+        if isinstance(name := data.get("use"), str) and name.endswith((".yaml", ".yml")):
+            yield name
+        for value in data.values():
+            yield from _names(value)
+    elif isinstance(data, list):
+        for value in data:
+            yield from _names(value)
 
 
 def write_files(files: Mapping[str, Mapping[str, str | None]], folder: Path) -> None:

@@ -1,5 +1,6 @@
 """Streams of others that a protocol asks for, and how right their time must be."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
@@ -17,7 +18,8 @@ class StreamNeed(Settings):
     """A stream of another program that a study records, by type, name or source id."""
 
     type: str | None = None
-    """LSL type: ``EEG``, ``Gaze``, ``Markers``."""
+    """LSL type: ``EEG``, ``Gaze``, ``Markers``. By its type alone any stream on the network fits, a
+    neighbour's as well: a check asks whether that is meant."""
 
     name: str | None = None
     """LSL name."""
@@ -65,8 +67,18 @@ class StreamNeed(Settings):
             )
         return self
 
-    def request(self, label: str, *, required: bool) -> "StreamRequest":
-        """Return what the recorder is asked for; ``label`` is the study's name for it."""
+    @property
+    def any_of_type(self) -> bool:
+        """Whether one stream is meant, and any of its type fits."""
+        return self.name is None and self.source_id is None and not self.several
+
+    def request(
+        self, label: str, *, required: bool, expected: Sequence[str] = ()
+    ) -> "StreamRequest":
+        """Return what the recorder is asked for; ``label`` is the study's name for it.
+
+        ``expected`` has the questions that a protocol has answered.
+        """
         from labcrane.streams.request import StreamRequest  # noqa: PLC0415
 
         return StreamRequest(
@@ -79,6 +91,7 @@ class StreamNeed(Settings):
             channels=self.channels,
             counter=self.counter,
             several=self.several,
+            any_meant=f"streams.{label}" in expected,
         )
 
     def is_for(self, header: "StreamHeader") -> bool:

@@ -42,6 +42,9 @@ RESET = "reset"
 
 SAME_CLOCK_S = 10.0
 
+TAKEN = "taken"
+"""Which stream was taken where any of its type would have been."""
+
 COUNTER_GAP = "counter gap"
 """A note of samples that the source's own counter left out; ``missing`` says how many."""
 PROBE_CHANNELS = tuple(Channel(label, "s") for label in ("remote_time", "offset", "rtt", "local"))

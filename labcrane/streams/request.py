@@ -38,6 +38,8 @@ class StreamRequest:
         Label of a channel that counts samples, to find lost ones.
     several
         Whether all streams that fit are meant, and not one.
+    any_meant
+        Whether somebody said that any stream of the type is meant.
     """
 
     label: str
@@ -49,6 +51,7 @@ class StreamRequest:
     channels: int | None = None
     counter: str | None = None
     several: bool = False
+    any_meant: bool = False
 
     def __post_init__(self) -> None:
         if self.type is None and self.name is None and self.source_id is None:
@@ -74,9 +77,22 @@ class StreamRequest:
             return False
         if self.type is None:
             return True
-        by_type_only = self.name is None and self.source_id is None
         return same_type(self.type, info.type()) and not (
-            by_type_only and info.name().startswith(OURS)
+            self.by_type_alone and info.name().startswith(OURS)
+        )
+
+    @property
+    def by_type_alone(self) -> bool:
+        """Whether any stream of a type fits, a neighbour's as well."""
+        return self.name is None and self.source_id is None
+
+    def taken(self, name: str, source_id: str, host: str) -> str | None:
+        """Say which stream was taken where any of its type would have been; else None."""
+        if not self.by_type_alone or self.several:
+            return None
+        return (
+            f"was taken by type {self.type!r} alone: it is {name!r} (source_id {source_id!r}) of "
+            f"{host}; write that source_id in the protocol if it is meant"
         )
 
     def misfits(self, channels: int, rate_hz: float) -> list[str]:

@@ -2,17 +2,12 @@
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 from labcrane.analysis.indicator import Performance, indicate
 from labcrane.analysis.indicator_settings import IndicatorSettings
 from labcrane.analysis.operator_tests import COUNTS, RATINGS, TIME, completion
 from labcrane.core.records import Event, Value
 
-if TYPE_CHECKING:
-    from labcrane.web.page import PageContext
-
-RATE_S = 0.25
 SHARE = "score.share"
 ORDERS = ("order.override", "order.completion")
 LIVE = {name: f"task.mistakes.{name}" for name in COUNTS}
@@ -164,28 +159,3 @@ def _time(time: float, reference: float) -> str:
 
 def _number(value: Value) -> float:
     return math.nan if value is None else float(str(value))
-
-
-class PerformancePanel:
-    """The indicator's panel of the page; nothing where no task counts mistakes."""
-
-    def __init__(self, context: "PageContext") -> None:
-        self._context = context
-
-    def build(self) -> None:
-        """Build it where the page stands, and keep it up to date."""
-        from nicegui import ui  # noqa: PLC0415 - loads for a second
-
-        with ui.card().classes("w-full") as self._all:
-            ui.label("Performance").classes("font-medium")
-            self._text = ui.label().classes("whitespace-pre-wrap font-mono text-sm")
-            self._text.props('id="performance" role=status')
-        self._update()
-        ui.timer(RATE_S, self._update)
-
-    def _update(self) -> None:
-        context = self._context
-        assessment = context.session.assessment
-        lines = assessment.lines(context.live.newest, context.study.protocol.indicator)
-        self._all.set_visibility(bool(lines))
-        self._text.set_text("\n".join(lines))

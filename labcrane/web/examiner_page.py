@@ -7,11 +7,10 @@ from labcrane.core.records import Event
 from labcrane.design.counts import TrialCounts
 from labcrane.protocol.questions import about, questions
 from labcrane.session.commands import Order
-from labcrane.web.assessment import PerformancePanel
 from labcrane.web.door.access import SUPERVISOR
 from labcrane.web.form import ConsentCard, Form
 from labcrane.web.page import PRIMARY, PageContext
-from labcrane.web.panels import Cameras, Loads
+from labcrane.web.panels import Cameras, Loads, PerformancePanel
 from labcrane.web.scene import Scene
 
 BUTTONS: Mapping[str, tuple[Order, str, str]] = {

@@ -1,4 +1,4 @@
-"""Panels of the supervisor's page: joint torques, and the views' cameras."""
+"""Panels of the supervisor's page: performance, joint torques, and the views' cameras."""
 
 import math
 from functools import partial
@@ -44,6 +44,31 @@ class Loads:
             column = f"{LOAD}.{joint.name}"
             load, unit = live.newest.get(column, math.nan), live.units.get(column, SHARE)
             self._values[joint.name].set_text(said(load, unit, joint))
+
+
+class PerformancePanel:
+    """The indicator's panel of the page; nothing where no task counts mistakes."""
+
+    def __init__(self, context: PageContext) -> None:
+        self._context = context
+
+    def build(self) -> None:
+        """Build it where the page stands, and keep it up to date."""
+        from nicegui import ui  # noqa: PLC0415 - loads for a second
+
+        with ui.card().classes("w-full") as self._all:
+            ui.label("Performance").classes("font-medium")
+            self._text = ui.label().classes("whitespace-pre-wrap font-mono text-sm")
+            self._text.props('id="performance" role=status')
+        self._update()
+        ui.timer(RATE_S, self._update)
+
+    def _update(self) -> None:
+        context = self._context
+        assessment = context.session.assessment
+        lines = assessment.lines(context.live.newest, context.study.protocol.indicator)
+        self._all.set_visibility(bool(lines))
+        self._text.set_text("\n".join(lines))
 
 
 def said(load: float, unit: str, joint: Joint) -> str:

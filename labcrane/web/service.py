@@ -37,6 +37,10 @@ AWAY_S = 30.0
 """How long a browser may be without connection, as a tablet or a laptop that sleeps, and find its
 page as it was. After that the page is loaded anew, without what was half written."""
 
+MISSED = 10_000
+"""How many changes of a page are kept for a browser that is away: more than come in ``AWAY_S``. One
+that has missed more is loaded anew too."""
+
 MOST_HEAD = 16_384
 """Bytes of a request's line and headers."""
 
@@ -123,7 +127,7 @@ def serve(order: PageConfig, parent: Parent) -> None:
     )
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     _routes(app, context)
-    ui.run_with(app, title="labcrane", show_welcome_message=False)
+    ui.run_with(app, title="labcrane", show_welcome_message=False, message_history_length=MISSED)
     secure = order.certificate is not None
     gate = Gate(app, order.keys, lambda page: parent.tell(Used(page)), denials, secure=secure)
     config = uvicorn.Config(

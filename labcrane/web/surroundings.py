@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from labcrane.machines.human_figure import Geom, ShapeKind
+from labcrane.machines.jointed_body import Segment, beside, segments, stands
 from labcrane.machines.scene import PlacedObject
 from labcrane.machines.scene_codec import read_placed
 from labcrane.web.page import PageContext
@@ -45,7 +46,11 @@ class Surroundings:
             self._drawn = things
             for group in self._groups.values():
                 group.delete()
-            self._groups = {placed.name: self._draw(placed) for placed in read_placed(things)}
+            self._groups = {
+                segment.name: self._draw(placed, segment)
+                for placed in read_placed(things)
+                for segment in segments(placed)
+            }
         newest = self._context.live.newest
         for name, group in self._groups.items():
             where = [newest.get(f"state.scene.{name}.position.{axis}", math.nan) for axis in "xyz"]
@@ -54,19 +59,21 @@ class Surroundings:
                 group.move(*where)
                 group.rotate_R(_rotation(turn))
 
-    def _draw(self, placed: PlacedObject) -> "Group":
+    def _draw(self, placed: PlacedObject, segment: Segment) -> "Group":
+        first = segment.parts[0]
         with self._canvas, self._canvas.group() as group:
-            for part in placed.parts:
-                self._part(part, PAINT[placed.kind])
-        group.with_name(placed.name).move(*placed.position)
-        group.rotate_R(_about_z(placed.yaw))
+            for part in segment.parts:
+                self._part(beside(first, part), PAINT[placed.kind])
+        where, yaw = stands(placed, first)
+        group.with_name(segment.name).move(*where)
+        group.rotate_R(_about_z(yaw))
         return group
 
     def _part(self, part: Geom, colour: str) -> None:
         canvas, (x, y, z) = self._canvas, part.size
         turn = np.array(_about_z(part.yaw))
         match part.shape:
-            case ShapeKind.BOX:
+            case ShapeKind.BOX | ShapeKind.HULL:  # three.js on the page has no solid of points
                 shape: Object3D = canvas.box(x, y, z)
             case ShapeKind.SPHERE:
                 shape = canvas.sphere(x / 2)

@@ -1,14 +1,14 @@
 """The commands ``labcrane dmd fit``, ``validate``, ``plot`` and ``record``."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from pydantic import ValidationError
 from rich.console import Console
 from rich.table import Table
 
-from labcrane import ProtocolError
+from labcrane import DeviceError, ProtocolError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -287,8 +287,8 @@ def record(
             f"{folder / f'{segment}.csv'} is there already, and recordings are not written over; "
             "give another folder"
         )
-    samples: Iterator[Sample]
     raw = folder / "raw" / f"{segment}.csv"
+    samples: Iterator[Sample]
     if lsl:
         samples = kept(read_lsl(signal, angle, segment, seconds), raw)
     elif log is not None and log.suffix == ".csv":
@@ -297,17 +297,9 @@ def record(
         raise ProtocolError("what is on a CAN bus only a DBC file explains; give it with --map")
     else:
         values = CanValues(signal, angle, map_, full)
-        if bus is not None:
-            samples = kept(read_bus(bus, bitrate, values, seconds), raw)
-        else:
-            samples = kept(read_log(cast("Path", log), values), raw)
-    found: list[Sample] = []
-    try:
-        for sample in samples:
-            found.append(sample)  # noqa: PERF402 - Ctrl-C keeps what has come
-    except KeyboardInterrupt:
-        out.print("stopped")
-    steps = cut(found)
+        frames = read_log(log, values) if log else read_bus(bus or "", bitrate, values, seconds)
+        samples = kept(frames, raw)
+    steps = cut(_taken(samples, raw))
     path = write_runs(steps, folder, segment)
     table = _table("signal", "seconds", "from", "to", "left out", title=segment)
     for step in steps:
@@ -315,3 +307,18 @@ def record(
         table.add_row(f"{step.signal:+d}", f"{step.time[-1]:.2f}", *ends, step.left_out)
     out.print(table)
     out.print(f"runs: {path}", markup=False)
+
+
+def _taken(samples: "Iterator[Sample]", raw: Path) -> "list[Sample]":
+    """Return what comes until there is no more, or somebody stops it."""
+    found: list[Sample] = []
+    try:
+        for sample in samples:
+            found.append(sample)  # noqa: PERF402 - Ctrl-C keeps what has come
+    except KeyboardInterrupt:
+        out.print("stopped")
+    except DeviceError as error:
+        if raw.exists():
+            error.add_note(f"what came until then is kept; cut it into runs with --log {raw}")
+        raise
+    return found

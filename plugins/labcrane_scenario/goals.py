@@ -5,9 +5,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from labcrane import FloatArray, Run
+from labcrane import FloatArray, ProtocolError, Run
 from labcrane.core import Event, Layout
-from labcrane.machines import PlacedObject, Scene
+from labcrane.machines import PlacedObject, Scene, beside, stands
 
 Point = tuple[float, float, float]
 ANY = -1.0
@@ -33,6 +33,12 @@ class Way:
         self._hold_rate = run.rate_hz
         self._held = 0
         self.reached = 0
+        for goal in scene.goals:
+            if goal.what not in {"tip", *self._placed, *self._positions}:
+                raise ProtocolError(
+                    f"a goal is about {goal.what!r}, and the machine's state does not say where it "
+                    f"is; it says of {', '.join(self._positions) or 'nothing'}"
+                )
 
     @property
     def done(self) -> bool:
@@ -49,18 +55,25 @@ class Way:
     def nearest(self, state: FloatArray, what: str, part: str) -> float:
         """Return how far the tip is from the middle of a thing's part, in m."""
         thing = self._placed[what]
-        if what in self._turns:
-            x, y, z, w = state[self._turns[what]].tolist()
+        pieces = [each for each in thing.parts if each.name == part]
+        segment = f"{what}.{part}"
+        # A segment is where its first part is; a thing of one piece where its very first one is.
+        first = pieces[0] if segment in self._turns else thing.parts[0]
+        moves = segment if segment in self._turns else what
+        if moves in self._turns:
+            x, y, z, w = state[self._turns[moves]].tolist()
+            at = np.array(self.position(state, moves))
         else:
-            x, y, z, w = 0.0, 0.0, math.sin(thing.yaw / 2.0), math.cos(thing.yaw / 2.0)
-        axis, at = np.array([x, y, z]), np.array(self.position(state, what))
+            where, yaw = stands(thing, first)
+            x, y, z, w = 0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)
+            at = np.array(where)
+        axis = np.array([x, y, z])
         tip = np.array(self.position(state, "tip"))
         found = []
-        for each in thing.parts:  # a thing moves with the centre of its first part
-            if each.name == part:
-                away = np.subtract(each.centre, thing.parts[0].centre)
-                turned = away + 2.0 * np.cross(axis, np.cross(axis, away) + w * away)
-                found.append(float(np.linalg.norm(tip - at - turned)))
+        for each in pieces:
+            away = np.array(beside(first, each).centre)
+            turned = away + 2.0 * np.cross(axis, np.cross(axis, away) + w * away)
+            found.append(float(np.linalg.norm(tip - at - turned)))
         return min(found)
 
     def see(self, state: FloatArray, due: float) -> Iterator[Event]:
@@ -112,10 +125,13 @@ class Way:
 
 
 def _of_things(state: Layout, quantity: str) -> dict[str, slice]:
-    """Return where the state has a quantity of each thing that moves, by the thing's name."""
-    names = (signal.name.split(".") for signal in state.signals)
-    return {
-        words[1]: state.find(".".join(words))
-        for words in names
-        if len(words) == 3 and words[0] == "scene" and words[2] == quantity  # noqa: PLR2004
-    }
+    """Return where the state has a quantity of whatever moves, by its name.
+
+    A part of a jointed thing has the thing's name before its own.
+    """
+    found = {}
+    for signal in state.signals:
+        first, *name, last = signal.name.split(".")
+        if name and first == "scene" and last == quantity:
+            found[".".join(name)] = state.find(signal.name)
+    return found

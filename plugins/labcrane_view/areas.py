@@ -7,8 +7,8 @@ import numpy as np
 
 from labcrane import FloatArray, Frame, Run
 from labcrane.core import Shape, Sphere
-from labcrane.machines import PlacedObject, read_placed
-from labcrane_view.scene.outline import of_body, of_thing
+from labcrane.machines import PlacedObject, Segment, read_placed, segments, stands
+from labcrane_view.scene.outline import of_body, of_segment
 
 TIP = 0.12
 """Radius in metres of the tip's area of interest."""
@@ -120,16 +120,17 @@ class Areas:
         self._said = {signal.name for signal in run.state.signals}
         self._bodies = [(body, of_body(body)) for body in run.bodies if body.name in names]
         self._scene = ""
-        self._things: list[tuple[PlacedObject, FloatArray]] = []
+        self._things: list[tuple[PlacedObject, Segment, FloatArray]] = []
 
     def update(self, scene: str) -> None:
         """Take up what stands around, as of :func:`labcrane.machines.read_placed`."""
         if scene != self._scene:
             self._scene = scene
             self._things = [
-                (thing, of_thing(thing))
+                (thing, segment, of_segment(thing, segment.parts))
                 for thing in read_placed(scene)
                 if thing.name in self._names
+                for segment in segments(thing)
             ]
 
     def of(
@@ -158,14 +159,16 @@ class Areas:
         for body, points in self._bodies:
             pose = self._moved(body.moves, state) if body.moves else poses[body.frame]
             found[body.name] = points @ pose[:3, :3].T + pose[:3, 3]
-        for thing, points in self._things:
-            moves = f"scene.{thing.name}"
+        whole: dict[str, list[FloatArray]] = {}
+        for thing, segment, points in self._things:
+            moves = f"scene.{segment.name}"
             if f"{moves}.position" in self._said:
                 pose = self._moved(moves, state)
             else:
-                pose = _pose(thing.position, _turned(thing.yaw))
-            found[thing.name] = points @ pose[:3, :3].T + pose[:3, 3]
-        return found
+                where, yaw = stands(thing, segment.parts[0])
+                pose = _pose(where, _turned(yaw))
+            whole.setdefault(thing.name, []).append(points @ pose[:3, :3].T + pose[:3, 3])
+        return found | {name: np.vstack(points) for name, points in whole.items()}
 
     def _moved(self, name: str, state: FloatArray) -> FloatArray:
         """Return the pose that the state says, shape ``(4, 4)``."""

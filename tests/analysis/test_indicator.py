@@ -16,7 +16,7 @@ from labcrane.analysis.cohort import find_cohort
 from labcrane.analysis.indicator import Indicator, Performance, indicate
 from labcrane.analysis.indicator_settings import IndicatorSettings, Weights
 from labcrane.analysis.operator_tests import OperatorTest, completion, operator_tests
-from labcrane.analysis.report.workbook import write_workbook
+from labcrane.analysis.report.workbook import advice, write_workbook
 from labcrane.cli.app import main
 from labcrane.core.records import Event
 from labcrane.errors import LabcraneError, RecordingError
@@ -381,6 +381,37 @@ def test_runs_that_worsen_again_suggest_another_scenario() -> None:
     assert fatigue(tired).verdict == "fatigue: give another scenario"
     assert "best mean of 3 runs 91.7 %, last 81.9 %" in fatigue(tired).evidence
     assert fatigue(runs([(60, 2), (60, 1), (60, 0), (60, 0)])).verdict == "none"
+
+
+def visit(times: list[float], ratings: list[float]) -> list[OperatorTest]:
+    """Return one test of each scenario; each takes longer than the one before, as references do."""
+    tests = []
+    for number, (share, rating) in enumerate(zip(times, ratings, strict=True), start=1):
+        reference = 20.0 * number
+        done = Performance(share * reference, 0, 0, 0, 0, rating, 0.8, completed=True)
+        made = indicate(done, reference, LITERAL)
+        scene = f"scene {number}"
+        tests.append(OperatorTest("R001", 1, number, scene, done, reference, "", made, LITERAL))
+    return tests
+
+
+def test_one_test_of_each_scenario_tells_familiarity_and_fatigue_of_all_together() -> None:
+    settled = visit([1.5, 1.2, 1.02, 1.0, 1.01, 1.0], [0.5, 0.6, 0.7, 0.8, 0.8, 0.8])
+    said = {each.about: each.verdict for each in advice(settled)}
+    assert said["environmental familiarity, scene 1"] == "too few runs to say"
+    assert said["environmental familiarity, all scenarios"] == "familiar"
+    assert said["scenario fatigue, all scenarios"] == "none"
+    unsure = visit([1.5, 1.2, 1.02, 1.0, 1.01, 1.0], [0.9, 0.9, 0.8, 0.6, 0.5, 0.5])
+    found = familiarity(unsure, across=True)
+    assert found.verdict == "still learning: felt accuracy has fallen"
+    assert "1.00, 1.01, 1.00 of the reference spread 1 %, the first was 1.50" in found.evidence
+    assert "rated accuracy went from 0.90 to 0.50, rated awareness went" in found.evidence
+    tired = visit([1.0, 1.0, 1.0, 1.6, 1.7, 1.8], [0.9, 0.9, 0.9, 0.5, 0.4, 0.4])
+    found = fatigue(tired, across=True)
+    assert found.verdict == "fatigue: give other scenarios, or a break"
+    (one,) = {each.operator for each in advice(tired)}
+    assert one == "R001"
+    assert "all scenarios" not in str(list(advice(runs([(60, 0)] * 4))))
 
 
 def test_a_session_without_a_tick_does_not_take_the_others_with_it(tmp_path: Path) -> None:

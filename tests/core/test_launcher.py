@@ -42,6 +42,9 @@ class LateRecorder:
     def unwatched(self) -> list[str]:
         return []
 
+    def taken(self) -> list[str]:
+        return ["eeg: was taken by type 'EEG' alone"]
+
     def stop(self) -> None:
         pass
 
@@ -70,6 +73,7 @@ def test_a_note_that_is_given_while_streams_are_waited_for_is_in_the_record(
     assert events["page.denied"]["why"] == "somebody asked for end"
     assert "order.start" not in events
     assert "start: the session has not begun; order it again when it has" in said
+    assert said.count("eeg: was taken by type 'EEG' alone") == 1
 
 
 STOPS_BUT_HANGS_AS_A_SPARE = """

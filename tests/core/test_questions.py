@@ -53,6 +53,8 @@ GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
          "a multiple of 2 is"),
         ([("sessions:", "participants: {planned: 3}\ndesign: {order: {pairs: williams}}\nsessions:")],
          "design.order.pairs", "which has 2 rows; a multiple of 2 does"),
+        ([("sessions:", "streams: {eeg: {type: EEG}, gaze: {name: Neon}}\nsessions:")],
+         "streams.eeg", "a neighbour's as well; give the source_id"),
     ],
 )  # fmt: skip
 def test_a_number_that_nobody_means_is_asked_about_until_it_is_answered(
@@ -63,6 +65,14 @@ def test_a_number_that_nobody_means_is_asked_about_until_it_is_answered(
     assert asked[key].endswith("is that meant?")
     answer = ("sessions:", f"expected: [{', '.join(asked)}]\nsessions:")
     assert questions(a_study(tmp_path, *changes, answer)) == ()
+
+
+@pytest.mark.parametrize(
+    "need", ["{name: Neon, type: Gaze}", "{source_id: neon-7}", "{type: Gaze, several: true}"]
+)
+def test_a_stream_that_can_be_no_neighbours_is_not_asked_about(tmp_path: Path, need: str) -> None:
+    asked = questions(a_study(tmp_path, ("sessions:", f"streams: {{gaze: {need}}}\nsessions:")))
+    assert asked == ()
 
 
 def test_an_answer_to_nothing_is_told_with_the_nearest_question(tmp_path: Path) -> None:

@@ -117,11 +117,73 @@ def test_only_our_own_hosts_and_origins_come_through(
 def test_pages_are_loaded_so_often_and_no_more_and_orders_all_the_same() -> None:
     asked = {path: Asked(path) for path in ("/participant", "/orders/note")}
     guard = Guard(let_in, HOST, PORT, lambda _: None)
-    for path in ["/participant"] * 100 + ["/orders/note"] * 100:
-        asyncio.run(guard(asked[path].scope, asked[path].receive, asked[path].send))
+
+    async def ask_all() -> None:
+        for path in ["/participant"] * 100 + ["/orders/note"] * 100:
+            await guard(asked[path].scope, asked[path].receive, asked[path].send)
+
+    asyncio.run(ask_all())
     assert asked["/participant"].status[:30] == [200] * 30
     assert 0 < asked["/participant"].status.count(429) <= 70
     assert asked["/orders/note"].status == [200] * 100
+
+
+PAGE_S = 0.03
+"""What it takes to put a page together, in this test."""
+
+
+def test_an_order_waits_for_one_page_and_not_for_all_that_are_asked_for() -> None:
+    """Whoever loads pages takes half of the process's time, and those who never read none."""
+    clock, waits, made = Clock(), [], []
+    loop = asyncio.SelectorEventLoop()
+    really, loop.time = loop._selector.select, clock
+
+    def select(timeout: float | None) -> list:
+        clock.now += timeout or 0.0
+        return really(0.0)
+
+    loop._selector.select = select
+
+    async def inner(scope, receive, send) -> None:
+        if scope["path"] == "/participant":
+            clock.now += PAGE_S  # nobody else's turn meanwhile
+            made.append(clock.now)
+        await let_in(scope, receive, send)
+
+    guard = Guard(inner, HOST, PORT, lambda _: None)
+    never = asyncio.Event()
+
+    async def load(number: int) -> None:
+        asked = Asked("/participant")
+        asked.scope["client"] = (f"10.0.0.{number % 3}", 1)
+
+        async def send(message: dict) -> None:
+            await never.wait()  # it does not read
+
+        await guard(asked.scope, asked.receive, send)
+
+    async def order(due: float) -> None:
+        await asyncio.sleep(due)
+        asked = Asked("/orders/note")
+        await guard(asked.scope, asked.receive, asked.send)
+        assert asked.status == [200]
+        waits.append(clock.now - due)
+
+    async def attacked() -> None:
+        loads = [asyncio.create_task(load(number)) for number in range(60)]
+        await asyncio.gather(*(order(0.1 * number) for number in range(40)))
+        assert not any(each.done() for each in loads)
+        for each in loads:
+            each.cancel()
+        await asyncio.gather(*loads, return_exceptions=True)
+
+    try:
+        loop.run_until_complete(attacked())
+    finally:
+        loop.close()
+    assert len(made) == 60
+    assert max(waits) <= PAGE_S + 1e-9
+    assert made[-1] == pytest.approx((2 * 60 - 1) * PAGE_S)
 
 
 async def let_in(scope, receive, send) -> None:

@@ -16,7 +16,7 @@ from dmd_arms import MODEL, RETRIEVAL
 from scipy.integrate import quad
 
 import labcrane_dmd
-from labcrane import ProtocolError, RecordingError
+from labcrane import DeviceError, ProtocolError, RecordingError
 from labcrane.cli.app import main
 from labcrane.machines import load_machine
 from labcrane_dmd.bench.driven import arm_settings, drive
@@ -40,17 +40,17 @@ BO_ 257 Encoders: 4 PANEL
 """
 
 
-def driven(names: tuple[str, ...], sizes: tuple[int, ...]):
+def driven(names: tuple[str, ...], sizes: tuple[int, ...], rate_hz: float = RATE_HZ):
     model = labcrane_dmd.load(MODEL)
     settings = model.settings.model_copy(update={"validation": sizes})
     model = replace(model, segments={name: model[name] for name in names}, settings=settings)
     machine = load_machine("ied_arm.yaml", RETRIEVAL)
     recordings = [each for each in read_recordings(FOLDER) if each.name in names]
     arm = arm_settings(machine, model, MODEL)
-    return model, drive(arm, model, machine, recordings, RATE_HZ)
+    return model, drive(arm, model, machine, recordings, rate_hz)
 
 
-def agrees_with_the_formula(model, level) -> None:
+def agrees_with_the_formula(model, level, rate_hz: float = RATE_HZ) -> None:
     """Assert that time between two angles is the formula's, but for what explicit steps add.
 
     Steps at the speed of their beginning take dt / 2 ln(w(b) / w(a)) longer than the integral of
@@ -64,14 +64,17 @@ def agrees_with_the_formula(model, level) -> None:
         return
     opened = run.time[run.step] + direction.dead_time + 25.0 * direction.lag
     first = int(np.searchsorted(run.time, opened))
-    moving = np.flatnonzero(np.abs(np.diff(run.angle)) > 1e-6)  # not the end stop's rounding
-    last = int(moving[-1]) - 2
-    assert last - first > 100
+    said = [segment.speed(run.signal, float(at)) for at in run.angle[:-1]]
+    moving = np.flatnonzero(np.abs(np.diff(run.angle)) * rate_hz > 0.5 * np.abs(said))
+    last = int(moving[-1]) - 2  # the end stop cuts the last step short
+    assert last - first > 0.2 * rate_hz
     a, b = float(run.angle[first]), float(run.angle[last])
     needs, _ = quad(lambda at: 1.0 / segment.speed(run.signal, at), a, b, limit=500)
-    dt = 1.0 / RATE_HZ
+    dt = 1.0 / rate_hz
     adds = 0.5 * dt * math.log(segment.speed(run.signal, b) / segment.speed(run.signal, a))
-    assert (last - first) * dt == pytest.approx(needs + adds, abs=0.02 * dt + 1e-6 * needs)
+    took = (last - first) * dt
+    where = (segment.name, run.signal)
+    assert took == pytest.approx(needs + adds, abs=0.02 * dt + 1e-6 * needs), where
 
 
 @needs_bullet
@@ -90,10 +93,11 @@ def test_driven_segments_move_as_the_formula_says_within_the_integrators_error(n
 @needs_bullet
 @pytest.mark.long
 def test_every_segment_direction_and_level_of_the_paper_is_driven_and_agrees() -> None:
-    model, levels = driven(("arm", "boom", "jaws"), (20, 60, 100, 140, 180, 220))
+    rate_hz = 60.0  # a quarter of the steps
+    model, levels = driven(("arm", "boom", "jaws"), (20, 60, 100, 140, 180, 220), rate_hz)
     assert len(levels) == 3 * 13
     for each in levels:
-        agrees_with_the_formula(model, each)
+        agrees_with_the_formula(model, each, rate_hz)
 
 
 @needs_bullet
@@ -175,6 +179,41 @@ def test_a_log_is_cut_into_the_steps_that_were_made(seed: int) -> None:
     ramp += [Sample(0.01 * n, "angle_deg", 0.1 * n) for n in range(600)]
     with pytest.raises(RecordingError, match=r"no step of the log is a run: signal 1 was held for"):
         cut(ramp)
+
+
+def test_a_signal_beyond_full_flow_or_without_a_number_is_refused_but_not_for_rounding() -> None:
+    rows, _ = steps(1)
+    angles = [Sample(t, "angle_deg", a) for t, _, a in rows]
+    signals = [Sample(t, "signal", 250.00000001 if u else 0.0) for t, u, _ in rows]
+    assert {step.signal for step in cut([*signals, *angles])} == {250, 0}
+    for wrong in (251.0, math.nan):
+        bad = Sample(rows[5][0], "signal", wrong)
+        with pytest.raises(RecordingError, match=r"beyond -250 to 250, which are full flow; see"):
+            cut([*signals, bad, *angles])
+
+
+def test_a_bus_that_cannot_be_opened_is_refused_and_what_came_is_kept(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from labcrane_dmd.bench import sources
+
+    panel = panel_file(tmp_path)
+    words = ["dmd", "record", str(tmp_path / "kept"), "--segment", "boom", "--map", str(panel)]
+    words += ["--signal", "Levers.Boom", "--angle", "Encoders.Boom"]
+    assert main([*words, "--bus", "nothing:there"]) == 1
+    assert "the bus 'nothing:there' cannot be opened" in capsys.readouterr().err
+
+    def lost(*_: object):
+        yield Sample(1.0, "angle_deg", 3.0)
+        raise DeviceError("the bus 'x:y' is lost: unplugged")
+
+    monkeypatch.setattr(sources, "read_bus", lost)
+    words[2] = str(tmp_path / "again")
+    assert main([*words, "--bus", "x:y"]) == 1
+    raw = tmp_path / "again" / "raw" / "boom.csv"
+    assert raw.read_text().splitlines()[1:] == ["1.0,angle_deg,3.0"]
+    said = " ".join(capsys.readouterr().err.split())
+    assert "cut it into runs with --log" in said
 
 
 def bus_log(path: Path, rows, dbc) -> None:
@@ -266,7 +305,7 @@ def test_a_live_bus_gives_the_valve_commands_and_angles_that_are_on_it(tmp_path:
     assert [(int(s), a) for s, a in pairs] == pytest.approx(sent[first : first + 20])
 
 
-def test_lsl_streams_become_a_recording(tmp_path: Path) -> None:
+def test_lsl_streams_become_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     import pylsl
 
     def outlet(name: str, unit: str) -> "pylsl.StreamOutlet":
@@ -296,6 +335,11 @@ def test_lsl_streams_become_a_recording(tmp_path: Path) -> None:
         assert main(["dmd", "record", str(folder), "--segment", "boom", *words]) == 0
     finally:
         thread.join()
+    capsys.readouterr()
+    words[4] = f"{angles}:jaws"
+    assert main(["dmd", "record", str(tmp_path / "no"), "--segment", "boom", *words]) == 1
+    said = " ".join(capsys.readouterr().err.split())
+    assert "it has no channel 'jaws', it has arm, boom; write STREAM:CHANNEL" in said
     table = pd.read_csv(folder / "boom.csv")
     assert sorted(table.groupby("run").signal.last()) == sorted([*levels, 0])
     assert len(pd.read_csv(folder / "raw" / "boom.csv")) == 2 * len(rows)

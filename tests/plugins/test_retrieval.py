@@ -85,7 +85,7 @@ def test_joints_objects_and_bodies_are_recorded_tick_by_tick(session) -> None:
     for scene in SCENES.values():
         for thing in labcrane.machines.place_objects(scene, 1):
             names = {part.name for part in thing.parts}
-            for part in names if thing.kind != "obstacle" else ():
+            for part in names if thing.kind != "obstacle" else thing.limits:
                 assert f"scene.{thing.name}.force.{part}" in state
 
 
@@ -97,7 +97,7 @@ def test_the_trial_table_agrees_with_the_events_and_the_forces(session) -> None:
     )
     force = {
         "object": [c for c in state if ".force." in c and not c.startswith("scene.figure")],
-        "body": [c for c in state if c.startswith("scene.figure.force.")],
+        "body": [c for c in state if c.startswith(("scene.figure.force.", "scene.figure.hit."))],
     }
     for _, row in session.trials.iterrows():
         mine = events[events["trial"] == row["trial"]]

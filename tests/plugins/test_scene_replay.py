@@ -47,6 +47,8 @@ def test_a_scenario_is_replayed_bit_for_bit_from_its_record_alone(recorded: Path
     context = open_recording(recorded).session(1).context
     scene = "scenes/touch.yaml"
     assert context["files"][scene]["text"] == (RETRIEVAL / scene).read_text(encoding="utf-8")
+    part = "scenes/parts/table.yaml"  # which the scene uses
+    assert context["files"][part]["text"] == (RETRIEVAL / part).read_text(encoding="utf-8")
     assert context["components"]["dynamics"]["settings"]["scenes"] == [scene]
     assert "somewhere" not in json.dumps(context)
     again = replay_session(recorded, 1)

@@ -3,7 +3,7 @@
 import itertools
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -18,9 +18,12 @@ from labcrane.machines import (
     Geom,
     PlacedObject,
     ShapeKind,
+    beside,
     load_scene,
     place_objects,
     read_placed,
+    segments,
+    stands,
     write_placed,
 )
 from labcrane.protocol.rig import Rig
@@ -37,7 +40,7 @@ pytestmark = [needs_bullet, needs(*GRAPHICS)]
 RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"
 SCENES = ("carry", "casualty", "extract", "reach_over", "reach_through", "touch")
 SIZE = (640, 480)
-CAMERA = CameraSettings(eye=(1.7, -4.5, 1.6), look=(1.2, 0.0, 0.9), fov_deg=60)
+CAMERA = CameraSettings(eye=(1.7, -6.5, 2.4), look=(1.2, 0.0, 0.9), fov_deg=60)
 
 
 @pytest.fixture(scope="module")
@@ -75,16 +78,15 @@ def make_frame(run: Run, things: tuple[PlacedObject, ...]) -> Frame:
     state[run.state.find("joint.angle")] = np.radians([0.0, -20.0, -60.0, 0.0])
     for thing in things:
         if thing.kind != "obstacle":
-            move(run, state, thing, thing.position, thing.yaw)
+            for segment in segments(thing):
+                move(run, state, segment.name, *stands(thing, segment.parts[0]))
     nothing = np.zeros(0)
     return Frame(Tick(0, 0.0, 0.0), 0.0, nothing, nothing, state, np.full(run.task.size, np.nan))
 
 
-def move(
-    run: Run, state: FloatArray, thing: PlacedObject, to: tuple[float, ...], yaw: float
-) -> None:
-    state[run.state.find(f"scene.{thing.name}.position")] = to
-    state[run.state.find(f"scene.{thing.name}.orientation")] = (
+def move(run: Run, state: FloatArray, name: str, to: tuple[float, ...], yaw: float) -> None:
+    state[run.state.find(f"scene.{name}.position")] = to
+    state[run.state.find(f"scene.{name}.orientation")] = (
         0.0,
         0.0,
         math.sin(yaw / 2),
@@ -107,9 +109,15 @@ def box_of(mask: np.ndarray) -> tuple[float, float, float, float]:
 
 def corners(part: Geom, to: tuple[float, ...], yaw: float) -> FloatArray:
     """Return points around a part, in the base frame: its outermost in every direction."""
-    x, y, _ = part.size
+    x, y, z = part.size
     if part.shape is ShapeKind.BOX:
         cloud = np.array(list(itertools.product((-0.5, 0.5), repeat=3))) * part.size
+    elif part.shape is ShapeKind.HULL:
+        cloud = np.array(part.points)
+    elif part.shape is ShapeKind.CYLINDER:
+        turns = np.linspace(0.0, 2.0 * math.pi, 25)
+        rim = 0.5 * x * np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=1)
+        cloud = np.vstack([rim + 0.5 * z * side * np.eye(3)[2] for side in (-1.0, 1.0)])
     else:
         around = np.random.default_rng(1).normal(size=(4000, 3))
         around /= np.linalg.norm(around, axis=1, keepdims=True)
@@ -124,9 +132,9 @@ def corners(part: Geom, to: tuple[float, ...], yaw: float) -> FloatArray:
     return cloud
 
 
-def expected(thing: PlacedObject, to: tuple[float, ...], yaw: float) -> FloatArray:
+def expected(parts: Sequence[Geom], to: tuple[float, ...], yaw: float) -> FloatArray:
     eyes = Projection(np.array(CAMERA.eye), np.array(CAMERA.look), CAMERA.fov_deg, 0, *SIZE)
-    boxes = np.array([eyes.points(corners(part, to, yaw)) for part in thing.parts])
+    boxes = np.array([eyes.points(corners(part, to, yaw)) for part in parts])
     return np.hstack([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
 
 
@@ -138,19 +146,23 @@ def test_everything_in_a_scene_is_drawn_where_it_stands(name: str, view: View, r
     for thing in things:
         changed = np.abs(drawn(view, frame, (thing,)) - bare).max(axis=-1) > 12
         np.testing.assert_allclose(
-            box_of(changed), expected(thing, thing.position, thing.yaw), atol=3.0
+            box_of(changed), expected(thing.parts, thing.position, thing.yaw), atol=3.0
         )
 
 
 @pytest.mark.parametrize("name", ["touch", "casualty"])
 def test_what_moves_is_drawn_where_the_state_says(name: str, view: View, run: Run) -> None:
     *_, thing = place_objects(load_scene(RETRIEVAL / "scenes" / f"{name}.yaml"), 3)
-    frame = make_frame(run, (thing,))
-    bare = drawn(view, frame, ())
-    to, yaw = (1.5, -0.3, 0.4), 0.7
-    move(run, frame.state, thing, to, yaw)
-    changed = np.abs(drawn(view, frame, (thing,)) - bare).max(axis=-1) > 12
-    np.testing.assert_allclose(box_of(changed), expected(thing, to, yaw), atol=3.0)
+    for segment in segments(thing):
+        frame = make_frame(run, (thing,))
+        for each in segments(thing):  # all the others out of the picture
+            move(run, frame.state, each.name, (0.0, 0.0, -50.0), 0.0)
+        bare = drawn(view, frame, (thing,))
+        to, yaw = (1.5, -0.3, 0.4), 0.7
+        move(run, frame.state, segment.name, to, yaw)
+        changed = np.abs(drawn(view, frame, (thing,)) - bare).max(axis=-1) > 12
+        parts = [beside(segment.parts[0], part) for part in segment.parts]
+        np.testing.assert_allclose(box_of(changed), expected(parts, to, yaw), atol=3.0)
 
 
 def test_a_bent_limb_can_be_seen(view: View, run: Run) -> None:

@@ -227,6 +227,15 @@ def test_a_curve_that_no_ways_of_its_probes_allow_says_so(random):
     assert (moved.with_error(probes[:, REMOTE])[1] >= least).all()
 
 
+def test_a_clock_that_was_probed_once_is_placed_by_that_probe(random):
+    times = regular(2.0)
+    raw = source(SourceClock(), times, random)
+    corrected = correct(RawStream.of(raw.stamps, raw.probes[:1], raw.arrivals), REGULAR)
+    assert np.abs(corrected.time - times).max() < 5e-4
+    assert (np.abs(corrected.time - times) <= corrected.error).all()
+    assert corrected.quality.slews == 0
+
+
 def test_a_long_time_without_probes_is_no_step(random):
     times = regular(600)
     raw = source(SourceClock(ppm=150.0), times, random)

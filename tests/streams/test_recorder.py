@@ -18,8 +18,13 @@ from labcrane.recording.xdf.reader import read_xdf
 from labcrane.streams.discovery import discover
 from labcrane.streams.network import VARIABLE
 from labcrane.streams.request import StreamRequest
+from labcrane.streams.sync.report.limits import Limits
+from labcrane.streams.sync.report.stream_report import judge_stream
+from labcrane.streams.sync.report.sync_report import SyncReport
+from labcrane.streams.sync.resync import resync
 
 EEG = {"label": "EEG", "type": "EEG"}
+AMPLIFIER = EEG | {"name": "Amplifier"}
 GAZE = {"label": "eyes", "name": "Gaze", "required": False, "rate_hz": 50, "channels": 3}
 
 
@@ -41,7 +46,7 @@ def events(stream):
 def test_streams_that_come_late_return_or_never_send_are_all_recorded(lab):
     first = lab.sender("Amplifier", "EEG", "amplifier-1")
     lab.sender("Mute", "EEG", "amplifier-2", rate=-100.0)
-    recorder = lab.recorder(EEG | {"name": "Amplifier"}, EEG | {"label": "mute"}, GAZE)
+    recorder = lab.recorder(AMPLIFIER, EEG | {"label": "mute"}, GAZE)
     status = until_ready_but_for(recorder, "Mute")
     assert named(status, "Gaze")["condition"] == "absent"
     lab.sender("Gaze", "Gaze", "")
@@ -90,7 +95,7 @@ def until_ready_but_for(recorder, name):
 
 def test_the_recorder_outlives_whoever_started_it_by_a_grace_and_closes_its_journal(lab):
     lab.sender("Amplifier", "EEG", "amplifier-1")
-    recorder = lab.recorder(EEG, grace_s=1.5)
+    recorder = lab.recorder(AMPLIFIER, grace_s=1.5)
     until_ready(recorder)
     died = time.perf_counter()
     recorder.stdin.close()
@@ -104,12 +109,12 @@ def test_the_recorder_outlives_whoever_started_it_by_a_grace_and_closes_its_jour
 
 def test_a_killed_recorder_goes_on_in_the_next_part(lab):
     lab.sender("Amplifier", "EEG", "amplifier-1")
-    first = lab.recorder(EEG)
+    first = lab.recorder(AMPLIFIER)
     kept = named(until_ready(first), "Amplifier")["samples"]
     first.kill()
     first.wait()
     died = time.perf_counter()
-    second = lab.recorder(EEG)
+    second = lab.recorder(AMPLIFIER)
     until_ready(second)
     assert stop(second) == 0
     assert [part.name for part in parts(lab.journal)] == [
@@ -128,7 +133,7 @@ def test_a_killed_recorder_goes_on_in_the_next_part(lab):
 def test_two_programs_with_one_source_id_are_warned_of(lab):
     lab.sender("Amplifier", "EEG", "same")
     lab.sender("Amplifier", "EEG", "same")
-    recorder = lab.recorder(EEG)
+    recorder = lab.recorder(AMPLIFIER)
     status = until(recorder, lambda s: "2 programs" in " ".join(s["streams"][0]["warnings"]))
     assert "'same'" in " ".join(status["streams"][0]["warnings"])
     looks = ([one for one in discover(1.0) if one.name == "Amplifier"] for _ in range(100))
@@ -144,7 +149,7 @@ def test_a_source_that_comes_back_from_another_session_is_warned_of(lab, tmp_pat
     lines = (line for line in ours.read_text("utf-8").splitlines() if "SessionID" not in line)
     theirs.write_text("\n".join(lines), encoding="utf-8")
     first = lab.sender("Amplifier", "EEG", "amplifier-1")
-    recorder = lab.recorder(EEG)
+    recorder = lab.recorder(AMPLIFIER)
     until_ready(recorder)
     first.kill()
     with monkeypatch.context() as patch:
@@ -163,7 +168,7 @@ def test_a_source_that_comes_back_from_another_session_is_warned_of(lab, tmp_pat
 
 def test_a_source_that_comes_back_in_this_session_is_not_warned_of(lab):
     first = lab.sender("Amplifier", "EEG", "amplifier-1")
-    recorder = lab.recorder(EEG)
+    recorder = lab.recorder(AMPLIFIER)
     until_ready(recorder)
     first.kill()
     until(recorder, lambda status: status["streams"][0]["condition"] == "silent")
@@ -231,3 +236,20 @@ def test_a_request_that_two_streams_meet_takes_none_silently(lab):
         assert "give the name or source_id of the one that is meant, or several: true" in text
     assert stop(recorder) == 0
     assert set(lab.streams()) == {"Amplifier", "Filtered"}
+
+
+@pytest.mark.parametrize("any_meant", [False, True])
+def test_a_stream_taken_by_its_type_alone_is_named_at_once_and_in_the_report(lab, any_meant):
+    lab.sender("Amplifier", "EEG", "amplifier-1")
+    recorder = lab.recorder({"label": "eeg", "type": "EEG", "any_meant": any_meant})
+    status = until_ready(recorder)
+    (one,) = status["streams"]
+    said = "was taken by type 'EEG' alone: it is 'Amplifier' (source_id 'amplifier-1')"
+    assert said in one["taken"]
+    assert (one["taken"] in one["warnings"]) is not any_meant
+    assert stop(recorder) == 0
+    recorded = lab.streams()["Amplifier"]
+    report = SyncReport((judge_stream(recorded, resync(recorded).quality, Limits()),))
+    warned = [line for line in report.advice() if "was taken by type 'EEG' alone" in line]
+    assert len(warned) == (0 if any_meant else 1)
+    assert any(said in line for line in report.details()) is any_meant

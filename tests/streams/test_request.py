@@ -29,6 +29,26 @@ def test_a_stream_is_meant_when_all_that_is_asked_for_fits(asked, offered, meant
     assert StreamRequest("a stream", **asked).matches(offered) is meant
 
 
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"type": "EEG"}, True),
+        ({"type": "EEG", "several": True}, False),
+        ({"type": "EEG", "name": "ActiChamp-0"}, False),
+        ({"source_id": "amp-1"}, False),
+    ],
+)
+def test_which_stream_was_taken_is_said_where_any_of_its_type_would_have_been(asked, said):
+    request = StreamRequest("eeg", **asked)
+    text = request.taken("ActiChamp-0", "amp-1", "next-door")
+    assert bool(text) is said
+    if text:
+        assert text == (
+            "was taken by type 'EEG' alone: it is 'ActiChamp-0' (source_id 'amp-1') of next-door; "
+            "write that source_id in the protocol if it is meant"
+        )
+
+
 def test_what_is_expected_is_compared_with_what_there_is():
     request = StreamRequest("EEG", type="EEG", rate_hz=1000.0, channels=64)
     assert request.misfits(64, 1000.0) == []

@@ -84,10 +84,14 @@ def advice(tests: Sequence[OperatorTest]) -> Iterator[Advice]:
     for _, own in groupby(tests, key=lambda test: test.operator):
         mine = list(own)
         yield suggest(mine)
-        for scenario in dict.fromkeys(test.scenario for test in mine):
+        scenarios = dict.fromkeys(test.scenario for test in mine)
+        for scenario in scenarios:
             runs = [test for test in mine if test.scenario == scenario]
             yield familiarity(runs)
             yield fatigue(runs)
+        if len(scenarios) > 1:  # perhaps with one test of each
+            yield familiarity(mine, across=True)
+            yield fatigue(mine, across=True)
 
 
 def _row(test: OperatorTest, number: int) -> tuple[Cell, ...]:

@@ -2,3 +2,5 @@
 
 In come STL, OBJ and glTF 2; out go triangles whose numbers are finite and whose corners are there.
 """
+
+FORMATS = (".stl", ".obj", ".gltf", ".glb")

@@ -3,12 +3,11 @@
 from pathlib import Path
 
 from labcrane.limits import LimitError, check_size
+from labcrane.machines.meshes import FORMATS
 from labcrane.machines.meshes.gltf import read_glb, read_gltf
 from labcrane.machines.meshes.obj import read_obj
 from labcrane.machines.meshes.stl import read_stl
 from labcrane.machines.meshes.surface import MeshError, Surface
-
-FORMATS = (".stl", ".obj", ".gltf", ".glb")
 
 
 def read_surfaces(path: Path) -> list[Surface]:

@@ -103,6 +103,11 @@ class RecorderHandle:
                 lines.append(f"{stream['label']}: {stream['condition']}")
         return list(dict.fromkeys(lines))
 
+    def taken(self) -> list[str]:
+        """Return which streams were taken by their type alone, one line each."""
+        streams = self.status.get("streams", ())
+        return [f"{one['label']}: {one['taken']}" for one in streams if one["taken"]]
+
     def signals(self) -> dict[tuple[str, str, str], str]:
         """Return what is wrong with signals: the message by stream, channel and kind of fault.
 

@@ -86,6 +86,9 @@ class Health:
     unwatched: Mapping[str, str] = field(default_factory=dict)
     """Why a monitor does not look at it any more, by its name."""
 
+    taken: str = ""
+    """Which stream it is, where any of its type would have been taken."""
+
     @property
     def sane(self) -> bool:
         """Whether it is what was expected, flows as far as can be said, and its clock is known."""

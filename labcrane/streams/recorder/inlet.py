@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from labcrane.errors import RecordingError
-from labcrane.recording.foreign_streams import COUNTER_GAP, OPENED, RESET
+from labcrane.recording.foreign_streams import COUNTER_GAP, OPENED, RESET, TAKEN
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.streams.probes import ClockProbe, was_reset
@@ -48,6 +48,8 @@ class Inlet:
         What is known to be wrong with it, noted beside the stream.
     feed
         To whom its samples are passed on, to see whether its signal is alive.
+    taken
+        Which stream it is, noted beside it, where any of its type was meant.
     """
 
     def __init__(
@@ -57,6 +59,7 @@ class Inlet:
         counter: str | None = None,
         warnings: tuple[str, ...] = (),
         feed: SignalFeed | None = None,
+        taken: str | None = None,
     ) -> None:
         self.info = info
         self.flow = Flow()
@@ -64,6 +67,7 @@ class Inlet:
         self._writer = writer
         self._counter_label = counter
         self._warnings = warnings
+        self._taken = taken
         self._stop = threading.Event()
         self._give_up = threading.Event()
         self._companions: RecordedStreamWriter | None = None
@@ -131,6 +135,8 @@ class Inlet:
         self.note(OPENED)
         for text in self._warnings:
             self.note("warning", text=text)
+        if self._taken is not None:
+            self.note(TAKEN, text=self._taken)
         if self.signals is not None:
             self.signals.begin(header)
         prober = threading.Thread(

@@ -33,6 +33,7 @@ class _Recorded:
     inlet: Inlet
     misfits: list[str]
     warnings: list[str]
+    taken: str
 
     def warn(self, text: str) -> None:
         """Say from now on, and note once beside the stream, what is wrong with it."""
@@ -72,6 +73,7 @@ class Recorder:
         self._since: dict[str, float] = {}
         self._unseen: dict[tuple[str, str, str], float] = {}
         """Since when no search finds a stream, on our clock."""
+        self._rivalled: set[tuple[str, str, str]] = set()
         self._fault: str | None = None
         self._feed = None if monitors is None else SignalFeed(monitors)
         self.know(known)
@@ -95,6 +97,7 @@ class Recorder:
             self._start(info)
         self._find_duplicates(found, now)
         self._find_strangers(found)
+        self._note_rivals()
         if self._feed is not None:
             self._feed.look()
 
@@ -156,10 +159,22 @@ class Recorder:
             return
         misfits = request.misfits(info.channel_count(), info.nominal_srate())
         warnings = list(misfits)
+        taken = request.taken(info.name(), info.source_id(), info.hostname())
+        if taken is not None and not request.any_meant:
+            warnings.append(taken)
+        noted = taken if request.any_meant else None
         if (unstable := unstable_id(info.source_id())) is not None:
             warnings.append(unstable)
-        inlet = Inlet(info, self._writer, request.counter, (*warnings,), self._feed)
-        self._streams[key] = _Recorded(request, inlet, misfits, warnings)
+        inlet = Inlet(info, self._writer, request.counter, (*warnings,), self._feed, noted)
+        self._streams[key] = _Recorded(request, inlet, misfits, warnings, taken or "")
+
+    def _note_rivals(self) -> None:
+        """Note once beside each stream that it is not the only one that fits."""
+        for key, one in self._streams.items():
+            if key not in self._rivalled and one.inlet.header and (rivals := self._rivals(one)):
+                self._rivalled.add(key)
+                for text in rivals:
+                    one.inlet.note("warning", text=text)
 
     def _rivals(self, recorded: _Recorded) -> list[str]:
         """Say which other streams fit a request for one; all are recorded, none is chosen."""
@@ -254,6 +269,7 @@ def _health(recorded: _Recorded, now: float, rivals: list[str]) -> Health:
         warnings=[*recorded.warnings, *rivals],
         signals=list(signals.faults.values()) if signals else [],
         unwatched=signals.failed if signals else {},
+        taken=recorded.taken,
     )
     health.warnings.extend(complaints(health))
     return health

@@ -79,6 +79,8 @@ class OffsetCurve:
     def slews(self) -> list[tuple[float, float]]:
         """Return when, in the clock's time, its rate was changed at once, and by how much."""
         time, skew = self.smoothed.time, self.smoothed.skew
+        if len(time) < 2:  # noqa: PLR2004
+            return []
         free = np.flatnonzero(self.smoothed.walk > 4.0 * np.median(self.smoothed.walk) + 1e-12)
         found: list[tuple[float, float]] = []
         last = -LONG

@@ -26,6 +26,9 @@ LOADS_AT_ONCE = 30
 """A page is put together for whoever loads it, which takes 30 ms: fifty a second would leave no
 time for anybody else's orders."""
 
+MOST_REST_S = 0.1
+"""Rest after a page at most: one that waited for something has not taken this process's time."""
+
 PAGES = frozenset({"/supervisor", "/participant"})
 MOST_SOCKETS = LIMITS["sockets"].most
 MOST_ADDRESSES = 1024
@@ -80,6 +83,7 @@ class Guard:
         if port == usual:
             self._hosts |= names
         self._buckets: dict[tuple[str, bool], Bucket] = {}
+        self._turn = asyncio.Lock()
 
     async def __call__(self, scope: dict[str, Any], receive: Any, send: Any) -> None:
         """Let a request in, or refuse it."""
@@ -97,7 +101,35 @@ class Guard:
                 await self._refuse(scope, receive, send, body, why)
                 return
             receive = _given(body, receive)
+            if scope["path"] in PAGES:
+                await self._in_turn(scope, receive, _with_headers(send))
+                return
         await self._inner(scope, receive, _with_headers(send))
+
+    async def _in_turn(self, scope: dict[str, Any], receive: Any, send: Any) -> None:
+        """Put a page together when it is its turn, and rest as long as that took.
+
+        Whoever loads pages, from however many addresses, so takes half of this process's time at
+        most, and an order waits for one page, not for all that were asked for at once.
+        """
+        await self._turn.acquire()
+        clock = asyncio.get_running_loop()
+        began: float | None = clock.time()
+
+        def rest() -> None:
+            nonlocal began
+            if began is not None:
+                took, began = clock.time() - began, None
+                clock.call_later(min(took, MOST_REST_S), self._turn.release)
+
+        async def sent(message: dict[str, Any]) -> None:
+            rest()  # it is put together; who reads slowly keeps nobody waiting
+            await send(message)
+
+        try:
+            await self._inner(scope, receive, sent)
+        finally:
+            rest()
 
     def _refused(
         self, scope: Mapping[str, Any], headers: Mapping[bytes, bytes]

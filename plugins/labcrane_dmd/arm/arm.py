@@ -11,6 +11,7 @@ from labcrane_dmd.arm.drive import drives
 from labcrane_dmd.arm.overload import overloads
 from labcrane_dmd.arm.settings import ArmSettings
 from labcrane_dmd.arm.state import ArmState, arm_signals, scene_parts
+from labcrane_dmd.arm.urdf import link_names
 from labcrane_dmd.arm.visual import boxes
 from labcrane_dmd.arm.world import World
 from labcrane_dmd.model.interpolation import FULL
@@ -37,8 +38,9 @@ class DmdArm(Dynamics):
         self._model = model or load(settings.model)
         self._scenes = {path.name.split(".")[0]: load_scene(path) for path in settings.scenes}
         self._parts = scene_parts(self._scenes.values())
-        self.signals = arm_signals(machine, self._parts)
-        self._state = ArmState(machine, self._parts)
+        links = link_names(machine, settings.jaws)
+        self.signals = arm_signals(machine, self._parts, links)
+        self._state = ArmState(machine, self._parts, links)
         drives(self._model, settings.proportional, machine, 1.0)  # complains before anything opens
         if settings.jaws and (
             machine.joints[-1].name != settings.jaws.joint or machine.joints[-1].a

@@ -1,13 +1,16 @@
 """Contact forces: impulses over a short time, divided by it."""
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from typing import Any, TypeVar
 
 from labcrane_dmd.arm.engine import pybullet
 from labcrane_dmd.arm.scene_bodies import Standing
 
 Key = tuple[str, str]
 """A thing and one of its parts."""
+
+KeyT = TypeVar("KeyT", bound=Hashable)
 
 BODY_B, LINK_A, LINK_B, NORMAL_FORCE = 2, 3, 4, 9
 """Places in the engine's contact points."""
@@ -33,10 +36,13 @@ class Window:
 class Contacts:
     """What presses on each part of each thing.
 
-    ``pressed`` is by the machine and by things that move; ``support`` by the ground and obstacles.
-    Contact points at a distance have no force; the engine lists them all the same.
+    ``pressed`` is by the machine and by things that move, on what is fixed by the machine alone;
+    ``support`` by the ground and obstacles. ``hits`` is what presses on the parts of jointed
+    figures where they touch obstacles, but for those that carry them. Contact points at a distance
+    have no force; the engine lists them all the same.
 
-    ``by_link`` is the force of each of the arm's links on each thing. All in N.
+    ``by_link`` is the force of each of the arm's links on each thing, ``fixed`` that of each on
+    whatever is fixed and has a limit. All in N.
 
     Parameters
     ----------
@@ -53,42 +59,85 @@ class Contacts:
     ) -> None:
         self._client = client
         self._things = [each for each in standing if each.placed.kind != "obstacle"]
-        obstacles = {each.body for each in standing if each.placed.kind == "obstacle"}
-        self._still = obstacles | {ground}
+        obstacles = [each for each in standing if each.placed.kind == "obstacle"]
+        self._limited = [each for each in obstacles if each.placed.limits]
+        self._still = {each.body for each in obstacles} | {ground}
+        self._hard = {each.body for each in obstacles if not each.placed.carries}
         self._arm = arm
-        keys = [(each.placed.name, part) for each in self._things for part in _names(each)]
-        self._pressed = {key: Window(ticks) for key in keys}
-        self._support = {each.placed.name: Window(ticks) for each in self._things}
-        self._links: dict[tuple[str, int], Window] = {}
         self._ticks = ticks
+        keys = [
+            (each.placed.name, part)
+            for each in (*self._things, *self._limited)
+            for part in _names(each)
+        ]
+        jointed = [each for each in self._things if each.placed.jointed]
+        self._hits = self._windows(
+            (each.placed.name, part) for each in jointed for part in _names(each)
+        )
+        self._pressed = self._windows(keys)
+        self._support = self._windows(each.placed.name for each in self._things)
+        self._links: dict[tuple[str, int], Window] = {}
+        self._fixed: dict[int, Window] = {}
         self.pressed: Mapping[Key, float] = dict.fromkeys(keys, 0.0)
+        self.hits: Mapping[Key, float] = dict.fromkeys(self._hits, 0.0)
         self.support: Mapping[str, float] = dict.fromkeys(self._support, 0.0)
         self.by_link: Mapping[tuple[str, int], float] = {}
+        self.fixed: Mapping[int, float] = {}
 
-    def look(self) -> None:
-        """Read the contacts of the tick that was just made."""
+    def look(self, squeezed: Mapping[Key, float]) -> None:
+        """Read the contacts of the tick that was just made, and add what the grip presses with."""
         pressed = dict.fromkeys(self._pressed, 0.0)
+        for key, force in squeezed.items():
+            pressed[key] += force
+        hits = dict.fromkeys(self._hits, 0.0)
         support = dict.fromkeys(self._support, 0.0)
         by_link: dict[tuple[str, int], float] = {}
         for each in self._things:
             name = each.placed.name
-            for point in pybullet.getContactPoints(bodyA=each.body, physicsClientId=self._client):
+            for point in self._touching(bodyA=each.body):
                 force, other = point[NORMAL_FORCE], point[BODY_B]
                 if force <= 0.0 or other == each.body:
                     continue
+                part = each.parts[point[LINK_A]]
                 if other in self._still:
                     support[name] += force
+                    if other in self._hard and each.placed.jointed:
+                        hits[name, part] += force
                 else:
-                    pressed[name, each.parts[point[LINK_A]]] += force
+                    pressed[name, part] += force
                 if other == self._arm:
-                    key = (name, point[LINK_B])
-                    by_link[key] = by_link.get(key, 0.0) + force
-        self.pressed = {key: self._pressed[key].add(force) for key, force in pressed.items()}
-        self.support = {name: self._support[name].add(force) for name, force in support.items()}
-        for key in by_link.keys() | self._links.keys():
-            window = self._links.setdefault(key, Window(self._ticks))
-            window.add(by_link.get(key, 0.0))
-        self.by_link = {key: window.force for key, window in self._links.items()}
+                    pressing = (name, point[LINK_B])
+                    by_link[pressing] = by_link.get(pressing, 0.0) + force
+        fixed: dict[int, float] = {}
+        for each in self._limited:
+            for point in self._touching(bodyA=each.body, bodyB=self._arm):
+                force, link = max(0.0, point[NORMAL_FORCE]), point[LINK_B]
+                pressed[each.placed.name, each.parts[point[LINK_A]]] += force
+                fixed[link] = fixed.get(link, 0.0) + force
+        self.pressed = _added(self._pressed, pressed)
+        self.hits = _added(self._hits, hits)
+        self.support = _added(self._support, support)
+        self.by_link = self._grown(self._links, by_link)
+        self.fixed = self._grown(self._fixed, fixed)
+
+    def _touching(self, **bodies: int) -> tuple[Any, ...]:
+        found: tuple[Any, ...] = pybullet.getContactPoints(**bodies, physicsClientId=self._client)
+        return found
+
+    def _windows(self, keys: Iterable[KeyT]) -> dict[KeyT, Window]:
+        return {key: Window(self._ticks) for key in keys}
+
+    def _grown(
+        self, windows: dict[KeyT, Window], forces: Mapping[KeyT, float]
+    ) -> Mapping[KeyT, float]:
+        """Add forces of what may press for the first time."""
+        for key in forces.keys() | windows.keys():
+            windows.setdefault(key, Window(self._ticks)).add(forces.get(key, 0.0))
+        return {key: window.force for key, window in windows.items()}
+
+
+def _added(windows: Mapping[KeyT, Window], forces: Mapping[KeyT, float]) -> Mapping[KeyT, float]:
+    return {key: windows[key].add(force) for key, force in forces.items()}
 
 
 def _names(standing: Standing) -> list[str]:

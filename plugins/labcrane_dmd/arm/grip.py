@@ -1,20 +1,27 @@
 """The grip of the jaws on a thing."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
-from labcrane_dmd.arm.contacts import LINK_B, Contacts, Window
+from labcrane_dmd.arm.contacts import LINK_B, Contacts, Key, Window
 from labcrane_dmd.arm.engine import pybullet
 from labcrane_dmd.arm.scene_bodies import Standing
 
 
 @dataclass
 class Held:
-    """A thing in the grip: how it is fixed, how far the jaws were open, and what pulls at it."""
+    """A thing in the grip.
+
+    How it is fixed, by which of its parts, how far the jaws were open, what pulls at it, and with
+    how much more than at first the jaws press.
+    """
 
     standing: Standing
     constraint: int
+    part: str
     opening: float
     pull: Window
+    squeeze: float = 0.0
 
 
 class Grip:
@@ -41,6 +48,19 @@ class Grip:
         self.force = 0.0
         self.drops = 0
 
+    def tighten(self, force: float) -> None:
+        """Press on what is held with so much more, in N."""
+        if self.held is not None:
+            self.held.squeeze += force
+
+    def squeezed(self, most: float) -> Mapping[Key, float]:
+        """Return with how much the jaws press on what they hold, each with ``most`` N at most."""
+        if self.held is None or self.held.squeeze == 0.0:
+            return {}
+        self.held.squeeze = min(self.held.squeeze, most)
+        both = 2.0 * self.held.squeeze
+        return {(self.held.standing.placed.name, self.held.part): both}
+
     def look(self, contacts: Contacts, things: list[Standing], opening: float) -> None:
         """Form, keep or break the grip after a tick; ``opening`` is the jaws' angle in rad."""
         if self.held is None:
@@ -59,10 +79,12 @@ class Grip:
             self._let_go()
 
     def _take(self, each: Standing, opening: float) -> None:
-        constraint = self._hold_limb(each) if each.placed.kind == "body" else self._hold(each)
+        touched = self._touched(each)
+        limb = each.placed.kind == "body"
+        constraint = self._hold_limb(each, touched) if limb else self._hold(each)
         # What is held is part of the hand: jaws that went on pressing would fight the constraint.
         self._collide(each, touch=False)
-        self.held = Held(each, constraint, opening, Window(self._ticks))
+        self.held = Held(each, constraint, each.parts[touched], opening, Window(self._ticks))
         self.force = 0.0
 
     def _hold(self, each: Standing) -> int:
@@ -86,11 +108,16 @@ class Grip:
         )
         return constraint
 
-    def _hold_limb(self, each: Standing) -> int:
+    def _touched(self, each: Standing) -> int:
+        """Return the link of a thing that a jaw touches."""
+        touching = pybullet.getContactPoints(
+            self._arm, each.body, self._jaws[1], physicsClientId=self._client
+        )
+        return int(touching[0][LINK_B]) if touching else -1
+
+    def _hold_limb(self, each: Standing, link: int) -> int:
         """Hold a body at one point: a limb turns in the hand that has hold of it."""
         client, hand = self._client, self._jaws[1]
-        touching = pybullet.getContactPoints(self._arm, each.body, hand, physicsClientId=client)
-        link = touching[0][LINK_B] if touching else -1
         grabbed = pybullet.getLinkState(self._arm, hand, physicsClientId=client)[0]
         place = (
             pybullet.getBasePositionAndOrientation(each.body, physicsClientId=client)

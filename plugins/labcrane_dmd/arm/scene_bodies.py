@@ -1,13 +1,16 @@
 """A scene's things in the engine."""
 
 import math
+import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from labcrane import ProtocolError
-from labcrane.machines import PlacedObject, ShapeKind
+from labcrane.machines import Geom, PlacedObject, ShapeKind, beside, stands
 from labcrane_dmd.arm.engine import pybullet
+from labcrane_dmd.arm.ragdoll import ragdoll
 
 OVERLAP_M = 0.002
 """Depth, in metres, to which two things may stand in each other at the start."""
@@ -18,17 +21,32 @@ ROLLING = 0.002
 LYING = [0.0, math.pi / 2.0, 0.0]
 """The engine's capsules stand along z; ours lie along x."""
 
+STOP_NM = 1e4
+"""Torque that the stop of a hinge can give, in N m; the engine's own is weak (bullet3 #2944)."""
+
+LINK_NAME = 12
+"""Place of the name in what the engine says of a joint and the link behind it."""
+
 DISTANCE = 8
 """Place of the distance in the engine's closest points; below 0 inside each other."""
 
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """A thing in the engine: its number there, and the name of the part behind each link."""
+    """A thing in the engine: its number there, and what is behind its links.
+
+    Attributes
+    ----------
+    parts
+        Name of the part by link; -1 is the base.
+    segments
+        For every segment but the first: its link, and its first part's centre in that link, in m.
+    """
 
     placed: PlacedObject
     body: int
     parts: Mapping[int, str]
+    segments: Mapping[str, tuple[int, tuple[float, float, float]]] = field(default_factory=dict)
 
 
 def add_ground(client: int) -> int:
@@ -40,26 +58,30 @@ def add_ground(client: int) -> int:
 
 
 def add(placed: PlacedObject, client: int) -> Standing:
+    """Put a thing into the engine; what is jointed moves in its joints, all else as one piece."""
+    return _add_jointed(placed, client) if placed.jointed else _add_rigid(placed, client)
+
+
+def _add_rigid(placed: PlacedObject, client: int) -> Standing:
     """Put a thing into the engine: its first part is the body, the others are fixed to it."""
-    shapes = [_shape(part.shape, part.size, client) for part in placed.parts]
+    shapes = [_shape(part, client) for part in placed.parts]
     mass = 0.0 if placed.kind == "obstacle" else placed.mass
-    each = mass / len(placed.parts)
-    first, *others = placed.parts
+    shares = _shares(placed)
+    first, *_ = placed.parts
     turn = pybullet.getQuaternionFromEuler
     # The first part's centre is the body's; the others' places count from there.
-    at = _turned(first.centre, placed.yaw, placed.position)
+    others = [beside(first, part) for part in placed.parts[1:]]
+    at, yaw = stands(placed, first)
     count = len(others)
     body = pybullet.createMultiBody(
-        baseMass=each,
+        baseMass=mass * shares[0],
         baseCollisionShapeIndex=shapes[0],
         basePosition=at,
-        baseOrientation=turn([0.0, 0.0, placed.yaw + first.yaw]),
-        linkMasses=[each] * count,
+        baseOrientation=turn([0.0, 0.0, yaw]),
+        linkMasses=[mass * share for share in shares[1:]],
         linkCollisionShapeIndices=shapes[1:],
         linkVisualShapeIndices=[-1] * count,
-        linkPositions=[
-            [part.centre[axis] - first.centre[axis] for axis in range(3)] for part in others
-        ],
+        linkPositions=[part.centre for part in others],
         linkOrientations=[turn([0.0, 0.0, part.yaw]) for part in others],
         linkInertialFramePositions=[[0.0, 0.0, 0.0]] * count,
         linkInertialFrameOrientations=[[0.0, 0.0, 0.0, 1.0]] * count,
@@ -68,6 +90,54 @@ def add(placed: PlacedObject, client: int) -> Standing:
         linkJointAxis=[[0.0, 0.0, 1.0]] * count,
         physicsClientId=client,
     )
+    _surface(placed, body, count, client)
+    names = {number - 1: part.name for number, part in enumerate(placed.parts)}
+    return Standing(placed, body, names)
+
+
+def _add_jointed(placed: PlacedObject, client: int) -> Standing:
+    """Put a jointed figure into the engine, with friction in its hinges and stops at their ends."""
+    doll = ragdoll(placed)
+    at, yaw = stands(placed, placed.parts[0])
+    with tempfile.TemporaryDirectory(prefix="labcrane-") as folder:
+        path = Path(folder) / "figure.urdf"
+        path.write_text(doll.urdf, encoding="utf-8")
+        body = pybullet.loadURDF(
+            str(path),
+            basePosition=at,
+            baseOrientation=pybullet.getQuaternionFromEuler([0.0, 0.0, yaw]),
+            flags=pybullet.URDF_USE_INERTIA_FROM_FILE,
+            physicsClientId=client,
+        )
+    links = {}
+    for joint in range(pybullet.getNumJoints(body, physicsClientId=client)):
+        about = pybullet.getJointInfo(body, joint, physicsClientId=client)
+        links[about[LINK_NAME].decode()] = joint
+    _surface(placed, body, len(links), client)
+    for name, hinge in doll.hinges.items():
+        pybullet.changeDynamics(body, links[name], jointLimitForce=STOP_NM, physicsClientId=client)
+        # A motor that wants to stand still and has little torque is friction that is dry.
+        pybullet.setJointMotorControl2(
+            body,
+            links[name],
+            pybullet.VELOCITY_CONTROL,
+            targetVelocity=0.0,
+            force=hinge.friction,
+            physicsClientId=client,
+        )
+    return Standing(
+        placed,
+        body,
+        {links.get(name, -1): part for name, part in doll.parts.items()},
+        {
+            segment: (links[name], doll.centres[name])
+            for name, segment in doll.segments.items()
+            if name in links
+        },
+    )
+
+
+def _surface(placed: PlacedObject, body: int, count: int, client: int) -> None:
     for link in range(-1, count):
         pybullet.changeDynamics(
             body,
@@ -78,15 +148,32 @@ def add(placed: PlacedObject, client: int) -> Standing:
             angularDamping=0.0,
             physicsClientId=client,
         )
-    names = {number - 1: part.name for number, part in enumerate(placed.parts)}
-    return Standing(placed, body, names)
+        if placed.jointed:  # apart from the rest, as settings in one call can displace each other
+            pybullet.changeDynamics(body, link, jointDamping=0.0, physicsClientId=client)
+
+
+def _shares(placed: PlacedObject) -> list[float]:
+    """Return each part's share of the mass: by the boxes around them, of a figure the same for all.
+
+    A figure of one piece is as it always was: what was recorded with it must move so again.
+    """
+    if placed.kind == "body":
+        return [1.0 / len(placed.parts)] * len(placed.parts)
+    sizes = [math.prod(part.size) for part in placed.parts]
+    return [size / sum(sizes) for size in sizes]
 
 
 def check_apart(standing: list[Standing], arm: int, client: int) -> None:
-    """Refuse a scene in which things stand in each other or in the arm."""
+    """Refuse a scene in which things stand in each other or in the arm.
+
+    What is fixed may stand in what is fixed, as rubble does.
+    """
     bodies = [("the arm", arm), *((each.placed.name, each.body) for each in standing)]
+    fixed = {each.body for each in standing if each.placed.kind == "obstacle"}
     for number, (one, first) in enumerate(bodies):
         for other, second in bodies[number + 1 :]:
+            if {first, second} <= fixed:
+                continue
             near: tuple[Any, ...] = pybullet.getClosestPoints(
                 first, second, 0.0, physicsClientId=client
             )
@@ -98,8 +185,9 @@ def check_apart(standing: list[Standing], arm: int, client: int) -> None:
                 )
 
 
-def _shape(shape: ShapeKind, size: tuple[float, float, float], client: int) -> int:
-    x, y, z = size
+def _shape(part: Geom, client: int) -> int:
+    x, y, z = part.size
+    shape = part.shape
     if shape is ShapeKind.BOX:
         made = pybullet.createCollisionShape(
             pybullet.GEOM_BOX, halfExtents=[x / 2, y / 2, z / 2], physicsClientId=client
@@ -107,6 +195,10 @@ def _shape(shape: ShapeKind, size: tuple[float, float, float], client: int) -> i
     elif shape is ShapeKind.SPHERE:
         made = pybullet.createCollisionShape(
             pybullet.GEOM_SPHERE, radius=x / 2, physicsClientId=client
+        )
+    elif shape is ShapeKind.HULL:
+        made = pybullet.createCollisionShape(
+            pybullet.GEOM_MESH, vertices=part.points, physicsClientId=client
         )
     elif shape is ShapeKind.CYLINDER:
         made = pybullet.createCollisionShape(
@@ -121,12 +213,3 @@ def _shape(shape: ShapeKind, size: tuple[float, float, float], client: int) -> i
             physicsClientId=client,
         )
     return int(made)
-
-
-def _turned(
-    point: tuple[float, float, float], yaw: float, origin: tuple[float, float, float]
-) -> list[float]:
-    at, _ = pybullet.multiplyTransforms(
-        origin, pybullet.getQuaternionFromEuler([0.0, 0.0, yaw]), point, [0.0, 0.0, 0.0, 1.0]
-    )
-    return list(at)

@@ -45,6 +45,10 @@ class JawsSettings(Settings):
     release_deg: PositiveFloat = 2.0
     """A grip is let go when the jaws are opened by this much, in degrees."""
 
+    squeeze_n_m: NonNegativeFloat = 0.0
+    """By how much more each jaw presses on what it holds for every metre that it is driven further
+    shut, in N/m, up to what its drive can give; opening lets go. At 0 a grip does not tighten."""
+
 
 class OverloadSettings(Settings):
     """When a joint counts as overloaded."""

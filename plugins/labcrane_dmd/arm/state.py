@@ -1,19 +1,40 @@
 """The state array of the arm: joints, tip, and everything in its scenes."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane import FloatArray, Machine, Signal
-from labcrane.machines import Arm, Scene, place_objects
+from labcrane import FloatArray, Machine, ProtocolError, Signal
+from labcrane.machines import Arm, Scene, place_objects, segments
 
 if TYPE_CHECKING:
     from labcrane_dmd.arm.world import World
 
-Parts = Mapping[str, tuple[str, ...]]
-"""The parts of every thing that can move, by its name."""
+
+@dataclass(frozen=True, slots=True)
+class Felt:
+    """What the state says of one thing.
+
+    Attributes
+    ----------
+    parts
+        Those whose forces it has.
+    moves
+        Whether it moves; of what does not, there is no position.
+    segments
+        Those that move in joints, with the parts that may hit what is fixed.
+    """
+
+    parts: tuple[str, ...]
+    moves: bool
+    segments: tuple[str, ...]
+
+
+Parts = Mapping[str, Felt]
+"""What the state says of every thing, by its name."""
 
 LIMIT_RAD = 1e-3
 """A joint this close to the end of its range stands there."""
@@ -23,33 +44,49 @@ GRIP = (("thing", "1"), ("force", "N"), ("drops", "1"))
 something slipped out."""
 
 
+NOWHERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+"""Pose of what is not there."""
+
+
 def scene_parts(scenes: Iterable[Scene]) -> Parts:
-    """Return what can move in any of the scenes; a thing of the same name shares its columns."""
-    found: dict[str, tuple[str, ...]] = {}
+    """Return what can move in any of the scenes, and what is fixed and has limits.
+
+    A thing of the same name shares its columns.
+    """
+    found: dict[str, Felt] = {}
     for scene in scenes:
         for each in place_objects(scene, 0):
-            if each.kind != "obstacle":
-                found[each.name] = tuple(dict.fromkeys(part.name for part in each.parts))
+            moves = each.kind != "obstacle"
+            names = [part.name for part in each.parts if moves or part.name in each.limits]
+            if not names:
+                continue
+            before = found.get(each.name, Felt((), moves, ()))
+            if before.moves != moves:
+                raise ProtocolError(
+                    f"{each.name!r} is fixed in one scene and moves in another; give one of them "
+                    "another name"
+                )
+            jointed = [segment.name for segment in segments(each)[1:]]
+            found[each.name] = Felt(
+                tuple(dict.fromkeys((*before.parts, *names))),
+                moves,
+                tuple(dict.fromkeys((*before.segments, *jointed))),
+            )
     return found
 
 
-def arm_signals(machine: Machine, parts: Parts) -> tuple[Signal, ...]:
+def arm_signals(machine: Machine, parts: Parts, links: tuple[str, ...]) -> tuple[Signal, ...]:
     """Return what the state holds, in order.
 
     ``joint.load`` is a fraction of the joint's effort, ``joint.overload`` and ``joint.end`` are
     -1, 0 or 1 (the end of the range at which the joint stands), ``valve.opening`` is the signal
-    that the valve's opening stands for. A thing that is not in the trial's scene is at 0.
+    that the valve's opening stands for. A thing that is not in the trial's scene is at 0. What is
+    fixed and has limits has a force only, that of the arm, and ``contact.fixed`` says with which of
+    its links it presses on any of it.
     """
-    scene = [
-        signal
-        for name, regions in parts.items()
-        for signal in (
-            Signal(f"scene.{name}.position", "m", ("x", "y", "z")),
-            Signal(f"scene.{name}.orientation", "1", ("x", "y", "z", "w")),
-            Signal(f"scene.{name}.force", "N", regions),
-            Signal(f"scene.{name}.support", "N"),
-        )
-    ]
+    scene = [signal for name, felt in parts.items() for signal in _thing_signals(name, felt)]
+    if not all(felt.moves for felt in parts.values()):
+        scene.append(Signal("contact.fixed", "N", links))
     grip = [Signal(f"grip.{word}", unit) for word, unit in GRIP] if parts else []
     return (
         Signal("joint.angle", "rad", machine.names),
@@ -65,15 +102,37 @@ def arm_signals(machine: Machine, parts: Parts) -> tuple[Signal, ...]:
     )
 
 
+def _thing_signals(name: str, felt: Felt) -> Iterator[Signal]:
+    if not felt.moves:
+        yield Signal(f"scene.{name}.force", "N", felt.parts)
+        return
+    yield from _pose_signals(name)
+    yield Signal(f"scene.{name}.force", "N", felt.parts)
+    yield Signal(f"scene.{name}.support", "N")
+    if felt.segments:
+        yield Signal(f"scene.{name}.hit", "N", felt.parts)
+    for segment in felt.segments:
+        yield from _pose_signals(segment)
+
+
+def _pose_signals(name: str) -> tuple[Signal, Signal]:
+    return (
+        Signal(f"scene.{name}.position", "m", ("x", "y", "z")),
+        Signal(f"scene.{name}.orientation", "1", ("x", "y", "z", "w")),
+    )
+
+
 class ArmState:
     """One array that is filled anew on every tick."""
 
-    def __init__(self, machine: Machine, parts: Parts) -> None:
+    def __init__(self, machine: Machine, parts: Parts, links: tuple[str, ...]) -> None:
+        self._links = links
         self._arm = Arm(machine)
         self._limits = machine.limits
         self._parts = parts
-        self._order = {name: number for number, name in enumerate(parts, start=1)}
-        size = sum(len(signal.columns) for signal in arm_signals(machine, parts))
+        moving = (name for name, felt in parts.items() if felt.moves)
+        self._order = {name: number for number, name in enumerate(moving, start=1)}
+        size = sum(len(signal.columns) for signal in arm_signals(machine, parts, links))
         self.values: FloatArray = np.zeros(size)
 
     def fill(
@@ -118,18 +177,45 @@ class ArmState:
         if not self._parts:
             return []
         there = {each.placed.name: each for each in world.things}
+        contacts = world.contacts
         values: list[float] = []
-        for name, parts in self._parts.items():
-            if name not in there or world.contacts is None:
-                values += [0.0] * (3 + 3) + [1.0] + [0.0] * (len(parts) + 1)
+        for name, felt in self._parts.items():
+            standing = there.get(name)
+            if standing is None or contacts is None:
+                values += _absent(felt)
                 continue
-            position, orientation = world.where(there[name].body)
-            pressed = world.contacts.pressed
-            values += [*position, *orientation]
-            values += [pressed.get((name, part), 0.0) for part in parts]
-            values.append(world.contacts.support[name])
+            pressed = [contacts.pressed.get((name, part), 0.0) for part in felt.parts]
+            if not felt.moves:
+                values += pressed
+                continue
+            position, orientation = world.where(standing.body)
+            values += [*position, *orientation, *pressed, contacts.support[name]]
+            if felt.segments:
+                values += [contacts.hits.get((name, part), 0.0) for part in felt.parts]
+            for segment in felt.segments:
+                if segment in standing.segments:
+                    position, orientation = world.segment(standing, segment)
+                    values += [*position, *orientation]
+                else:
+                    values += NOWHERE
+        if not all(felt.moves for felt in self._parts.values()):
+            fixed = {} if contacts is None else contacts.fixed
+            values += [fixed.get(number, 0.0) for number in range(len(self._links))]
         grip = world.grip
         if grip is None:
             return [*values, 0.0, 0.0, 0.0]
         held = self._order[grip.held.standing.placed.name] if grip.held else 0
         return [*values, float(held), grip.force, float(grip.drops)]
+
+
+def _absent(felt: Felt) -> list[float]:
+    """Return what the state says of a thing that is not in the trial's scene."""
+    forces = [0.0] * len(felt.parts)
+    if not felt.moves:
+        return forces
+    values = [*NOWHERE, *forces, 0.0]
+    if felt.segments:
+        values += forces
+    for _ in felt.segments:
+        values += NOWHERE
+    return values

@@ -10,7 +10,7 @@ from labcrane.machines import PlacedObject
 from labcrane_dmd.arm.contacts import Contacts
 from labcrane_dmd.arm.engine import pybullet
 from labcrane_dmd.arm.grip import Grip
-from labcrane_dmd.arm.scene_bodies import add, add_ground, check_apart
+from labcrane_dmd.arm.scene_bodies import Standing, add, add_ground, check_apart
 from labcrane_dmd.arm.settings import ArmSettings
 from labcrane_dmd.arm.urdf import urdf_of
 
@@ -19,6 +19,10 @@ GRAVITY = 9.81
 
 ITERATIONS = 400
 """Solver passes per tick; with the engine's 50, joints creep under their own weight."""
+
+JOINTED_ITERATIONS = 150
+"""Where somebody with joints lies: many more contacts, which settle with fewer passes; the arm
+creeps by no more (a test has the figure)."""
 
 LIMIT_FORCE = 1e7
 """In N m. The engine's own is weaker than a drive (bullet3 #2944)."""
@@ -47,7 +51,8 @@ class World:
         angles: Sequence[float],
         placed: Sequence[PlacedObject],
     ) -> None:
-        client = _engine(dt)
+        jointed = any(each.jointed for each in placed)
+        client = _engine(dt, JOINTED_ITERATIONS if jointed else ITERATIONS)
         self._client: int | None = client
         self.arm = _load(machine, settings, client)
         self._jaws = settings.jaws is not None
@@ -96,6 +101,9 @@ class World:
         if settings.jaws is not None:
             release = settings.jaws.release_deg * DEGREE
             jaws = (joints - 2, joints - 1)
+            self._most = self._efforts[-1] / settings.jaws.length_m
+            # Each jaw turns by half the opening.
+            self._tightening = 0.5 * dt * settings.jaws.length_m * settings.jaws.squeeze_n_m
             self.grip = Grip(self.arm, jaws, client, settings.jaws.grip_n, release, ticks)
 
     def step(self, speeds: Sequence[float]) -> tuple[list[float], list[float], list[float]]:
@@ -108,6 +116,8 @@ class World:
         """
         held = self.grip is not None and self.grip.held is not None
         if held and speeds[-1] < 0.0:  # jaws that hold something cannot close further
+            if self.grip is not None:
+                self.grip.tighten(-speeds[-1] * self._tightening)
             speeds = [*speeds[:-1], 0.0]
         self._push(targetVelocities=self._split(speeds))
         pybullet.stepSimulation(physicsClientId=self._client)
@@ -117,7 +127,7 @@ class World:
         torques = [state[3] for state in states[: len(self._efforts)]]
         loads = [torque / most for torque, most in zip(torques, self._efforts, strict=True)]
         if self.contacts is not None:
-            self.contacts.look()
+            self.contacts.look({} if self.grip is None else self.grip.squeezed(self._most))
             if self.grip is not None:
                 self.grip.look(self.contacts, self.things, angles[-1])
         return angles, moved, loads
@@ -126,6 +136,15 @@ class World:
         """Return a body's position in m and its orientation as a quaternion x, y, z, w."""
         found: tuple[Sequence[float], Sequence[float]] = pybullet.getBasePositionAndOrientation(
             body, physicsClientId=self._client
+        )
+        return found
+
+    def segment(self, standing: Standing, name: str) -> tuple[Sequence[float], Sequence[float]]:
+        """Return where a jointed thing's segment is, and its orientation; as :meth:`where`."""
+        link, centre = standing.segments[name]
+        state = pybullet.getLinkState(standing.body, link, physicsClientId=self._client)
+        found: tuple[Sequence[float], Sequence[float]] = pybullet.multiplyTransforms(
+            *state[FRAME:ORIENTED], centre, (0.0, 0.0, 0.0, 1.0)
         )
         return found
 
@@ -146,10 +165,13 @@ class World:
         return [*values[:-2], values[-2] + values[-1]]
 
 
+FRAME, ORIENTED = 4, 6
+"""Places of a link's frame in the engine's link state: its position, and behind its orientation."""
+
 DEGREE = 0.017453292519943295
 
 
-def _engine(dt: float) -> int:
+def _engine(dt: float, iterations: int) -> int:
     """Start an engine that steps by ``dt`` in s; return its number."""
     client: int | None = pybullet.connect(pybullet.DIRECT)
     if client is None or client < 0:
@@ -157,7 +179,7 @@ def _engine(dt: float) -> int:
     pybullet.setPhysicsEngineParameter(
         fixedTimeStep=dt,
         numSubSteps=0,
-        numSolverIterations=ITERATIONS,
+        numSolverIterations=iterations,
         solverResidualThreshold=0.0,
         deterministicOverlappingPairs=1,
         physicsClientId=client,

@@ -3,17 +3,19 @@
 import csv
 import math
 import time as clock
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from labcrane import DeviceError, RecordingError
+from labcrane.streams import NewestSample
 from labcrane_dmd.bench.steps import ANGLE, SAMPLE, SIGNAL, Sample
 from labcrane_dmd.model.interpolation import FULL
 
 if TYPE_CHECKING:
     import can
+    import pylsl
     from cantools.database.can import Message
 
 DEGREES = {"deg": 1.0, "degree": 1.0, "degrees": 1.0, "°": 1.0, "rad": math.degrees(1.0)}
@@ -25,6 +27,10 @@ VALVE_COMMAND = 0xFE30
 EXTEND, RETRACT = 1, 2
 WAIT_S = 0.2
 FIND_S = 10.0
+BUFFER_S = 60
+
+CLOCK_S = 5.0
+"""How often the offset of the other computer's clock is asked for."""
 
 
 class CanValues:
@@ -181,21 +187,15 @@ def read_lsl(
     DeviceError
         A stream is not there, is lost, or has no such channel.
     """
-    import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
-
-    channels = [_Channel(signal, segment, find_s), _Channel(angle, segment, find_s)]
+    channels = [_Channel(signal, segment, find_s), _Channel(angle, segment, find_s, DEGREES)]
     try:
-        degrees = channels[1].degrees()
+        for channel in channels:
+            channel.wait()
         end = math.inf if seconds is None else clock.monotonic() + seconds
         while clock.monotonic() < end:
-            for channel, what, factor in zip(
-                channels, (SIGNAL, ANGLE), (1.0, degrees), strict=True
-            ):
-                try:
-                    for time, value in channel.pull():
-                        yield Sample(time, what, value * factor)
-                except pylsl.util.LostError as error:
-                    raise DeviceError(f"the stream {channel.stream!r} is lost") from error
+            for channel, what in zip(channels, (SIGNAL, ANGLE), strict=True):
+                for time, value in channel.pull():
+                    yield Sample(time, what, value)
             clock.sleep(0.01)
     finally:
         for channel in channels:
@@ -203,51 +203,72 @@ def read_lsl(
 
 
 class _Channel:
-    """One channel of a stream."""
+    """One channel of a stream, with stamps on this computer's clock and values in one unit."""
 
-    def __init__(self, written: str, segment: str, find_s: float) -> None:
-        import pylsl  # noqa: PLC0415
+    def __init__(
+        self, written: str, segment: str, find_s: float, units: Mapping[str, float] | None = None
+    ) -> None:
+        self._stream, _, label = written.partition(":")
+        self._label, self._units, self._find_s = label or segment, units, find_s
+        self._index, self._factor = 0, 1.0
+        self._offset, self._asked = 0.0, -math.inf
+        self._samples = NewestSample({"name": self._stream}, self._accept, BUFFER_S)
 
-        self.stream, _, label = written.partition(":")
-        label = label or segment
-        found = pylsl.resolve_byprop("name", self.stream, 1, find_s)
-        if not found:
-            raise DeviceError(f"no LSL stream is called {self.stream!r}; start its program")
-        self._inlet = pylsl.StreamInlet(
-            found[0], recover=False, processing_flags=pylsl.proc_clocksync
-        )
-        info = self._inlet.info(find_s)
-        labels = [str(each) for each in info.get_channel_labels() or []]
-        if label not in labels:
-            self.close()
-            raise DeviceError(
-                f"the stream {self.stream!r} has no channel {label!r}, it has "
-                f"{', '.join(labels) or 'none with a label'}; write STREAM:CHANNEL"
-            )
-        self._index = labels.index(label)
-        units = [str(each) for each in info.get_channel_units() or []]
-        self._unit = units[self._index] if self._index < len(units) else ""
-        self._inlet.open_stream(find_s)
+    def wait(self) -> None:
+        """Wait until it is received.
 
-    def degrees(self) -> float:
-        """Return how many degrees one of the channel's unit is."""
-        if self._unit not in DEGREES:
-            raise DeviceError(
-                f"the angle of stream {self.stream!r} has unit {self._unit!r}; its description "
-                f"must say {', '.join(DEGREES)}"
-            )
-        return DEGREES[self._unit]
+        Raises
+        ------
+        DeviceError
+            It is not there, or of no use.
+        """
+        if not self._samples.wait(self._find_s):
+            why = self._samples.complaint or "start its program"
+            raise DeviceError(f"no LSL stream {self._stream!r} can be used: {why}")
 
     def pull(self) -> list[tuple[float, float]]:
-        """Return the samples that came: times in s, and values."""
-        samples, stamps = self._inlet.pull_chunk(timeout=0.0)
+        """Return the samples that came: times in s, and values.
+
+        Raises
+        ------
+        DeviceError
+            The stream is gone, so that its clock cannot be asked.
+        """
+        import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
+
+        if clock.monotonic() - self._asked > CLOCK_S:
+            try:
+                self._offset = self._samples.time_correction(self._find_s)
+            except (pylsl.util.LostError, pylsl.util.TimeoutError) as error:
+                raise DeviceError(f"the LSL stream {self._stream!r} is lost: {error}") from error
+            self._asked = clock.monotonic()
+        samples, stamps = self._samples.pull()
         return [
-            (stamp, float(sample[self._index]))
-            for stamp, sample in zip(stamps, samples or [], strict=True)
+            (stamp + self._offset, float(sample[self._index]) * self._factor)
+            for stamp, sample in zip(stamps, samples, strict=True)
         ]
 
     def close(self) -> None:
-        self._inlet.close_stream()
+        """Let go of the stream."""
+        self._samples.close()
+
+    def _accept(self, info: "pylsl.StreamInfo") -> str | None:
+        """Take which channel it is and its unit, or say why it is of no use."""
+        labels = [str(each) for each in info.get_channel_labels() or []]
+        if self._label not in labels:
+            return (
+                f"it has no channel {self._label!r}, it has "
+                f"{', '.join(labels) or 'none with a label'}; write STREAM:CHANNEL"
+            )
+        self._index = labels.index(self._label)
+        if self._units is None:
+            return None
+        units = [str(each) for each in info.get_channel_units() or []]
+        unit = units[self._index] if units else ""
+        if unit not in self._units:
+            return f"its angle has unit {unit!r}; its description must say {', '.join(self._units)}"
+        self._factor = self._units[unit]
+        return None
 
 
 def read_raw(path: Path) -> Iterator[Sample]:

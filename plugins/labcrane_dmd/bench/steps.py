@@ -100,7 +100,7 @@ def _joined(samples: Sequence[Sample]) -> tuple[FloatArray, FloatArray, FloatArr
     rows, signal = [], None
     for sample in samples:
         if sample.what == SIGNAL:
-            if not abs(sample.value) <= FULL:
+            if not abs(sample.value) < FULL + 0.5:  # it is rounded; NaN is refused, too
                 raise RecordingError(
                     f"the signal is {sample.value:g} at {sample.time:g} s, beyond -250 to 250, "
                     "which are full flow; see what full flow is in its source (--full)"

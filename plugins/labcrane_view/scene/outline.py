@@ -1,11 +1,12 @@
 """The outermost points of what is drawn: its box in a picture needs no others."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from labcrane import FloatArray
-from labcrane.machines import Body, PlacedObject
+from labcrane.machines import Body, Geom, PlacedObject
 from labcrane_view.scene.mesh import bevelled_box
 from labcrane_view.scene.mesh_reader import read_mesh
 from labcrane_view.scene.things import pieces
@@ -22,9 +23,9 @@ def of_body(body: Body) -> FloatArray:
     return outermost(bevelled_box(body.size, body.centre).points)
 
 
-def of_thing(thing: PlacedObject) -> FloatArray:
-    """Return those of what was placed, in the frame in which it moves, shape ``(n, 3)``."""
-    return outermost(np.vstack([mesh.points for mesh, _ in pieces(thing)]))
+def of_segment(thing: PlacedObject, parts: Sequence[Geom]) -> FloatArray:
+    """Return those of a thing's segment, in the frame in which it moves, shape ``(n, 3)``."""
+    return outermost(np.vstack([mesh.points for mesh, _ in pieces(thing, parts)]))
 
 
 def outermost(points: FloatArray) -> FloatArray:

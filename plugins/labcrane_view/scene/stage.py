@@ -9,7 +9,7 @@ from panda3d import core
 
 from labcrane import FloatArray, Run
 from labcrane.core import Shape, Sphere
-from labcrane.machines import Body, read_placed
+from labcrane.machines import Body, read_placed, segments, stands
 from labcrane_view.scene import shader
 from labcrane_view.scene.forest import forest
 from labcrane_view.scene.mesh import Mesh, bevelled_box, cone, sphere
@@ -87,15 +87,18 @@ class Stage:
         for node in self._things:
             node.remove_node()
         self._things, self._moving = [], []
+        said = {signal.name for signal in self._state.signals}
         for thing in read_placed(scene):
-            node = self.root.attach_new_node(thing.name)
-            node.set_pos(*thing.position)
-            node.set_h(math.degrees(thing.yaw))
-            for mesh, colour in pieces(thing):
-                self._add(node, thing.name, mesh, colour, 0.0)
-            self._things.append(node)
-            if f"scene.{thing.name}.position" in (signal.name for signal in self._state.signals):
-                self._moving.append((node, *self._places(f"scene.{thing.name}")))
+            for segment in segments(thing):
+                node = self.root.attach_new_node(segment.name)
+                where, yaw = stands(thing, segment.parts[0])
+                node.set_pos(*where)
+                node.set_h(math.degrees(yaw))
+                for mesh, colour in pieces(thing, segment.parts):
+                    self._add(node, segment.name, mesh, colour, 0.0)
+                self._things.append(node)
+                if f"scene.{segment.name}.position" in said:
+                    self._moving.append((node, *self._places(f"scene.{segment.name}")))
 
     def _places(self, name: str) -> tuple[slice, slice]:
         """Return where the state holds a position and an orientation."""

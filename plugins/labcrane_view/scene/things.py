@@ -1,12 +1,14 @@
 """Meshes of what stands around the machine: objects, obstacles, a human figure."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
-from labcrane.machines import Geom, PlacedObject, ShapeKind
-from labcrane_view.scene.mesh import Mesh, bevelled_box, cone, joined, sphere
+from labcrane import FloatArray
+from labcrane.machines import Geom, PlacedObject, ShapeKind, beside
+from labcrane_view.scene.mesh import Mesh, bevelled_box, cone, flat, joined, sphere
 from labcrane_view.scene.mesh_reader import painted, read_mesh
 
 Colour = tuple[float, float, float, float]
@@ -19,18 +21,17 @@ TROUSERS: Colour = (0.20, 0.23, 0.32, 1.0)
 CLOTHES = {"head": SKIN, "torso": JACKET, "pelvis": TROUSERS}
 
 
-def pieces(thing: PlacedObject) -> Iterator[tuple[Mesh, Colour]]:
-    """Yield a mesh for every part, in the frame in which the thing moves, with its colour.
+def pieces(thing: PlacedObject, parts: Sequence[Geom]) -> Iterator[tuple[Mesh, Colour]]:
+    """Yield a mesh for each of a segment's parts, in the frame in which it moves, with its colour.
 
-    That is the frame of the first part: its centre is what ``scene.NAME.position`` says.
+    That is the frame of its first part, whose centre is what ``scene.NAME.position`` says.
     """
-    first = thing.parts[0].centre
-    for part in thing.parts:
-        x, y, z = (at - origin for at, origin in zip(part.centre, first, strict=True))
+    for part in parts:
+        placed = beside(parts[0], part)
         colour = _colour(thing, part)
         if part.mesh is not None:
             colour = painted(part.mesh, colour)
-        yield _turned(_solid(part), part.yaw).moved((x, y, z)), colour
+        yield _turned(_solid(part), placed.yaw).moved(placed.centre), colour
 
 
 def _colour(thing: PlacedObject, part: Geom) -> Colour:
@@ -49,6 +50,8 @@ def _solid(part: Geom) -> Mesh:
     if part.mesh is not None:
         return read_mesh(part.mesh)
     x, y, z = part.size
+    if part.shape is ShapeKind.HULL:
+        return _hull(np.array(part.points))
     if part.shape is ShapeKind.BOX:
         return bevelled_box(part.size, (0.0, 0.0, 0.0))
     if part.shape is ShapeKind.SPHERE:
@@ -59,6 +62,18 @@ def _solid(part: Geom) -> Mesh:
     bar = cone((-half, 0.0, 0.0), (half, 0.0, 0.0), (y / 2, y / 2))
     ends = (_ball(y / 2).moved((sign * half, 0.0, 0.0)) for sign in (-1.0, 1.0))
     return joined(bar, *ends)
+
+
+def _hull(points: FloatArray) -> Mesh:
+    """Return the surface of the solid around points."""
+    found = ConvexHull(points)
+    corners = found.simplices.copy()
+    ways = np.cross(
+        points[corners[:, 1]] - points[corners[:, 0]], points[corners[:, 2]] - points[corners[:, 0]]
+    )
+    inward = (ways * found.equations[:, :3]).sum(axis=1) < 0.0
+    corners[inward] = corners[inward][:, ::-1]
+    return flat(points, corners.astype(np.uint32))
 
 
 def _ball(radius: float) -> Mesh:

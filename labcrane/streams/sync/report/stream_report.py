@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from labcrane.core.findings import Finding, Verdict, worst
-from labcrane.recording.foreign_streams import COUNTER_GAP, RESET, RecordedStream
+from labcrane.recording.foreign_streams import COUNTER_GAP, RESET, TAKEN, RecordedStream
 from labcrane.streams.sync.quality import Quality
 from labcrane.streams.sync.report.certificate import (
     CONGESTED_S,
@@ -33,6 +33,8 @@ class StreamReport:
         What no software can know of them.
     carries
         Which analyses its stamps carry.
+    taken
+        Which stream it is, where any of its type was meant.
     """
 
     name: str
@@ -47,6 +49,7 @@ class StreamReport:
     corrected: tuple[str, ...] = ()
     unknown: str = ""
     carries: str = ""
+    taken: str = ""
 
 
 def judge_stream(
@@ -74,6 +77,7 @@ def judge_stream(
         tuple(corrections(quality)),
         unknowable(quality),
         carries(quality),
+        _taken(recorded),
     )
 
 
@@ -284,6 +288,11 @@ def _noted(recorded: RecordedStream) -> list[Finding]:
     for text in {str(note.data["text"]) for note in recorded.notes if _is_warning(note.data)}:
         _add(found, Verdict.WARN, text.partition(": ")[0], text.partition(": ")[2] or "correct it")
     return found
+
+
+def _taken(recorded: RecordedStream) -> str:
+    told = (note.data["text"] for note in recorded.notes if note.data.get("event") == TAKEN)
+    return "; ".join(dict.fromkeys(map(str, told)))
 
 
 def _is_warning(data: Mapping[str, Any]) -> bool:

@@ -78,9 +78,9 @@ class SyncReport:
         return [f"{f.verdict} {whose}{f.text}; {f.advice}" for whose, f in found]
 
     def details(self) -> list[str]:
-        """Return what was done to each stream's stamps and what stays unknown, one line each."""
+        """Return how each stream was found, what was done to its stamps, what stays unknown."""
         return [
-            f"{one.name}: {'; '.join((*one.corrected, one.unknown))}"
+            f"{one.name}: {'; '.join(filter(None, (one.taken, *one.corrected, one.unknown)))}"
             for one in self.streams
             if one.samples
         ]

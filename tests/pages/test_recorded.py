@@ -1,0 +1,58 @@
+"""Pages of a session that was begun under older rules."""
+
+import http.client
+import random
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from faults.sessions import unique, wait_for
+from recording.test_outdated import faulty
+
+from labcrane import ProtocolError
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
+from labcrane.web.handle import PageHandle, free_port
+from labcrane.web.service import PageConfig
+
+HOST = "127.0.0.1"
+
+
+def answer(port: int, path: str, cookie: str = "") -> tuple[int, str, str]:
+    to = http.client.HTTPConnection(HOST, port, timeout=240)
+    try:
+        to.request("GET", path, headers={"Cookie": cookie} if cookie else {})
+        got = to.getresponse()
+        return got.status, got.getheader("set-cookie") or "", got.read().decode()
+    finally:
+        to.close()
+
+
+def test_pages_show_a_session_whose_protocol_would_be_refused_today(tmp_path: Path) -> None:
+    names = ["twice", "two_of_a_name", "no_writing", "stream_device", "no_bus"]
+    path = faulty(tmp_path, random.Random(3), names)
+    with pytest.raises(ProtocolError):
+        load(path, discover(study=path))
+    said: list[str] = []
+    port = free_port(HOST, 0)
+    order = PageConfig(path, "P001", "P001", 1, unique("old"), HOST, port, recorded=True)
+    pages = PageHandle(order, lambda _: None, said.append, dict)
+    found: list[tuple[int, str, str]] = []
+
+    def served() -> bool:
+        with suppress(ConnectionRefusedError):  # it loads for a second
+            link = pages.links()["supervisor"]
+            found.append(answer(port, link.partition(str(port))[2]))
+        return bool(found or said)
+
+    try:
+        wait_for(served)
+        assert not said
+        [(status, cookie, _)] = found
+        assert status == 303
+        status, _, shown = answer(port, "/supervisor", cookie.partition(";")[0])
+        assert status == 200
+        assert "P001" in shown
+    finally:
+        pages.close([])
+    assert pages.restarts == 0
