@@ -3,7 +3,7 @@
 from importlib.resources import files
 from pathlib import Path
 
-from labcrane.errors import ProtocolError
+from labcrane.errors import ProtocolError, nearest
 from labcrane.files.system import is_file
 from labcrane.files.yaml import YamlFile
 from labcrane.machines.machine import Machine
@@ -26,9 +26,9 @@ def find_machine(name: str, beside: Path | None = None) -> Path:
         )
     if name in machine_names():
         return Path(str(files("labcrane") / "machines" / "data" / f"{name}.yaml"))
+    there = nearest(name, machine_names(), "labcrane has")
     raise ProtocolError(
-        f"no machine is called {name!r}; labcrane has {', '.join(machine_names())}, "
-        "and a file beside the protocol may end in .yaml"
+        f"no machine is called {name!r}; {there}, and a file beside the protocol may end in .yaml"
     )
 
 
