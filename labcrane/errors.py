@@ -45,3 +45,11 @@ def suggestion(word: str, known: Iterable[str], otherwise: str = "there is") -> 
     if close := get_close_matches(word, possible, n=1):
         return f"did you mean {close[0]!r}?"
     return f"{otherwise} {', '.join(possible) or 'none'}"
+
+
+def nearest(word: str, known: Iterable[str], there: str) -> str:
+    """Return the known word that is closest, as a question where one is close, and all of them."""
+    names = list(known)
+    meant = suggestion(word, names, "")
+    listed = f"{there} {', '.join(names) or 'none'}"
+    return f"{meant} {listed}" if meant.startswith("did") else listed

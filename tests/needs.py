@@ -41,7 +41,12 @@ PACKAGES = {
 }
 """Programs, and the Debian packages that they are in."""
 
-R_PACKAGES = {"afex": "r-cran-afex", "hdf5r": "r-cran-hdf5r", "rhdf5": "r-bioc-rhdf5"}
+R_PACKAGES = {
+    "afex": "r-cran-afex",
+    "emmeans": "r-cran-emmeans",
+    "hdf5r": "r-cran-hdf5r",
+    "rhdf5": "r-bioc-rhdf5",
+}
 """Packages of R, and the Debian packages that they are in."""
 
 LIBRARIES = {"libX11.so.6": "libx11-6", "libGL.so.1": "libgl1", "libEGL.so.1": "libegl1"}

@@ -254,7 +254,7 @@ def test_the_exit_status_of_the_benchmark_of_sync_counts(
 
 def test_memory_is_that_of_the_command_itself_and_not_of_who_started_it() -> None:
     own_process = importlib.import_module("benchmarks.own_process")
-    ballast = bytearray(600_000_000)
+    ballast = bytearray(400_000_000)
     ballast[::4096] = b"x" * len(ballast[::4096])
     assert own_process.used("--version").megabytes < 300
     del ballast

@@ -166,7 +166,7 @@ def test_an_unknown_machine_is_refused_with_those_there_are() -> None:
     with pytest.raises(ProtocolError) as refusal:
         load_machine("ch9")
     assert str(refusal.value) == (
-        "no machine is called 'ch9'; labcrane has ch8, ch8_cranelike, "
+        "no machine is called 'ch9'; did you mean 'ch8'? labcrane has ch8, ch8_cranelike, "
         "and a file beside the protocol may end in .yaml"
     )
 

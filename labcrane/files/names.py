@@ -7,8 +7,9 @@ copied to any disk, relabelled and erased.
 import re
 import unicodedata
 from hashlib import sha256
+from pathlib import Path
 
-from labcrane.errors import ProtocolError
+from labcrane.errors import ProtocolError, suggestion
 
 LONGEST = 40
 """Most characters of a name; file names are made of several, and some disks take 143 in all."""
@@ -136,3 +137,17 @@ def file_name_of(text: str) -> str:
     if name and name == text and name.lower().split(".")[0] not in DEVICES:
         return name
     return f"{name or 'x'}-{sha256(text.encode('utf-8', 'surrogatepass')).hexdigest()[:HASHED]}"
+
+
+MOST_LISTED = 10
+"""Files of a folder that a message lists."""
+
+
+def absent(path: Path) -> str:
+    """Return that there is no such file, and which one beside it may be meant."""
+    beside = sorted(each.name for each in path.parent.glob("*")) if is_folder(path.parent) else []
+    meant = suggestion(path.name, beside, "")
+    if not meant.startswith("did"):
+        more = ", ..." if len(beside) > MOST_LISTED else ""
+        meant = f"{path.parent} has {', '.join(beside[:MOST_LISTED]) or 'none'}{more}"
+    return f"there is no such file; {meant}"

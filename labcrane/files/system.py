@@ -16,6 +16,24 @@ new files and folders take over: of a folder in the user's profile nobody else h
 """
 
 
+def is_file(path: Path) -> bool:
+    """Whether there is such a file: none has a name that no disk takes, or cannot be looked at.
+
+    Before Python 3.14, ``Path.is_file`` raises for those; ``os.path`` never did.
+    """
+    return os.path.isfile(path)  # noqa: PTH113
+
+
+def is_folder(path: Path) -> bool:
+    """Whether there is such a folder, as :func:`is_file`."""
+    return os.path.isdir(path)  # noqa: PTH112
+
+
+def is_there(path: Path) -> bool:
+    """Whether there is such a file or folder, as :func:`is_file`."""
+    return os.path.exists(path)  # noqa: PTH110
+
+
 def free_bytes(path: Path) -> int:
     """Return the bytes free to this user on the disk that holds ``path``."""
     return shutil.disk_usage(path).free

@@ -4,6 +4,7 @@ import gzip
 import zlib
 from pathlib import Path
 
+from labcrane.files.system import is_file
 from labcrane.limits import LIMITS, LimitError, check_size
 
 PACKED = b"\x1f\x8b"
@@ -21,7 +22,7 @@ def read_csv_text(path: Path) -> str:
         It is larger than a table may be, no UTF-8, or damaged where it is packed; says which.
     """
     most = LIMITS["CSV table"].most
-    if not path.is_file():
+    if not is_file(path):
         raise LimitError("it is no file")
     check_size(path.stat().st_size, "CSV table", "it")
     with path.open("rb") as file:

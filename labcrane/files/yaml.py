@@ -96,7 +96,7 @@ class YamlFile:
     def misnamed(self, place: Place, message: str, *, key: bool = False) -> None:
         """Note a mistake in the value at ``place``, or in its key, with line and column."""
         line, column = self._position(place, key=key)
-        self._problems.append((line, column, message))
+        self._problems += [(line, column, each) for each in message.splitlines()]
 
     def _position(self, place: Place, *, key: bool) -> tuple[int, int]:
         """Return line and column, from 1, of the value at ``place``; column 0 where none is known.

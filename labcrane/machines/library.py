@@ -3,7 +3,8 @@
 from importlib.resources import files
 from pathlib import Path
 
-from labcrane.errors import ProtocolError
+from labcrane.errors import ProtocolError, nearest
+from labcrane.files.system import is_file
 from labcrane.files.yaml import YamlFile
 from labcrane.machines.machine import Machine
 
@@ -18,16 +19,16 @@ def find_machine(name: str, beside: Path | None = None) -> Path:
     """Return the file of machine ``name``; ``beside`` is the folder of the study that asks."""
     if name.endswith((".yaml", ".yml")):
         path = (beside or Path()) / name
-        if path.is_file():
+        if is_file(path):
             return path
         raise ProtocolError(
             f"machine file {str(path)!r} does not exist; a path counts from the protocol's folder"
         )
     if name in machine_names():
         return Path(str(files("labcrane") / "machines" / "data" / f"{name}.yaml"))
+    there = nearest(name, machine_names(), "labcrane has")
     raise ProtocolError(
-        f"no machine is called {name!r}; labcrane has {', '.join(machine_names())}, "
-        "and a file beside the protocol may end in .yaml"
+        f"no machine is called {name!r}; {there}, and a file beside the protocol may end in .yaml"
     )
 
 

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, PositiveFloat, ValidationInfo
 
 from labcrane.files.model import StrictModel, was_run
+from labcrane.files.system import is_file
 from labcrane.machines.meshes import FORMATS
 
 Triple = tuple[float, float, float]
@@ -18,7 +19,7 @@ def _beside(path: Path, info: ValidationInfo) -> Path:
     file = info.context["folder"] / path if info.context else path
     if file.suffix.lower() not in FORMATS:
         raise ValueError(f"{str(path)!r} is no mesh; {', '.join(FORMATS)} can be shown")
-    if not file.is_file():
+    if not is_file(file):
         raise ValueError(f"there is no mesh {str(file)!r}; a path counts from the file naming it")
     # What is read with needs NumPy, which a protocol without meshes does without.
     from labcrane.machines.meshes.reader import read_surfaces  # noqa: PLC0415

@@ -117,8 +117,13 @@ class ComponentResolver:
         for number, session in enumerate(protocol.sessions):
             for at, step in enumerate(session.steps):
                 place: Place = ("sessions", number, "steps", at)
-                for name in (*step.questionnaires, *(step.block.ask if step.block else ())):
-                    yield place, name
+                written = self._at(place)
+                kind = next(iter(written)) if isinstance(written, dict) else step.kind
+                several = isinstance(self._at((*place, kind)), list)
+                for index, name in enumerate(step.questionnaires):
+                    yield (*place, kind, index) if several else (*place, kind), name
+                for index, name in enumerate(step.block.ask if step.block else ()):
+                    yield (*place, kind, "ask", index), name
         for number, rule in enumerate(protocol.stop_rules):
             yield ("stop_rules", number, "questionnaire"), rule.questionnaire
 
@@ -129,7 +134,7 @@ class ComponentResolver:
         try:
             offer = self._registry.find(role, use.use)
         except PluginError as error:
-            self._source.problem(named, str(error))
+            self._source.misnamed(named, str(error))
             return None
         settings = self._source.check(offer.settings, place, use.settings)
         if settings is None:
@@ -175,7 +180,7 @@ class ComponentResolver:
             machine = load_machine(name, folder, recorded=self._source.recorded)
             return machine, find_machine(name, folder).read_text(encoding="utf-8")
         except ProtocolError as error:
-            self._source.problem(("machine",), str(error))
+            self._source.misnamed(("machine",), str(error))
             return None
 
     def build(

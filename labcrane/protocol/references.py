@@ -10,7 +10,9 @@ from typing import Any
 from labcrane.core.references import EVENTS, Covers, Mark, Mentioned, Once, Reference, mentioned
 from labcrane.core.roles import Component, Task
 from labcrane.core.settings import Settings
-from labcrane.errors import LabcraneError, suggestion
+from labcrane.errors import LabcraneError, nearest
+from labcrane.files.names import absent
+from labcrane.files.system import is_there
 from labcrane.files.yaml import Place, YamlFile
 from labcrane.machines.machine import Machine
 from labcrane.protocol.components import ComponentSpec
@@ -91,12 +93,8 @@ class ReferenceChecker:
         self._source.misnamed(at, message, key=mention.key)
 
     def _is_there(self, at: Place, path: Path) -> None:
-        if path.exists():
-            return
-        beside = sorted(each.name for each in path.parent.glob("*")) if path.parent.is_dir() else []
-        near = suggestion(path.name, beside, f"{path.parent} has")
-        message = f"{_dotted(at)} is {path.name!r}, and there is no such file; {near}"
-        self._source.misnamed(at, message)
+        if not is_there(path):
+            self._source.misnamed(at, f"{_dotted(at)} is {path.name!r}, and {absent(path)}")
 
     def _needed(self, place: Place, settings: Settings) -> Iterator[tuple[str, Sequence[str]]]:
         try:
@@ -198,14 +196,8 @@ def _columns(component: Component) -> Iterator[str]:
 
 def _has(kind: str, name: str, known: frozenset[str]) -> str:
     """Return what there is, and the nearest name."""
-    names = sorted(known)
-    near = suggestion(name, names, "")
-    there = f"{OWNERS.get(kind, 'it')} has {', '.join(names) or 'none'}"
-    return (
-        f"there is no such {kind}; {near} {there}"
-        if near.startswith("did")
-        else (f"there is no such {kind}; {there}")
-    )
+    there = nearest(name, sorted(known), f"{OWNERS.get(kind, 'it')} has")
+    return f"there is no such {kind}; {there}"
 
 
 def _dotted(place: Place) -> str:

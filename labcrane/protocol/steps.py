@@ -15,6 +15,7 @@ from labcrane.core.settings import Settings
 from labcrane.errors import ProtocolError, suggestion
 from labcrane.files.complaints import shown
 from labcrane.files.model import AtMost
+from labcrane.files.names import absent
 from labcrane.files.units import Unit
 from labcrane.files.yaml import Place, YamlFile, read_text
 from labcrane.protocol.design import Criterion
@@ -178,5 +179,7 @@ def _instructions(source: YamlFile, place: Place, value: Any) -> dict[str, Any] 
     try:
         return {"kind": "instructions", "file": value, "text": read_text(path)}
     except ProtocolError as error:
-        source.problem(place, f"instructions: {error}")
+        missing = isinstance(error.__context__, FileNotFoundError)
+        told = f" is {value!r}, and {absent(path)}" if missing else f": {error}"
+        source.misnamed((*place, "instructions"), f"instructions{told}")
         return None

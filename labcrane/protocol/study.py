@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeGuard
 
 from labcrane.core.roles import Controller, Dynamics, InputDevice, Questionnaire, Task
-from labcrane.errors import ProtocolError
+from labcrane.errors import ProtocolError, nearest
 from labcrane.files.complaints import written
 from labcrane.files.names import check_name
 from labcrane.files.yaml import Place, YamlFile
@@ -192,9 +192,9 @@ class Checker:
         """Note blocks that name no task, or limit what the task does not vary."""
         for place, block in self._blocks():
             if block.task not in self._protocol.tasks:
-                known = ", ".join(self._protocol.tasks)
-                message = f"there is no task {block.task!r}; there is {known}"
-                self._source.problem((*place, "task"), message)
+                there = nearest(block.task, self._protocol.tasks, "there is")
+                message = f"there is no task {block.task!r}; {there}"
+                self._source.misnamed((*place, "task"), message)
             elif task := tasks.get(block.task):
                 self._limits(place, block.limits, task)
                 self._count(place, block, task)
@@ -217,13 +217,14 @@ class Checker:
         factors = task.factors()
         for factor, count in limits.items():
             if factor not in factors:
-                message = f"{factor!r} is nothing the task varies; it varies {', '.join(factors)}"
+                there = nearest(factor, factors, "it varies")
+                message = f"{factor!r} is nothing the task varies; {there}"
             elif not (self._is_count(count) and 1 <= count <= len(factors[factor])):
                 most = len(factors[factor])
                 message = f"{factor} is {written(count)}; it must be a whole number, 1 to {most}"
             else:
                 continue
-            self._source.problem((*place, factor), message)
+            self._source.misnamed((*place, factor), message, key=factor not in factors)
 
     def _is_count(self, count: object) -> TypeGuard[int]:
         """Whether a number is whole; ``true``, which Python takes for 1, is so in old records."""
@@ -234,8 +235,10 @@ class Checker:
         known = {factor for task in tasks.values() for factor in task.factors()}
         for factor in self._protocol.design.order:
             if factor not in known:
-                message = f"no task varies {factor!r}; they vary {', '.join(sorted(known))}"
-                self._source.problem(("design", "order", factor), message)
+                message = (
+                    f"no task varies {factor!r}; {nearest(factor, sorted(known), 'they vary')}"
+                )
+                self._source.misnamed(("design", "order", factor), message, key=True)
 
     def _check_stop_rules(self, asked: Mapping[str, Questionnaire]) -> None:
         """Note stop rules on scores that a questionnaire does not have."""
@@ -243,10 +246,10 @@ class Checker:
             questionnaire = asked.get(rule.questionnaire)
             scores = [score.name for score in questionnaire.scores] if questionnaire else []
             if questionnaire and rule.score not in scores:
-                self._source.problem(
+                self._source.misnamed(
                     ("stop_rules", number, "score"),
                     f"{rule.questionnaire} has no score {rule.score!r}; "
-                    f"it has {', '.join(scores) or 'none'}",
+                    f"{nearest(rule.score, scores, 'it has')}",
                 )
 
     def _check_feedback(self) -> None:
@@ -264,10 +267,10 @@ class Checker:
                 self._feedback_exists((*place, "feedback"), block.feedback)
 
     def _feedback_exists(self, place: Place, names: Sequence[str]) -> None:
-        for name in names:
+        for at, name in enumerate(names):
             if name not in self._protocol.feedback:
-                known = ", ".join(self._protocol.feedback) or "none"
-                self._source.problem(place, f"there is no feedback {name!r}; there is {known}")
+                there = nearest(name, self._protocol.feedback, "there is")
+                self._source.misnamed((*place, at), f"there is no feedback {name!r}; {there}")
 
 
 def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:

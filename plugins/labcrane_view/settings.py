@@ -71,7 +71,10 @@ def _named(value: Any) -> Any:
     if not isinstance(value, str):
         return value
     if value not in CAMERAS:
-        raise ValueError(f"there is no camera {value!r}; there is {', '.join(CAMERAS)}")
+        from difflib import get_close_matches  # noqa: PLC0415 - only a mistake needs it
+
+        meant = "".join(f"did you mean {each!r}? " for each in get_close_matches(value, CAMERAS, 1))
+        raise ValueError(f"there is no camera {value!r}; {meant}there is {', '.join(CAMERAS)}")
     return CAMERAS[value]
 
 

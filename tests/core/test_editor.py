@@ -89,9 +89,9 @@ BY_SCHEMA = {
     "an unknown choice": ("end: rest_inside", "end: rest_outside", "rest_outside", "not accepted"),
     "an unknown rule of order": ("pairs: shuffled", "pairs: shufled", "shufled", "not accepted"),
     "what happens at a fault": ("input_lost: pause", "input_lost: wait", "wait", "not accepted"),
-    "no list where one belongs": ("none: []", "none: 5", "5", 'Expected "array"'),
-    "an unknown step": ("- block: {task", "- blok: {task", "blok", "blok is not allowed"),
-    "no pair of circles": ("feedback: group}", "feedback: group, pairs: 0}", "0}", "minimum"),
+    "no list where one belongs": ("none: []", "none: 5", "none: 5", 'Expected "array"'),
+    "an unknown step": ("- block: {task", "- blok: {task", "blok", 'must be "consent"'),
+    "no pair of circles": ("feedback: group}", "feedback: group, pairs: 0}", "pairs: 0", "minimum"),
     "a name of the study that is none": ("study: aiming", "study: Aiming!", "Aiming!", "pattern"),
 }  # fmt: skip
 """What a schema can say: what is right, what is wrong, what is marked, and what is said of it."""
@@ -120,7 +120,7 @@ def test_the_yaml_language_server_marks_what_a_schema_can_say_in_its_line_and_no
             assert line in {each["line"] for each in told(path, capsys)}, wrong
         # Whatever it marks in a protocol drawn at random, a check refuses in the same line.
         seen = 0
-        for number, each in enumerate(drawn(registry, 40, seed=3)):
+        for number, each in enumerate(drawn(registry, 20, seed=3)):
             path = folder / f"drawn{number}.yaml"
             path.write_bytes(MODELINE.encode() + each.text)
             marks, found = editor.open(path), told(path, capsys)
@@ -130,7 +130,7 @@ def test_the_yaml_language_server_marks_what_a_schema_can_say_in_its_line_and_no
             if marks and each.fault != "removed":
                 lines = {one["line"] for one in refused}
                 assert lines & {mark.line for mark in marks}, (str(each), marks, refused)
-        assert seen > 20
+        assert seen > 10
 
 
 @pytest.mark.long
@@ -197,7 +197,7 @@ def test_mistakes_in_another_file_are_marked_where_the_protocol_names_it(
     path, machine = tmp_path / "protocol.yaml", tmp_path / "digger.yaml"
     shutil.copy(PROTOCOLS / "aiming" / "instructions.md", tmp_path)
     path.write_text(AIMING.replace("machine: ch8", "machine: digger.yaml"), encoding="utf-8")
-    machine.write_text("titel: Digger\njoints: []\n")
+    machine.write_text("titel: Digger\njoints: 5\n")
     with Editor(own_server, tmp_path) as editor:
         marks = editor.open(path)
         assert {mark.line for mark in marks} == {place(AIMING, "machine:")[0]}

@@ -74,18 +74,18 @@ def test_the_protocol_of_these_tests_is_fine(complaint) -> None:
         ("rate_hz: 240", "rat_hz: 240", "5: 'rat_hz' is not a key of the file; did you mean 'rate_hz'?"),
         ("rate_hz: 240", "rate_hz: -5", "5: rate_hz is -5; it must be greater than 0"),
         ("rate_hz: 240", "rate_hz: fast", "5: rate_hz is 'fast'; it must be a number in Hz, or one with its unit, as 1 kHz"),
-        ("machine: ch8", "machine: ch9", "6: no machine is called 'ch9'; labcrane has ch8, ch8_cranelike, and a file beside the protocol may end in .yaml"),
-        ("use: dual_joystick", "use: dual_joistick", "7: input 'dual_joistick' is not installed; did you mean 'dual_joystick'? (labcrane plugins lists all)"),
+        ("machine: ch8", "machine: ch9", "6:10: no machine is called 'ch9'; did you mean 'ch8'? labcrane has ch8, ch8_cranelike, and a file beside the protocol may end in .yaml"),
+        ("use: dual_joystick", "use: dual_joistick", "7:14: input 'dual_joistick' is not installed; did you mean 'dual_joystick'? (labcrane plugins lists all)"),
         ("use: kinematic_crane", "use: kinematic_crane, actuatr: ideal", "11: 'actuatr' is not a key of dynamics; did you mean 'actuator'?"),
         ("distances: [2, 3]", "distances: [2, -3]", "13: tasks.aiming.distances[2] is -3; it must be greater than 0"),
         ("distances: [2, 3]", "distances: 2 m", "13: tasks.aiming.distances is '2 m'; it must be a list: [.., ..]"),
         ("pairs: shuffled", "pairs: randomly", "15: design.order: pairs is 'randomly'; it can be as_written, blocked, latin_square, shuffled, williams"),
-        ("pairs: shuffled", "paris: shuffled", "15: no task varies 'paris'; they vary pairs"),
-        ("hello.md", "goodbye.md", None),
+        ("pairs: shuffled", "paris: shuffled", "15:11: no task varies 'paris'; did you mean 'pairs'? they vary pairs"),
+        ("hello.md", "hallo.md", "19:23: instructions is 'hallo.md', and there is no such file; did you mean 'hello.md'?"),
         ("- break:", "- brake:", "22: 'brake' is not a step; did you mean 'break'?"),
-        ("task: aiming, pairs: 2", "task: aimin, pairs: 2", "20: there is no task 'aimin'; there is aiming"),
-        ("task: aiming, pairs: 2", "task: aiming, pairs: 9", "20: pairs is 9; it must be a whole number, 1 to 4"),
-        ("task: aiming, pairs: 2", "task: aiming, circles: 2", "20: 'circles' is nothing the task varies; it varies pairs"),
+        ("task: aiming, pairs: 2", "task: aimin, pairs: 2", "20:26: there is no task 'aimin'; did you mean 'aiming'? there is aiming"),
+        ("task: aiming, pairs: 2", "task: aiming, pairs: 9", "20:41: pairs is 9; it must be a whole number, 1 to 4"),
+        ("task: aiming, pairs: 2", "task: aiming, circles: 2", "20:34: 'circles' is nothing the task varies; it varies pairs"),
         ("study: aiming", "study: Aiming Study", None),
         ("labcrane: 1", "labcrane: 2", "1: labcrane is 2; it must be 1"),
     ],
@@ -119,7 +119,7 @@ def test_a_target_out_of_reach_is_told_before_anything_runs(complaint) -> None:
 def test_a_mistake_in_the_machines_file_names_that_file(complaint, tmp_path: Path) -> None:
     (tmp_path / "mine.yaml").write_text("title: mine\n", encoding="utf-8")
     told = complaint(("machine: ch8", "machine: mine.yaml"))
-    assert told[0].startswith("6: ")
+    assert told[0].startswith("6:10: ")
     assert "mine.yaml:1: the file needs 'source'" in "\n".join(told)
 
 

@@ -209,6 +209,25 @@ def test_a_rehearsal_finds_what_a_check_cannot(
     assert not (tmp_path / "study.lock.json").exists()
 
 
+def test_what_is_approved_or_amended_was_rehearsed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cue = tmp_path / "plugins" / "broken.py"
+    cue.parent.mkdir()
+    cue.write_text(BROKEN.replace("return [1 / 0]", "return []"))
+    (tmp_path / "consent.md").write_text("You may stop at any time.\n")
+    study = a_study(tmp_path, ("sessions:", "feedback: {ball: {use: broken}}\nsessions:"))
+    path, lock = str(study.path), tmp_path / "study.lock.json"
+    granted = ["--board", "B", "--reference", "R", "--valid-until", "2099-01-01"]
+    assert main(["approve", path, *granted, "--consent", str(tmp_path / "consent.md")]) == 0
+    locked = lock.read_text()
+    cue.write_text(BROKEN)
+    capsys.readouterr()
+    assert main(["amend", path, "--why", "another cue", "--reference", "R2"]) == 2
+    assert "rehearsal, session 'only': cue 'ball'" in " ".join(capsys.readouterr().err.split())
+    assert lock.read_text() == locked
+
+
 def test_a_trial_that_runs_out_of_time_is_asked_about(tmp_path: Path) -> None:
     done = rehearse(a_study(tmp_path, ("movements: 2", "movements: 2, limit_s: 1.5")))
     (question,) = done.questions

@@ -7,7 +7,9 @@ import random
 import re
 import shutil
 import time
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -172,6 +174,40 @@ def test_a_protocol_with_anything_in_any_place_is_checked_without_a_traceback(
 @pytest.mark.soak
 def test_many_protocols_with_anything_in_any_place(tmp_path: Path) -> None:
     fuzz_protocols(tmp_path / "protocols", discover(), 20_000, seed=156)
+
+
+NOWHERE = ("{}" + "a" * 300, "b/" * 3000 + "{}", "{}/under a file", "c\0{}")
+"""Names of files that no disk takes, or that lead through what is no folder."""
+
+
+@pytest.mark.parametrize("form", NOWHERE, ids=["long", "deep", "through", "NUL"])
+def test_a_file_that_no_disk_can_have_is_told_of_wherever_one_is_named(
+    tmp_path: Path, form: str
+) -> None:
+    folder = shutil.copytree(PROTOCOLS / "retrieval", tmp_path / "retrieval")
+    path, registry = folder / "protocol.yaml", discover()
+    whole = read_yaml(path)
+    named = [
+        place
+        for place in places_in(whole)
+        if isinstance(text := at(whole, place), str) and text and (folder / text).is_file()
+    ]
+    assert len(named) >= 3
+    for *way, last in named:
+        data = copy.deepcopy(whole)
+        holder = at(data, way)
+        ending = Path(holder[last]).suffix
+        holder[last] = form.format(holder[last]) + ending
+        path.write_text(json.dumps(data))
+        with pytest.raises(ProtocolError, match=r"protocol\.yaml"):
+            load(path, registry)
+
+
+def at(data: object, place: Iterable[str | int]) -> Any:
+    """Return what is in a place."""
+    for step in place:
+        data = data[step]
+    return data
 
 
 TOKENS = st.sampled_from(

@@ -154,13 +154,21 @@ def find(launcher: psutil.Process, folder: Path) -> dict[str, psutil.Process]:
     return found
 
 
-def kill(lab: Lab, data: Path, victims: tuple[str, ...], chance: random.Random) -> set[str]:
-    """Run a session and kill ``victims`` in its middle; return which of them there were."""
+def kill(
+    lab: Lab, data: Path, victims: tuple[str, ...], chance: random.Random, command: str = "run"
+) -> set[str]:
+    """Run a session, or go on, and kill ``victims`` in its middle; return which there were."""
     page = "--page" if "page" in victims else "--no-page"
-    run = lab.start("run", data, page)
     journal = data / "P001-SIMULATED" / "ses-01_run.xdf"
-    wait_for(lambda: run.poll() is not None or journal.exists())
-    assert run.poll() is None, run.communicate()
+    before = len(parts(journal))
+    run = lab.start(command, data, page)
+    wait_for(lambda: run.poll() is not None or len(parts(journal)) > before)
+    if command == "run":
+        assert run.poll() is None, run.communicate()
+    if run.poll() is not None:  # there was nothing to go on with
+        said = run.communicate()[0]
+        assert "so there is nothing to go on with" in " ".join(said.split()), said
+        return set()
     launcher = psutil.Process(run.pid)
     everybody = [launcher, *launcher.children(recursive=True)]
     time.sleep(chance.uniform(0.0, 3.0))
@@ -263,6 +271,27 @@ def test_a_session_whose_processes_were_killed_comes_to_its_planned_end(
     lab: Lab, tmp_path: Path, number: int, victims: tuple[str, ...]
 ) -> None:
     assert kill_and_go_on(lab, tmp_path, victims, number) == set(victims)
+
+
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize(
+    "seed",
+    [pytest.param(0, marks=pytest.mark.long)]
+    + [pytest.param(seed, marks=pytest.mark.soak) for seed in range(1, 60)],
+)
+def test_a_session_that_is_killed_again_and_again_comes_to_its_planned_end(
+    lab: Lab, tmp_path: Path, seed: int
+) -> None:
+    """Whoever dies, and in whichever order, while it is run and while it is gone on with."""
+    chance, began = random.Random(3000 + seed), time.perf_counter()
+    killed = kill(lab, tmp_path, tuple(chance.sample(VICTIMS, 2)), chance)
+    for _ in range(3):
+        victims = tuple(chance.sample(VICTIMS, chance.choice([1, 2, 3])))
+        killed |= kill(lab, tmp_path, victims, chance, "resume")
+    assert killed
+    go_on(lab, tmp_path)
+    lost = check(lab, tmp_path, began, time.perf_counter())
+    assert max(lost, default=0.0) <= CHUNK / RATE_HZ
 
 
 @pytest.mark.soak

@@ -175,7 +175,7 @@ def test_a_lost_stream_pauses_the_session_until_it_is_back(session) -> None:
     assert ("stream.lost", "gaze") not in names  # it is not required
 
 
-def test_a_killed_recorder_costs_nothing_and_both_at_once_at_most_a_second(session) -> None:
+def test_a_killed_recorder_costs_nothing_and_both_at_once_one_gap(session) -> None:
     path, _ = session
     assert len(list(path.parent.glob("ses-01_streams*.xdf"))) == RECORDERS + RECORDER_KILLS + 2
     stream = open_recording(path).session(1).streams["Amplifier"]
@@ -183,10 +183,8 @@ def test_a_killed_recorder_costs_nothing_and_both_at_once_at_most_a_second(sessi
     restarted = counter >= 100_000
     assert (np.diff(counter) > 0).all()  # each sample once, in order
     # The sender never stopped: what is missing in its count is the gap of both recorders.
-    gaps = np.flatnonzero(np.diff(counter[restarted]) > 1)
-    assert len(gaps) <= 1
-    if len(gaps):
-        assert np.diff(stream.time_raw[restarted])[gaps].max() <= 1.0
+    # How long it may be is tried where nothing else runs: tests/faults/test_kills.py.
+    assert np.count_nonzero(np.diff(counter[restarted]) > 1) <= 1
 
 
 def test_the_gaps_and_what_to_do_are_in_the_sync_report(session) -> None:

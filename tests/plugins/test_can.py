@@ -250,9 +250,9 @@ def test_a_flooded_bus_holds_the_machine_and_says_so() -> None:
     with can.Bus(interface="virtual", channel="flood") as bus:
         device.open(run)
         try:
-            end = time.perf_counter() + 4.0
+            end = time.perf_counter() + 240.0
             while time.perf_counter() < end and "flooded" not in (device.fault or ""):
-                for _ in range(10):
+                for _ in range(100):  # however seldom this process has its turn
                     bus.send(message(*encode(1, 100, 0x25)))
                 time.sleep(0.002)
                 now = time.perf_counter()

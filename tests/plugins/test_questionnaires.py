@@ -184,7 +184,7 @@ def refusal(folder: Path, steps: str, more: str = "") -> str:
 def test_an_unknown_questionnaire_gets_its_line_and_a_suggestion(tmp_path: Path) -> None:
     said = refusal(tmp_path, "      - questionnaire: nasa_tlxx\n")
     assert (
-        "study.yaml:16: questionnaire 'nasa_tlxx' is not installed; did you mean 'nasa_tlx'?"
+        "study.yaml:16:24: questionnaire 'nasa_tlxx' is not installed; did you mean 'nasa_tlx'?"
         in said
     )
 

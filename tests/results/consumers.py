@@ -7,6 +7,7 @@ from pathlib import Path
 from needs import needs
 
 needs_r = needs("Rscript", "afex", "hdf5r", "rhdf5")
+needs_emmeans = needs("Rscript", "afex", "emmeans")
 needs_octave = needs("octave-cli")
 
 

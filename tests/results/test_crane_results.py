@@ -12,9 +12,10 @@ import pytest
 
 from labcrane.analysis.cohort import find_cohort
 from labcrane.analysis.quality import is_result
+from labcrane.analysis.report import report
 from labcrane.analysis.report.factors import with_factors
 from labcrane.cli.app import main
-from results.consumers import needs_r, r, table
+from results.consumers import needs_emmeans, needs_r, r, table
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(1800)]
 
@@ -35,7 +36,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / name).write_text((STUDY / name).read_text())
     data, out = str(folder / "data"), str(folder / "report")
     assert main(["simulate", str(folder), "--participants", str(PEOPLE), "--out", data]) == 0
-    assert main(["report", data, "--include", "simulated", "--out", out]) == 0
+    with pytest.MonkeyPatch.context() as patch:
+        # The pages of single people, with five sixths of all figures, are tested elsewhere.
+        patch.setattr(report, "_participant_page", lambda *_: None)
+        assert main(["report", data, "--include", "simulated", "--out", out]) == 0
     return folder
 
 
@@ -135,6 +139,35 @@ def test_the_numbers_are_those_of_afex_on_the_recordings(
         df = [row["epsilon"] * row["df1"], row["epsilon"] * row["df2"]]
         ours = [row["f"], *df, row["p_gg"], row["eta2p"]]
         np.testing.assert_allclose(ours, np.array(values, float), rtol=1e-6, err_msg=key)
+
+
+EMMEANS = """
+suppressMessages({library(afex); library(emmeans)})
+d <- read.csv(commandArgs(TRUE)[1])
+d$distance <- factor(d$distance)
+say <- function(key, ...) cat(key, sprintf("%.17g", c(...)), sep = "|", fill = 10000)
+for (dv in c("circle_to_circle", "movement_time", "absolute_error")) {
+  fit <- suppressMessages(suppressWarnings(
+    aov_ez("participant", dv, d, within = "distance", fun_aggregate = mean)))
+  means <- emmeans(fit, "distance", model = "multivariate")
+  s <- summary(contrast(means, "pairwise", adjust = "holm"))
+  say(dv, s$estimate, s$SE, s$df, s$t.ratio, s$p.value)
+}
+"""
+
+
+@needs_emmeans
+def test_the_contrasts_of_distances_are_those_of_emmeans(
+    folder: Path, movements: pd.DataFrame
+) -> None:
+    theirs = table(r(EMMEANS, folder / "for_r.csv"))
+    contrasts = told(folder, "contrasts")
+    assert set(theirs) == set(OUTCOMES)
+    for measure, values in theirs.items():
+        own = contrasts[(contrasts["measure"] == measure) & (contrasts["factor"] == "distance")]
+        assert len(own) == DISTANCES * (DISTANCES - 1) / 2
+        ours = own[["difference", "se", "df", "t", "p_holm"]].to_numpy(float).T.ravel()
+        np.testing.assert_allclose(ours, np.array(values, float), rtol=1e-6, err_msg=measure)
 
 
 def planned(folder: Path, movements: pd.DataFrame) -> pd.Series:

@@ -13,7 +13,7 @@ from labcrane.analysis.report.factors import factors_of, with_factors
 from labcrane.analysis.report.outcomes import anova_table
 from labcrane.analysis.report.report import write_report
 from labcrane.cli.app import main
-from results.consumers import needs_r, r, table
+from results.consumers import needs_emmeans, needs_r, r, table
 
 pytestmark = [pytest.mark.long, pytest.mark.timeout(900)]
 
@@ -197,6 +197,41 @@ def test_contrasts_are_those_of_linear_models_of_each_difference(
         row = found[key]
         ours = [row.difference, row.se, row.t, row.p]
         np.testing.assert_allclose(ours, np.array(values, float), rtol=1e-6, err_msg=key)
+
+
+EMMEANS = """
+suppressMessages({library(afex); library(emmeans)})
+d <- read.csv(commandArgs(TRUE)[1])
+d$distance <- factor(d$distance)
+say <- function(key, ...) cat(key, sprintf("%.17g", c(...)), sep = "|", fill = 10000)
+for (dv in c("movement_time", "absolute_error")) {
+  fit <- suppressMessages(suppressWarnings(aov_ez("participant", dv, d,
+    within = c("phase", "distance"), between = "group", fun_aggregate = mean)))
+  for (factor in c("distance", "phase", "group")) {
+    if (factor != "distance") fit <- suppressMessages(suppressWarnings(aov_ez("participant", dv, d,
+      within = "phase", between = "group", fun_aggregate = mean)))
+    means <- suppressMessages(emmeans(fit, factor, model = "multivariate"))
+    s <- summary(contrast(means, "pairwise", adjust = "holm"))
+    say(paste(dv, factor), s$estimate, s$SE, s$df, s$t.ratio, s$p.value)
+  }
+}
+"""
+
+
+@needs_emmeans
+def test_contrasts_of_unequal_groups_and_two_sessions_are_those_of_emmeans(
+    report: Path, movements: pd.DataFrame
+) -> None:
+    theirs = table(r(EMMEANS, report / "for_r.csv"))
+    own = told(report, "contrasts").fillna({"at": ""})
+    own = own[own["at"] == ""]
+    words = {"phase": "session"}
+    assert len(theirs) == 6
+    for key, values in theirs.items():
+        measure, factor = key.split(" ")
+        here = own[(own["measure"] == measure) & (own["factor"] == words.get(factor, factor))]
+        found = here[["difference", "se", "df", "t", "p_holm"]].to_numpy(float).T.ravel()
+        np.testing.assert_allclose(found, np.array(values, float), rtol=1e-6, err_msg=key)
 
 
 def test_time_outs_are_counted_beside_the_mean_of_what_succeeded(report: Path) -> None:

@@ -165,10 +165,10 @@ def test_a_replay_is_shown_on_the_streams_at_a_speed(path: Path) -> None:
     got: list[float] = []
 
     def watch() -> None:
-        (info,) = pylsl.resolve_byprop("name", "labcrane.state", 1, 20.0)
+        (info,) = pylsl.resolve_byprop("name", "labcrane.state", 1, 240.0)
         inlet = pylsl.StreamInlet(info)
         while len(got) < 3:
-            sample, _ = inlet.pull_sample(timeout=20.0)
+            sample, _ = inlet.pull_sample(timeout=240.0)
             if sample is None:
                 return
             got.append(sample[0])

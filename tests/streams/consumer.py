@@ -14,15 +14,15 @@ wanted = [
 ]
 inlets = {}
 for source, _ in wanted:
-    found = pylsl.resolve_byprop("source_id", source, 1, 20.0)
+    found = pylsl.resolve_byprop("source_id", source, 1, 240.0)
     inlets[source] = pylsl.StreamInlet(found[0])
-    inlets[source].open_stream(10.0)
+    inlets[source].open_stream(240.0)
 sys.stdout.write("ready\n")
 sys.stdout.flush()
 result = {}
 deadline = time.monotonic() + 240.0
 for source, count in wanted:
-    info = inlets[source].info(10.0)
+    info = inlets[source].info(240.0)
     samples, stamps = [], []
     while len(stamps) < count and time.monotonic() < deadline:
         values, times = inlets[source].pull_chunk(0.2)

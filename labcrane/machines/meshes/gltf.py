@@ -10,6 +10,7 @@ from urllib.parse import unquote
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
+from labcrane.files.system import is_file
 from labcrane.limits import check_size
 from labcrane.machines.meshes.surface import (
     MeshError,
@@ -261,17 +262,10 @@ class _File:
         if not name.isprintable() or any(mark in name for mark in (":", "\\")):
             raise MeshError(f"names {uri[:60]!r}; its numbers must be in files beside it")
         file, inside = (self._folder / name).resolve(), self._folder.resolve()
-        if not file.is_relative_to(inside) or not _is_file(file):
+        if not file.is_relative_to(inside) or not is_file(file):
             raise MeshError(f"names {uri[:60]!r}, which is no file beside it or below")
         check_size(file.stat().st_size, "mesh", f"{name[:60]!r}")
         return file.read_bytes()
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except OSError:  # a name that is too long
-        return False
 
 
 def _at(items: Sequence[_Item], number: int, kind: str) -> _Item:
