@@ -10,6 +10,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from labcrane.errors import ProtocolError, suggestion
+from labcrane.files.system import is_folder
 
 LONGEST = 40
 """Most characters of a name; file names are made of several, and some disks take 143 in all."""

@@ -105,7 +105,7 @@ class Figure(StrictModel):
     """Mass of the whole, in kilograms."""
 
     friction: NonNegativeFloat = 0.5
-    """Coefficient of friction."""
+    """Coefficient of friction, a share of the force that presses."""
 
     slip_n: PositiveFloat = 600.0
     """Force, in newtons, at which it slips out of the jaws."""

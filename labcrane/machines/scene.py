@@ -77,7 +77,7 @@ class SceneObject(StrictModel):
     """Its mass, in kilograms."""
 
     friction: NonNegativeFloat = 0.6
-    """Coefficient of friction."""
+    """Coefficient of friction, a share of the force that presses."""
 
     limit_n: PositiveFloat | None = None
     """Contact force, in newtons, beyond which touching it is a mistake; none by default."""

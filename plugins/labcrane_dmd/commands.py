@@ -8,7 +8,8 @@ from pydantic import ValidationError
 from rich.console import Console
 from rich.table import Table
 
-from labcrane import DeviceError, ProtocolError
+from labcrane import DeviceError, PluginError, ProtocolError
+from labcrane.registry import LAB, not_installed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -287,6 +288,9 @@ def record(
             f"{folder / f'{segment}.csv'} is there already, and recordings are not written over; "
             "give another folder"
         )
+    of_can = not lsl and (log is None or log.suffix != ".csv")
+    if of_can and (missing := not_installed({"can": LAB, "cantools": LAB})):
+        raise PluginError(f"what is on a CAN bus {missing}")
     raw = folder / "raw" / f"{segment}.csv"
     samples: Iterator[Sample]
     if lsl:

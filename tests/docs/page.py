@@ -261,7 +261,7 @@ class Reader:
     def _check(self, text: str) -> None:
         """Check a protocol, or a part of one put into the page's study."""
         yaml = YAML()
-        part = yaml.load(text)
+        part = yaml.load(text) or {}  # of comments alone
         if "labcrane" not in part:
             part = {**yaml.load(BASE), **part}
         path = self._folder / "page.yaml"

@@ -2,6 +2,7 @@
 
 import csv
 import math
+import sys
 import threading
 import time
 from dataclasses import replace
@@ -345,3 +346,14 @@ def test_lsl_streams_become_a_recording(tmp_path: Path, capsys: pytest.CaptureFi
     assert len(pd.read_csv(folder / "raw" / "boom.csv")) == 2 * len(rows)
     angle = table.groupby("run").angle_deg.last().to_numpy()
     assert angle.max() == pytest.approx(max(a for _, u, a in rows if u), abs=1e-4)
+
+
+def test_without_the_reader_of_dbc_files_a_bus_is_refused_before_anything_is_recorded(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "cantools", None)
+    words = ["--segment", "boom", "--signal", "1", "--angle", "a.b", "--bus", "nothing:there"]
+    assert main(["dmd", "record", str(tmp_path / "kept"), *words]) == 1
+    said = " ".join(capsys.readouterr().err.split())
+    assert "what is on a CAN bus needs cantools, which is not installed: pip install" in said
+    assert not (tmp_path / "kept").exists()
