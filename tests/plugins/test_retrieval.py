@@ -182,7 +182,8 @@ def test_the_casualty_is_carried_three_metres_onto_the_stretcher_within_its_forc
     rows = session.trials[session.trials["scenario"] == "casualty"]
     assert len(rows) == 2  # the reference and the test
     for _, row in rows.iterrows():
-        own = state[(loop["trial"] == row["trial"]).to_numpy()]
+        # In the tick that ends a trial the next scene is set up already.
+        own = state[(loop["trial"] == row["trial"]).to_numpy()].iloc[:-1]
         where = {
             part: own[[f"scene.figure{part}.position.{axis}" for axis in "xy"]].to_numpy()
             for part in ("", ".pelvis")
