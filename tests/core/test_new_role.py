@@ -132,9 +132,8 @@ def test_mistakes_are_named_with_their_line(
     ):
         with pytest.raises(LabcraneError) as refused:
             load(study(tmp_path, row, use), registry)
-        assert f"protocol.yaml:{len(STUDY.read_text(encoding='utf-8').splitlines()) + 1}: " in str(
-            refused.value
-        )
+        line = len(STUDY.read_text(encoding="utf-8").splitlines()) + 1
+        assert f"protocol.yaml:{line}:" in str(refused.value)
         assert words in str(refused.value)
 
 

@@ -45,7 +45,7 @@ def test_the_picture_is_that_of_the_contract() -> None:
 
 def test_there_are_five_ways_and_ten_places() -> None:
     assert len(WAYS) == 5
-    rows = PAGE.split("## Where would I put")[1].strip().splitlines()[4:]
+    rows = PAGE.split("## Where would I put")[1].split("\n## ")[0].strip().splitlines()[4:]
     assert len(rows) == 10, rows
 
 
