@@ -92,6 +92,7 @@ class Sequencer:
         self._wishes: set[Order] = set()  # to start, skip or repeat what runs now
         self._warm_up = WarmUp()
         self.over = False
+        self._frame: Frame | None = None
         self._script = self._session()
         next(self._script, None)  # a session that owes nothing ends at its first tick
 
@@ -116,6 +117,7 @@ class Sequencer:
         """Complete ``frame``: trial, phase, the task's values, and everything that happened."""
         frame.paused = bool(self._held.by)
         frame.events = self._stamped(frame)
+        self._frame = frame
         try:
             self._script.send(frame)
         except StopIteration:
@@ -202,6 +204,7 @@ class Sequencer:
     def _trial(self, block: PlannedBlock, trial: Trial) -> Ticks:
         task = self._study.tasks[block.task]
         attempt = TrialRun(task, block, trial, self._rate_hz)
+        self._keep_what_was()
         for component in (*self._rig.components, task):
             component.begin_trial(trial)
         if trial.planned.start_pose is not None:
@@ -217,6 +220,13 @@ class Sequencer:
             self._warm_up.count(block, attempt.phase)
         if attempt.phase is Phase.REPEATED:
             yield from self._trial(block, next_attempt(self._study, self._plan, trial))
+
+    def _keep_what_was(self) -> None:
+        """Part the frame of this tick, not yet written, from arrays that a new trial sets anew."""
+        frame = self._frame
+        if frame is not None:
+            frame.axes, frame.command = frame.axes.copy(), frame.command.copy()
+            frame.state, frame.task = frame.state.copy(), frame.task.copy()
 
     def _ask(self, name: str, answered: Mapping[str, Value], after: Trial | None = None) -> Ticks:
         if self._held.ending:

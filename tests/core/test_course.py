@@ -8,7 +8,7 @@ import pytest
 from rehearsal import SHORT, a_study, rehearse
 
 from labcrane import InputDevice
-from labcrane.core.records import Phase
+from labcrane.core.records import Frame, Phase
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.session.commands import Command, FeedbackLost, FeedbackReady, Order
@@ -54,6 +54,30 @@ def test_elapsed_counts_the_ticks_of_a_trial(study: Study) -> None:
     for number in (1, 2, 3):
         elapsed = [frame.elapsed for frame in seen.frames if frame.trial == number]
         np.testing.assert_allclose(elapsed, np.arange(len(elapsed)) / 240.0, rtol=0, atol=1e-12)
+
+
+def test_the_last_frame_of_a_trial_is_not_that_of_the_next_ones_start(
+    study: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pose = (0.5, 0.3, -0.4, 0.2)
+    task = study.tasks["aiming"]
+    plan = task.plan
+    monkeypatch.setattr(
+        task, "plan", lambda *about: [replace(each, start_pose=pose) for each in plan(*about)]
+    )
+    seen = rehearse(study, {number: give(Order.SKIP) for number in (240, 480)})
+    ends = [at for at, frame in enumerate(seen.frames) if "trial.end" in names_of(frame)]
+    assert ends[:2] == [240, 480]
+    for at in ends[:2]:
+        assert "trial.start" in names_of(seen.frames[at + 1])
+        moved = np.abs(seen.frames[at].state[:4] - seen.frames[at - 1].state[:4])
+        assert moved.max() < 0.02, "a tick's way, and no jump"
+        assert (seen.frames[at].state[:4] != pose).any()
+        np.testing.assert_allclose(seen.frames[at + 1].state[:4], pose, rtol=0, atol=0.02)
+
+
+def names_of(frame: Frame) -> list[str]:
+    return [event.name for event in frame.events]
 
 
 def test_a_pause_holds_the_machine_and_the_trials_clock(study: Study) -> None:
