@@ -7,7 +7,7 @@ from .kinematics import Arm, jacobian, link_frames
 from .library import load_machine
 from .links import link_boxes
 from .machine import Body, Joint
-from .mesh import MeshFile
+from .meshes.mesh_file import MeshFile
 from .meshes.reader import read_surfaces
 from .meshes.surface import MeshError, Surface
 from .scene import Geom, PlacedObject, Scene, ShapeKind, load_scene, place_objects

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from labcrane.files.model import StrictModel
-from labcrane.machines.mesh import MeshFile
+from labcrane.machines.meshes.mesh_file import MeshFile
 
 Point = tuple[float, float, float]
 Extent = tuple[float, float]

@@ -11,7 +11,7 @@ from functools import cached_property
 from pydantic import Field, PositiveFloat, model_validator
 
 from labcrane.files.model import StrictModel
-from labcrane.machines.mesh import Looks, MeshFile
+from labcrane.machines.meshes.mesh_file import Looks, MeshFile
 
 FEWEST_JOINTS = 3
 

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PrivateAttr, model_validator
 
 from labcrane.errors import ProtocolError
 from labcrane.files.model import StrictModel
 from labcrane.files.yaml import YamlFile
 from labcrane.machines.human_figure import REGIONS, Figure, Geom, ShapeKind, figure_parts
-from labcrane.machines.mesh import Looks
+from labcrane.machines.meshes.mesh_file import Looks
 from labcrane.machines.scene_part import Part, PartFile, load_part, lowest
 
 Point = tuple[float, float, float]
@@ -90,6 +90,24 @@ class SceneObject(StrictModel):
 
     mesh: Looks | None = None
     """What it looks like instead of its shape, in a frame at its centre; its touch is the same."""
+
+    _part: Part | None = PrivateAttr(default=None)
+
+    @property
+    def part(self) -> Part | None:
+        """The part that is used, once :meth:`read_part` has read it."""
+        return self._part
+
+    def read_part(self) -> None:
+        """Read the file of the part that is used: once, as things are placed while a session runs.
+
+        Raises
+        ------
+        ProtocolError
+            It cannot be read, or is no part.
+        """
+        if self.use is not None:
+            self._part = load_part(self.use)
 
     @model_validator(mode="after")
     def _is_one_or_the_other(self) -> "SceneObject":
@@ -219,11 +237,10 @@ def load_scene(path: Path) -> Scene:
 
 
 def _check_parts(scene: Scene, source: YamlFile) -> None:
-    """Note library parts that cannot be read."""
+    """Read the library parts, and note those that cannot be."""
     for name, thing in scene.things.items():
         try:
-            if thing.use is not None:
-                load_part(thing.use)
+            thing.read_part()
         except ProtocolError as error:
             source.problem(("things", name, "use"), f"{name!r} cannot be used: {error}")
 
@@ -283,7 +300,7 @@ def place_objects(scene: Scene, seed: int) -> tuple[PlacedObject, ...]:
 def _placed(name: str, thing: SceneObject, random: np.random.Generator) -> PlacedObject:
     x, y, z = thing.position
     scatter = thing.scatter
-    said = thing if thing.use is None else load_part(thing.use)
+    said = thing.part or thing
     return PlacedObject(
         name=name,
         kind="obstacle" if said.fixed else "object",
@@ -305,8 +322,8 @@ def _limits(name: str, said: SceneObject | Part) -> dict[str, float]:
 
 
 def _parts(name: str, thing: SceneObject) -> tuple[Geom, ...]:
-    if thing.use is not None:
-        return load_part(thing.use).geoms()
+    if thing.part is not None:
+        return thing.part.geoms()
     if thing.shape is None or thing.size is None:
-        raise AssertionError("a thing without a part has shape and size, or was refused")
+        raise AssertionError("a thing has shape and size or a part that was read, or was refused")
     return (Geom(name, ShapeKind(thing.shape), thing.size, (0.0, 0.0, 0.0), 0.0, thing.mesh),)

@@ -1,5 +1,6 @@
 """Library parts: things of several shapes, each in a file of its own that scenes use."""
 
+import math
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -15,7 +16,7 @@ from pydantic import (
 from labcrane.files.model import StrictModel
 from labcrane.files.yaml import YamlFile
 from labcrane.machines.human_figure import Geom, Point, ShapeKind
-from labcrane.machines.mesh import Looks
+from labcrane.machines.meshes.mesh_file import Looks
 
 FEWEST = 4
 """Points that a solid has at least."""
@@ -98,7 +99,7 @@ class Part(StrictModel):
                 ShapeKind(each.shape),
                 each.size if each.shape != "hull" else _extent(each.points),
                 each.centre,
-                _rad(each.yaw_deg),
+                math.radians(each.yaw_deg),
                 each.mesh,
                 each.points,
             )
@@ -136,7 +137,3 @@ def lowest(part: Geom) -> float:
 def _extent(points: tuple[Point, ...]) -> Point:
     x, y, z = (max(along) - min(along) for along in zip(*points, strict=True))
     return x, y, z
-
-
-def _rad(degrees: float) -> float:
-    return degrees * 0.017453292519943295

@@ -17,6 +17,24 @@ OPEN_WITHIN = 0.1
 """How near the jaws' opening must come to what a goal asks, as a share of their range."""
 
 
+def check_goals(name: str, scene: Scene, state: Layout) -> None:
+    """Refuse a scene of whose goals the machine's state does not say where they are.
+
+    Raises
+    ------
+    ProtocolError
+        Of the first such goal.
+    """
+    said = _of_things(state, "position")
+    known = {"tip", "figure", *scene.things, *said}
+    for goal in scene.goals:
+        if goal.what not in known:
+            raise ProtocolError(
+                f"scene {name!r}: a goal is about {goal.what!r}, and the machine's state does not "
+                f"say where it is; it says of {', '.join(said) or 'nothing'}"
+            )
+
+
 class Way:
     """Follows which goal is next."""
 
@@ -33,12 +51,6 @@ class Way:
         self._hold_rate = run.rate_hz
         self._held = 0
         self.reached = 0
-        for goal in scene.goals:
-            if goal.what not in {"tip", *self._placed, *self._positions}:
-                raise ProtocolError(
-                    f"a goal is about {goal.what!r}, and the machine's state does not say where it "
-                    f"is; it says of {', '.join(self._positions) or 'nothing'}"
-                )
 
     @property
     def done(self) -> bool:

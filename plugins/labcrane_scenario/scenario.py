@@ -9,7 +9,7 @@ import numpy as np
 from labcrane import FloatArray, Frame, Machine, ProtocolError, Run, Signal, Task, Trial
 from labcrane.core import Event, Phase, PlannedTrial, TrialStatus, Value
 from labcrane.machines import SCENE_PLACED, Scene, load_scene, place_objects, write_placed
-from labcrane_scenario.goals import Way
+from labcrane_scenario.goals import Way, check_goals
 from labcrane_scenario.mistakes import KINDS
 from labcrane_scenario.observation import Observation
 from labcrane_scenario.settings import ScenarioSettings
@@ -66,6 +66,8 @@ class Scenario(Task):
 
     def open(self, run: Run) -> None:
         self._run = run
+        for name, scene in self._scenes.items():
+            check_goals(name, scene, run.state)
         self._button = (
             run.axes.index(self._settings.find_axis) if self._settings.find_axis else None
         )

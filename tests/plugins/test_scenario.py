@@ -1,6 +1,7 @@
 """Scenes judged: what is counted, what is found, what ends a run."""
 
 import math
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -128,6 +129,29 @@ def test_the_same_seed_places_everything_the_same_and_another_one_does_not() -> 
     assert found == {"left_forearm", "left_shank", "right_shank"}
     yaws = [place_objects(scene, seed)[-1].yaw for seed in range(50)]
     assert math.radians(162) <= min(yaws) < max(yaws) <= math.radians(170)
+
+
+def test_things_are_placed_while_a_session_runs_without_a_file_being_read(tmp_path: Path) -> None:
+    shutil.copytree(RETRIEVAL / "scenes", tmp_path / "scenes")
+    scenes = {path: load_scene(path) for path in (tmp_path / "scenes").glob("*.yaml")}
+    before = {path: place_objects(scene, 1) for path, scene in scenes.items()}
+    shutil.rmtree(tmp_path / "scenes")
+    assert {path: place_objects(scene, 1) for path, scene in scenes.items()} == before
+    assert len(before) == 6
+
+
+def test_a_goal_of_which_the_state_says_nothing_is_refused_before_the_session(
+    tmp_path: Path,
+) -> None:
+    text = (RETRIEVAL / "scenes" / "casualty.yaml").read_text(encoding="utf-8")
+    goal = "  - {what: figure.pelvis, position: [1.1, 0.4, 0.3], radius: 0.3}\n"
+    shutil.copytree(RETRIEVAL / "scenes" / "parts", tmp_path / "parts")
+    (tmp_path / "lying.yaml").write_text(text.replace("goals:\n", f"goals:\n{goal}"), "utf-8")
+    task = Scenario(ScenarioSettings(scenes=(tmp_path / "lying.yaml",)), ch8())
+    run = make_run(ch8(), state=crane_state(ch8()).signals, task=task.signals)
+    said = r"scene 'lying': a goal is about 'figure.pelvis', and the machine's state does not say"
+    with pytest.raises(ProtocolError, match=said):
+        task.open(run)
 
 
 @pytest.mark.parametrize(
