@@ -4,7 +4,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping
-from importlib.metadata import EntryPoint, entry_points, version
+from importlib.metadata import EntryPoint, version
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ from labcrane.errors import ProtocolError
 from labcrane.files.atomic import sha256
 from labcrane.files.yaml import YamlFile, parse_yaml
 from labcrane.protocol.study import Study
+from labcrane.registry.entry_points import entry_points_of
 from labcrane.registry.hookspecs import PROJECT
 from labcrane.registry.registry import Registry
 
@@ -184,7 +185,7 @@ def _plugins(study: Study, registry: Registry, protocol: Mapping[str, Any]) -> d
     said = set(_strings({key: value for key, value in protocol.items() if key not in WORDS_ONLY}))
     for offers in registry.plugins.values():
         used |= {plugin for name, plugin in offers.items() if name in said}
-    points = {point.name: point for point in entry_points(group=PROJECT)}
+    points = {point.name: point for point in entry_points_of(PROJECT)}
     found = {name: _plugin(points[name]) for name in sorted(used - registry.local.keys())}
     # Every file in the study's own folder runs when the study is read, whatever it offers.
     own = {

@@ -6,9 +6,10 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
-from importlib.metadata import PackageNotFoundError, entry_points, version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from labcrane.registry.entry_points import entry_points_of
 from labcrane.registry.hookspecs import PROJECT
 from labcrane.streams.network import VARIABLE
 
@@ -29,7 +30,7 @@ def versions() -> Sequence[str]:
     others = sorted(
         {
             f"{point.dist.name} {point.dist.version}"
-            for point in entry_points(group=PROJECT)
+            for point in entry_points_of(PROJECT)
             if point.dist is not None and point.dist.name != PROJECT
         }
     )

@@ -4,7 +4,7 @@ import hashlib
 import platform
 from dataclasses import asdict
 from datetime import UTC, datetime
-from importlib.metadata import entry_points, version
+from importlib.metadata import version
 from importlib.util import find_spec
 from typing import Any
 
@@ -17,6 +17,7 @@ from labcrane.protocol.referenced_files import named_files
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.recording.trial_columns import trial_units
+from labcrane.registry.entry_points import entry_points_of
 from labcrane.registry.hookspecs import PROJECT
 from labcrane.registry.loader import own_plugins
 from labcrane.session.visit import Visit
@@ -124,5 +125,5 @@ def _versions() -> dict[str, str]:
         "python": platform.python_version(),
         "system": platform.platform(),
         **{name: version(name) for name in RECORDED_PACKAGES if find_spec(name)},
-        **{each.dist.name: each.dist.version for each in entry_points(group=PROJECT) if each.dist},
+        **{each.dist.name: each.dist.version for each in entry_points_of(PROJECT) if each.dist},
     }
