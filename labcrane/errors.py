@@ -10,7 +10,7 @@ LabcraneError
 A late tick is not an error: it is data, and is recorded with the frame.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 
 class LabcraneError(Exception):
@@ -39,17 +39,19 @@ class RecordingError(LabcraneError):
 
 def suggestion(word: str, known: Iterable[str], otherwise: str = "there is") -> str:
     """Return the known word that is closest, as a question; all of them when none is close."""
-    from difflib import get_close_matches  # noqa: PLC0415 - only a mistake needs it
-
     possible = list(known)
-    if close := get_close_matches(word, possible, n=1):
-        return f"did you mean {close[0]!r}?"
-    return f"{otherwise} {', '.join(possible) or 'none'}"
+    return meant(word, possible) or f"{otherwise} {', '.join(possible) or 'none'}"
 
 
 def nearest(word: str, known: Iterable[str], there: str) -> str:
     """Return the known word that is closest, as a question where one is close, and all of them."""
     names = list(known)
-    meant = suggestion(word, names, "")
-    listed = f"{there} {', '.join(names) or 'none'}"
-    return f"{meant} {listed}" if meant.startswith("did") else listed
+    return f"{meant(word, names)} {there} {', '.join(names) or 'none'}".lstrip()
+
+
+def meant(word: str, known: Sequence[str]) -> str:
+    """Return the known word that is closest, as a question; nothing when none is close."""
+    from difflib import get_close_matches  # noqa: PLC0415 - only a mistake needs it
+
+    close = get_close_matches(word, known, n=1)
+    return f"did you mean {close[0]!r}?" if close else ""

@@ -9,7 +9,7 @@ import unicodedata
 from hashlib import sha256
 from pathlib import Path
 
-from labcrane.errors import ProtocolError, suggestion
+from labcrane.errors import ProtocolError, meant
 from labcrane.files.system import is_folder
 
 LONGEST = 40
@@ -147,8 +147,6 @@ MOST_LISTED = 10
 def absent(path: Path) -> str:
     """Return that there is no such file, and which one beside it may be meant."""
     beside = sorted(each.name for each in path.parent.glob("*")) if is_folder(path.parent) else []
-    meant = suggestion(path.name, beside, "")
-    if not meant.startswith("did"):
-        more = ", ..." if len(beside) > MOST_LISTED else ""
-        meant = f"{path.parent} has {', '.join(beside[:MOST_LISTED]) or 'none'}{more}"
-    return f"there is no such file; {meant}"
+    more = ", ..." if len(beside) > MOST_LISTED else ""
+    there = f"{path.parent} has {', '.join(beside[:MOST_LISTED]) or 'none'}{more}"
+    return f"there is no such file; {meant(path.name, beside) or there}"
