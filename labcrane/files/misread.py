@@ -8,8 +8,14 @@ from collections.abc import Iterator
 from typing import Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import ScalarNode
+
+GARBLED = (
+    YAMLError, ValueError, LookupError, TypeError, ArithmeticError, AttributeError, AssertionError
+)  # fmt: skip
+"""What ruamel.yaml raises of a text that is no YAML, or of values that are not what they look like:
+it does not say what, and these were seen."""
 
 _WIDE = re.compile(r"[ \t]*[\u00a0\u2000-\u200b\u202f\u3000]")
 _NO_SPACE = re.compile(r"\s*(?:- +)?([A-Za-z_][\w-]*):([^\s/].*)?$")
@@ -131,9 +137,9 @@ def _first_unlike(text: str) -> tuple[int, str] | None:
         for node in _values(yaml.compose(text)):
             try:
                 yaml.constructor.construct_object(node, deep=True)
-            except Exception:  # noqa: BLE001 - ruamel.yaml does not say what it raises
+            except GARBLED:
                 return node.start_mark.line + 1, _unlike(node)
-    except Exception:  # noqa: BLE001 - as above; whatever it was is told without its line
+    except GARBLED:  # told without its line
         return None
     return None
 

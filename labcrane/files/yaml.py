@@ -12,13 +12,13 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
-from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning, YAMLError
+from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning
 from ruamel.yaml.reader import ReaderError
 
 from labcrane.errors import ProtocolError
 from labcrane.files.complaints import Place as Place  # noqa: PLC0414 - public here
 from labcrane.files.complaints import named, shown, told
-from labcrane.files.misread import misread, unreadable
+from labcrane.files.misread import GARBLED, misread, unreadable
 from labcrane.limits import LIMITS, LimitError, check_size, foreign
 
 DEEPEST = LIMITS["YAML file"].depth
@@ -30,8 +30,6 @@ MOST_VALUES = 50_000
 
 MOST_BITS = 1000
 """Of a whole number: Python writes down no more than 4,300 digits."""
-
-GARBLED = (ValueError, LookupError, TypeError, ArithmeticError, AttributeError, AssertionError)
 
 _MARKS = re.compile(r"[,:\[\]{}\n-]")
 _BRACKETS = re.compile(r"[\[\]{}]")
@@ -312,7 +310,7 @@ def _load(text: str, name: str, *, recorded: bool = False) -> Any:
         ) from None
     # Impossible dates, numbers of too many digits, tags on what they do not fit, and whatever else
     # ruamel.yaml stumbles over: it does not say what it raises.
-    except (YAMLError, *GARBLED) as error:
+    except GARBLED as error:
         raise ProtocolError(f"{name}{unreadable(text, error)}") from error
 
 
