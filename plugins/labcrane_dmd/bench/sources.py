@@ -4,7 +4,6 @@ import csv
 import math
 import time as clock
 from collections.abc import Iterator, Mapping
-from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -147,7 +146,7 @@ def read_bus(name: str, bitrate: int, values: CanValues, seconds: float | None) 
         bus = can.Bus(interface=interface, channel=channel, bitrate=bitrate)
     except (OSError, ValueError, ImportError, can.CanError) as error:
         raise DeviceError(f"the bus {name!r} cannot be opened: {error}") from error
-    with closing(_Shut(bus)):
+    with bus:
         end = math.inf if seconds is None else clock.monotonic() + seconds
         while clock.monotonic() < end:
             try:
@@ -156,13 +155,6 @@ def read_bus(name: str, bitrate: int, values: CanValues, seconds: float | None) 
                 raise DeviceError(f"the bus {name!r} is lost: {error}") from error
             if frame is not None:
                 yield from values.read(frame)
-
-
-class _Shut:
-    """A bus that :func:`contextlib.closing` can close."""
-
-    def __init__(self, bus: "can.BusABC") -> None:
-        self.close = bus.shutdown
 
 
 def read_lsl(
