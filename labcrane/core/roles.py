@@ -129,6 +129,10 @@ class Task(Component):
     condition_units: Mapping[str, str] = {}
     """Units of the numbers in its trials' conditions; ``"1"`` for counts and ratios."""
 
+    reports: tuple[str, ...] = ()
+    """What people may say by a button of either page that they have seen, while a trial of it runs:
+    ``("deformity",)``. It comes as the event ``order.report``, with it as ``text``."""
+
     @abstractmethod
     def factors(self) -> Mapping[str, Sequence[str]]:
         """Return what the design may order: the levels of each factor, as written."""
