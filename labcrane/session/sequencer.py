@@ -98,6 +98,11 @@ class Sequencer:
         next(self._script, None)  # a session that owes nothing ends at its first tick
 
     @property
+    def step(self) -> int:
+        """Number of the plan's step that runs; 0 before the first."""
+        return self._step
+
+    @property
     def moving(self) -> bool:
         """Whether the operator's command reaches the machine in this tick."""
         return self._attempt is not None and not self._held.by
