@@ -11,6 +11,8 @@ QUICK = (
     "rate changes at once",
     "stamps of the receiver's clock",
     "stalls and bursts",
+    "chunks stamped when sent, under load",
+    "the same, and samples lost",
 )
 
 

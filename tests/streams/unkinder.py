@@ -15,6 +15,7 @@ from streams.unkind import (
 )
 
 from labcrane.streams.sync.correction import Treatment
+from labcrane.streams.sync.dejitter import Dejitter
 from labcrane.streams.sync.raw import RawStream
 from labcrane.streams.sync.report.certificate import Fault
 
@@ -43,6 +44,35 @@ def one_by_one(random):
         random, Clock(random), times, rate, stamped=stamped, sent=stamped,
         treatment=Treatment(rate, latency_s=mean),
         faults=frozenset({Fault.LATE_STAMPS}), clean=False,
+    )  # fmt: skip
+
+
+def chunks_under_load(random, *, drops=False):
+    """Chunks stamped when sent, by a program that waits for its turn for seconds at a time.
+
+    The waits pass and nothing is lost, or something is.
+    """
+    rate, size = 250.0, int(random.integers(10, 60))
+    times = regular(random, rate, 50.0, 250.0)
+    kept = np.ones(len(times), dtype=bool)
+    if drops:
+        for at in random.integers(size, len(times) - size, int(random.integers(5, 30))):
+            kept[at : at + int(random.integers(1, 10))] = False
+    times = times[kept][: int(kept.sum()) // size * size]
+    last = times.reshape(-1, size)[:, -1]
+    least, usual = random.uniform(0.004, 0.010), random.uniform(1e-3, 5e-3)
+    delay = random.exponential(usual, len(last))
+    for _ in range(int(random.integers(1, 5))):
+        begin = random.uniform(last[0] - 5.0, last[-1])
+        busy = (last > begin) & (last < begin + random.uniform(3.0, 20.0))
+        delay[busy] += random.exponential(random.uniform(0.01, 0.08), int(busy.sum()))
+    sent = np.maximum.accumulate(last + least + delay)
+    stamped = (sent[:, None] + (np.arange(size) - (size - 1)) / rate).ravel()
+    faults = {Fault.LATE_STAMPS, Fault.LOST} if drops else {Fault.LATE_STAMPS}
+    return received(
+        random, Clock(random), times, rate, stamped=stamped, sent=np.repeat(sent, size),
+        treatment=Treatment(rate, dejitter=Dejitter.ENVELOPE, transport_s=least),
+        faults=frozenset(faults), clean=False,
     )  # fmt: skip
 
 
@@ -243,6 +273,8 @@ EITHER = frozenset({Fault.STEPPED, Fault.SLEWED})
 
 MORE: dict[str, Callable] = {
     "samples of bursts stamped one by one": one_by_one,
+    "chunks stamped when sent, under load": chunks_under_load,
+    "the same, and samples lost": partial(chunks_under_load, drops=True),
     "two or three faults at once": together,
     "wireless that comes and goes": bad_wireless,
     "our own clock slewed, logged": lambda r: own_slewed(r, logged=True),
