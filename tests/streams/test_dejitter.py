@@ -101,7 +101,7 @@ def test_chunks_that_a_busy_computer_holds_up_have_lost_nothing_and_lost_ones_ar
     assert lost_between(index, rest + 0.004 * lost, 0.004)[0] is True
     found = lost_before(rest + 0.004 * lost, 0.004)
     assert abs(found[-1] - 36.0) <= 1.0  # the first ones may go while all chunks are held up
-    assert np.mean(np.abs(found - lost) <= 1.0) > 0.9
+    assert np.mean(np.abs(found - lost) <= 1.0) > 0.8
 
 
 def test_lines_that_swallowed_lost_samples_are_said_to_be_off(random):
