@@ -157,21 +157,24 @@ def beside_trials(measures: "pd.DataFrame", participant: Participant) -> "pd.Dat
     """
     answers, scores = answers_of(participant), scores_of(participant)
     given: dict[tuple[int, int], dict[str, Any]] = {}
-    for row in answers[answers["trial"].notna()].itertuples(index=False):
-        name = f"{row.questionnaire}.{row.item}"
-        value = row.text or row.value
-        given.setdefault((int(row.session), int(row.trial)), {})[name] = value
-    asked = {f"{row.questionnaire}.{row.item}" for row in answers.itertuples(index=False)}
-    for row in scores[scores["trial"].notna()].itertuples(index=False):
-        name = score_column(str(row.questionnaire), str(row.score), asked)
-        given.setdefault((int(row.session), int(row.trial)), {})[name] = row.value
+    for row in answers[answers["trial"].notna()].to_dict("records"):
+        name = f"{row['questionnaire']}.{row['item']}"
+        value = row["text"] or row["value"]
+        given.setdefault((int(row["session"]), int(row["trial"])), {})[name] = value
+    asked = {f"{row['questionnaire']}.{row['item']}" for row in answers.to_dict("records")}
+    for row in scores[scores["trial"].notna()].to_dict("records"):
+        name = score_column(row["questionnaire"], row["score"], asked)
+        given.setdefault((int(row["session"]), int(row["trial"])), {})[name] = row["value"]
     columns = list(dict.fromkeys(name for row in given.values() for name in row))
     last = ~measures.duplicated(["session", "trial"], keep="last")
     rows = [
         given.get((int(session), int(trial)), {}) if newest else {}
         for session, trial, newest in zip(measures["session"], measures["trial"], last, strict=True)
     ]
-    return measures.assign(**{name: [row.get(name) for row in rows] for name in columns})
+    beside = measures.copy()
+    for name in columns:
+        beside[name] = [row.get(name) for row in rows]
+    return beside
 
 
 def score_column(questionnaire: str, score: str, asked: Collection[str]) -> str:
