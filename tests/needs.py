@@ -34,6 +34,7 @@ PACKAGES = {
     "jackd": "jackd2",
     "jack_wait": "jackd2",
     "gcc": "gcc libc6-dev",
+    "sha256sum": "coreutils",
     "ufw": "ufw",
     "unshare": "util-linux",
     "node": "nodejs",

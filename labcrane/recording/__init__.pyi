@@ -1,6 +1,7 @@
 """The public names of this package, and the modules from which they are imported."""
 
 from .labels import HED_VERSION, LABELS, hed_sidecar, labelled, name_of
+from .participant_file.about import citation
 from .participant_file.reader import Recording, SessionRecord, Stream, open_recording
 from .xdf.header import Channel, StreamHeader
 from .xdf.writer import XdfWriter
@@ -14,6 +15,7 @@ __all__ = [
     "Stream",
     "StreamHeader",
     "XdfWriter",
+    "citation",
     "hed_sidecar",
     "labelled",
     "name_of",
