@@ -230,6 +230,13 @@ class SessionState:
     scene
         What stands around the machine, as of :func:`labcrane.machines.read_placed`; empty for
         nothing.
+    held
+        Who or what holds the session: the examiner, a stop rule, a part that is lost.
+    waiting
+        What the session waits with for the examiner's order, or that there is a break; empty while
+        it does not wait.
+    over
+        Why the session has ended; empty until it has.
     """
 
     step: int = 0
@@ -249,6 +256,9 @@ class SessionState:
     hint: str = ""
     hint_time: float = 0.0
     scene: str = ""
+    held: tuple[str, ...] = ()
+    waiting: str = ""
+    over: str = ""
 
 
 UNDONE = frozenset({Phase.REPEATED, Phase.ENDED, Phase.INTERRUPTED})

@@ -136,6 +136,16 @@ class ViewSettings(Settings):
     """The monitor to fill: its name (``HDMI-1``), or its number, counted from 0; a window by
     default."""
 
+    screens: tuple[NonNegativeInt | str, ...] = ()
+    """Monitors to fill with one wide picture, from left to right, instead of ``screen``."""
+
+    bezel_mm: NonNegativeFloat = 0.0
+    """What lies between the pictures of two of ``screens``, in millimetres: as much of the wide
+    picture is behind their frames, so that what moves across goes on straight."""
+
+    screen_mm: PositiveFloat | None = None
+    """Width of one monitor's visible picture, in millimetres; as the monitor says by default."""
+
     flip: Literal["none", "horizontal", "vertical"] = "none"
     """Turns the picture over, for a mirror."""
 
@@ -159,7 +169,14 @@ class ViewSettings(Settings):
     """Of that text."""
 
     font: str | None = None
-    """Font file for the text; one that comes with the renderer by default."""
+    """Font file for the text; DejaVu Sans by default, whose digits are as high as capitals."""
+
+    text_arcmin: PositiveFloat | None = None
+    """Height of capitals and digits on the retina, in minutes of arc (ISO 9241-303 asks for 16 at
+    least, and recommends 20 to 22); a fixed share of the window's height by default."""
+
+    viewing_m: Annotated[PositiveFloat, Unit("m")] | None = None
+    """Distance from the eye to the screen, in metres; ``text_arcmin`` needs it."""
 
     targets: bool = True
     """Whether targets are drawn."""
@@ -192,6 +209,23 @@ class ViewSettings(Settings):
 
     renderer: Literal["auto", "software"] = "auto"
     """``software`` draws without any graphics driver, and without shadows."""
+
+    @model_validator(mode="after")
+    def _screens_and_text_fit(self) -> "ViewSettings":
+        if self.screens and self.screen is not None:
+            raise ValueError("screen and screens are both there; write one of them")
+        if self.screens and self.beside:
+            raise ValueError(
+                "screens shows one wide picture, and beside asks for several; leave one out"
+            )
+        if self.text_arcmin is not None and self.viewing_m is None:
+            raise ValueError("text_arcmin needs viewing_m, the distance from the eye to the screen")
+        return self
+
+    @property
+    def all_screens(self) -> tuple[int | str, ...]:
+        """The monitors that it fills, from left to right."""
+        return self.screens if self.screen is None else (self.screen,)
 
     def provides(self, machine: Machine) -> Names:
         cameras = [camera.name for camera in (self.camera, *self.beside)]

@@ -15,13 +15,14 @@ from labcrane.core import CameraImage, Cylinder, SessionState, Shape, TargetFind
 from labcrane.machines import link_frames
 from labcrane_view.areas import Areas
 from labcrane_view.camera import Camera, Delay, Part
-from labcrane_view.hud import WORDS, Hud, notice
+from labcrane_view.hud import WORDS, Hud, notice, standing
 from labcrane_view.keys import Keys
-from labcrane_view.overlay import Overlay
+from labcrane_view.overlay import Overlay, capital
+from labcrane_view.placement import Keeper, Piece, Span, monitor_of, per_metre
 from labcrane_view.scene.stage import HAZE, Stage
 from labcrane_view.settings import ViewSettings
 from labcrane_view.shots import Shots
-from labcrane_view.window import TURNED, Window, font, hidden_picture, open_window
+from labcrane_view.window import TURNED, Window, font, font_name, hidden_picture, open_window
 
 BOX = ("left", "top", "right", "bottom")
 PREVIEW_S = 0.5
@@ -38,6 +39,7 @@ class View(Feedback):
         Signal("render.began", "s"),
         Signal("flip.time", "s"),  # the picture is handed to the screen; the photodiode knows more
         Signal("patch", "1"),
+        Signal("monitors.lost", "1"),  # of those that it fills: nobody sees what they would show
     )
 
     def __init__(self, settings: ViewSettings, machine: Machine) -> None:
@@ -61,6 +63,7 @@ class View(Feedback):
         self._delay = Delay(settings.delay_s)
         self._due = self._now = 0.0
         self._samples: dict[str, FloatArray] = {}
+        self._letters: Any = None
         # Made before there is a window: a camera on a link that does not exist is refused at once.
         self._cameras = [Camera(camera, machine) for camera in cameras]
 
@@ -73,6 +76,7 @@ class View(Feedback):
             self.title or "labcrane",
             [view for view in self.before if isinstance(view, ViewSettings)],
         )
+        self._keeper = Keeper(settings, window.span.place)
         if not window.shaders:
             self._check_simple()
         output = window.output
@@ -87,15 +91,19 @@ class View(Feedback):
             target = self._turned_over(output)
         target.set_clear_color(core.LColor(*back, 1.0))
         self._pictures = [output] if target is output else [output, target]
-        overlay = Overlay(target, self._size, sort=20)
-        for camera, part in zip(self._cameras, _parts(self._size, len(self._cameras)), strict=True):
+        pieces, letters = window.span.pieces, font(settings.font)
+        self._letters = letters
+        self._line_px = _line(settings, letters)
+        overlay = Overlay(target, self._size, 20, pieces, self._line_px)
+        parts = _parts(self._size, len(self._cameras), window.span)
+        for camera, part in zip(self._cameras, parts, strict=True):
             picture = camera.open(window, self.stage, target, part, back)
             if picture is not None:
                 overlay.picture((part.left, part.left + part.width), picture)
-        self._text = overlay.text(font(settings.font)) if settings.hud_lines else None
-        self._notice = overlay.notice(font(settings.font)) if settings.notices else None
+        self._text = overlay.text(letters) if settings.hud_lines else None
+        self._notice = overlay.notice(letters) if settings.notices else None
         told = settings.notices or settings.hud_lines
-        self._paused = overlay.curtain(font(settings.font)) if told else None
+        self._paused = overlay.curtain(letters) if told else None
         self._patch = overlay.patch(settings.patch) if settings.patch else None
         if self._keys:
             self._keys.open(output)
@@ -119,6 +127,7 @@ class View(Feedback):
 
     def close(self) -> None:
         if self._window is not None:
+            self._keeper.close()
             self._window.close()
             self._window = None
 
@@ -142,12 +151,14 @@ class View(Feedback):
             if not camera.apart:
                 self._look(camera, shown, shapes, poses)
         white = self._write(shown)
+        self._keeper.keep(window.output)
         window.engine.render_frame()
         flipped = time.perf_counter()
         self._samples = {"areas": np.concatenate([camera.boxes for camera in self._cameras])}
         if self._keys:
             self._samples["keys"] = self._keys.rows()
-        return np.array([shown.tick.number, began, flipped, white])
+        lost = float(self._keeper.lost)
+        return np.array([shown.tick.number, began, flipped, white, lost])
 
     def samples(self) -> Mapping[str, FloatArray]:
         return self._samples
@@ -162,9 +173,18 @@ class View(Feedback):
         software = window is not None and window.software
         return {
             "renderer": f"{driver} (software: no graphics card takes part)" if software else driver,
-            "size": f"{self._size[0]}x{self._size[1]}",
+            "size": self._size_in_words(),
+            "font": font_name(self._settings.font, self._letters),
             "delay": "not measured",
         }
+
+    def _size_in_words(self) -> str:
+        """Return how large the window is, and that it was to be larger."""
+        width, height = self._size
+        asked = self._settings.size
+        if self._settings.all_screens or (width, height) == asked:
+            return f"{width}x{height}"
+        return f"{width}x{height} ({asked[0]}x{asked[1]} has no room beside the other windows)"
 
     def picture(self) -> npt.NDArray[np.uint8]:
         """Return what the window shows, shape ``(height, width, 3)``, red first, from the top."""
@@ -245,7 +265,8 @@ class View(Feedback):
                 notice(frame, self._situation, self._settings.hint_s, self._settings.language)
             )
         if self._paused is not None:
-            self._paused.show([WORDS[self._settings.language]["paused"]] if frame.paused else [])
+            state = standing(frame, self._situation)
+            self._paused.show([WORDS[self._settings.language][state]] if state else [])
         if self._patch is None or self._settings.patch is None:
             return math.nan
         counts = self._situation.counts
@@ -254,7 +275,22 @@ class View(Feedback):
         return white
 
 
-def _parts(size: tuple[int, int], count: int) -> list[Part]:
-    """Return the parts of a window of ``size`` pixels, side by side."""
+def _parts(size: tuple[int, int], count: int, span: Span) -> list[Part]:
+    """Return the parts of a window of ``size`` pixels, side by side, or its only one's pieces."""
+    if count == 1:
+        # A window manager may have made it smaller than it was asked for.
+        only = len(span.pieces) == 1
+        whole = (Piece(0, 0, *size, 0, 0),)
+        picture = size if only else span.picture
+        return [Part(0, *size, picture, whole if only else span.pieces)]
     width = size[0] // count
-    return [Part(at * width, width, size[1]) for at in range(count)]
+    one = (width, size[1])
+    return [Part(at * width, *one, one, (Piece(at * width, 0, *one, 0, 0),)) for at in range(count)]
+
+
+def _line(settings: ViewSettings, letters: Any) -> float | None:
+    """Return the height of a line of text in pixels, by its size on the retina; None for usual."""
+    if settings.text_arcmin is None or settings.viewing_m is None:
+        return None
+    high = 2.0 * settings.viewing_m * math.tan(math.radians(settings.text_arcmin / 60.0) / 2.0)
+    return high * per_metre(settings, monitor_of(settings)) / capital(letters)
