@@ -11,6 +11,7 @@ from panda3d import core
 
 from labcrane import FloatArray, Frame, Machine, ProtocolError
 from labcrane_view.areas import Projection, axes_of
+from labcrane_view.framing import framed
 from labcrane_view.placement import Piece
 from labcrane_view.scene.stage import Stage
 from labcrane_view.settings import CameraSettings
@@ -87,6 +88,8 @@ class Camera:
             )
         self.settings = settings
         self._machine = machine
+        self._look: Sequence[float] = () if settings.look == "targets" else settings.look
+        self._fov_deg = settings.fov_deg
         self._delay = Delay(settings.delay_s)
         self._due = -math.inf
         self.boxes: list[float] = []
@@ -107,11 +110,25 @@ class Camera:
         return self.settings.rate_hz is not None or self.settings.delay_s > 0.0
 
     def open(
-        self, window: Window, stage: Stage, target: Any, part: Part, back: Sequence[float]
+        self,
+        window: Window,
+        stage: Stage,
+        target: Any,
+        part: Part,
+        back: Sequence[float],
+        must_see: FloatArray,
     ) -> Any:
-        """Make its region in ``target``; return its picture if it has one of its own."""
+        """Make its region in ``target``; return its picture if it has one of its own.
+
+        ``must_see`` are the points that one framed on targets must hold, shape ``(n, 3)``.
+        """
         deep = self.settings.shows == "depth"
         self._stage, self.part = stage, part
+        if self.settings.look == "targets":
+            width, height = part.picture
+            place = np.array(self.settings.eye)
+            look, self._fov_deg = framed(self.settings.name, place, must_see, width / height)
+            self._look = look.tolist()
         self._node = self._stage.root.attach_new_node(self.settings.name)
         picture = None
         left = 0
@@ -137,7 +154,7 @@ class Camera:
         width, height = self.part.picture
         lens = core.PerspectiveLens()
         lens.set_film_size(piece.width, piece.height)
-        lens.set_focal_length(width / 2.0 / math.tan(math.radians(self.settings.fov_deg) / 2.0))
+        lens.set_focal_length(width / 2.0 / math.tan(math.radians(self._fov_deg) / 2.0))
         aside = piece.x + piece.width / 2.0 - width / 2.0
         up = height / 2.0 - piece.y - piece.height / 2.0
         lens.set_film_offset(aside, up)
@@ -156,16 +173,12 @@ class Camera:
 
     def aim(self, poses: FloatArray) -> Projection:
         """Look from where it is now: ``poses`` as of :func:`labcrane.machines.link_frames`."""
-        eye, look = (
-            self._in_base(point, poses) for point in (self.settings.eye, self.settings.look)
-        )
+        eye, look = (self._in_base(point, poses) for point in (self.settings.eye, self._look))
         right, forward, up = axes_of(eye, look)
         rows = [*right, 0.0, *forward, 0.0, *up, 0.0, *eye, 1.0]
         self._node.set_mat(core.LMatrix4f(*(float(value) for value in rows)))
         part = self.part
-        return Projection(
-            eye, look, self.settings.fov_deg, part.left, *part.picture, pieces=part.pieces
-        )
+        return Projection(eye, look, self._fov_deg, part.left, *part.picture, pieces=part.pieces)
 
     def see(self) -> None:
         """Tell the shader that this is the eye."""

@@ -28,11 +28,13 @@ class CameraSettings(Settings):
     eye: Annotated[Triple, Unit("m")]
     """Where it is, in metres, in the machine's base frame or in that of the joint it rides on."""
 
-    look: Annotated[Triple, Unit("m")]
-    """A point in the middle of its picture, in the same frame."""
+    look: Annotated[Triple, Unit("m")] | Literal["targets"]
+    """A point in the middle of its picture, in the same frame. ``targets`` turns it once, for the
+    whole session, so that its picture holds all of the tasks' targets, the way of the tip between
+    them, and the tip at rest."""
 
     fov_deg: float = Field(default=70.0, gt=1.0, lt=170.0)
-    """Horizontal field of view, in degrees."""
+    """Horizontal field of view, in degrees; with ``look: targets`` as wide as it must be."""
 
     on: LinkName | None = None
     """Joint behind whose link it rides; it stands in the scene by default."""
@@ -52,6 +54,11 @@ class CameraSettings(Settings):
 
     @model_validator(mode="after")
     def _depth_rises(self) -> "CameraSettings":
+        if self.look == "targets" and self.on is not None:
+            raise ValueError(
+                f"a camera that rides on {self.on!r} cannot hold the targets in its picture; write "
+                "look: as a point"
+            )
         near, far = self.depth_m
         if not near < far:
             raise ValueError(f"depth_m is {near:g} to {far:g} m; the second must be farther away")
@@ -59,6 +66,7 @@ class CameraSettings(Settings):
 
 
 CAMERAS: Mapping[str, CameraSettings] = {
+    "cab": CameraSettings(name="cab", eye=(-0.9, 1.8, 3.1), look="targets"),
     "cab_left": CameraSettings(name="cab_left", eye=(-2.2, 2.2, 3.3), look=(5.2, 0.3, 0.8)),
     "cab_right": CameraSettings(name="cab_right", eye=(-2.2, -2.2, 3.3), look=(5.2, -0.3, 0.8)),
     "free": CameraSettings(name="free", eye=(11.0, -9.5, 5.5), look=(3.5, 0.0, 1.2), fov_deg=60),

@@ -15,6 +15,7 @@ from labcrane.core import CameraImage, Cylinder, SessionState, Shape, TargetFind
 from labcrane.machines import link_frames
 from labcrane_view.areas import Areas
 from labcrane_view.camera import Camera, Delay, Part
+from labcrane_view.framing import must_be_seen
 from labcrane_view.hud import WORDS, Hud, notice, standing
 from labcrane_view.keys import Keys
 from labcrane_view.overlay import Overlay, capital
@@ -97,7 +98,7 @@ class View(Feedback):
         overlay = Overlay(target, self._size, 20, pieces, self._line_px)
         parts = _parts(self._size, len(self._cameras), window.span)
         for camera, part in zip(self._cameras, parts, strict=True):
-            picture = camera.open(window, self.stage, target, part, back)
+            picture = camera.open(window, self.stage, target, part, back, must_be_seen(run))
             if picture is not None:
                 overlay.picture((part.left, part.left + part.width), picture)
         self._text = overlay.text(letters) if settings.hud_lines else None
