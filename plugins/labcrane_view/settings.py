@@ -209,8 +209,13 @@ class ViewSettings(Settings):
     """What has a box for eye tracking: tip, targets, shapes of cues; links, the grapple and things
     by name, around what is drawn of them, wherever it moves."""
 
-    shadow: NonNegativeInt = Field(default=2048, le=8192)
-    """Edge of the shadow map in pixels; 0 for no shadows."""
+    quality: Literal["low", "medium", "high", "auto"] = "medium"
+    """``low`` is without shadows, ``medium`` has hard ones, ``high`` soft ones and smooth edges
+    (four samples a pixel). ``auto`` measures when the window opens, and takes the best that leaves
+    time for 40 pictures a second, or ``low``; the record says which."""
+
+    shadow: Annotated[NonNegativeInt, Field(le=8192)] | None = None
+    """Edge of the shadow maps in pixels; 0 for no shadows, as ``quality`` has it by default."""
 
     display: Literal["window", "hidden"] = "window"
     """``hidden`` draws without any screen: for recordings and tests."""

@@ -20,6 +20,7 @@ from labcrane_view.hud import WORDS, Hud, notice, standing
 from labcrane_view.keys import Keys
 from labcrane_view.overlay import Overlay, capital
 from labcrane_view.placement import Keeper, Piece, Span, monitor_of, per_metre
+from labcrane_view.quality import LEVELS, Level, chosen, picture_s
 from labcrane_view.scene.stage import HAZE, Stage
 from labcrane_view.settings import ViewSettings
 from labcrane_view.shots import Shots
@@ -65,17 +66,37 @@ class View(Feedback):
         self._due = self._now = 0.0
         self._samples: dict[str, FloatArray] = {}
         self._letters: Any = None
+        self._quality = ""
         # Made before there is a window: a camera on a link that does not exist is refused at once.
         self._cameras = [Camera(camera, machine) for camera in cameras]
 
     def open(self, run: Run) -> None:
-        settings = self._settings
+        wanted = self._settings.quality
+        if wanted == "auto":
+            level, self._quality = chosen(lambda each: self._measured(run, each))
+            if self._window is not None and self._level == level:
+                return
+            self.close()
+        else:
+            level = self._quality = wanted
+        self._open(run, level)
+
+    def _measured(self, run: Run, level: Level) -> float:
+        """Open with a quality; return how long a picture takes, in seconds."""
+        self.close()
+        self._open(run, level)
+        return picture_s(self.redraw)
+
+    def _open(self, run: Run, level: Level) -> None:
+        settings, quality = self._settings, LEVELS[level]
+        self._level = level
         self._angles = run.state.find("joint.angle")
         self._targets = TargetFinder(run.task)
         window = self._window = open_window(
             settings,
             self.title or "labcrane",
             [view for view in self.before if isinstance(view, ViewSettings)],
+            quality.samples,
         )
         self._keeper = Keeper(settings, window.span.place)
         if not window.shaders:
@@ -83,7 +104,12 @@ class View(Feedback):
         output = window.output
         self._size = (output.get_x_size(), output.get_y_size())
         scenery = settings.content == "scene"
-        self.stage = Stage(run, shaders=window.shaders, shadow=settings.shadow, scenery=scenery)
+        shadow = quality.shadow if settings.shadow is None else settings.shadow
+        self.stage = Stage(
+            run, shaders=window.shaders, shadow=shadow, scenery=scenery, soft=quality.soft
+        )
+        if quality.samples and window.shaders:
+            self.stage.root.set_antialias(core.AntialiasAttrib.M_multisample)
         self._hud = Hud(settings.hud_lines, settings.language, run)
         self._areas = Areas(settings.areas, run, self._size, settings.flip)
         back = HAZE if scenery else (0.0, 0.0, 0.0)
@@ -155,6 +181,7 @@ class View(Feedback):
         self._keeper.keep(window.output)
         window.engine.render_frame()
         flipped = time.perf_counter()
+        self.stage.drawn(window.output.get_gsg())
         self._samples = {"areas": np.concatenate([camera.boxes for camera in self._cameras])}
         if self._keys:
             self._samples["keys"] = self._keys.rows()
@@ -175,9 +202,15 @@ class View(Feedback):
         return {
             "renderer": f"{driver} (software: no graphics card takes part)" if software else driver,
             "size": self._size_in_words(),
+            "quality": self._quality,
+            "samples": 1 if window is None else self._samples_a_pixel(window),
             "font": font_name(self._settings.font, self._letters),
             "delay": "not measured",
         }
+
+    def _samples_a_pixel(self, window: Window) -> int:
+        """Return how many there are, which may be fewer than were asked for."""
+        return max(1, int(window.output.get_fb_properties().get_multisamples()))
 
     def _size_in_words(self) -> str:
         """Return how large the window is, and that it was to be larger."""

@@ -70,7 +70,9 @@ class Window:
         self.engine.remove_all_windows()
 
 
-def open_window(settings: ViewSettings, title: str, before: Sequence[ViewSettings] = ()) -> Window:
+def open_window(
+    settings: ViewSettings, title: str, before: Sequence[ViewSettings] = (), samples: int = 0
+) -> Window:
     """Open what the settings ask for.
 
     Parameters
@@ -78,6 +80,8 @@ def open_window(settings: ViewSettings, title: str, before: Sequence[ViewSetting
     before
         Views whose windows may be on the desktop already: this one lies beside them, and is smaller
         where there is no room. A window manager may put it elsewhere.
+    samples
+        Samples a pixel to ask for; the renderer may have fewer.
 
     Raises
     ------
@@ -94,7 +98,7 @@ def open_window(settings: ViewSettings, title: str, before: Sequence[ViewSetting
     tried = [("p3headlessgl" if hidden else "pandagl", True)] * (settings.renderer == "auto")
     for module, shaders in [*tried, ("p3tinydisplay", False)]:
         engine = core.GraphicsEngine()
-        opened = _output(engine, module, settings, title, before)
+        opened = _output(engine, module, settings, title, before, samples)
         if opened is None:
             continue
         output, span = opened
@@ -121,6 +125,7 @@ def _output(
     settings: ViewSettings,
     title: str,
     before: Sequence[ViewSettings],
+    samples: int,
 ) -> tuple[Any, Span] | None:
     selection = core.GraphicsPipeSelection.get_global_ptr()
     hidden = settings.display == "hidden"
@@ -147,6 +152,7 @@ def _output(
     form.rgb_color = True
     form.set_rgba_bits(8, 8, 8, 0)
     form.depth_bits = 24
+    form.multisamples = samples
     # A picture is drawn where nobody sees it, and shown whole. Without this the X server shows what
     # is drawn so far.
     form.back_buffers = 0 if hidden else 1
