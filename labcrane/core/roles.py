@@ -24,7 +24,7 @@ from pydantic import BaseModel
 if TYPE_CHECKING:  # a protocol is checked without loading what it does not need
     from labcrane.core.clock import Tick
     from labcrane.core.items import Answers, Item, Score
-    from labcrane.core.primitives import Shape
+    from labcrane.core.primitives import Shape, Sphere
     from labcrane.core.records import (
         CameraImage,
         Echo,
@@ -142,6 +142,10 @@ class Task(Component):
     @abstractmethod
     def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[PlannedTrial]:
         """Return a block's trials, for the levels of each factor in the order given."""
+
+    def places(self) -> Sequence[Sphere]:
+        """Return where targets can be, of all trials together: cameras are framed on them."""
+        return ()
 
     @abstractmethod
     def evaluate(self, frame: Frame) -> TrialStatus:
