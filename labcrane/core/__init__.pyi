@@ -31,6 +31,7 @@ from .references import (
 )
 from .settings import AtMost, Names, StudyPath, Unit, read_csv_text, read_yaml, was_run
 from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
+from .twin import Twin
 
 __all__ = [
     "AnswerError",
@@ -71,6 +72,7 @@ __all__ = [
     "StudyPath",
     "TargetFinder",
     "TrialStatus",
+    "Twin",
     "Unit",
     "Value",
     "Verdict",
