@@ -1,33 +1,53 @@
 """Compiler of twins: numba, with the one calling convention of each role.
 
-Import it where a twin is made and nowhere else: numba is an extra, and loads for a second.
-Arithmetic is Python's, operation by operation: nothing is reordered or fused, and a root, a sine
-or a cube is the C library's, as Python's is. ``math.hypot`` and ``math.dist`` are not: Python 3.12
-rounds them otherwise than 3.11. Write the root of a sum of squares, here and in the component.
+Numba is an extra and loads for a second: it is loaded when the first function is compiled, so
+import a module with compiled functions in :meth:`labcrane.Component.twin` and nowhere else.
+Arithmetic is Python's, operation by operation: nothing is reordered or fused, and a root, a sine or
+a cube root is the C library's, as Python's is. ``math.hypot`` and ``math.dist`` are not: Python
+3.12 rounds them otherwise than 3.11. Write the root of a sum of squares, here and in the component.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
 from typing import Any, TypeVar
-
-import numba
-from numba import types
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_NUMBERS = types.Array(types.float64, 1, "C")
-_PLACES = types.Array(types.int64, 1, "C")
-_OPTIONS = {"cache": True, "error_model": "numpy", "fastmath": False}
-_njit: Any = numba.njit  # typed by some versions only, and then by what options are written out
 
-TICK = types.int64(_NUMBERS, _PLACES, _NUMBERS, _NUMBERS)
-INVERSE = types.int64(_NUMBERS, _PLACES, _NUMBERS, _NUMBERS, _NUMBERS)
-READ = types.int64(_NUMBERS, _PLACES, _NUMBERS, _NUMBERS, types.FunctionType(INVERSE), _NUMBERS)
+@dataclass(frozen=True, slots=True)
+class Signatures:
+    """What compiled functions are given and return, as numba writes it.
+
+    Attributes
+    ----------
+    tick, inverse, read
+        Of the functions of the same names below.
+    """
+
+    tick: Any
+    inverse: Any
+    read: Any
+
+
+@cache
+def signatures() -> Signatures:
+    """Return the calling conventions."""
+    from numba import types  # noqa: PLC0415
+
+    numbers, places = types.Array(types.float64, 1, "C"), types.Array(types.int64, 1, "C")
+    inverse = types.int64(numbers, places, numbers, numbers, numbers)
+    hands = types.FunctionType(inverse)
+    return Signatures(
+        tick=types.int64(numbers, places, numbers, numbers),
+        inverse=inverse,
+        read=types.int64(numbers, places, numbers, numbers, hands, numbers),
+    )
 
 
 def part(function: F) -> F:
     """Compile a function that others in the same module call."""
-    compiled: F = _njit(**_OPTIONS)(function)
-    return compiled
+    return _compiled(function)
 
 
 def tick(function: F) -> F:
@@ -35,14 +55,12 @@ def tick(function: F) -> F:
 
     ``function(own, places, seen, row)``: all of float64, but ``places`` of int64.
     """
-    compiled: F = _njit(TICK, **_OPTIONS)(function)
-    return compiled
+    return _compiled(function, signatures().tick)
 
 
 def inverse(function: F) -> F:
     """Compile the inverse of a controller: ``function(own, places, velocity, seen, row)``."""
-    compiled: F = _njit(INVERSE, **_OPTIONS)(function)
-    return compiled
+    return _compiled(function, signatures().inverse)
 
 
 def read(function: F) -> F:
@@ -51,5 +69,12 @@ def read(function: F) -> F:
     ``function(own, places, seen, row, inverse, theirs)``: the last two are the controller's inverse
     and what its twin knows, to be called as ``inverse(theirs, places, velocity, seen, row)``.
     """
-    compiled: F = _njit(READ, **_OPTIONS)(function)
-    return compiled
+    return _compiled(function, signatures().read)
+
+
+def _compiled(function: F, *signature: Any) -> F:
+    import numba  # noqa: PLC0415
+
+    compile_it: Any = numba.njit  # some versions have types, for fewer ways to call it
+    made: F = compile_it(*signature, cache=True, error_model="numpy", fastmath=False)(function)
+    return made

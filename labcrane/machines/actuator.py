@@ -102,15 +102,15 @@ class Actuator:
 
     @property
     def constants(self) -> tuple[float, ...]:
-        """Whether it is ideal, the share of the lag in a tick, and each joint's largest change."""
+        """Whether it is ideal, the lag's share of a tick, each joint's largest change in rad/s."""
         return (float(self.ideal), self._share, *self._most)
 
     def numbers(self) -> list[float]:
-        """Return what a compiled twin goes on from: speeds, then commands on their way."""
+        """Return what a compiled twin goes on from: speeds, then commands under way, in rad/s."""
         return [*self._speeds, *(speed for command in self._waiting for speed in command)]
 
     def go_on(self, numbers: Sequence[float]) -> None:
-        """Go on from where a compiled twin came to."""
+        """Go on from where a compiled twin came to: :attr:`numbers`, in rad/s."""
         joints = len(self._speeds)
         self._speeds = list(numbers[:joints])
         rows = range(joints, joints * (1 + self._delay), joints)

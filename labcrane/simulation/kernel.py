@@ -8,14 +8,15 @@ import numba
 import numpy as np
 from numba import types
 
-from labcrane.core.compiled import INVERSE, READ, TICK
+from labcrane.core.compiled import signatures
 from labcrane.core.twin import AXES, MADE, TASK, Places
 from labcrane.types import FloatArray
 
 _NUMBERS = types.Array(types.float64, 1, "C")
 _ROWS = types.Array(types.float64, 2, "C")
 _PLACES = types.Array(types.int64, 1, "C")
-_READ, _INVERSE, _TICK = (types.FunctionType(each) for each in (READ, INVERSE, TICK))
+_OF = signatures()
+_READ, _INVERSE, _TICK = (types.FunctionType(each) for each in (_OF.read, _OF.inverse, _OF.tick))
 _SIGNATURE = types.int64(
     _ROWS, _NUMBERS, _PLACES, _NUMBERS, _NUMBERS, types.int64,
     _READ, _NUMBERS, _INVERSE, _TICK, _NUMBERS, _TICK, _NUMBERS, _TICK, _NUMBERS, _PLACES,

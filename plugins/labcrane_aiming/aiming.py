@@ -3,13 +3,17 @@
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
-from labcrane import FloatArray, Frame, Machine, ProtocolError, Run, Signal, Task, Trial
-from labcrane.core import Event, Phase, PlannedTrial, TrialStatus, Twin
-from labcrane.core.twin import ELAPSED, STATE, TIME, Places
+from labcrane import Frame, Machine, ProtocolError, Run, Signal, Task, Trial
+from labcrane.core import Event, Phase, PlannedTrial, TrialStatus, Twin, twin
 from labcrane.machines import reach
 from labcrane_aiming.pairs import Pair, Point, index_of_difficulty, pairs
 from labcrane_aiming.settings import AimingSettings
+
+if TYPE_CHECKING:  # a protocol is checked without loading numpy
+    from labcrane import FloatArray
+    from labcrane.core import Places
 
 # Seconds per movement in a plan: an intercept and seconds per bit, seen with simulated operators.
 PLAN_INTERCEPT_S = 1.0
@@ -143,7 +147,7 @@ class Aiming(Task):
         own = np.zeros(16 + 7)
         return Twin(evaluate, own, CHANGING, self._take_over, self._hand_back)
 
-    def _take_over(self, own: FloatArray, seen: Frame) -> bool:
+    def _take_over(self, own: "FloatArray", seen: Frame) -> bool:
         from labcrane_aiming.movement import ROUNDING_S  # noqa: PLC0415 - loads numpy
 
         settings, movement, command = self._settings, self._movement, self._command
@@ -157,11 +161,11 @@ class Aiming(Task):
         own[16:] = self._values
         return True
 
-    def _hand_back(self, own: FloatArray, rows: FloatArray, places: Places) -> None:
-        movement, at = self._movement, int(places[STATE])
+    def _hand_back(self, own: "FloatArray", rows: "FloatArray", places: "Places") -> None:
+        movement, at = self._movement, int(places[twin.STATE])
         tip, velocity = self._tip, self._velocity
         movement.go_on(
-            rows[:, ELAPSED], rows[:, TIME], rows[:, at + tip.start : at + tip.stop],
+            rows[:, twin.ELAPSED], rows[:, twin.TIME], rows[:, at + tip.start : at + tip.stop],
             rows[:, at + velocity.start : at + velocity.stop],
         )  # fmt: skip
         movement.rest_since, inside, entries, pressed = own[:4].tolist()

@@ -3,8 +3,7 @@
 import math
 
 from labcrane import FloatArray
-from labcrane.core.compiled import part, tick
-from labcrane.core.twin import AXES, COMMAND, DECLINED, ELAPSED, END, MADE, STATE, TASK, Places
+from labcrane.core import Places, compiled, twin
 
 RESTS_SINCE, INSIDE, ENTRIES, PRESSED = range(4)
 CHANGING = 4
@@ -20,7 +19,7 @@ REST_INSIDE, REST_ANYWHERE, BY_TRIGGER = range(3)
 ROUNDING = 1e-9
 
 
-@part
+@compiled.part
 def _done(own: FloatArray, row: FloatArray, tip: int) -> float:
     """Return the fraction of the way that is made; the task itself decides when it is close."""
     along = length2 = 0.0
@@ -31,12 +30,12 @@ def _done(own: FloatArray, row: FloatArray, tip: int) -> float:
     return along / length2
 
 
-@tick
+@compiled.tick
 def evaluate(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) -> int:
     """Judge a tick; decline one with an event, or that may end the trial."""
-    state, task, rule = places[STATE], places[TASK], own[RULE]
+    state, task, rule = places[twin.STATE], places[twin.TASK], own[RULE]
     tip, velocity = state + int(own[TIP]), state + int(own[VELOCITY])
-    elapsed = row[ELAPSED]
+    elapsed = row[twin.ELAPSED]
     vx, vy, vz = row[velocity], row[velocity + 1], row[velocity + 2]
     speed = math.sqrt(vx * vx + vy * vy + vz * vz)
     ex = row[tip] - own[SHOWN]
@@ -50,23 +49,25 @@ def evaluate(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray)
     elif math.isnan(own[RESTS_SINCE]):
         own[RESTS_SINCE] = elapsed
     if own[COMMANDED] == 0.0:
-        for k in range(places[COMMAND] + int(own[FIRST]), places[COMMAND] + int(own[LAST])):
+        for k in range(
+            places[twin.COMMAND] + int(own[FIRST]), places[twin.COMMAND] + int(own[LAST])
+        ):
             if row[k] != 0.0:
-                return DECLINED
+                return twin.DECLINED
     if entered:
         own[ENTRIES] += 1.0
         if own[ENTRIES] == 1.0:
-            return DECLINED
+            return twin.DECLINED
     if rule == BY_TRIGGER:
-        pressed = row[places[AXES] + int(own[TRIGGER])] > 0.5  # noqa: PLR2004 - as in the class
+        pressed = row[places[twin.AXES] + int(own[TRIGGER])] > 0.5  # noqa: PLR2004 - as in the class
         if pressed and own[PRESSED] == 0.0:
-            return DECLINED
+            return twin.DECLINED
         own[PRESSED] = 1.0 if pressed else 0.0
     elif elapsed - own[RESTS_SINCE] >= own[REST] and (
         rule == REST_INSIDE or _done(own, row, tip) >= own[AFTER] - ROUNDING
     ):
-        return DECLINED
+        return twin.DECLINED
     if elapsed >= own[LIMIT]:
-        return DECLINED
-    row[task : places[END]] = own[SHOWN : SHOWN + places[END] - task]
-    return MADE
+        return twin.DECLINED
+    row[task : places[twin.END]] = own[SHOWN : SHOWN + places[twin.END] - task]
+    return twin.MADE

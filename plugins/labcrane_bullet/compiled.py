@@ -7,8 +7,7 @@ all other ticks are the engine's.
 import math
 
 from labcrane import FloatArray
-from labcrane.core.compiled import part, tick
-from labcrane.core.twin import COMMAND, DECLINED, MADE, STATE, Places
+from labcrane.core import Places, compiled, twin
 
 JOINTS, DELAY, DT, BASE_X, HEIGHT, DRIVE, CHANGES, IDEAL, SHARE = range(9)
 """Joints, ticks of dead time, length of a tick, the foot, the first command and where what changes
@@ -18,7 +17,7 @@ TABLES = 10
 comes behind them: angles, speeds, the actuator's speeds and commands on their way."""
 
 
-@part
+@compiled.part
 def follow(own: FloatArray, at: int, command: FloatArray, speeds: FloatArray) -> None:
     """Fill the speeds that come of a command."""
     n, delay = len(speeds), int(own[DELAY])
@@ -39,7 +38,7 @@ def follow(own: FloatArray, at: int, command: FloatArray, speeds: FloatArray) ->
         own[last : last + n] = command
 
 
-@part
+@compiled.part
 def put_tip(own: FloatArray, angles: FloatArray, speeds: FloatArray, tip: FloatArray) -> None:
     """Fill the tip's position and velocity."""
     n = len(angles)
@@ -65,11 +64,11 @@ def put_tip(own: FloatArray, angles: FloatArray, speeds: FloatArray, tip: FloatA
     tip[5] = upward
 
 
-@tick
+@compiled.tick
 def step(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) -> int:
     """Move the crane for a tick."""
     n, at, dt = int(own[JOINTS]), int(own[CHANGES]), own[DT]
-    state, drive = places[STATE], places[COMMAND] + int(own[DRIVE])
+    state, drive = places[twin.STATE], places[twin.COMMAND] + int(own[DRIVE])
     angles, speeds = row[state : state + n], row[state + n : state + 2 * n]
     follow(own, at, row[drive : drive + n], speeds)
     low, high = TABLES + n, TABLES + 2 * n
@@ -80,7 +79,7 @@ def step(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) -> 
             speeds[j] = 0.0
         own[at + j] = angles[j] = angle
     put_tip(own, angles, speeds, row[state + 2 * n : state + 2 * n + 6])
-    return MADE
+    return twin.MADE
 
 
 MASS, CENTRE, ALONG, ACROSS, UPRIGHT, EFFORT = range(6)
@@ -93,7 +92,7 @@ ENOUGH = 0.999
 """Share of a motor's torque up to which rounding cannot tell otherwise."""
 
 
-@part
+@compiled.part
 def torques_suffice(
     own: FloatArray, angles: FloatArray, speeds: FloatArray, asked: FloatArray
 ) -> bool:
@@ -146,22 +145,22 @@ def torques_suffice(
     return bool(abs(about_slew) <= ENOUGH * own[link + EFFORT * n])
 
 
-@tick
+@compiled.tick
 def step_engine(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) -> int:
     """Move the engine's crane for a tick, if its motors can."""
     n, at, dt = int(own[JOINTS]), int(own[CHANGES]), own[DT]
-    state, drive = places[STATE], places[COMMAND] + int(own[DRIVE])
+    state, drive = places[twin.STATE], places[twin.COMMAND] + int(own[DRIVE])
     angles, speeds = row[state : state + n], row[state + n : state + 2 * n]
     follow(own, at, row[drive : drive + n], speeds)
     before, was = own[at : at + n], own[at + n : at + 2 * n]
     if not torques_suffice(own, before, was, speeds):
-        return DECLINED
+        return twin.DECLINED
     low, high = TABLES + n, TABLES + 2 * n
     for j in range(n):
         angle = before[j] + speeds[j] * dt
         if not own[low + j] + NEAR < angle < own[high + j] - NEAR:
-            return DECLINED
+            return twin.DECLINED
         angles[j] = angle
     own[at : at + n], own[at + n : at + 2 * n] = angles, speeds
     put_tip(own, angles, speeds, row[state + 2 * n : state + 2 * n + 6])
-    return MADE
+    return twin.MADE

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from labcrane import FloatArray, Frame, InputDevice, Run, Signal, Tick, Trial
-from labcrane.core import Layout, Phase, Twin, Value
-from labcrane.core.twin import Places
+from labcrane.core import Layout, Phase, Places, Twin, Value
 from labcrane_operator.aimer import STILL, Aimer
 from labcrane_operator.noise import BLOCK, Noise
 from labcrane_operator.settings import STICK, OperatorSettings

@@ -8,8 +8,7 @@ import math
 import numpy as np
 
 from labcrane import FloatArray
-from labcrane.core.compiled import inverse, part, tick
-from labcrane.core.twin import AXES, COMMAND, MADE, STATE, Places
+from labcrane.core import Places, compiled, twin
 
 ACTIVE, DOWN, SWITCHES, BUTTON, BUTTON_SIGN, FIRST, SECOND = range(7)
 """Of the scheme: which law is active, whether the button is down, whether there is one and where;
@@ -42,12 +41,12 @@ N_TABLES = 14
 NOTHING = 1e-12
 
 
-@part
+@compiled.part
 def _table(at: int, stride: int, which: int) -> int:
     return at + 17 + which * stride
 
 
-@part
+@compiled.part
 def _shape(own: FloatArray, at: int, push: float) -> float:
     beyond = abs(push) - own[at + EDGE]
     if beyond <= 0.0:
@@ -56,7 +55,7 @@ def _shape(own: FloatArray, at: int, push: float) -> float:
     return math.copysign(x * (own[at + LINEAR] + own[at + EXPO] * x * x), push)
 
 
-@part
+@compiled.part
 def _unshape(own: FloatArray, at: int, share: float) -> float:
     if share == 0.0:
         return 0.0
@@ -70,7 +69,7 @@ def _unshape(own: FloatArray, at: int, share: float) -> float:
     return math.copysign(push if push < 1.0 else 1.0, share)
 
 
-@part
+@compiled.part
 def _factor(low: float, high: float, width: float, angle: float, speed: float) -> float:
     if speed == 0.0:
         return 1.0
@@ -80,7 +79,7 @@ def _factor(low: float, high: float, width: float, angle: float, speed: float) -
     return room / width if room > 0.0 else 0.0
 
 
-@part
+@compiled.part
 def _free(own: FloatArray, at: int, angles: FloatArray) -> bool:
     stride, width = int(own[at + STRIDE]), own[at + WIDTH]
     low, high = _table(at, stride, LOW), _table(at, stride, HIGH)
@@ -90,7 +89,7 @@ def _free(own: FloatArray, at: int, angles: FloatArray) -> bool:
     return True
 
 
-@part
+@compiled.part
 def _damp(own: FloatArray, at: int, singular2: float) -> float:
     threshold2 = own[at + THRESHOLD2]
     if singular2 >= threshold2:
@@ -99,7 +98,7 @@ def _damp(own: FloatArray, at: int, singular2: float) -> float:
     return damping2
 
 
-@part
+@compiled.part
 def _pitch(
     own: FloatArray, at: int, r: FloatArray, z: FloatArray, radial: float, vertical: float,
     out: FloatArray,
@@ -125,7 +124,7 @@ def _pitch(
         out[k] = r[k] * y_r + z[k] * y_z
 
 
-@part
+@compiled.part
 def _solve(
     own: FloatArray, at: int, angles: FloatArray, radial: float, tangential: float, vertical: float
 ) -> float:
@@ -180,7 +179,7 @@ def _solve(
     return scale
 
 
-@part
+@compiled.part
 def _relieve(
     own: FloatArray, at: int, angles: FloatArray, column_r: FloatArray, column_z: FloatArray,
     pitches: FloatArray, radial: float, vertical: float,
@@ -212,7 +211,7 @@ def _relieve(
             pitches[k] = math.sqrt(weights[k]) * pitches[k]
 
 
-@part
+@compiled.part
 def _solve_base(
     own: FloatArray, at: int, angles: FloatArray, x: float, y: float, z: float
 ) -> float:
@@ -221,7 +220,7 @@ def _solve_base(
     return _solve(own, at, angles, cos * x + sin * y, cos * y - sin * x, z)
 
 
-@part
+@compiled.part
 def _command(
     own: FloatArray, at: int, axes: FloatArray, angles: FloatArray, out: FloatArray
 ) -> None:
@@ -257,35 +256,38 @@ def _command(
         out[n + 1 + j] = own[factors + j]
 
 
-@part
+@compiled.part
 def _block(own: FloatArray) -> int:
     return int(own[FIRST] if own[ACTIVE] == 0.0 else own[SECOND])
 
 
-@tick
+@compiled.tick
 def command(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) -> int:
     """Make the command of a tick."""
-    axes, out = row[places[AXES] : places[COMMAND]], row[places[COMMAND] : places[STATE]]
+    axes, out = (
+        row[places[twin.AXES] : places[twin.COMMAND]],
+        row[places[twin.COMMAND] : places[twin.STATE]],
+    )
     if own[SWITCHES] != 0.0:
         down = own[BUTTON_SIGN] * axes[int(own[BUTTON])] > 0.5  # noqa: PLR2004 - as in the class
         if down and own[DOWN] == 0.0:
             own[ACTIVE] = 1.0 - own[ACTIVE]
         own[DOWN] = 1.0 if down else 0.0
         out[len(out) - 1] = own[ACTIVE]
-    _command(own, _block(own), axes, seen[places[STATE] :], out)
-    return MADE
+    _command(own, _block(own), axes, seen[places[twin.STATE] :], out)
+    return twin.MADE
 
 
-@inverse
+@compiled.inverse
 def hands(
     own: FloatArray, places: Places, velocity: FloatArray, seen: FloatArray, row: FloatArray
 ) -> int:
     """Put the axes that ask for a tip velocity into the row."""
-    at, angles = _block(own), seen[places[STATE] :]
+    at, angles = _block(own), seen[places[twin.STATE] :]
     n, stride = int(own[at + JOINTS]), int(own[at + STRIDE])
     axis, factor = _table(at, stride, AXIS), _table(at, stride, FACTOR)
     x, y, z = velocity[0], velocity[1], velocity[2]
-    axes = row[places[AXES] : places[COMMAND]]
+    axes = row[places[twin.AXES] : places[twin.COMMAND]]
     axes[:] = 0.0
     if own[at + RESOLVED] == 0.0:
         scale = _solve_base(own, at, angles, x, y, z)
@@ -295,7 +297,7 @@ def hands(
             if abs(speed) > NOTHING and left > 0.0:
                 share = scale * speed / (own[factor + j] * left)
                 axes[int(own[axis + j])] = _unshape(own, at, share)
-        return MADE
+        return twin.MADE
     if own[at + BASE] == 0.0:
         bearing = angles[0] + own[_table(at, stride, OFFSET)]
         cos, sin = math.cos(bearing), math.sin(bearing)
@@ -304,4 +306,4 @@ def hands(
     axes[int(own[axis])] = own[factor] * _unshape(own, at, x / most)
     axes[int(own[axis + 1])] = own[factor + 1] * _unshape(own, at, y / most)
     axes[int(own[axis + 2])] = own[factor + 2] * _unshape(own, at, z / most)
-    return MADE
+    return twin.MADE

@@ -3,8 +3,7 @@
 import numpy as np
 
 from labcrane import Controller, FloatArray, Frame, Machine, Run, Signal, Trial
-from labcrane.core import Twin
-from labcrane.core.twin import Places
+from labcrane.core import Places, Twin
 from labcrane_schemes.axis_map import find_axis
 from labcrane_schemes.end_effector import EndEffector
 from labcrane_schemes.joint_velocity import JointVelocity
