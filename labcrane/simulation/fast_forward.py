@@ -81,7 +81,7 @@ class FastForward:
     def _find(self, rig: Rig) -> Way:
         if find_spec("numba") is None:
             return Way(compiled=False, why=f"numba is not installed; {EXTRA} brings it")
-        from labcrane.simulation.kernel import advance, same_arithmetic  # noqa: PLC0415
+        from labcrane.simulation.kernel import addresses, advance, same_arithmetic  # noqa: PLC0415
 
         if not same_arithmetic():
             return Way(compiled=False, why="compiled arithmetic is not Python's on this computer")
@@ -97,6 +97,10 @@ class FastForward:
         operator, scheme, dynamics, *tasks = found.values()
         self._twins = (operator, scheme, dynamics)
         self._tasks = dict(zip(rig.tasks.values(), tasks, strict=True))
+        self._functions = {
+            task: addresses(operator.tick, scheme.inverse, scheme.tick, dynamics.tick, twin.tick)
+            for task, twin in self._tasks.items()
+        }
         most = sum(twin.changing for twin in found.values())
         self._kept = np.empty(most)
         compiler = f"numba {version('numba')}"
@@ -117,6 +121,7 @@ class FastForward:
             return frame
         number = frame.tick.number + 1
         hands, scheme, machine, task = twins
+        read, inverse, command, step, evaluate = self._functions[going.task]
         self._rows.fill(self._seen, frame)
         self._about[:] = (
             start, self._run.rate_hz, frame.trial, going.ticks, CODES[Phase.RUNNING],
@@ -127,8 +132,8 @@ class FastForward:
             room = self._log.room
             made = self._advance(
                 room, seen, self._places, self._about, self._kept, number + done,
-                hands.tick, hands.own, scheme.inverse, scheme.tick, scheme.own,
-                machine.tick, machine.own, task.tick, task.own, changing,
+                read, hands.own, inverse, command, scheme.own,
+                step, machine.own, evaluate, task.own, changing,
             )  # fmt: skip
             if made:
                 for twin in twins:

@@ -23,6 +23,28 @@ _SIGNATURE = types.int64(
 )  # fmt: skip
 
 
+class Address(types.WrapperAddressProtocol):  # type: ignore[misc, unused-ignore]  # without types
+    """A compiled function that is found once: numba looks up a function at every call."""
+
+    def __init__(self, function: Any, signature: Any) -> None:
+        result = function.get_compile_result(signature)
+        name = result.fndesc.llvm_cfunc_wrapper_name
+        self._function, self._signature = function, signature  # kept, so that its code is
+        self._address = int(result.library.get_pointer_to_function(name))
+
+    def __wrapper_address__(self) -> int:
+        return self._address
+
+    def signature(self) -> Any:
+        return self._signature
+
+
+def addresses(read: Any, inverse: Any, *ticks: Any) -> tuple[Address, ...]:
+    """Return the functions of the operator, of the controller's inverse, and ticks."""
+    others = (Address(tick, _OF.tick) for tick in ticks)
+    return (Address(read, _OF.read), Address(inverse, _OF.inverse), *others)
+
+
 @numba.njit(_SIGNATURE, cache=True, error_model="numpy")
 def advance(
     rows: FloatArray, seen: FloatArray, places: Places, about: FloatArray, kept: FloatArray,

@@ -6,6 +6,8 @@ all other ticks are the engine's.
 
 import math
 
+import numpy as np
+
 from labcrane import FloatArray
 from labcrane.core import Places, compiled, twin
 
@@ -104,43 +106,37 @@ def torques_suffice(
     length, offset, link = TABLES + 3 * n, TABLES + 4 * n, TABLES + 5 * n
     slew, faster = speeds[0], (asked[0] - speeds[0]) / dt
     about_slew = own[link + UPRIGHT * n] * faster
-    for j in range(1, n):
-        about_joint = 0.0
-        pitch = turn = spin = 0.0
-        r = dr = ddr = z = ddz = 0.0
-        joint_r = joint_z = 0.0
-        for k in range(1, n):
-            pitch += angles[k] + own[offset + k]
-            turn += speeds[k]
-            spin += (asked[k] - speeds[k]) / dt
-            if k == j:
-                joint_r, joint_z = r, z
-            c, s = math.cos(pitch), math.sin(pitch)
-            mass, centre = own[link + MASS * n + k], own[link + CENTRE * n + k]
-            ixx, izz = own[link + ALONG * n + k], own[link + UPRIGHT * n + k]
-            at_r, at_z = r + centre * c, z - centre * s
-            at_dr = dr - centre * s * turn
-            at_ddr = ddr - centre * (c * turn * turn + s * spin)
-            at_ddz = ddz + centre * (s * turn * turn - c * spin)
-            if k >= j:
-                push = mass * (at_ddr - at_r * slew * slew)
-                lift = mass * (at_ddz + GRAVITY)
-                about_joint += (
-                    own[link + ACROSS * n + k] * spin + slew * slew * (izz - ixx) * s * c
-                    + (at_z - joint_z) * push - (at_r - joint_r) * lift
-                )  # fmt: skip
-            if j == 1:
-                aside = mass * (at_r * faster + 2.0 * at_dr * slew)
-                about_slew += (
-                    2.0 * (ixx - izz) * s * c * turn * slew
-                    + (ixx * s * s + izz * c * c) * faster + at_r * aside
-                )  # fmt: skip
-            reach = own[length + k]
-            r, z = r + reach * c, z - reach * s
-            dr -= reach * s * turn
-            ddr -= reach * (c * turn * turn + s * spin)
-            ddz += reach * (s * turn * turn - c * spin)
-        if abs(about_joint) > ENOUGH * own[link + EFFORT * n + j]:
+    # Of every link: moment, push and lift, the moment of both about the foot, and its joint.
+    moment, push, lift = np.empty(n), np.empty(n), np.empty(n)
+    joint_r, joint_z = np.empty(n), np.empty(n)
+    pitch = turn = spin = r = dr = ddr = z = ddz = 0.0
+    for k in range(1, n):
+        pitch += angles[k] + own[offset + k]
+        turn += speeds[k]
+        spin += (asked[k] - speeds[k]) / dt
+        joint_r[k], joint_z[k] = r, z
+        c, s = math.cos(pitch), math.sin(pitch)
+        mass, centre = own[link + MASS * n + k], own[link + CENTRE * n + k]
+        ixx, izz = own[link + ALONG * n + k], own[link + UPRIGHT * n + k]
+        at_r, at_z = r + centre * c, z - centre * s
+        at_dr = dr - centre * s * turn
+        push[k] = mass * (ddr - centre * (c * turn * turn + s * spin) - at_r * slew * slew)
+        lift[k] = mass * (ddz + centre * (s * turn * turn - c * spin) + GRAVITY)
+        moment[k] = own[link + ACROSS * n + k] * spin + slew * slew * (izz - ixx) * s * c
+        moment[k] += at_z * push[k] - at_r * lift[k]
+        about_slew += at_r * mass * (at_r * faster + 2.0 * at_dr * slew)
+        about_slew += 2.0 * (ixx - izz) * s * c * turn * slew
+        about_slew += (ixx * s * s + izz * c * c) * faster
+        reach = own[length + k]
+        r, z = r + reach * c, z - reach * s
+        dr -= reach * s * turn
+        ddr -= reach * (c * turn * turn + s * spin)
+        ddz += reach * (s * turn * turn - c * spin)
+    moments = pushes = lifts = 0.0
+    for k in range(n - 1, 0, -1):
+        moments, pushes, lifts = moments + moment[k], pushes + push[k], lifts + lift[k]
+        about_joint = moments - joint_z[k] * pushes + joint_r[k] * lifts
+        if abs(about_joint) > ENOUGH * own[link + EFFORT * n + k]:
             return False
     return bool(abs(about_slew) <= ENOUGH * own[link + EFFORT * n])
 
