@@ -184,6 +184,10 @@ class Protocol(Section):
     on_fault: OnFault = OnFault()
     """What happens when something fails."""
 
+    environment: Literal["record", "refuse"] = "record"
+    """What is installed is not what was when the study was approved (another NumPy): name it and
+    record it with the session, or refuse to run."""
+
     expected: tuple[str, ...] = ()
     """Answers to the questions of ``labcrane check``, by their keys: what is asked is meant."""
 

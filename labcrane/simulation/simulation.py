@@ -162,7 +162,7 @@ def simulate_study(
     with alone_in(first.data, wait=False):
         _check_same(first, study)
         shutil.rmtree(first.data / UNFINISHED, ignore_errors=True)
-        short = _too_short(study, orders)
+        short = _too_short(study, first.participant)
         jobs = [replace(order, loop=order.loop or short) for order in orders]
         missing = [order for order in jobs if not order.folder.path.exists()]
         yield from (order.folder for order in jobs if order not in missing)
@@ -170,11 +170,15 @@ def simulate_study(
         shutil.rmtree(first.data / UNFINISHED, ignore_errors=True)
 
 
-def _too_short(study: Study, orders: Sequence[SimulationJob]) -> str:
-    """Return why the loop is sooner done than twins are loaded; empty when it is not."""
+def _too_short(study: Study, participant: str) -> str:
+    """Return why the loop is sooner done than twins are loaded; empty when it is not.
+
+    By all who are planned: who is simulated later must not be noted otherwise.
+    """
     numbers = range(1, len(study.protocol.sessions) + 1)
-    plans = [plan_session(study, orders[0].participant, number) for number in numbers]
-    expected = round(sum(plan.expected_s for plan in plans) * study.protocol.rate_hz * len(orders))
+    plans = [plan_session(study, participant, number) for number in numbers]
+    seconds = sum(plan.expected_s for plan in plans) * study.protocol.participants.planned
+    expected = round(seconds * study.protocol.rate_hz)
     if expected >= WORTH_LOADING:
         return ""
     return f"twins are loaded for {WORTH_LOADING:,} ticks or more, and {expected:,} are expected"
