@@ -37,6 +37,7 @@ if TYPE_CHECKING:  # a protocol is checked without loading what it does not need
         Value,
     )
     from labcrane.core.signals import Signal, SignalFault, SignalStream
+    from labcrane.core.twin import Twin
     from labcrane.machines.machine import Body
     from labcrane.types import FloatArray
 
@@ -59,6 +60,14 @@ class Component(ABC):
     def metadata(self) -> Mapping[str, Value]:
         """Return what the record should know of the open component: calibration, versions."""
         return {}
+
+    def twin(self) -> Twin | None:
+        """Return the compiled twin of the open component's tick, for simulations; None for none.
+
+        Of an input device, a controller, a machine or a task: see :mod:`labcrane.core.twin`. Asked
+        for once a session, and only where numba is installed, so import it there.
+        """
+        return None
 
 
 class InputDevice(Component):

@@ -107,6 +107,13 @@ class Sequencer:
         """Whether the operator's command reaches the machine in this tick."""
         return self._attempt is not None and not self._held.by
 
+    @property
+    def going(self) -> TrialRun | None:
+        """The trial under way, if its next tick is like the one before; None if something waits."""
+        attempt = self._attempt
+        waits = self._notes or self._wishes or self._held.by or self._held.ending
+        return None if waits or attempt is None or not attempt.ticks else attempt
+
     def handle(
         self, commands: Sequence[Message], lost_input: str | None, disk_trouble: str | None
     ) -> None:
