@@ -98,9 +98,21 @@ class Sequencer:
         next(self._script, None)  # a session that owes nothing ends at its first tick
 
     @property
+    def step(self) -> int:
+        """Number of the plan's step that runs; 0 before the first."""
+        return self._step
+
+    @property
     def moving(self) -> bool:
         """Whether the operator's command reaches the machine in this tick."""
         return self._attempt is not None and not self._held.by
+
+    @property
+    def going(self) -> TrialRun | None:
+        """The trial under way, if its next tick is like the one before; None if something waits."""
+        attempt = self._attempt
+        waits = self._notes or self._wishes or self._held.by or self._held.ending
+        return None if waits or attempt is None or not attempt.ticks else attempt
 
     def handle(
         self, commands: Sequence[Message], lost_input: str | None, disk_trouble: str | None

@@ -45,6 +45,20 @@ class TrialRun:
         self._worst_s = 0.0
         self._began: float | None = None
 
+    @property
+    def ticks(self) -> int:
+        """Ticks so far, pauses left out."""
+        return self._ticks
+
+    @property
+    def task(self) -> Task:
+        """What judges it."""
+        return self._task
+
+    def skip(self, ticks: int) -> None:
+        """Take as many ticks on time that its task has judged, and in which nothing happened."""
+        self._ticks += ticks
+
     def lift_limits(self) -> None:
         """Let the trial go on past its automatic ends."""
         self._task.lift_limits()
