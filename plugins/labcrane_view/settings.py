@@ -132,7 +132,7 @@ class ViewSettings(Settings):
     size: tuple[Pixels, Pixels] = (1280, 720)
     """Width and height, in pixels; a full screen has its own."""
 
-    screen: NonNegativeInt | str | None = None
+    screen: NonNegativeInt | Annotated[str, Field(min_length=1)] | None = None
     """The monitor to fill: its name (``HDMI-1``), or its number, counted from 0; a window by
     default."""
 
