@@ -83,7 +83,8 @@ def test_a_machine_beside_the_study_is_read_in_degrees_and_gives_radians(tmp_pat
             "    a: 3.0",
             "    lenght: 3.0",
             "digger.yaml:6: 'lenght' is not a key of joints[2]; possible: name, a, d, alpha_deg,"
-            " offset_deg, range_deg, speed_deg_s, rest_deg, mass_kg, effort, thickness, mesh",
+            " offset_deg, range_deg, speed_deg_s, rest_deg, mass_kg, effort, thickness, mesh, "
+            "centre_m, inertia_kgm2",
         ),
         (
             "    range_deg:",
@@ -117,7 +118,7 @@ def test_a_machine_beside_the_study_is_read_in_degrees_and_gives_radians(tmp_pat
         (
             "alpha_deg: -90",
             "alpha_deg: 90",
-            "digger.yaml:1: the file: the first joint slews: it needs alpha_deg -90 and a 0",
+            "digger.yaml:1: the file: the first joint slews: it needs alpha_deg -90",
         ),
         (
             "    a: 3.0",

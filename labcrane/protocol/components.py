@@ -10,7 +10,8 @@ from labcrane.core.roles import Component, Cue, Feedback, Questionnaire, SignalM
 from labcrane.core.settings import Settings
 from labcrane.errors import PluginError, ProtocolError
 from labcrane.files.yaml import Place, YamlFile
-from labcrane.machines.library import find_machine, load_machine
+from labcrane.machines.descriptions.description import MachineDescription
+from labcrane.machines.library import read_machine
 from labcrane.machines.machine import Machine
 from labcrane.protocol.protocol import Protocol, Use
 from labcrane.protocol.referenced_files import plain_settings
@@ -174,11 +175,13 @@ class ComponentResolver:
     def machine(self) -> tuple[Machine, str] | None:
         """Return the machine and its file's text, or note what is wrong."""
         name, folder = self._at(("machine",)), self._source.path.parent
-        if not isinstance(name, str):
-            return None
         try:
-            machine = load_machine(name, folder, recorded=self._source.recorded)
-            return machine, find_machine(name, folder).read_text(encoding="utf-8")
+            if isinstance(name, dict):
+                described = self._source.check(MachineDescription, ("machine",))
+                return described.read(folder) if described else None
+            if not isinstance(name, str):
+                return None  # noted by the protocol's own check
+            return read_machine(name, folder, recorded=self._source.recorded)
         except ProtocolError as error:
             self._source.misnamed(("machine",), str(error))
             return None

@@ -3,17 +3,21 @@
 import gc
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from labcrane.core.clock import Clock, ManualClock, SystemClock
 from labcrane.core.records import Event, Frame, Phase, Run
 from labcrane.core.roles import Trigger
 from labcrane.design.counts import TrialCounts
 from labcrane.design.plan import SessionPlan, plan_session
+from labcrane.doctor.scheduling import lateness
 from labcrane.errors import DeviceError, PluginError, ProtocolError
 from labcrane.files.lock import held
+from labcrane.processes.real_time import real_time
 from labcrane.protocol.rig import Rig
 from labcrane.recording.crash_marker import CrashMarker, read_whereabouts
 from labcrane.recording.frame_log import BatchLog, FrameLog, columns, frame_bytes
@@ -47,6 +51,9 @@ from labcrane.streams.sync.report.sync_report import SyncReport
 
 TRIGGERS = "triggers."
 """How the parts begin that a study's triggers play."""
+
+MEASURED_S = 1.0
+"""How long an empty loop is measured, before a loop in real time."""
 
 RESERVE_S = 60.0
 """Seconds of recording for which the disk must always have room; below it the session pauses."""
@@ -169,6 +176,7 @@ def _record(
     clock = _clock(visit, so_far)
     died = read_whereabouts(visit.whereabouts) if visit.resumed else None
     with (
+        _scheduled(visit) as scheduling,
         _watching(visit, rig),
         rig.opened(study, plan.seed) as run,
     ):
@@ -176,7 +184,7 @@ def _record(
             rig.dynamics.reset(within_limits(study, so_far.angles))
         second = frame_bytes(run) * run.rate_hz
         visit.folder.check_space(plan.expected_s, second, RESERVE_S)
-        about = context(visit, plan, rig, run) | admission.context
+        about = context(visit, plan, rig, run) | admission.context | scheduling
         awaits = (*study.views, *study.sounds) if visit.feedback else ()
         opening = list(_opening(about, so_far, died, clock.now()))
         if so_far is not None:
@@ -219,6 +227,32 @@ def _watching(visit: Visit, rig: Rig) -> AbstractContextManager[None]:
     return visit.study.oversight.published(visit.whereabouts)
 
 
+@contextmanager
+def _scheduled(visit: Visit) -> Iterator[dict[str, Any]]:
+    """Schedule the loop as a visit says; give what the record is to say of it.
+
+    What real time gains is measured here and now, by a second of an empty loop before and with it.
+    """
+    if not visit.real_time:
+        yield {}
+        return
+    rate_hz = visit.study.protocol.rate_hz
+    before = _late(SystemClock(), rate_hz)
+    with real_time(visit.core) as granted:
+        with_it = _late(SystemClock(SystemClock.REAL_TIME_SPIN_S), rate_hz)
+        lateness = {"before": before, "with": with_it}
+        yield {"real_time": {**asdict(granted), "lateness_ms": lateness}}
+
+
+def _late(clock: Clock, rate_hz: float) -> dict[str, float]:
+    late = 1e3 * lateness(clock, rate_hz, MEASURED_S)
+    return {
+        "p50": float(np.quantile(late, 0.5)),
+        "p99": float(np.quantile(late, 0.99)),
+        "most": float(late.max()),
+    }
+
+
 def _log(visit: Visit, run: Run, clock: Clock, reserve: int) -> FrameLog:
     now = clock.now if visit.fast else None
     path, held = next_part(visit.journal), columns(run)
@@ -229,7 +263,7 @@ def _log(visit: Visit, run: Run, clock: Clock, reserve: int) -> FrameLog:
 def _clock(visit: Visit, so_far: Progress | None) -> Clock:
     """Return the session's clock; a simulated one goes on where the last part ended."""
     if not visit.fast:
-        return SystemClock()
+        return SystemClock(SystemClock.REAL_TIME_SPIN_S if visit.real_time else SystemClock.SPIN_S)
     if so_far is None or so_far.time is None:
         return ManualClock()
     return ManualClock(start=so_far.time + 1.0 / visit.study.protocol.rate_hz)
