@@ -31,6 +31,8 @@ PACKAGES = {
     "soffice": "libreoffice-calc-nogui",
     "Xvfb": "xvfb",
     "xdotool": "xdotool",
+    "xrandr": "x11-xserver-utils",
+    "xwininfo": "x11-utils",
     "jackd": "jackd2",
     "jack_wait": "jackd2",
     "gcc": "gcc libc6-dev",

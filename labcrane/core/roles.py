@@ -24,7 +24,7 @@ from pydantic import BaseModel
 if TYPE_CHECKING:  # a protocol is checked without loading what it does not need
     from labcrane.core.clock import Tick
     from labcrane.core.items import Answers, Item, Score
-    from labcrane.core.primitives import Shape
+    from labcrane.core.primitives import Shape, Sphere
     from labcrane.core.records import (
         CameraImage,
         Echo,
@@ -37,6 +37,7 @@ if TYPE_CHECKING:  # a protocol is checked without loading what it does not need
         Value,
     )
     from labcrane.core.signals import Signal, SignalFault, SignalStream
+    from labcrane.core.twin import Twin
     from labcrane.machines.machine import Body
     from labcrane.types import FloatArray
 
@@ -59,6 +60,14 @@ class Component(ABC):
     def metadata(self) -> Mapping[str, Value]:
         """Return what the record should know of the open component: calibration, versions."""
         return {}
+
+    def twin(self) -> Twin | None:
+        """Return the compiled twin of the open component's tick, for simulations; None for none.
+
+        Of an input device, a controller, a machine or a task: see :mod:`labcrane.core.twin`. Asked
+        for once a session, and only where numba is installed, so import it there.
+        """
+        return None
 
 
 class InputDevice(Component):
@@ -131,6 +140,10 @@ class Task(Component):
     condition_units: Mapping[str, str] = {}
     """Units of the numbers in its trials' conditions; ``"1"`` for counts and ratios."""
 
+    reports: tuple[str, ...] = ()
+    """What people may say by a button of either page that they have seen, while a trial of it runs:
+    ``("deformity",)``. It comes as the event ``order.report``, with it as ``text``."""
+
     @abstractmethod
     def factors(self) -> Mapping[str, Sequence[str]]:
         """Return what the design may order: the levels of each factor, as written."""
@@ -138,6 +151,10 @@ class Task(Component):
     @abstractmethod
     def plan(self, levels: Mapping[str, Sequence[str]]) -> Sequence[PlannedTrial]:
         """Return a block's trials, for the levels of each factor in the order given."""
+
+    def places(self) -> Sequence[Sphere]:
+        """Return where targets can be, of all trials together: cameras are framed on them."""
+        return ()
 
     @abstractmethod
     def evaluate(self, frame: Frame) -> TrialStatus:

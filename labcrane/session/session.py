@@ -49,25 +49,34 @@ from labcrane.session.sequencer import Sequencer
 from labcrane.session.visit import Visit, claim
 from labcrane.streams.sync.report.sync_report import SyncReport
 
-TRIGGERS = "triggers."
-"""How the parts begin that a study's triggers play."""
-
 MEASURED_S = 1.0
 """How long an empty loop is measured, before a loop in real time."""
+
+TRIGGERS = "triggers."
+"""How the parts begin that a study's triggers play."""
 
 RESERVE_S = 60.0
 """Seconds of recording for which the disk must always have room; below it the session pauses."""
 
 
-def run(visit: Visit, console: Console) -> Path:
+ForwardMaker = Callable[[Rig, Run, Sequencer, BatchLog], loop.Forward]
+"""Makes what goes forward through the ticks of a simulation, from its open rig."""
+
+
+def run(visit: Visit, console: Console, forward: ForwardMaker | None = None) -> Path:
     """Record a session in this process and consolidate it; return the participant file.
 
     Whatever ends it, what was recorded until then is in the file.
+
+    Parameters
+    ----------
+    forward
+        For sessions on a clock that jumps.
     """
     check_eligibility(visit)
     with running(visit):
         try:
-            record(visit, console)
+            record(visit, console, forward=forward)
         finally:
             if parts(visit.journal):
                 finish(visit)
@@ -140,7 +149,10 @@ def finish(visit: Visit) -> SyncReport:
 
 
 def record(
-    visit: Visit, console: Console, offer: Callable[[Mapping[str, str]], None] | None = None
+    visit: Visit,
+    console: Console,
+    offer: Callable[[Mapping[str, str]], None] | None = None,
+    forward: ForwardMaker | None = None,
 ) -> None:
     """Run a session to its end and write its journal.
 
@@ -148,6 +160,8 @@ def record(
     ----------
     offer
         Is told the streams of frames and context, by name and description, once they are there.
+    forward
+        As of :func:`run`.
 
     Raises
     ------
@@ -158,7 +172,7 @@ def record(
     admission = check_eligibility(visit)
     whole = plan_session(study, visit.participant, visit.session, admission.slot)
     with recording(visit):
-        _record(visit, console, admission, whole, offer)
+        _record(visit, console, admission, whole, offer, forward)
 
 
 def _record(
@@ -167,6 +181,7 @@ def _record(
     admission: Admission,
     whole: SessionPlan,
     offer: Callable[[Mapping[str, str]], None] | None,
+    forward: ForwardMaker | None,
 ) -> None:
     study = visit.study
     so_far, plan = go_on(visit, whole) if visit.resumed else (None, whole)
@@ -207,8 +222,11 @@ def _record(
                 sinks = [*triggers, *outlets, _teller(console)]
                 if not visit.fast:
                     sinks.append(OverrunReporter(study.oversight, run.rate_hz, log, console))
+                ahead = None
+                if forward is not None and isinstance(log, BatchLog):
+                    ahead = forward(rig, run, sequencer, log)
                 with _settled():
-                    loop.run(rig, run, sequencer, clock, console, log, sinks)
+                    loop.run(rig, run, sequencer, clock, console, log, sinks, ahead)
         except (PluginError, DeviceError) as error:
             log.note(Event("session.failed", clock.now(), {"why": str(error)}))
             error.add_note(

@@ -34,6 +34,7 @@ from labcrane.testing.roles import (
 )
 from labcrane.testing.tasks import TaskContract
 from labcrane.testing.triggers import TriggerContract
+from labcrane.testing.twins import TwinContract
 
 __all__ = [
     "RATE_HZ",
@@ -52,6 +53,7 @@ __all__ = [
     "SignalMonitorContract",
     "TaskContract",
     "TriggerContract",
+    "TwinContract",
     "ch8",
     "check_array",
     "check_closes_after_failed_open",

@@ -299,6 +299,7 @@ def progress_bar(what: str, total: int) -> Iterator[Any]:
         Progress,
         TextColumn,
         TimeElapsedColumn,
+        TimeRemainingColumn,
     )
 
     parts = (
@@ -306,6 +307,8 @@ def progress_bar(what: str, total: int) -> Iterator[Any]:
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
     )
     with Progress(*parts, console=out.console) as progress:
         task = progress.add_task(what, total=total)
