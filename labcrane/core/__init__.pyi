@@ -9,6 +9,7 @@ from .items import AnswerError, Answers, Item, Score, numeric_answers
 from .primitives import Cylinder, Shape, Sphere, TargetFinder
 from .records import (
     CameraImage,
+    Echo,
     Event,
     Phase,
     PlannedTrial,
@@ -46,6 +47,7 @@ __all__ = [
     "Crane",
     "CraneSettings",
     "Cylinder",
+    "Echo",
     "Event",
     "EventName",
     "Finding",

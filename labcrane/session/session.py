@@ -11,6 +11,7 @@ import numpy as np
 
 from labcrane.core.clock import Clock, ManualClock, SystemClock
 from labcrane.core.records import Event, Frame, Phase, Run
+from labcrane.core.roles import Trigger
 from labcrane.design.counts import TrialCounts
 from labcrane.design.plan import SessionPlan, plan_session
 from labcrane.doctor.scheduling import lateness
@@ -50,6 +51,9 @@ from labcrane.streams.sync.report.sync_report import SyncReport
 
 MEASURED_S = 1.0
 """How long an empty loop is measured, before a loop in real time."""
+
+TRIGGERS = "triggers."
+"""How the parts begin that a study's triggers play."""
 
 RESERVE_S = 60.0
 """Seconds of recording for which the disk must always have room; below it the session pauses."""
@@ -211,8 +215,11 @@ def _record(
         try:
             for event in opening:
                 log.note(event)
-            with _outlets(visit, whole, done, run, offer) as outlets:
-                sinks = [*outlets, _teller(console)]
+            with (
+                _triggers(visit, run, log, console) as triggers,
+                _outlets(visit, whole, done, run, offer) as outlets,
+            ):
+                sinks = [*triggers, *outlets, _teller(console)]
                 if not visit.fast:
                     sinks.append(OverrunReporter(study.oversight, run.rate_hz, log, console))
                 ahead = None
@@ -382,6 +389,29 @@ def _settled() -> Iterator[None]:
         yield
     finally:
         gc.unfreeze()
+
+
+@contextmanager
+def _triggers(
+    visit: Visit, run: Run, log: FrameLog, console: Console
+) -> Iterator[list[Callable[[Frame], None]]]:
+    study = visit.study
+    chosen = {
+        part.removeprefix(TRIGGERS): choice
+        for part, choice in study.others.items()
+        if part.startswith(TRIGGERS)
+    }
+    if visit.fast or not chosen:  # a simulation is over long before any device has seen a pulse
+        yield []
+        return
+    from labcrane.streams.triggers import Triggers, opened  # noqa: PLC0415
+
+    built = {name: choice.build(study.machine) for name, choice in chosen.items()}
+    lines = {name: each for name, each in built.items() if isinstance(each, Trigger)}
+    with opened(lines, run):
+        triggers = Triggers(lines, log.append, console.report)
+        yield [triggers]
+        triggers.finish()
 
 
 def _teller(console: Console) -> Callable[[Frame], None]:

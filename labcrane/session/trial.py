@@ -63,6 +63,12 @@ class TrialRun:
         """Let the trial go on past its automatic ends."""
         self._task.lift_limits()
 
+    def doubt(self, what: str) -> str | None:
+        """Return why the task does not ask whether ``what`` was seen, or None when it does."""
+        if what in self._task.reports:
+            return None
+        return f"this task asks for reports of {', '.join(self._task.reports) or 'nothing'}"
+
     def evaluate(self, frame: Frame, wish: Phase | None) -> None:
         """Complete ``frame``; ``wish`` ends the trial whatever the task thinks."""
         if self._began is None:

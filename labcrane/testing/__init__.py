@@ -33,6 +33,7 @@ from labcrane.testing.roles import (
     opened,
 )
 from labcrane.testing.tasks import TaskContract
+from labcrane.testing.triggers import TriggerContract
 from labcrane.testing.twins import TwinContract
 
 __all__ = [
@@ -51,6 +52,7 @@ __all__ = [
     "QuestionnaireContract",
     "SignalMonitorContract",
     "TaskContract",
+    "TriggerContract",
     "TwinContract",
     "ch8",
     "check_array",

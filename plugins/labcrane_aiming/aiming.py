@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from labcrane import Frame, Machine, ProtocolError, Run, Signal, Task, Trial
-from labcrane.core import Event, Phase, PlannedTrial, TrialStatus, Twin, twin
+from labcrane.core import Event, Phase, PlannedTrial, Sphere, TrialStatus, Twin, twin
 from labcrane.machines import reach
 from labcrane_aiming.pairs import Pair, Point, index_of_difficulty, pairs
 from labcrane_aiming.settings import AimingSettings
@@ -99,6 +99,14 @@ class Aiming(Task):
         }
         expected = PLAN_INTERCEPT_S + PLAN_SLOPE_S * difficulty
         return PlannedTrial(condition, expected_s=expected, counted=number > 0)
+
+    def places(self) -> Sequence[Sphere]:
+        radius = self._settings.width / 2
+        return [
+            Sphere(f"{pair.name} {which}", point, radius, (0.9, 0.1, 0.1, 1.0))
+            for pair in self._pairs.values()
+            for which, point in (("near", pair.near), ("far", pair.far))
+        ]
 
     def open(self, run: Run) -> None:
         # A protocol is checked, and a study planned, without loading numpy.

@@ -56,6 +56,7 @@ class ResolvedRate:
         threshold: float = 0.5,
     ) -> None:
         self._arm = Arm(machine)
+        self._foot = machine.joints[0].a
         self._stops = stops
         self._full = tuple(full)
         self._hold_pitch = redundancy == "hold_pitch"
@@ -78,7 +79,7 @@ class ResolvedRate:
     ) -> Motion:
         """Return the joints' motion for a tip velocity along the arm, in m/s."""
         columns = self._arm.planar_jacobian(angles)
-        radius = -columns[0][1]  # the shoulder sits on the slew axis
+        radius = self._foot - columns[0][1]  # the first pitch axis may be before the slew axis
         radius2 = radius * radius
         slew = tangential * radius / (radius2 + self._damp(radius2))
         if self._hold_pitch:
