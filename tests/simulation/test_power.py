@@ -1,12 +1,14 @@
 """The power of planned tests, against the power that theory gives them."""
 
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from statsmodels.stats.power import TTestIndPower, TTestPower
 
+from labcrane.cli.app import main
 from labcrane.errors import ProtocolError
 from labcrane.simulation.power import Claim, Effect, Pool, make_pool, power, read_effect
 from labcrane.simulation.sample_size import paragraph, sample_size
@@ -238,3 +240,19 @@ def test_the_paragraph_says_sizes_intervals_and_what_was_tested() -> None:
     assert f"({found.low} to {found.high} by the 95 % interval of 500 cohorts" in text
     assert "movement_time~half was tested" in text
     assert "overstated by a factor of 1." in text
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--claim", "equivalent"], "did you mean 'equivalence'?"),
+        (["--claim", "equivalence"], "equivalence is shown against a margin"),
+        (["--goal", "much"], "--goal 'much' is no list of powers; write 0.8,0.9"),
+    ],
+)
+def test_what_cannot_be_shown_is_refused_before_anybody_is_simulated(
+    tmp_path: Path, words: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["power", "protocol.yaml", "--out", str(tmp_path / "out"), *words]) == 2
+    assert message in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "out").exists()

@@ -235,7 +235,7 @@ def _print_power(
     if pool.left_out:
         out.print(f"left out, without a value at some level: {', '.join(pool.left_out)}")
     table = whole_table(
-        "participants", "cohorts", "power", "95 %", "found in nothing", "95 %", "type M", "type S"
+        "participants", "cohorts", "power", "95 %", "in nothing", "type M", "type S"
     )
     found = []
     seed = derive(study, "power")
@@ -248,7 +248,6 @@ def _print_power(
             f"{one.power:.3f}",
             f"{one.power_low:.3f} to {one.power_high:.3f}",
             f"{one.null:.3f}",
-            f"{one.null_low:.3f} to {one.null_high:.3f}",
             f"{one.type_m:.2f}",
             f"{one.type_s:.3f}",
         )
