@@ -124,6 +124,8 @@ class SupervisorSettings(Settings):
     sent."""
 
 
+DepthCue = Literal["tip_shadow", "plumb_line", "ground_grid"]
+
 HudLine = Literal["block", "trial", "distance", "time", "speed", "load", "lateness"]
 """What a line of text can say."""
 
@@ -188,6 +190,11 @@ class ViewSettings(Settings):
 
     targets: bool = True
     """Whether targets are drawn."""
+
+    depth_cues: tuple[DepthCue, ...] = ()
+    """What tells how high the tip is and where it is above the ground: a spot below it, a line down
+    to it, lines on the ground a metre apart. Every group sees them: views have the same settings in
+    all of them."""
 
     delay_s: NonNegativeFloat = 0.0
     """How long ago what is shown happened: a teleoperator's delay, in seconds."""
