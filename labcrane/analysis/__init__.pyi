@@ -6,8 +6,10 @@ from .exporter import Exporter
 from .measures import measures_of
 from .movements import Movement, movements_of
 from .questionnaires import answers_of, asked_in, scores_of
+from .tables.dataset import Dataset, open_dataset
 
 __all__ = [
+    "Dataset",
     "Exporter",
     "Movement",
     "Participant",
@@ -17,5 +19,6 @@ __all__ = [
     "find_cohort",
     "measures_of",
     "movements_of",
+    "open_dataset",
     "scores_of",
 ]

@@ -8,7 +8,7 @@ from labcrane.testing import ExporterContract, ch8
 
 
 class TestExporters(ExporterContract):
-    @pytest.fixture(params=["tables", "psychds", "matlab", "bids", "xdf"])
+    @pytest.fixture(params=["tables", "psychds", "matlab", "bids", "xdf", "lerobot", "robomimic"])
     def exporter(self, request: pytest.FixtureRequest) -> Exporter:
         offer = discover().find(Exporter, request.param)
         return offer.build(offer.settings(), ch8())
