@@ -108,6 +108,11 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
         lambda: shutil.which("bids-validator-deno", path=Path(sys.executable).parent) is not None,
         "pip install bids-validator-deno",
     ),
+    "lerobot": (
+        lambda: Path(os.environ.get("LABCRANE_LEROBOT", "none")).is_file(),
+        "pip install lerobot in an environment of its own, which brings torch, and name its Python "
+        "in LABCRANE_LEROBOT",
+    ),
     "alsa.conf": (
         lambda: Path("/usr/share/alsa/alsa.conf").exists(),
         "apt install libasound2-data",  # PortAudio ends the process without it
