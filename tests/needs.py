@@ -31,9 +31,12 @@ PACKAGES = {
     "soffice": "libreoffice-calc-nogui",
     "Xvfb": "xvfb",
     "xdotool": "xdotool",
+    "xrandr": "x11-xserver-utils",
+    "xwininfo": "x11-utils",
     "jackd": "jackd2",
     "jack_wait": "jackd2",
     "gcc": "gcc libc6-dev",
+    "sha256sum": "coreutils",
     "ufw": "ufw",
     "unshare": "util-linux",
     "node": "nodejs",
@@ -82,6 +85,15 @@ def _may_run_in_real_time() -> bool:
     return _succeeds(sys.executable, "-c", asked)  # in a process of its own: it would stay so
 
 
+LEARNERS = "LABCRANE_LEARNERS"
+"""Names the Python of an environment with what learns, which brings torch."""
+
+
+def _learner_has(package: str) -> bool:
+    asked = f"import sys, importlib.util as u; sys.exit(u.find_spec({package!r}) is None)"
+    return LEARNERS in os.environ and _succeeds(os.environ[LEARNERS], "-c", asked)
+
+
 GRAPHICS = tuple(LIBRARIES)
 """What any picture is drawn with, a hidden one by the software renderer too."""
 
@@ -104,14 +116,20 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
     "root": (lambda: os.geteuid() == 0, "only root may ask what a firewall would do"),
     "pybullet": (lambda: find_spec("pybullet") is not None, "Python 3.11: it has no later wheels"),
     "mujoco": (lambda: find_spec("mujoco") is not None, "pip install mujoco"),
+    "mne": (lambda: find_spec("mne") is not None, "pip install 'labcrane[eeg]'"),
+    "mne_bids": (lambda: find_spec("mne_bids") is not None, "pip install mne-bids"),
+    "pybv": (lambda: find_spec("pybv") is not None, "pip install 'labcrane[eeg]'"),
     "bids-validator-deno": (
         lambda: shutil.which("bids-validator-deno", path=Path(sys.executable).parent) is not None,
         "pip install bids-validator-deno",
     ),
     "lerobot": (
-        lambda: Path(os.environ.get("LABCRANE_LEROBOT", "none")).is_file(),
-        "pip install lerobot in an environment of its own, which brings torch, and name its Python "
-        "in LABCRANE_LEROBOT",
+        lambda: _learner_has("lerobot"),
+        f"pip install lerobot into an environment of its own, and name its Python in {LEARNERS}",
+    ),
+    "robomimic": (
+        lambda: _learner_has("robomimic"),
+        f"pip install robomimic into an environment of its own, and name its Python in {LEARNERS}",
     ),
     "alsa.conf": (
         lambda: Path("/usr/share/alsa/alsa.conf").exists(),

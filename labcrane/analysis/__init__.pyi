@@ -2,23 +2,34 @@
 
 from .codebook import codebook_of
 from .cohort import Participant, find_cohort
+from .electrodes.mne import EEG_READERS, channel_types, eeg_streams, events_at, to_mne, volts
+from .electrodes.sampled import Sampled, sampled
 from .exporter import Exporter
 from .measures import measures_of
 from .movements import Movement, movements_of
-from .questionnaires import answers_of, asked_in, scores_of
+from .questionnaires import answers_of, asked_in, beside_trials, scores_of
 from .tables.dataset import Dataset, open_dataset
 
 __all__ = [
+    "EEG_READERS",
     "Dataset",
     "Exporter",
     "Movement",
     "Participant",
+    "Sampled",
     "answers_of",
     "asked_in",
+    "beside_trials",
+    "channel_types",
     "codebook_of",
+    "eeg_streams",
+    "events_at",
     "find_cohort",
     "measures_of",
     "movements_of",
     "open_dataset",
+    "sampled",
     "scores_of",
+    "to_mne",
+    "volts",
 ]

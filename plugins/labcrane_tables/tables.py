@@ -8,7 +8,15 @@ from pathlib import Path
 from shutil import copyfile
 from typing import TYPE_CHECKING, Any
 
-from labcrane.analysis import Exporter, Participant, answers_of, codebook_of, measures_of, scores_of
+from labcrane.analysis import (
+    Exporter,
+    Participant,
+    answers_of,
+    beside_trials,
+    codebook_of,
+    measures_of,
+    scores_of,
+)
 from labcrane.recording import SessionRecord
 from labcrane_tables.frames import StreamTable, snake, stream_tables
 from labcrane_tables.settings import TableSettings
@@ -47,7 +55,7 @@ class Tables(Exporter):
         events = _Growing(folder / "events")
         for participant in participants:
             people.append(_person(participant))
-            measures = measures_of(participant)
+            measures = beside_trials(measures_of(participant), participant)
             trials.append(snake(measures))
             codebooks.append(codebook_of(participant, measures))
             answers.append(answers_of(participant))
@@ -73,12 +81,13 @@ class Tables(Exporter):
         for table in stream_tables(session):
             stem = f"{participant.name}_ses-{number:02}_{table.name.replace('/', '-')}"
             if forms in {"both", "parquet"}:
-                _write_parquet(table, folder / f"{stem}.parquet")
+                write_parquet(table, folder / f"{stem}.parquet")
             if forms in {"both", "csv"}:
                 _write_packed_csv(table, folder / f"{stem}.csv.gz")
 
 
-def _write_parquet(table: StreamTable, path: Path) -> None:
+def write_parquet(table: StreamTable, path: Path) -> None:
+    """Write a table a row group at a time."""
     from pyarrow import parquet
 
     batches = table.batches()

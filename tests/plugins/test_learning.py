@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
-from needs import missing, needs
+from needs import LEARNERS, missing, needs
 
 from labcrane import RecordingError
 from labcrane.analysis import Participant
@@ -20,6 +20,28 @@ from labcrane_learning.episodes import episodes_of, layout_of
 from labcrane_learning.lerobot import LeRobot
 from labcrane_learning.robomimic import NAME, Robomimic
 from labcrane_learning.settings import EpisodeSettings
+
+ROBOMIMIC = """
+import sys, h5py, numpy as np
+from robomimic.utils import obs_utils
+from robomimic.utils.dataset import SequenceDataset
+low = {"low_dim": ["state"], "rgb": [], "depth": [], "scan": []}
+obs_utils.initialize_obs_utils_with_obs_specs({"obs": low})
+read = SequenceDataset(
+    hdf5_path=sys.argv[1], obs_keys=("state",), dataset_keys=("actions", "rewards", "dones"),
+    hdf5_cache_mode="low_dim", load_next_obs=True,
+)
+at = 0
+with h5py.File(sys.argv[1]) as file:
+    for name in read.demos:
+        demo = file["data"][name]
+        for row in range(demo.attrs["num_samples"]):
+            for key, held in (("actions", "actions"), ("rewards", "rewards"), ("dones", "dones")):
+                assert np.array_equal(read[at][key][0], demo[held][row])
+            assert np.array_equal(read[at]["obs"]["state"][0], demo["obs/state"][row])
+            at += 1
+print(len(read) == at, at)
+"""
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +139,7 @@ def test_the_published_lerobot_loads_it_equal_in_float32(
     at = np.random.default_rng().integers(0, len(seen), 20).tolist()
     reader = Path(__file__).with_name("lerobot_reader.py")
     said = subprocess.check_output(
-        [os.environ["LABCRANE_LEROBOT"], str(reader), str(lerobot), *map(str, at)],
+        [os.environ[LEARNERS], str(reader), str(lerobot), *map(str, at)],
         env={**os.environ, "HF_HOME": str(tmp_path)},
     )
     read = json.loads(said.splitlines()[-1])
@@ -157,6 +179,16 @@ def test_robomimics_file_holds_every_episode_with_its_ends(
         assert {name.decode() for name in file["mask/success"][:]} == succeeded
 
 
+@pytest.mark.long
+@needs("robomimic")
+def test_the_published_robomimic_reads_every_row(people: list[Participant], tmp_path: Path) -> None:
+    Robomimic(EpisodeSettings()).export(iter(people), tmp_path)
+    words = [os.environ[LEARNERS], "-c", ROBOMIMIC, str(tmp_path / NAME)]
+    said = subprocess.check_output(words, text=True).splitlines()[-1]
+    with h5py.File(tmp_path / NAME) as file:
+        assert said == f"True {file['data'].attrs['total']}"
+
+
 def test_people_with_other_columns_are_not_mixed(
     people: list[Participant], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -172,7 +204,7 @@ def test_people_with_other_columns_are_not_mixed(
 
 
 def test_what_to_do_without_lerobot_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("LABCRANE_LEROBOT", raising=False)
+    monkeypatch.delenv(LEARNERS, raising=False)
     missing.cache_clear()
     assert "pip install lerobot" in str(missing("lerobot"))
     missing.cache_clear()

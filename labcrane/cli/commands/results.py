@@ -40,7 +40,7 @@ def export(
     to: Annotated[
         str,
         typer.Option(
-            help="tables, matlab, bids, psychds, xdf, lerobot, robomimic; see labcrane plugins"
+            help="tables, matlab, bids, psychds, xdf, zip, lerobot, robomimic; see labcrane plugins"
         ),
     ],
     folder: Annotated[Path, typer.Option("--out", help="a folder that is empty or new")],
@@ -302,6 +302,7 @@ def progress_bar(what: str, total: int) -> Iterator[Any]:
         Progress,
         TextColumn,
         TimeElapsedColumn,
+        TimeRemainingColumn,
     )
 
     parts = (
@@ -309,6 +310,8 @@ def progress_bar(what: str, total: int) -> Iterator[Any]:
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
     )
     with Progress(*parts, console=out.console) as progress:
         task = progress.add_task(what, total=total)

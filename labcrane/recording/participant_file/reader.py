@@ -17,6 +17,7 @@ from labcrane.recording.participant_file.columns import CHUNK, holds_texts, text
 from labcrane.recording.participant_file.session_group import SYNC_REPORT
 from labcrane.recording.participant_file.stream_group import BASES
 from labcrane.recording.participant_file.writer import group_name, reading
+from labcrane.recording.xdf.header import StreamHeader
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -204,6 +205,14 @@ class Stream:
         """Where each column is in the file."""
         with reading(self._path) as file:
             return {name: str(dataset.name) for name, dataset in _columns(file[self._group])}
+
+    @cached_property
+    def header(self) -> StreamHeader | None:
+        """What the source says of itself and its channels; None for the session's own signals."""
+        if "rate_hz" not in self.attrs:
+            return None
+        with reading(self._path) as file:
+            return StreamHeader.from_xml(text_of(file[self._group].parent["header"]))
 
     def _beside(self, name: str) -> FloatArray | None:
         """Return a column beside the corrected time; None where there is none."""
