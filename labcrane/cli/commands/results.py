@@ -38,7 +38,10 @@ LEFT_OUT = 3
 def export(
     data: DataFolder,
     to: Annotated[
-        str, typer.Option(help="tables, matlab, bids, psychds, xdf, zip; see labcrane plugins")
+        str,
+        typer.Option(
+            help="tables, matlab, bids, psychds, xdf, zip, lerobot, robomimic; see labcrane plugins"
+        ),
     ],
     folder: Annotated[Path, typer.Option("--out", help="a folder that is empty or new")],
     include: Include = None,
