@@ -7,6 +7,7 @@ from pathlib import Path
 
 from labcrane.approval import codebook
 from labcrane.approval.difference import differences
+from labcrane.approval.environment import changes, environment
 from labcrane.approval.lock import FORMAT, VERSION, Lock, lock_path, read_lock
 from labcrane.approval.materials import materials
 from labcrane.errors import ProtocolError
@@ -65,13 +66,14 @@ def amend(study: Study, registry: Registry, grant: Grant, why: str, today: date)
     """
     old = read_lock(study.path)
     new = _lock(study, registry, grant, today, old.amendments)
-    changes = differences(old.content["materials"], new.content["materials"])
-    changes += [
+    changed = differences(old.content["materials"], new.content["materials"])
+    changed += [f"environment: {each}" for each in otherwise_installed(old)]
+    changed += [
         f"approval: {name} was {old.approval[name]!r}, is {new.approval[name]!r}"
         for name in ("board", "valid_until", "consent")
         if old.approval[name] != new.approval[name]
     ]
-    if not changes:
+    if not changed:
         raise ProtocolError(f"{study.path} is as it was approved; there is nothing to amend")
     if not why.strip():
         raise ProtocolError("an amendment needs a reason; give one with --why")
@@ -80,7 +82,7 @@ def amend(study: Study, registry: Registry, grant: Grant, why: str, today: date)
         "date": today.isoformat(),
         "reference": grant.reference,
         "why": why,
-        "changes": changes,
+        "changes": changed,
         "replaces": old.seal,
     }
     kept = old.path.with_name(old.path.name.replace(".json", f".{entry['number']}.json"))
@@ -96,14 +98,24 @@ def drift(study: Study, registry: Registry, lock: Lock) -> list[str]:
     return differences(lock.content["materials"], now)
 
 
+def otherwise_installed(lock: Lock) -> list[str]:
+    """Return what is installed in another way than when the study was approved, in words.
+
+    Of a lock that says nothing of packages, as the first ones, nothing differs.
+    """
+    before = lock.content.get("environment")
+    return changes(before, environment()) if before else []
+
+
 def verify(study: Study, registry: Registry, today: date) -> Lock:
     """Return the lock of a study that may be run with people today.
 
     Raises
     ------
     ProtocolError
-        It was not approved, the approval has expired, or the study is not the approved one; the
-        message has every difference on a line of its own.
+        It was not approved, the approval has expired, the study is not the approved one, or what is
+        installed is not, and the protocol refuses that; the message has every difference on a line
+        of its own.
     """
     lock = read_lock(study.path)
     lock.check_date(today)
@@ -113,6 +125,14 @@ def verify(study: Study, registry: Registry, today: date) -> Lock:
             f"{study.path} is not the study that was approved under "
             f"{lock.approval['reference']!r}:\n{listed}\n"
             "undo the changes, record the board's decision with labcrane amend, or use --pilot"
+        )
+    if study.protocol.environment == "refuse" and (others := otherwise_installed(lock)):
+        listed = "\n".join(f"  {each}" for each in others)
+        raise ProtocolError(
+            f"{study.path} was approved under {lock.approval['reference']!r} with other packages, "
+            f"and says environment: refuse:\n{listed}\n"
+            "install what there was, as from the study's bundle; record the change with labcrane "
+            "amend; or use --pilot"
         )
     return lock
 
@@ -141,6 +161,7 @@ def _lock(
                 "consent": consent.relative_to(study.path.parent).as_posix(),
             },
             "materials": materials(study, registry, consent),
+            "environment": environment(),
             "machine_title": study.machine.title,
             "codebook": codebook.rows(codebook.codebook(study)),
             "history": history,

@@ -29,7 +29,7 @@ MODULES = {
     "results": ("export", "report", "replay", "view"),
     "simulate": ("simulate", "power"),
     "engines": ("compare_engines",),
-    "approval": ("approve", "amend", "methods"),
+    "approval": ("approve", "amend", "methods", "bundle"),
     "participants": ("participants", "consent", "exclude", "note", "waive", "deviations"),
     "data": ("where", "erase", "relabel", "transfer"),
 }

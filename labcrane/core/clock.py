@@ -27,16 +27,27 @@ class SystemClock:
 
     That the two agree is checked when the first outlet opens
     (:func:`labcrane.streams.outlets.check_clock`).
+
+    Parameters
+    ----------
+    spin_s
+        The last stretch before a time, in s, which is spun: sleep overshoots.
     """
 
-    # Sleep overshoots by 30 to 70 us at the median, so the last stretch is spun.
+    # Sleep overshoots by 30 to 70 us at the median.
     SPIN_S = 0.0005
+
+    # A thread in real time wakes up sooner; one that never sleeps is stopped for 50 ms a second.
+    REAL_TIME_SPIN_S = 0.0001
+
+    def __init__(self, spin_s: float = SPIN_S) -> None:
+        self._spin_s = spin_s
 
     def now(self) -> float:
         return time.perf_counter()
 
     def wait_until(self, due: float) -> None:
-        if (remaining := due - self.now() - self.SPIN_S) > 0:
+        if (remaining := due - self.now() - self._spin_s) > 0:
             time.sleep(remaining)
         while self.now() < due:
             pass
@@ -67,6 +78,11 @@ def ticks(clock: Clock, rate_hz: float) -> Iterator[Tick]:
     """Yield ticks at ``rate_hz`` for ever, the first one now."""
     start = clock.now()
     for number in itertools.count():
-        due = start + number / rate_hz
-        clock.wait_until(due)
-        yield Tick(number, due, clock.now())
+        yield tick_of(clock, start, number, rate_hz)
+
+
+def tick_of(clock: Clock, start: float, number: int, rate_hz: float) -> Tick:
+    """Wait for a tick of a run that began at ``start`` seconds, and return it."""
+    due = start + number / rate_hz
+    clock.wait_until(due)
+    return Tick(number, due, clock.now())

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from labcrane.core.clock import Tick
-    from labcrane.core.primitives import Shape
+    from labcrane.core.primitives import Shape, Sphere
     from labcrane.core.signals import Layout
     from labcrane.machines.machine import Body, Machine
     from labcrane.types import FloatArray
@@ -146,6 +146,8 @@ class Run:
         velocity in m/s, shape ``(3,)``, in a state, shape ``(n_state,)``. For simulated operators.
     bodies
         What the machine looks like, for whoever draws it.
+    places
+        Where the tasks' targets can be, for whoever must keep them in sight.
     """
 
     rate_hz: float
@@ -157,6 +159,7 @@ class Run:
     task: Layout
     inverse: Callable[[FloatArray, FloatArray], FloatArray]
     bodies: tuple[Body, ...] = ()
+    places: tuple[Sphere, ...] = ()
 
 
 @dataclass(slots=True)
@@ -201,6 +204,22 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True)
+class Echo:
+    """A code that came back from where it was sent to.
+
+    Attributes
+    ----------
+    code
+        What came back, 1 to 255; a bare number.
+    time
+        When, in seconds on the session's clock, which is ``time.perf_counter``.
+    """
+
+    code: int
+    time: float
+
+
+@dataclass(frozen=True, slots=True)
 class SessionState:
     """What a session is about now, for whoever presents it.
 
@@ -230,6 +249,13 @@ class SessionState:
     scene
         What stands around the machine, as of :func:`labcrane.machines.read_placed`; empty for
         nothing.
+    held
+        Who or what holds the session: the examiner, a stop rule, a part that is lost.
+    waiting
+        What the session waits with for the examiner's order, or that there is a break; empty while
+        it does not wait.
+    over
+        Why the session has ended; empty until it has.
     """
 
     step: int = 0
@@ -249,6 +275,9 @@ class SessionState:
     hint: str = ""
     hint_time: float = 0.0
     scene: str = ""
+    held: tuple[str, ...] = ()
+    waiting: str = ""
+    over: str = ""
 
 
 UNDONE = frozenset({Phase.REPEATED, Phase.ENDED, Phase.INTERRUPTED})

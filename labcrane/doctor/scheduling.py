@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from labcrane.core.clock import SystemClock, ticks
+from labcrane.core.clock import Clock, SystemClock, ticks
 from labcrane.core.findings import Finding, Verdict
 from labcrane.streams.sync.report.limits import LATE
+from labcrane.types import FloatArray
 
 SECONDS = 2.0
 CPUS = Path("/sys/devices/system/cpu")
@@ -33,10 +34,8 @@ def light() -> list[Finding]:
 
 def examine(rate_hz: float) -> list[Finding]:
     """Tick for two seconds as a session does, and say how late that was."""
-    count = round(SECONDS * rate_hz)
-    late = np.array(
-        [tick.woke - tick.due for tick in itertools.islice(ticks(SystemClock(), rate_hz), count)]
-    )
+    late = lateness(SystemClock(), rate_hz, SECONDS)
+    count = len(late)
     share = float(np.mean(late > 1.0 / rate_hz))
     middle, most, worst = (1e3 * float(np.quantile(late, at)) for at in (0.5, 0.99, 1.0))
     text = (
@@ -46,6 +45,14 @@ def examine(rate_hz: float) -> list[Finding]:
     verdict = LATE.judge(share)
     fix = "" if verdict is Verdict.PASS else "close other programs; see the governor; lower rate_hz"
     return [Finding(verdict, text, fix), *light()]
+
+
+def lateness(clock: Clock, rate_hz: float, seconds: float) -> FloatArray:
+    """Return how late the ticks of an empty loop are here and now, in s, shape ``(n_ticks,)``."""
+    count = round(seconds * rate_hz)
+    return np.array(
+        [tick.woke - tick.due for tick in itertools.islice(ticks(clock, rate_hz), count)]
+    )
 
 
 def governor(cpus: Path) -> list[Finding]:

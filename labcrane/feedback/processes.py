@@ -94,7 +94,7 @@ def host_orders(study: Study, run: Run, source: str) -> list[FeedbackConfig]:
                 study.path,
                 always=True,
                 cues=cues,
-                title=f"{name} - {study.protocol.study}",
+                title=f"labcrane: {name} - {study.protocol.study}",
                 before=tuple(parts[:number]),
             )
             for number, (name, part) in enumerate(views.items())

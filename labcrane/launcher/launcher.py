@@ -100,6 +100,8 @@ class Launcher:
         """
         visit = self._visit
         admission = check_eligibility(visit)
+        for each in admission.otherwise_installed:
+            self._say(f"since the approval, and recorded with the session: {each}")
         with running(visit):
             if visit.resumed:
                 with recording(visit):  # of a launcher that died, the session may still be ending

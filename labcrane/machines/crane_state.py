@@ -26,6 +26,7 @@ class CraneState:
     def __init__(self, machine: Machine) -> None:
         slew, *chain = machine.joints
         self._base_x = machine.base_x
+        self._foot = slew.a
         self._height = slew.d
         self._slew_offset = slew.offset
         self._links = tuple((number, each.a, each.offset) for number, each in enumerate(chain, 1))
@@ -36,7 +37,7 @@ class CraneState:
     def fill(self, angles: Sequence[float], speeds: Sequence[float]) -> FloatArray:
         """Return the state with joints at ``angles`` in rad, moving at ``speeds`` in rad/s."""
         pitch, turning = 0.0, 0.0
-        radius, height, outward, upward = 0.0, self._height, 0.0, 0.0
+        radius, height, outward, upward = self._foot, self._height, 0.0, 0.0
         for joint, length, offset in self._links:
             pitch += angles[joint] + offset
             turning += speeds[joint]

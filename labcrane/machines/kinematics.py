@@ -67,13 +67,14 @@ class Arm:
     def __init__(self, machine: Machine) -> None:
         slew, *chain = machine.joints
         self._base_x = machine.base_x
+        self._foot = slew.a
         self._height = slew.d
         self._slew_offset = slew.offset
         self._links = tuple((number, each.a, each.offset) for number, each in enumerate(chain, 1))
 
     def plane(self, angles: Sequence[float]) -> tuple[float, float]:
         """Return the tip's radius and height in m."""
-        radius, height, pitch = 0.0, self._height, 0.0
+        radius, height, pitch = self._foot, self._height, 0.0
         for joint, length, offset in self._links:
             pitch += angles[joint] + offset
             radius += length * math.cos(pitch)

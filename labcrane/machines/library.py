@@ -1,7 +1,9 @@
 """Read a machine: one that comes with labcrane, or a YAML file of the study."""
 
+from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 from labcrane.errors import ProtocolError, nearest
 from labcrane.files.system import is_file
@@ -32,12 +34,39 @@ def find_machine(name: str, beside: Path | None = None) -> Path:
     )
 
 
-def load_machine(name: str, beside: Path | None = None, *, recorded: bool = False) -> Machine:
-    """Read machine ``name``; ``recorded`` is whether it is of a session that was run.
+def load_machine(
+    name: str | Mapping[str, Any], beside: Path | None = None, *, recorded: bool = False
+) -> Machine:
+    """Return a machine as a protocol names it; ``recorded`` is whether it is of a session that ran.
 
     Raises
     ------
     ProtocolError
         The machine does not exist, or its file is wrong; the message names file and line.
     """
-    return YamlFile.read(find_machine(name, beside), recorded=recorded).checked(Machine)
+    return read_machine(name, beside, recorded=recorded)[0]
+
+
+def read_machine(
+    name: str | Mapping[str, Any], beside: Path | None = None, *, recorded: bool = False
+) -> tuple[Machine, str]:
+    """Return a machine as a protocol names it, and the text of its YAML.
+
+    Parameters
+    ----------
+    name
+        One that comes with labcrane, a YAML file, or what describes one in another format
+        (:class:`labcrane.machines.descriptions.description.MachineDescription`).
+
+    Raises
+    ------
+    ProtocolError
+        The machine does not exist, or its file is wrong; the message names file and line.
+    """
+    if isinstance(name, str):
+        path = find_machine(name, beside)
+        machine = YamlFile.read(path, recorded=recorded).checked(Machine)
+        return machine, path.read_text(encoding="utf-8")
+    from labcrane.machines.descriptions.description import MachineDescription  # noqa: PLC0415
+
+    return MachineDescription.model_validate(name).read(beside or Path())

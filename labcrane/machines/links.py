@@ -22,8 +22,8 @@ def link_boxes(machine: Machine) -> tuple[Body, ...]:
         Body(
             slew.name,
             1,
-            (wide, abs(slew.d) or wide, wide),
-            (0.0, 0.5 * slew.d, 0.0),
+            (slew.a + wide, abs(slew.d) or wide, wide),
+            (-0.5 * slew.a, 0.5 * slew.d, 0.0),
             mesh=slew.mesh,
         ),
     ]

@@ -58,6 +58,14 @@ class Joint(StrictModel):
     mesh: Looks | None = None
     """What the link looks like instead of a beam, in the frame at its far end: x along the link."""
 
+    centre_m: tuple[float, float, float] | None = None
+    """Centre of mass, in metres, from the joint: x along the link, y along the pitch axis, z up.
+    The middle of its beam by default."""
+
+    inertia_kgm2: tuple[float, float, float, float, float, float] | None = None
+    """Moments of inertia about the centre of mass in the same directions, in kg m²: xx, yy, zz, xy,
+    xz, yz. Those of its beam by default."""
+
     @model_validator(mode="after")
     def _rest_is_within_range(self) -> "Joint":
         lowest, highest = self.range_deg
@@ -122,8 +130,8 @@ class Machine(StrictModel):
         names = [joint.name for joint in self.joints]
         if len(set(names)) < len(names):
             raise ValueError(f"joints are called {', '.join(names)}; give each a name of its own")
-        if slew.alpha_deg != UPWARD_TO_LEVEL or slew.a != 0.0:
-            raise ValueError("the first joint slews: it needs alpha_deg -90 and a 0")
+        if slew.alpha_deg != UPWARD_TO_LEVEL:
+            raise ValueError("the first joint slews: it needs alpha_deg -90")
         for joint in pitch:
             if joint.alpha_deg != 0.0 or joint.d != 0.0:
                 raise ValueError(f"joint {joint.name!r} pitches: it needs alpha_deg 0 and d 0")

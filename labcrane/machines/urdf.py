@@ -5,7 +5,7 @@ the signs of motion in the same place. All frames are x along the link, y along 
 z up, so a pitch axis is +y (positive is down), and the DH offset turns the joint's origin.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from labcrane.machines.machine import Joint, Machine
 
@@ -28,29 +28,48 @@ def urdf_of(machine: Machine, *, solid: bool = False, beyond: Iterable[str] = ()
         Further links and joints, as of :func:`urdf_link` and :func:`urdf_joint`.
     """
     slew, *chain = machine.joints
-    column = (slew.thickness, slew.thickness, abs(slew.d) or slew.thickness)
+    column = (slew.a + slew.thickness, slew.thickness, abs(slew.d) or slew.thickness)
+    middle = (0.5 * slew.a, 0.0, 0.5 * slew.d)
     parts = [
         '<robot name="machine">',
         urdf_link("foot", 0.0, ORIGIN),
-        urdf_link(slew.name, slew.mass_kg, column, (0.0, 0.0, 0.5 * slew.d), solid=solid),
+        _moved(slew, column, middle, solid=solid),
         _driven(slew, "foot", (machine.base_x, 0.0, 0.0), (0.0, 0.0, slew.offset), "0 0 1"),
     ]
-    parent, far_end = slew, (0.0, 0.0, slew.d)
+    parent, far_end = slew, (slew.a, 0.0, slew.d)
     for joint in chain:
         beam = (joint.a or joint.thickness, joint.thickness, joint.thickness)
         middle = (0.5 * joint.a, 0.0, 0.0)
-        parts.append(urdf_link(joint.name, joint.mass_kg, beam, middle, solid=solid))
+        parts.append(_moved(joint, beam, middle, solid=solid))
         parts.append(_driven(joint, parent.name, far_end, (0.0, joint.offset, 0.0), "0 1 0"))
         parent, far_end = joint, (joint.a, 0.0, 0.0)
     return "\n".join([*parts, *beyond, "</robot>"]) + "\n"
 
 
+def _moved(joint: Joint, size: Vector, middle: Vector, *, solid: bool) -> str:
+    """Return the link behind a joint: a box, with the inertia that the machine has."""
+    mass, about, inertia = joint.mass_kg, joint.centre_m, joint.inertia_kgm2
+    return urdf_link(joint.name, mass, size, middle, solid=solid, about=about, inertia=inertia)
+
+
 def urdf_link(
-    name: str, mass: float, size: Vector, centre: Vector = ORIGIN, *, solid: bool = False
+    name: str,
+    mass: float,
+    size: Vector,
+    centre: Vector = ORIGIN,
+    *,
+    solid: bool = False,
+    about: Vector | None = None,
+    inertia: Sequence[float] | None = None,
 ) -> str:
-    """Return a link that is a box of a mass in kg, of a size in m, about its centre in m."""
+    """Return a link that is a box of a mass in kg, of a size in m, about its centre in m.
+
+    Its centre of mass is ``about`` in m, and its moments of inertia in kg m² are ``inertia``: xx,
+    yy, zz, xy, xz, yz; those of the box by default.
+    """
     x, y, z = (edge * edge for edge in size)
-    ixx, iyy, izz = (mass / 12.0 * both for both in (y + z, x + z, x + y))
+    box = (mass / 12.0 * (y + z), mass / 12.0 * (x + z), mass / 12.0 * (x + y), 0.0, 0.0, 0.0)
+    ixx, iyy, izz, ixy, ixz, iyz = inertia or box
     shape = (
         f'<collision>{_origin(centre)}<geometry><box size="{" ".join(map(repr, size))}"/>'
         "</geometry></collision>"
@@ -58,8 +77,9 @@ def urdf_link(
         else ""
     )
     return (
-        f'<link name="{name}"><inertial>{_origin(centre)}<mass value="{mass!r}"/>'
-        f'<inertia ixx="{ixx!r}" iyy="{iyy!r}" izz="{izz!r}" ixy="0" ixz="0" iyz="0"/>'
+        f'<link name="{name}"><inertial>{_origin(about or centre)}<mass value="{mass!r}"/>'
+        f'<inertia ixx="{ixx!r}" iyy="{iyy!r}" izz="{izz!r}" ixy="{ixy!r}" ixz="{ixz!r}" '
+        f'iyz="{iyz!r}"/>'
         f"</inertial>{shape}</link>"
     )
 

@@ -32,7 +32,7 @@ class MonitorConfig:
     """
 
     protocol: str = ""
-    machine: str = MACHINE
+    machine: str | Mapping[str, Any] = MACHINE
     use: Sequence[Mapping[str, Any]] | None = None
 
     @classmethod

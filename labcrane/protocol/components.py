@@ -10,7 +10,8 @@ from labcrane.core.roles import Component, Cue, Feedback, Questionnaire, SignalM
 from labcrane.core.settings import Settings
 from labcrane.errors import PluginError, ProtocolError
 from labcrane.files.yaml import Place, YamlFile
-from labcrane.machines.library import find_machine, load_machine
+from labcrane.machines.descriptions.description import MachineDescription
+from labcrane.machines.library import read_machine
 from labcrane.machines.machine import Machine
 from labcrane.protocol.protocol import Protocol, Use
 from labcrane.protocol.referenced_files import plain_settings
@@ -33,7 +34,7 @@ class ComponentSpec:
     settings: Settings
     oversight: CallMonitor = field(default_factory=CallMonitor, compare=False)
     called: str = field(default="", compare=False)
-    """Where it is used, and what it is: ``study.yaml:7: input 'dual_joystick'``."""
+    """Where it is used, and what it is: ``study.yaml:7:14: input 'dual_joystick'``."""
 
     def described(self, folder: Path) -> dict[str, Any]:
         """Return it ready for JSON, with the study's files named from its ``folder``."""
@@ -134,14 +135,13 @@ class ComponentResolver:
         try:
             offer = self._registry.find(role, use.use)
         except PluginError as error:
-            self._source.misnamed(named, str(error))
+            self._source.problem(named, str(error))
             return None
         settings = self._source.check(offer.settings, place, use.settings)
         if settings is None:
             return None
         plugin = self._registry.plugin(role, use.use)
-        where = f"{self._source.path}:{self._source.line(named)}"
-        called = f"{where}: {ROLES[role].word} {use.use!r}"
+        called = f"{self._source.where(named)}: {ROLES[role].word} {use.use!r}"
         return ComponentSpec(use.use, plugin, offer, settings, self.oversight, called)
 
     def choose_feedback(
@@ -174,13 +174,15 @@ class ComponentResolver:
     def machine(self) -> tuple[Machine, str] | None:
         """Return the machine and its file's text, or note what is wrong."""
         name, folder = self._at(("machine",)), self._source.path.parent
-        if not isinstance(name, str):
-            return None
         try:
-            machine = load_machine(name, folder, recorded=self._source.recorded)
-            return machine, find_machine(name, folder).read_text(encoding="utf-8")
+            if isinstance(name, dict):
+                described = self._source.check(MachineDescription, ("machine",))
+                return described.read(folder) if described else None
+            if not isinstance(name, str):
+                return None  # noted by the protocol's own check
+            return read_machine(name, folder, recorded=self._source.recorded)
         except ProtocolError as error:
-            self._source.misnamed(("machine",), str(error))
+            self._source.problem(("machine",), str(error))
             return None
 
     def build(

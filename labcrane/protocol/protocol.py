@@ -9,12 +9,15 @@ from pydantic import (
     AfterValidator,
     ConfigDict,
     Field,
+    GetJsonSchemaHandler,
     PositiveFloat,
     PositiveInt,
     ValidationInfo,
     create_model,
     field_validator,
 )
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from labcrane.analysis.indicator_settings import IndicatorSettings
 from labcrane.files.model import AtMost, was_run
@@ -87,6 +90,18 @@ class Participants(Section):
         return "|" not in plain and bool(re.search(r"\$\w(?![*?{])|\w\^", plain))
 
 
+class _AsDescribed:
+    """Says in the JSON Schema what describes a machine; its keys are checked when it is read."""
+
+    def __get_pydantic_json_schema__(
+        self, core: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        # It is made of docstrings, which only a schema needs.
+        from labcrane.machines.descriptions.description import MachineDescription  # noqa: PLC0415
+
+        return {"anyOf": [{"type": "string"}, MachineDescription.model_json_schema()]}
+
+
 class OnFault(Section):
     """What happens when something fails during a session."""
 
@@ -126,8 +141,9 @@ class Protocol(Section):
     rate_hz: PositiveFloat = Field(default=240.0, le=2000.0)
     """Ticks of the loop per second."""
 
-    machine: str
-    """Name of a machine that comes with labcrane, or of a file beside the protocol."""
+    machine: Annotated[str | dict[str, Any], _AsDescribed()]
+    """Name of a machine that comes with labcrane, or of a YAML file beside the protocol; or a URDF
+    or MJCF file with its joints: ``{urdf: arm.urdf, joints: [...], tip: hook}``."""
 
     input: Use
     """What the operator moves."""
@@ -183,6 +199,10 @@ class Protocol(Section):
 
     on_fault: OnFault = OnFault()
     """What happens when something fails."""
+
+    environment: Literal["record", "refuse"] = "record"
+    """What is installed is not what was when the study was approved (another NumPy): name it and
+    record it with the session, or refuse to run."""
 
     expected: tuple[str, ...] = ()
     """Answers to the questions of ``labcrane check``, by their keys: what is asked is meant."""

@@ -65,6 +65,7 @@ class Rig:
             task=Layout("the tasks", _task_signals(self.tasks)),
             inverse=self.controller.inverse,
             bodies=tuple(self.dynamics.bodies()),
+            places=tuple(place for task in self.tasks.values() for place in task.places()),
         )
 
     @contextmanager

@@ -6,6 +6,7 @@ from functools import cache
 
 from pydantic import TypeAdapter
 
+from labcrane.core.primitives import Sphere
 from labcrane.core.records import Run
 from labcrane.core.signals import Layout
 from labcrane.errors import PluginError
@@ -22,6 +23,7 @@ class Scene:
     machine: Machine
     layouts: dict[str, Layout]
     bodies: tuple[Body, ...]
+    places: tuple[Sphere, ...] = ()
 
 
 @cache
@@ -32,7 +34,7 @@ def _codec() -> TypeAdapter[Scene]:
 def write_run(run: Run) -> str:
     """Return what does not change in a session's context, as JSON."""
     layouts = {"axes": run.axes, "command": run.command, "state": run.state, "task": run.task}
-    scene = Scene(run.rate_hz, run.participant_seed, run.machine, layouts, run.bodies)
+    scene = Scene(run.rate_hz, run.participant_seed, run.machine, layouts, run.bodies, run.places)
     return json.dumps(_codec().dump_python(scene, mode="json"))
 
 
@@ -45,6 +47,7 @@ def read_run(text: str) -> Run:
         participant_seed=found.seed,
         inverse=_nobody,
         bodies=found.bodies,
+        places=found.places,
         **found.layouts,
     )
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from datetime import date, datetime
 from typing import Any
 
-from labcrane.approval.decision import verify
+from labcrane.approval.decision import otherwise_installed, verify
 from labcrane.approval.lock import Lock
 from labcrane.errors import ProtocolError
 from labcrane.files.atomic import make_folder
@@ -30,10 +30,13 @@ class Admission:
         The participant's in the register; None for pilots and simulations.
     context
         For the record, ready for JSON.
+    otherwise_installed
+        What is installed in another way than when the study was approved, in words.
     """
 
     slot: int | None
     context: dict[str, Any]
+    otherwise_installed: tuple[str, ...] = ()
 
 
 EXEMPT = Admission(None, {"approval": "none"})
@@ -46,9 +49,9 @@ def check_eligibility(visit: Visit, today: date | None = None) -> Admission:
     Raises
     ------
     ProtocolError
-        The study is not what was approved, the approval has expired, the participant is not in
-        the register, has not consented to the approved text, was excluded, or comes too early or
-        too late.
+        The study is not what was approved, or the packages are not and the protocol refuses that,
+        the approval has expired, the participant is not in the register, has not consented to the
+        approved text, was excluded, or comes too early or too late.
     """
     if visit.simulated or visit.pilot:
         return EXEMPT
@@ -74,6 +77,7 @@ def check_eligibility(visit: Visit, today: date | None = None) -> Admission:
     )
     make_folder(visit.folder.path)
     enter_sitting(places, visit.participant, sitting)
+    others = tuple(otherwise_installed(lock))
     return Admission(
         entry.slot,
         {
@@ -85,7 +89,9 @@ def check_eligibility(visit: Visit, today: date | None = None) -> Admission:
             "consent_version": lock.consent_version,
             "consent_date": given[-1].date,
             "consent_by": given[-1].by,
+            "otherwise_installed": list(others),
         },
+        others,
     )
 
 

@@ -3,16 +3,21 @@
 import gc
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from labcrane.core.clock import Clock, ManualClock, SystemClock
 from labcrane.core.records import Event, Frame, Phase, Run
+from labcrane.core.roles import Trigger
 from labcrane.design.counts import TrialCounts
 from labcrane.design.plan import SessionPlan, plan_session
+from labcrane.doctor.scheduling import lateness
 from labcrane.errors import DeviceError, PluginError, ProtocolError
 from labcrane.files.lock import held
+from labcrane.processes.real_time import real_time
 from labcrane.protocol.rig import Rig
 from labcrane.recording.crash_marker import CrashMarker, read_whereabouts
 from labcrane.recording.frame_log import BatchLog, FrameLog, columns, frame_bytes
@@ -44,19 +49,34 @@ from labcrane.session.sequencer import Sequencer
 from labcrane.session.visit import Visit, claim
 from labcrane.streams.sync.report.sync_report import SyncReport
 
+MEASURED_S = 1.0
+"""How long an empty loop is measured, before a loop in real time."""
+
+TRIGGERS = "triggers."
+"""How the parts begin that a study's triggers play."""
+
 RESERVE_S = 60.0
 """Seconds of recording for which the disk must always have room; below it the session pauses."""
 
 
-def run(visit: Visit, console: Console) -> Path:
+ForwardMaker = Callable[[Rig, Run, Sequencer, BatchLog], loop.Forward]
+"""Makes what goes forward through the ticks of a simulation, from its open rig."""
+
+
+def run(visit: Visit, console: Console, forward: ForwardMaker | None = None) -> Path:
     """Record a session in this process and consolidate it; return the participant file.
 
     Whatever ends it, what was recorded until then is in the file.
+
+    Parameters
+    ----------
+    forward
+        For sessions on a clock that jumps.
     """
     check_eligibility(visit)
     with running(visit):
         try:
-            record(visit, console)
+            record(visit, console, forward=forward)
         finally:
             if parts(visit.journal):
                 finish(visit)
@@ -129,7 +149,10 @@ def finish(visit: Visit) -> SyncReport:
 
 
 def record(
-    visit: Visit, console: Console, offer: Callable[[Mapping[str, str]], None] | None = None
+    visit: Visit,
+    console: Console,
+    offer: Callable[[Mapping[str, str]], None] | None = None,
+    forward: ForwardMaker | None = None,
 ) -> None:
     """Run a session to its end and write its journal.
 
@@ -137,6 +160,8 @@ def record(
     ----------
     offer
         Is told the streams of frames and context, by name and description, once they are there.
+    forward
+        As of :func:`run`.
 
     Raises
     ------
@@ -147,7 +172,7 @@ def record(
     admission = check_eligibility(visit)
     whole = plan_session(study, visit.participant, visit.session, admission.slot)
     with recording(visit):
-        _record(visit, console, admission, whole, offer)
+        _record(visit, console, admission, whole, offer, forward)
 
 
 def _record(
@@ -156,6 +181,7 @@ def _record(
     admission: Admission,
     whole: SessionPlan,
     offer: Callable[[Mapping[str, str]], None] | None,
+    forward: ForwardMaker | None,
 ) -> None:
     study = visit.study
     so_far, plan = go_on(visit, whole) if visit.resumed else (None, whole)
@@ -165,6 +191,7 @@ def _record(
     clock = _clock(visit, so_far)
     died = read_whereabouts(visit.whereabouts) if visit.resumed else None
     with (
+        _scheduled(visit) as scheduling,
         _watching(visit, rig),
         rig.opened(study, plan.seed) as run,
     ):
@@ -172,7 +199,7 @@ def _record(
             rig.dynamics.reset(within_limits(study, so_far.angles))
         second = frame_bytes(run) * run.rate_hz
         visit.folder.check_space(plan.expected_s, second, RESERVE_S)
-        about = context(visit, plan, rig, run) | admission.context
+        about = context(visit, plan, rig, run) | admission.context | scheduling
         awaits = (*study.views, *study.sounds) if visit.feedback else ()
         opening = list(_opening(about, so_far, died, clock.now()))
         if so_far is not None:
@@ -188,12 +215,18 @@ def _record(
         try:
             for event in opening:
                 log.note(event)
-            with _outlets(visit, whole, done, run, offer) as outlets:
-                sinks = [*outlets, _teller(console)]
+            with (
+                _triggers(visit, run, log, console) as triggers,
+                _outlets(visit, whole, done, run, offer) as outlets,
+            ):
+                sinks = [*triggers, *outlets, _teller(console)]
                 if not visit.fast:
                     sinks.append(OverrunReporter(study.oversight, run.rate_hz, log, console))
+                ahead = None
+                if forward is not None and isinstance(log, BatchLog):
+                    ahead = forward(rig, run, sequencer, log)
                 with _settled():
-                    loop.run(rig, run, sequencer, clock, console, log, sinks)
+                    loop.run(rig, run, sequencer, clock, console, log, sinks, ahead)
         except (PluginError, DeviceError) as error:
             log.note(Event("session.failed", clock.now(), {"why": str(error)}))
             error.add_note(
@@ -212,6 +245,32 @@ def _watching(visit: Visit, rig: Rig) -> AbstractContextManager[None]:
     return visit.study.oversight.published(visit.whereabouts)
 
 
+@contextmanager
+def _scheduled(visit: Visit) -> Iterator[dict[str, Any]]:
+    """Schedule the loop as a visit says; give what the record is to say of it.
+
+    What real time gains is measured here and now, by a second of an empty loop before and with it.
+    """
+    if not visit.real_time:
+        yield {}
+        return
+    rate_hz = visit.study.protocol.rate_hz
+    before = _late(SystemClock(), rate_hz)
+    with real_time(visit.core) as granted:
+        with_it = _late(SystemClock(SystemClock.REAL_TIME_SPIN_S), rate_hz)
+        lateness = {"before": before, "with": with_it}
+        yield {"real_time": {**asdict(granted), "lateness_ms": lateness}}
+
+
+def _late(clock: Clock, rate_hz: float) -> dict[str, float]:
+    late = 1e3 * lateness(clock, rate_hz, MEASURED_S)
+    return {
+        "p50": float(np.quantile(late, 0.5)),
+        "p99": float(np.quantile(late, 0.99)),
+        "most": float(late.max()),
+    }
+
+
 def _log(visit: Visit, run: Run, clock: Clock, reserve: int) -> FrameLog:
     now = clock.now if visit.fast else None
     path, held = next_part(visit.journal), columns(run)
@@ -222,7 +281,7 @@ def _log(visit: Visit, run: Run, clock: Clock, reserve: int) -> FrameLog:
 def _clock(visit: Visit, so_far: Progress | None) -> Clock:
     """Return the session's clock; a simulated one goes on where the last part ended."""
     if not visit.fast:
-        return SystemClock()
+        return SystemClock(SystemClock.REAL_TIME_SPIN_S if visit.real_time else SystemClock.SPIN_S)
     if so_far is None or so_far.time is None:
         return ManualClock()
     return ManualClock(start=so_far.time + 1.0 / visit.study.protocol.rate_hz)
@@ -330,6 +389,29 @@ def _settled() -> Iterator[None]:
         yield
     finally:
         gc.unfreeze()
+
+
+@contextmanager
+def _triggers(
+    visit: Visit, run: Run, log: FrameLog, console: Console
+) -> Iterator[list[Callable[[Frame], None]]]:
+    study = visit.study
+    chosen = {
+        part.removeprefix(TRIGGERS): choice
+        for part, choice in study.others.items()
+        if part.startswith(TRIGGERS)
+    }
+    if visit.fast or not chosen:  # a simulation is over long before any device has seen a pulse
+        yield []
+        return
+    from labcrane.streams.triggers import Triggers, opened  # noqa: PLC0415
+
+    built = {name: choice.build(study.machine) for name, choice in chosen.items()}
+    lines = {name: each for name, each in built.items() if isinstance(each, Trigger)}
+    with opened(lines, run):
+        triggers = Triggers(lines, log.append, console.report)
+        yield [triggers]
+        triggers.finish()
 
 
 def _teller(console: Console) -> Callable[[Frame], None]:

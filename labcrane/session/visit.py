@@ -42,6 +42,10 @@ class Visit:
         Where it goes on; what the protocol says by default.
     feedback
         Whether the launcher starts the views and sounds, so that the session waits for them.
+    real_time
+        Whether the loop is scheduled in real time.
+    core
+        The processor core that is left to it then; None for any.
     """
 
     study: Study
@@ -54,6 +58,8 @@ class Visit:
     resumed: bool = False
     policy: Policy | None = None
     feedback: bool = False
+    real_time: bool = False
+    core: int | None = None
 
     @property
     def folder(self) -> DataFolder:
@@ -88,6 +94,7 @@ class Visit:
         if self.data != self.study.path.parent / "data":
             words += ["--data", str(self.data)]
         words += ["--pilot"] * self.pilot + ["--simulate"] * self.simulated
+        words += ["--real-time"] * self.real_time
         return subprocess.list2cmdline(words) if os.name == "nt" else shlex.join(words)
 
     def __reduce__(self) -> tuple[Any, ...]:

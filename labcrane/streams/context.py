@@ -49,6 +49,7 @@ def situation_after(
                 block=data["block"],
                 block_name=data["block_name"],
                 practice=data["practice"],
+                waiting="",
             )
         case "trial.start":
             named = data.get("feedback", "none")
@@ -62,7 +63,26 @@ def situation_after(
         case "feedback.setting":
             mine = {**situation.settings.get(data["feedback"], {}), data["key"]: data["value"]}
             return replace(now, settings={**situation.settings, data["feedback"]: mine})
-    return _read_after(now, event)
+    return _standing_after(_read_after(now, event), event)
+
+
+def _standing_after(now: SessionState, event: Event) -> SessionState:
+    """Return the situation with why nobody is to move once ``event`` has happened."""
+    data: Mapping[str, Any] = event.data
+    match event.name:
+        case "pause.start":
+            return replace(now, held=tuple(dict.fromkeys((*now.held, data["by"]))))
+        case "pause.end":
+            return replace(now, held=tuple(who for who in now.held if who != data["by"]))
+        case "waiting":
+            return replace(now, waiting=data["what"])
+        case "break.start":
+            return replace(now, waiting="break")
+        case "step.end" | "break.end":
+            return replace(now, waiting="")
+        case "session.end":
+            return replace(now, waiting="", over=data["reason"])
+    return now
 
 
 def _read_after(now: SessionState, event: Event) -> SessionState:

@@ -6,7 +6,7 @@ from labcrane.session.commands import Order
 from labcrane.web.door.access import SUPERVISOR
 from labcrane.web.form import ConsentCard, Form
 from labcrane.web.page import PRIMARY, PageContext, speak
-from labcrane.web.panels import Cameras
+from labcrane.web.panels import Cameras, Reports
 from labcrane.web.participant_page import STYLE as FORM_STYLE
 from labcrane.web.room.snapshot import Snapshot
 from labcrane.web.scene import Scene
@@ -55,6 +55,8 @@ def supervisor_page(context: PageContext) -> None:
     with room.add_slot("form"):
         ConsentCard(context, SUPERVISOR).build()
         Form(context, SUPERVISOR).build()
+    with room.add_slot("reports"):
+        Reports(context, SUPERVISOR).build()
     with room.add_slot("machine"):
         Scene(context).build()
     with room.add_slot("cameras"):

@@ -1,10 +1,11 @@
-"""The participant's page: consent, the questionnaire that is asked, and nothing else."""
+"""The participant's page: consent, the questionnaire that is asked, what may be reported."""
 
 from pathlib import Path
 
 from labcrane.web.door.access import PARTICIPANT
 from labcrane.web.form import ConsentCard, Form
 from labcrane.web.page import PageContext, speak
+from labcrane.web.panels import Reports
 
 STYLE = Path(__file__).with_name("form.css")
 
@@ -24,3 +25,4 @@ def participant_page(context: PageContext) -> None:
             logo.props["src"], logo.props["alt"] = "/logo", context.study.protocol.title
         ConsentCard(context, PARTICIPANT).build()
         Form(context, PARTICIPANT).build()
+        Reports(context, PARTICIPANT).build()

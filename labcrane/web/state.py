@@ -15,6 +15,14 @@ KEPT = 500
 RATES = 60
 """How many of the newest rates of each stream are kept."""
 
+STAGES = {
+    "consent.needed": "waits for the participant's consent",
+    "consent.given": "starting",
+    "trial.start": "trial",
+    **dict.fromkeys(("step.end", "questionnaire.end", "break.end"), "between steps"),
+}
+"""Where the session stands after an event that says nothing more of it."""
+
 LOST = {"input": "the controls", "disk": "the disk", "stream": "stream", "feedback": ""}
 """What can be lost, and what it is called."""
 
@@ -68,6 +76,8 @@ class SessionView:
         What the recorder says of the streams of others.
     consent
         What is asked before the session: file, version and text; nothing when none is.
+    reported
+        What was reported as seen in the running trial, in the order in which it came.
     rates
         The newest rates of each stream, in Hz, oldest first; None where none is known.
     faults
@@ -97,6 +107,7 @@ class SessionView:
         self.refusal = ""
         self.refused_item = ""
         self.streams: Mapping[str, Any] = {}
+        self.reported: list[str] = []
         self.rates: dict[str, deque[float | None]] = {}
         self.faults: dict[str, str] = {}
         self.settings: dict[str, dict[str, Value]] = {}
@@ -160,30 +171,26 @@ class SessionView:
             self.faults.pop(key, None)
 
     def _stage(self, event: Event) -> None:
+        self.stage = STAGES.get(event.name, self.stage)
         match event.name:
-            case "consent.needed":
-                self.stage = "waits for the participant's consent"
-            case "consent.given":
-                self.stage = "starting"
             case "waiting":
                 self.stage = f"waits to start: {event.data['what']}"
-            case "trial.start":
-                self.stage = "trial"
             case "break.start":
                 self.stage = f"break of {event.data['seconds']} s"
             case "questionnaire.start":
                 self.stage = f"questionnaire: {event.data['title']}"
             case "session.end":
                 self.stage = f"ended: {event.data['reason']}"
-            case "step.end" | "questionnaire.end" | "break.end":
-                self.stage = "between steps"
             case "pause.end":
                 self.alarm = ""
+            case "order.report" if event.data["refused"] is None:
+                self.reported.append(str(event.data["text"]))
 
     def _trial(self, what: str, data: Mapping[str, Value]) -> None:
         if what == "start":
             self.trial = data
             self.counts.clear()
+            self.reported.clear()
         elif what == "end":
             self.trial, self.things = {}, ""
             self.last_trial = data

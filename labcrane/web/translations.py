@@ -64,6 +64,9 @@ class Words:
     refused
         Says why an answer, or what was handed in without one, was not taken; given the refusal in
         the record, and the item if it was one.
+    seen, heard
+        What stands on the button with which something is reported, and what is said once it has
+        arrived; given what.
     """
 
     wait: str
@@ -82,6 +85,22 @@ class Words:
     open_file: str
     takes: Callable[[Item], str]
     refused: Callable[[str, Item | None], str]
+    seen: Callable[[str], str]
+    heard: Callable[[str], str]
+
+
+NAMES: Mapping[Language, Mapping[str, str]] = {
+    "de": {"deformity": "Verformung"},
+    "pl": {"deformity": "zniekształcenie"},
+    "fr": {"deformity": "déformation"},
+    "es": {"deformity": "deformidad"},
+}
+"""Of what the bundled tasks ask about."""
+
+
+def _named(language: Language, pattern: str) -> Callable[[str], str]:
+    """Return what says a pattern of what is reported, by its name in a language."""
+    return lambda what: pattern.format(what=NAMES.get(language, {}).get(what, what))
 
 
 GERMAN_PHRASES = Phrases(
@@ -138,6 +157,8 @@ ENGLISH = Words(
     open_file="Open",
     takes=lambda item: item.takes,
     refused=lambda why, item: why,
+    seen=_named("en", "I see: {what}"),
+    heard=_named("en", "{what}: reported"),
 )
 
 GERMAN = Words(
@@ -157,6 +178,8 @@ GERMAN = Words(
     open_file="Öffnen:",
     takes=GERMAN_PHRASES.takes,
     refused=GERMAN_PHRASES.refused,
+    seen=_named("de", "Ich sehe: {what}"),
+    heard=_named("de", "{what}: gemeldet"),
 )
 
 POLISH = Words(
@@ -176,6 +199,8 @@ POLISH = Words(
     open_file="Otwórz:",
     takes=POLISH_PHRASES.takes,
     refused=POLISH_PHRASES.refused,
+    seen=_named("pl", "Widzę: {what}"),
+    heard=_named("pl", "{what}: zgłoszono"),
 )
 
 FRENCH = Words(
@@ -195,6 +220,8 @@ FRENCH = Words(
     open_file="Ouvrir :",
     takes=FRENCH_PHRASES.takes,
     refused=FRENCH_PHRASES.refused,
+    seen=_named("fr", "Je vois : {what}"),
+    heard=_named("fr", "{what} : signalé"),
 )
 
 SPANISH = Words(
@@ -214,6 +241,8 @@ SPANISH = Words(
     open_file="Abrir:",
     takes=SPANISH_PHRASES.takes,
     refused=SPANISH_PHRASES.refused,
+    seen=_named("es", "Veo: {what}"),
+    heard=_named("es", "{what}: comunicado"),
 )
 
 WORDS: Mapping[Language, Words] = {

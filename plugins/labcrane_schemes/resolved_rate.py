@@ -56,11 +56,17 @@ class ResolvedRate:
         threshold: float = 0.5,
     ) -> None:
         self._arm = Arm(machine)
+        self._foot = machine.joints[0].a
         self._stops = stops
         self._full = tuple(full)
         self._hold_pitch = redundancy == "hold_pitch"
         self._damping2 = damping * damping
         self._threshold2 = threshold * threshold
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """What a compiled twin solves with."""
+        return (float(self._hold_pitch), self._damping2, self._threshold2)
 
     def solve_base(self, angles: Sequence[float], x: float, y: float, z: float) -> Motion:
         """Return the joints' motion for a tip velocity in the base frame, in m/s."""
@@ -73,7 +79,7 @@ class ResolvedRate:
     ) -> Motion:
         """Return the joints' motion for a tip velocity along the arm, in m/s."""
         columns = self._arm.planar_jacobian(angles)
-        radius = -columns[0][1]  # the shoulder sits on the slew axis
+        radius = self._foot - columns[0][1]  # the first pitch axis may be before the slew axis
         radius2 = radius * radius
         slew = tangential * radius / (radius2 + self._damp(radius2))
         if self._hold_pitch:
@@ -151,12 +157,18 @@ class ResolvedRate:
 
 def _without_turning(columns: Sequence[Column]) -> list[Column]:
     """Return ``J (I - 1 1ᵀ/n)``: what is left has speeds that add up to zero."""
-    mean_r = sum(r for r, _ in columns) / len(columns)
-    mean_z = sum(z for _, z in columns) / len(columns)
+    # Added one by one: sum() rounds otherwise since Python 3.12.
+    sum_r = sum_z = 0.0
+    for r, z in columns:
+        sum_r += r
+        sum_z += z
+    mean_r, mean_z = sum_r / len(columns), sum_z / len(columns)
     return [(r - mean_r, z - mean_z) for r, z in columns]
 
 
 def _smallest(rr: float, rz: float, zz: float) -> float:
     """Return the smaller eigenvalue of a symmetric matrix that has none below 0."""
-    largest = 0.5 * (rr + zz + math.hypot(rr - zz, 2.0 * rz))
+    # A root of squares, not hypot: that rounds otherwise since Python 3.12.
+    apart, twice = rr - zz, 2.0 * rz
+    largest = 0.5 * (rr + zz + math.sqrt(apart * apart + twice * twice))
     return max(rr * zz - rz * rz, 0.0) / largest if largest > 0.0 else 0.0

@@ -8,13 +8,17 @@ import numpy as np
 from labcrane import FloatArray, Frame, Run
 from labcrane.core import Shape, Sphere
 from labcrane.machines import PlacedObject, Segment, read_placed, segments, stands
+from labcrane_view.placement import Piece
 from labcrane_view.scene.outline import of_body, of_segment
 
 TIP = 0.12
 """Radius in metres of the tip's area of interest."""
 
+Box = tuple[float, float, float, float]
+"""Left, top, right and bottom, in pixels."""
+
 STRAIGHT = 0.999
-NOWHERE = (math.nan,) * 4
+NOWHERE: Box = (math.nan,) * 4
 
 
 class Projection:
@@ -27,7 +31,9 @@ class Projection:
     fov_deg
         Horizontal field of view, in degrees.
     left, width, height
-        Of the camera's part of the window, in pixels.
+        Of the camera's picture, in pixels; ``left`` counts from the window's left edge.
+    pieces
+        Which parts of the picture are where in the window, if it is not there in one piece.
     """
 
     def __init__(
@@ -38,13 +44,15 @@ class Projection:
         left: int,
         width: int,
         height: int,
+        pieces: Sequence[Piece] = (),
     ) -> None:
         self._eye = eye
         self._axes = axes_of(eye, look)
         self._scale = width / 2.0 / math.tan(math.radians(fov_deg) / 2.0)
-        self._left, self._width, self._height = left, width, height
+        self._width, self._height = width, height
+        self._pieces = pieces or (Piece(left, 0, width, height, 0, 0),)
 
-    def ball(self, centre: FloatArray, radius: float) -> tuple[float, float, float, float]:
+    def ball(self, centre: FloatArray, radius: float) -> Box:
         """Return left, top, right and bottom of a sphere; NaN where it is not to be seen.
 
         The outline of a sphere in perspective, exactly: the rays that touch it, not its diameter.
@@ -53,7 +61,7 @@ class Projection:
         if y <= radius:
             return NOWHERE
         across, up = _tangents(x, y, radius), _tangents(z, y, radius)
-        middle_x, middle_y = self._left + self._width / 2.0, self._height / 2.0
+        middle_x, middle_y = self._width / 2.0, self._height / 2.0
         box = (
             middle_x + self._scale * across[0],
             middle_y - self._scale * up[1],
@@ -62,22 +70,33 @@ class Projection:
         )
         return self._clipped(box)
 
-    def points(self, corners: FloatArray) -> tuple[float, float, float, float]:
+    def points(self, corners: FloatArray) -> Box:
         """Return the box around points, shape ``(n, 3)``; NaN when one is behind the eye."""
         seen = (corners - self._eye) @ self._axes.T
         if (seen[:, 1] <= 0.0).any():
             return NOWHERE
-        x = self._left + self._width / 2.0 + self._scale * seen[:, 0] / seen[:, 1]
+        x = self._width / 2.0 + self._scale * seen[:, 0] / seen[:, 1]
         y = self._height / 2.0 - self._scale * seen[:, 2] / seen[:, 1]
         return self._clipped((float(x.min()), float(y.min()), float(x.max()), float(y.max())))
 
-    def _clipped(self, box: tuple[float, float, float, float]) -> tuple[float, float, float, float]:
-        """Return the part of a box that is in the picture."""
-        left, top, right, bottom = box
-        first, last = float(self._left), float(self._left + self._width)
-        if right < first or left > last or bottom < 0.0 or top > self._height:
+    def _clipped(self, box: Box) -> Box:
+        """Return where the part of a box that is to be seen is in the window."""
+        seen = [part for piece in self._pieces if (part := _within(piece, box)) is not None]
+        if not seen:
             return NOWHERE
-        return max(left, first), max(top, 0.0), min(right, last), min(bottom, float(self._height))
+        lefts, tops, rights, bottoms = zip(*seen, strict=True)
+        return min(lefts), min(tops), max(rights), max(bottoms)
+
+
+def _within(piece: Piece, box: Box) -> Box | None:
+    """Return the part of a box of the picture that a piece shows, in the window; None for none."""
+    left, top, right, bottom = box
+    first, last = float(piece.x), float(piece.x + piece.width)
+    upper, lower = float(piece.y), float(piece.y + piece.height)
+    if right < first or left > last or bottom < upper or top > lower:
+        return None
+    x, y = piece.left - piece.x, piece.top - piece.y
+    return max(left, first) + x, max(top, upper) + y, min(right, last) + x, min(bottom, lower) + y
 
 
 def axes_of(eye: FloatArray, look: FloatArray) -> FloatArray:
@@ -98,9 +117,7 @@ def _tangents(aside: float, ahead: float, radius: float) -> tuple[float, float]:
     return (aside * ahead - root) / square, (aside * ahead + root) / square
 
 
-def turned(
-    box: tuple[float, float, float, float], size: tuple[int, int], flip: str
-) -> tuple[float, float, float, float]:
+def turned(box: Box, size: tuple[int, int], flip: str) -> Box:
     """Return where a box is once the picture has been turned over."""
     left, top, right, bottom = box
     if flip == "horizontal":

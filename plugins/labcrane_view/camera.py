@@ -11,6 +11,8 @@ from panda3d import core
 
 from labcrane import FloatArray, Frame, Machine, ProtocolError
 from labcrane_view.areas import Projection, axes_of
+from labcrane_view.framing import framed
+from labcrane_view.placement import Piece
 from labcrane_view.scene.stage import Stage
 from labcrane_view.settings import CameraSettings
 from labcrane_view.window import SEEN, Window, hidden_picture
@@ -21,11 +23,21 @@ ROUNDING_S = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """The camera's part of the window, in pixels: ``left`` counts from the window's left edge."""
+    """The camera's part of the window, in pixels: ``left`` counts from the window's left edge.
+
+    Attributes
+    ----------
+    picture
+        Width and height of the camera's whole picture, what no monitor shows included.
+    pieces
+        What of the picture is where in the window.
+    """
 
     left: int
     width: int
     height: int
+    picture: tuple[int, int]
+    pieces: tuple[Piece, ...]
 
 
 class Delay:
@@ -76,6 +88,8 @@ class Camera:
             )
         self.settings = settings
         self._machine = machine
+        self._look: Sequence[float] = () if settings.look == "targets" else settings.look
+        self._fov_deg = settings.fov_deg
         self._delay = Delay(settings.delay_s)
         self._due = -math.inf
         self.boxes: list[float] = []
@@ -96,34 +110,56 @@ class Camera:
         return self.settings.rate_hz is not None or self.settings.delay_s > 0.0
 
     def open(
-        self, window: Window, stage: Stage, target: Any, part: Part, back: Sequence[float]
+        self,
+        window: Window,
+        stage: Stage,
+        target: Any,
+        part: Part,
+        back: Sequence[float],
+        must_see: FloatArray,
     ) -> Any:
-        """Make its region in ``target``; return its picture if it has one of its own."""
+        """Make its region in ``target``; return its picture if it has one of its own.
+
+        ``must_see`` are the points that one framed on targets must hold, shape ``(n, 3)``.
+        """
         deep = self.settings.shows == "depth"
         self._stage, self.part = stage, part
-        lens = core.PerspectiveLens()
-        lens.set_aspect_ratio(part.width / part.height)
-        lens.set_fov(self.settings.fov_deg)
-        lens.set_near_far(NEAR, FAR)
-        eye = core.Camera(self.settings.name, lens)
-        self._node = self._stage.root.attach_new_node(eye)
+        if self.settings.look == "targets":
+            width, height = part.picture
+            place = np.array(self.settings.eye)
+            look, self._fov_deg = framed(self.settings.name, place, must_see, width / height)
+            self._look = look.tolist()
+        self._node = self._stage.root.attach_new_node(self.settings.name)
         picture = None
+        left = 0
         if self.apart:
             size = part.width, part.height
             self._buffer, picture = hidden_picture(window.output, self.settings.name, size, SEEN)
             self._buffer.set_active(False)
-            region = self._buffer.make_display_region()
-        else:
-            width = target.get_x_size()
-            left, right = part.left / width, (part.left + part.width) / width
-            region = target.make_display_region(left, right, 0.0, 1.0)
-        region.set_clear_color_active(True)
-        region.set_clear_color(core.LColor(*((0.0, 0.0, 0.0) if deep else back), 1.0))
-        region.set_clear_depth_active(True)
-        region.set_camera(self._node)
-        if deep:
-            self._stage.see_depth(eye, *self.settings.depth_m)
+            target, left = self._buffer, part.left
+        ground = (0.0, 0.0, 0.0) if deep else back
+        for piece in part.pieces:
+            eye = core.Camera(self.settings.name, self._lens(piece))
+            region = _region(target, piece, left)
+            region.set_clear_color_active(True)
+            region.set_clear_color(core.LColor(*ground, 1.0))
+            region.set_clear_depth_active(True)
+            region.set_camera(self._node.attach_new_node(eye))
+            if deep:
+                self._stage.see_depth(eye, *self.settings.depth_m)
         return picture
+
+    def _lens(self, piece: Piece) -> Any:
+        """Return a lens for a piece: the frustum of the whole picture, cut off at its edges."""
+        width, height = self.part.picture
+        lens = core.PerspectiveLens()
+        lens.set_film_size(piece.width, piece.height)
+        lens.set_focal_length(width / 2.0 / math.tan(math.radians(self._fov_deg) / 2.0))
+        aside = piece.x + piece.width / 2.0 - width / 2.0
+        up = height / 2.0 - piece.y - piece.height / 2.0
+        lens.set_film_offset(aside, up)
+        lens.set_near_far(NEAR, FAR)
+        return lens
 
     def take(self, frame: Frame) -> Frame | None:
         """Take a frame; return the one to be drawn now, None while the last picture stands."""
@@ -137,14 +173,12 @@ class Camera:
 
     def aim(self, poses: FloatArray) -> Projection:
         """Look from where it is now: ``poses`` as of :func:`labcrane.machines.link_frames`."""
-        eye, look = (
-            self._in_base(point, poses) for point in (self.settings.eye, self.settings.look)
-        )
+        eye, look = (self._in_base(point, poses) for point in (self.settings.eye, self._look))
         right, forward, up = axes_of(eye, look)
         rows = [*right, 0.0, *forward, 0.0, *up, 0.0, *eye, 1.0]
         self._node.set_mat(core.LMatrix4f(*(float(value) for value in rows)))
         part = self.part
-        return Projection(eye, look, self.settings.fov_deg, part.left, part.width, part.height)
+        return Projection(eye, look, self._fov_deg, part.left, *part.picture, pieces=part.pieces)
 
     def see(self) -> None:
         """Tell the shader that this is the eye."""
@@ -166,3 +200,12 @@ class Camera:
             return np.array(point)
         pose = poses[1 + self._machine.names.index(self.settings.on)]
         return np.asarray(pose[:3, :3] @ np.array(point) + pose[:3, 3])
+
+
+def _region(target: Any, piece: Piece, left: int) -> Any:
+    """Return the region of ``target`` for a piece; its left edge is the window's ``left``."""
+    width, height = target.get_x_size(), target.get_y_size()
+    start, top = piece.left - left, height - piece.top
+    return target.make_display_region(
+        start / width, (start + piece.width) / width, (top - piece.height) / height, top / height
+    )

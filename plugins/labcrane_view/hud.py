@@ -8,6 +8,9 @@ from labcrane import Frame, Run
 from labcrane.core import SessionState, TargetFinder
 
 LOAD = "joint.load"
+PEOPLE = {"examiner", "stop rule"}
+"""Whoever else holds a session is a part that is lost."""
+
 ITEM = re.compile(r"([-*+•]|\d+[.)])\s")
 
 WORDS: Mapping[str, Mapping[str, str]] = {
@@ -20,6 +23,9 @@ WORDS: Mapping[str, Mapping[str, str]] = {
         "load": "Load",
         "lateness": "Late",
         "paused": "PAUSED",
+        "fault": "FAULT",
+        "wait": "WAIT",
+        "done": "DONE",
         "practice": "practice",
         "questions": "Please answer the questions now:",
     },
@@ -32,6 +38,9 @@ WORDS: Mapping[str, Mapping[str, str]] = {
         "load": "Last",
         "lateness": "Verspätung",
         "paused": "PAUSE",
+        "fault": "STÖRUNG",
+        "wait": "WARTEN",
+        "done": "FERTIG",
         "practice": "Übung",
         "questions": "Bitte jetzt die Fragen beantworten:",
     },
@@ -44,6 +53,9 @@ WORDS: Mapping[str, Mapping[str, str]] = {
         "load": "Obciążenie",
         "lateness": "Opóźnienie",
         "paused": "PAUZA",
+        "fault": "AWARIA",
+        "wait": "CZEKAJ",
+        "done": "KONIEC",
         "practice": "trening",
         "questions": "Proszę teraz odpowiedzieć na pytania:",
     },
@@ -99,6 +111,20 @@ def notice(frame: Frame, situation: SessionState, hint_s: float, language: str) 
     asked = situation.questionnaire
     text = f"{WORDS[language]['questions']}\n{asked}" if asked else unwrapped(situation.text)
     return [text for text in (text, situation.hint if fresh else "") if text]
+
+
+def standing(frame: Frame, situation: SessionState) -> str:
+    """Return why nobody is to move, as the word's name in ``WORDS``; empty while somebody may.
+
+    What is to be read stays legible: nothing covers the picture only because the session waits for
+    its reader.
+    """
+    if situation.over:
+        return "done"
+    if frame.paused:
+        return "fault" if set(situation.held) - PEOPLE else "paused"
+    reads = situation.text or situation.questionnaire
+    return "wait" if situation.waiting and not reads else ""
 
 
 def unwrapped(text: str) -> str:

@@ -6,16 +6,20 @@ from dataclasses import dataclass
 
 from labcrane import DeviceError
 
-LINE = re.compile(r"^ *\d+: \+?\*?(\S+) (\d+)/\d+x(\d+)/\d+\+(-?\d+)\+(-?\d+)", re.MULTILINE)
+LINE = re.compile(r"^ *\d+: \+?\*?(\S+) (\d+)/(\d+)x(\d+)/\d+\+(-?\d+)\+(-?\d+)", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
 class Monitor:
-    """One monitor: its name, its size, and its place on the desktop in pixels."""
+    """One monitor: its name, its size and place on the desktop in pixels, and its width in mm.
+
+    The width is 0 where the monitor does not say it.
+    """
 
     name: str
     size: tuple[int, int]
     origin: tuple[int, int]
+    wide_mm: int = 0
 
 
 def monitors() -> list[Monitor]:
@@ -50,6 +54,6 @@ def parse(text: str) -> list[Monitor]:
     """Return the monitors in what xrandr prints."""
     found = []
     for name, *numbers in LINE.findall(text):
-        width, height, left, top = map(int, numbers)
-        found.append(Monitor(name, (width, height), (left, top)))
+        width, wide_mm, height, left, top = map(int, numbers)
+        found.append(Monitor(name, (width, height), (left, top), wide_mm))
     return found

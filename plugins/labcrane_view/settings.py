@@ -28,11 +28,13 @@ class CameraSettings(Settings):
     eye: Annotated[Triple, Unit("m")]
     """Where it is, in metres, in the machine's base frame or in that of the joint it rides on."""
 
-    look: Annotated[Triple, Unit("m")]
-    """A point in the middle of its picture, in the same frame."""
+    look: Annotated[Triple, Unit("m")] | Literal["targets"]
+    """A point in the middle of its picture, in the same frame. ``targets`` turns it once, for the
+    whole session, so that its picture holds all of the tasks' targets, the way of the tip between
+    them, and the tip at rest."""
 
     fov_deg: float = Field(default=70.0, gt=1.0, lt=170.0)
-    """Horizontal field of view, in degrees."""
+    """Horizontal field of view, in degrees; with ``look: targets`` as wide as it must be."""
 
     on: LinkName | None = None
     """Joint behind whose link it rides; it stands in the scene by default."""
@@ -52,6 +54,11 @@ class CameraSettings(Settings):
 
     @model_validator(mode="after")
     def _depth_rises(self) -> "CameraSettings":
+        if self.look == "targets" and self.on is not None:
+            raise ValueError(
+                f"a camera that rides on {self.on!r} cannot hold the targets in its picture; write "
+                "look: as a point"
+            )
         near, far = self.depth_m
         if not near < far:
             raise ValueError(f"depth_m is {near:g} to {far:g} m; the second must be farther away")
@@ -59,6 +66,7 @@ class CameraSettings(Settings):
 
 
 CAMERAS: Mapping[str, CameraSettings] = {
+    "cab": CameraSettings(name="cab", eye=(-0.9, 1.8, 3.1), look="targets"),
     "cab_left": CameraSettings(name="cab_left", eye=(-2.2, 2.2, 3.3), look=(5.2, 0.3, 0.8)),
     "cab_right": CameraSettings(name="cab_right", eye=(-2.2, -2.2, 3.3), look=(5.2, -0.3, 0.8)),
     "free": CameraSettings(name="free", eye=(11.0, -9.5, 5.5), look=(3.5, 0.0, 1.2), fov_deg=60),
@@ -136,6 +144,16 @@ class ViewSettings(Settings):
     """The monitor to fill: its name (``HDMI-1``), or its number, counted from 0; a window by
     default."""
 
+    screens: tuple[NonNegativeInt | str, ...] = ()
+    """Monitors to fill with one wide picture, from left to right, instead of ``screen``."""
+
+    bezel_mm: NonNegativeFloat = 0.0
+    """What lies between the pictures of two of ``screens``, in millimetres: as much of the wide
+    picture is behind their frames, so that what moves across goes on straight."""
+
+    screen_mm: PositiveFloat | None = None
+    """Width of one monitor's visible picture, in millimetres; as the monitor says by default."""
+
     flip: Literal["none", "horizontal", "vertical"] = "none"
     """Turns the picture over, for a mirror."""
 
@@ -159,7 +177,14 @@ class ViewSettings(Settings):
     """Of that text."""
 
     font: str | None = None
-    """Font file for the text; one that comes with the renderer by default."""
+    """Font file for the text; DejaVu Sans by default, whose digits are as high as capitals."""
+
+    text_arcmin: PositiveFloat | None = None
+    """Height of capitals and digits on the retina, in minutes of arc (ISO 9241-303 asks for 16 at
+    least, and recommends 20 to 22); a fixed share of the window's height by default."""
+
+    viewing_m: Annotated[PositiveFloat, Unit("m")] | None = None
+    """Distance from the eye to the screen, in metres; ``text_arcmin`` needs it."""
 
     targets: bool = True
     """Whether targets are drawn."""
@@ -184,14 +209,36 @@ class ViewSettings(Settings):
     """What has a box for eye tracking: tip, targets, shapes of cues; links, the grapple and things
     by name, around what is drawn of them, wherever it moves."""
 
-    shadow: NonNegativeInt = Field(default=2048, le=8192)
-    """Edge of the shadow map in pixels; 0 for no shadows."""
+    quality: Literal["low", "medium", "high", "auto"] = "medium"
+    """``low`` is without shadows, ``medium`` has hard ones, ``high`` soft ones and smooth edges
+    (four samples a pixel). ``auto`` measures when the window opens, and takes the best that leaves
+    time for 40 pictures a second, or ``low``; the record says which."""
+
+    shadow: Annotated[NonNegativeInt, Field(le=8192)] | None = None
+    """Edge of the shadow maps in pixels; 0 for no shadows, as ``quality`` has it by default."""
 
     display: Literal["window", "hidden"] = "window"
     """``hidden`` draws without any screen: for recordings and tests."""
 
     renderer: Literal["auto", "software"] = "auto"
     """``software`` draws without any graphics driver, and without shadows."""
+
+    @model_validator(mode="after")
+    def _screens_and_text_fit(self) -> "ViewSettings":
+        if self.screens and self.screen is not None:
+            raise ValueError("screen and screens are both there; write one of them")
+        if self.screens and self.beside:
+            raise ValueError(
+                "screens shows one wide picture, and beside asks for several; leave one out"
+            )
+        if self.text_arcmin is not None and self.viewing_m is None:
+            raise ValueError("text_arcmin needs viewing_m, the distance from the eye to the screen")
+        return self
+
+    @property
+    def all_screens(self) -> tuple[int | str, ...]:
+        """The monitors that it fills, from left to right."""
+        return self.screens if self.screen is None else (self.screen,)
 
     def provides(self, machine: Machine) -> Names:
         cameras = [camera.name for camera in (self.camera, *self.beside)]

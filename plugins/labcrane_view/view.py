@@ -15,13 +15,16 @@ from labcrane.core import CameraImage, Cylinder, SessionState, Shape, TargetFind
 from labcrane.machines import link_frames
 from labcrane_view.areas import Areas
 from labcrane_view.camera import Camera, Delay, Part
-from labcrane_view.hud import WORDS, Hud, notice
+from labcrane_view.framing import must_be_seen
+from labcrane_view.hud import WORDS, Hud, notice, standing
 from labcrane_view.keys import Keys
-from labcrane_view.overlay import Overlay
+from labcrane_view.overlay import Overlay, capital
+from labcrane_view.placement import Keeper, Piece, Span, monitor_of, per_metre
+from labcrane_view.quality import LEVELS, Level, chosen, picture_s
 from labcrane_view.scene.stage import HAZE, Stage
 from labcrane_view.settings import ViewSettings
 from labcrane_view.shots import Shots
-from labcrane_view.window import TURNED, Window, font, hidden_picture, open_window
+from labcrane_view.window import TURNED, Window, font, font_name, hidden_picture, open_window
 
 BOX = ("left", "top", "right", "bottom")
 PREVIEW_S = 0.5
@@ -38,6 +41,7 @@ class View(Feedback):
         Signal("render.began", "s"),
         Signal("flip.time", "s"),  # the picture is handed to the screen; the photodiode knows more
         Signal("patch", "1"),
+        Signal("monitors.lost", "1"),  # of those that it fills: nobody sees what they would show
     )
 
     def __init__(self, settings: ViewSettings, machine: Machine) -> None:
@@ -61,24 +65,51 @@ class View(Feedback):
         self._delay = Delay(settings.delay_s)
         self._due = self._now = 0.0
         self._samples: dict[str, FloatArray] = {}
+        self._letters: Any = None
+        self._quality = ""
         # Made before there is a window: a camera on a link that does not exist is refused at once.
         self._cameras = [Camera(camera, machine) for camera in cameras]
 
     def open(self, run: Run) -> None:
-        settings = self._settings
+        wanted = self._settings.quality
+        if wanted == "auto":
+            level, self._quality = chosen(lambda each: self._measured(run, each))
+            if self._window is not None and self._level == level:
+                return
+            self.close()
+        else:
+            level = self._quality = wanted
+        self._open(run, level)
+
+    def _measured(self, run: Run, level: Level) -> float:
+        """Open with a quality; return how long a picture takes, in seconds."""
+        self.close()
+        self._open(run, level)
+        return picture_s(self.redraw)
+
+    def _open(self, run: Run, level: Level) -> None:
+        settings, quality = self._settings, LEVELS[level]
+        self._level = level
         self._angles = run.state.find("joint.angle")
         self._targets = TargetFinder(run.task)
         window = self._window = open_window(
             settings,
             self.title or "labcrane",
             [view for view in self.before if isinstance(view, ViewSettings)],
+            quality.samples,
         )
+        self._keeper = Keeper(settings, window.span.place)
         if not window.shaders:
             self._check_simple()
         output = window.output
         self._size = (output.get_x_size(), output.get_y_size())
         scenery = settings.content == "scene"
-        self.stage = Stage(run, shaders=window.shaders, shadow=settings.shadow, scenery=scenery)
+        shadow = quality.shadow if settings.shadow is None else settings.shadow
+        self.stage = Stage(
+            run, shaders=window.shaders, shadow=shadow, scenery=scenery, soft=quality.soft
+        )
+        if quality.samples and window.shaders:
+            self.stage.root.set_antialias(core.AntialiasAttrib.M_multisample)
         self._hud = Hud(settings.hud_lines, settings.language, run)
         self._areas = Areas(settings.areas, run, self._size, settings.flip)
         back = HAZE if scenery else (0.0, 0.0, 0.0)
@@ -87,15 +118,19 @@ class View(Feedback):
             target = self._turned_over(output)
         target.set_clear_color(core.LColor(*back, 1.0))
         self._pictures = [output] if target is output else [output, target]
-        overlay = Overlay(target, self._size, sort=20)
-        for camera, part in zip(self._cameras, _parts(self._size, len(self._cameras)), strict=True):
-            picture = camera.open(window, self.stage, target, part, back)
+        pieces, letters = window.span.pieces, font(settings.font)
+        self._letters = letters
+        self._line_px = _line(settings, letters)
+        overlay = Overlay(target, self._size, 20, pieces, self._line_px)
+        parts = _parts(self._size, len(self._cameras), window.span)
+        for camera, part in zip(self._cameras, parts, strict=True):
+            picture = camera.open(window, self.stage, target, part, back, must_be_seen(run))
             if picture is not None:
                 overlay.picture((part.left, part.left + part.width), picture)
-        self._text = overlay.text(font(settings.font)) if settings.hud_lines else None
-        self._notice = overlay.notice(font(settings.font)) if settings.notices else None
+        self._text = overlay.text(letters) if settings.hud_lines else None
+        self._notice = overlay.notice(letters) if settings.notices else None
         told = settings.notices or settings.hud_lines
-        self._paused = overlay.curtain(font(settings.font)) if told else None
+        self._paused = overlay.curtain(letters) if told else None
         self._patch = overlay.patch(settings.patch) if settings.patch else None
         if self._keys:
             self._keys.open(output)
@@ -119,6 +154,7 @@ class View(Feedback):
 
     def close(self) -> None:
         if self._window is not None:
+            self._keeper.close()
             self._window.close()
             self._window = None
 
@@ -142,12 +178,15 @@ class View(Feedback):
             if not camera.apart:
                 self._look(camera, shown, shapes, poses)
         white = self._write(shown)
+        self._keeper.keep(window.output)
         window.engine.render_frame()
         flipped = time.perf_counter()
+        self.stage.drawn(window.output.get_gsg())
         self._samples = {"areas": np.concatenate([camera.boxes for camera in self._cameras])}
         if self._keys:
             self._samples["keys"] = self._keys.rows()
-        return np.array([shown.tick.number, began, flipped, white])
+        lost = float(self._keeper.lost)
+        return np.array([shown.tick.number, began, flipped, white, lost])
 
     def samples(self) -> Mapping[str, FloatArray]:
         return self._samples
@@ -162,9 +201,24 @@ class View(Feedback):
         software = window is not None and window.software
         return {
             "renderer": f"{driver} (software: no graphics card takes part)" if software else driver,
-            "size": f"{self._size[0]}x{self._size[1]}",
+            "size": self._size_in_words(),
+            "quality": self._quality,
+            "samples": 1 if window is None else self._samples_a_pixel(window),
+            "font": font_name(self._settings.font, self._letters),
             "delay": "not measured",
         }
+
+    def _samples_a_pixel(self, window: Window) -> int:
+        """Return how many there are, which may be fewer than were asked for."""
+        return max(1, int(window.output.get_fb_properties().get_multisamples()))
+
+    def _size_in_words(self) -> str:
+        """Return how large the window is, and that it was to be larger."""
+        width, height = self._size
+        asked = self._settings.size
+        if self._settings.all_screens or (width, height) == asked:
+            return f"{width}x{height}"
+        return f"{width}x{height} ({asked[0]}x{asked[1]} has no room beside the other windows)"
 
     def picture(self) -> npt.NDArray[np.uint8]:
         """Return what the window shows, shape ``(height, width, 3)``, red first, from the top."""
@@ -245,7 +299,8 @@ class View(Feedback):
                 notice(frame, self._situation, self._settings.hint_s, self._settings.language)
             )
         if self._paused is not None:
-            self._paused.show([WORDS[self._settings.language]["paused"]] if frame.paused else [])
+            state = standing(frame, self._situation)
+            self._paused.show([WORDS[self._settings.language][state]] if state else [])
         if self._patch is None or self._settings.patch is None:
             return math.nan
         counts = self._situation.counts
@@ -254,7 +309,22 @@ class View(Feedback):
         return white
 
 
-def _parts(size: tuple[int, int], count: int) -> list[Part]:
-    """Return the parts of a window of ``size`` pixels, side by side."""
+def _parts(size: tuple[int, int], count: int, span: Span) -> list[Part]:
+    """Return the parts of a window of ``size`` pixels, side by side, or its only one's pieces."""
+    if count == 1:
+        # A window manager may have made it smaller than it was asked for.
+        only = len(span.pieces) == 1
+        whole = (Piece(0, 0, *size, 0, 0),)
+        picture = size if only else span.picture
+        return [Part(0, *size, picture, whole if only else span.pieces)]
     width = size[0] // count
-    return [Part(at * width, width, size[1]) for at in range(count)]
+    one = (width, size[1])
+    return [Part(at * width, *one, one, (Piece(at * width, 0, *one, 0, 0),)) for at in range(count)]
+
+
+def _line(settings: ViewSettings, letters: Any) -> float | None:
+    """Return the height of a line of text in pixels, by its size on the retina; None for usual."""
+    if settings.text_arcmin is None or settings.viewing_m is None:
+        return None
+    high = 2.0 * settings.viewing_m * math.tan(math.radians(settings.text_arcmin / 60.0) / 2.0)
+    return high * per_metre(settings, monitor_of(settings)) / capital(letters)

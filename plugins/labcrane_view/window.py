@@ -10,7 +10,7 @@ from typing import Any
 from panda3d import core
 
 from labcrane import DeviceError
-from labcrane_view.monitors import Monitor, monitors
+from labcrane_view.placement import Span, placed
 from labcrane_view.settings import ViewSettings
 
 # auto-flip 1: by default Panda3D shows every picture one render_frame late. gl-finish 1: the stamp
@@ -28,9 +28,8 @@ textures-power-2 none
 """
 
 
-Pixels = tuple[int, int]
-Place = tuple[Pixels, Pixels]
-"""Upper left corner and size, in pixels."""
+SHARP = 64
+"""Pixels of a line of text as it is kept: larger text is blurred a little."""
 
 SEEN, TURNED = -7, -5
 """When cameras' pictures and the whole window turned over are drawn: after the shadows (Panda3D's
@@ -49,12 +48,15 @@ class Window:
         Whether the renderer runs our shader; the software renderer does not.
     driver
         What draws, in its own words.
+    span
+        Where it lies, and which part of the picture is where in it.
     """
 
     engine: Any
     output: Any
     shaders: bool
     driver: str
+    span: Span
 
     @property
     def software(self) -> bool:
@@ -68,19 +70,23 @@ class Window:
         self.engine.remove_all_windows()
 
 
-def open_window(settings: ViewSettings, title: str, before: Sequence[ViewSettings] = ()) -> Window:
+def open_window(
+    settings: ViewSettings, title: str, before: Sequence[ViewSettings] = (), samples: int = 0
+) -> Window:
     """Open what the settings ask for.
 
     Parameters
     ----------
     before
-        Views whose windows may be on the desktop already: this one lies beside them, where there is
-        room. A window manager may put it elsewhere.
+        Views whose windows may be on the desktop already: this one lies beside them, and is smaller
+        where there is no room. A window manager may put it elsewhere.
+    samples
+        Samples a pixel to ask for; the renderer may have fewer.
 
     Raises
     ------
     DeviceError
-        There is no display, no such monitor, or nothing that can draw.
+        There is no display, no such monitor, no room, or nothing that can draw.
     """
     core.load_prc_file_data("labcrane", CONFIGURATION)
     hidden = settings.display == "hidden"
@@ -89,15 +95,14 @@ def open_window(settings: ViewSettings, title: str, before: Sequence[ViewSetting
             "there is no display for a window (DISPLAY is not set); start labcrane in a desktop "
             "session, or write display: hidden to draw without a screen"
         )
-    monitor = None if hidden or settings.screen is None else _monitor(settings.screen)
     tried = [("p3headlessgl" if hidden else "pandagl", True)] * (settings.renderer == "auto")
     for module, shaders in [*tried, ("p3tinydisplay", False)]:
         engine = core.GraphicsEngine()
-        output = _output(engine, module, settings, title, monitor, before)
-        if output is None:
+        opened = _output(engine, module, settings, title, before, samples)
+        if opened is None:
             continue
-        gsg = output.get_gsg()
-        return Window(engine, output, shaders, gsg.driver_renderer or module)
+        output, span = opened
+        return Window(engine, output, shaders, output.get_gsg().driver_renderer or module, span)
     raise DeviceError(
         "nothing can draw here: neither OpenGL nor the software renderer could be opened; check "
         f"that DISPLAY {os.environ.get('DISPLAY')!r} exists and may be used"
@@ -119,9 +124,9 @@ def _output(
     module: str,
     settings: ViewSettings,
     title: str,
-    monitor: Monitor | None,
     before: Sequence[ViewSettings],
-) -> Any:
+    samples: int,
+) -> tuple[Any, Span] | None:
     selection = core.GraphicsPipeSelection.get_global_ptr()
     hidden = settings.display == "hidden"
     if module == "p3tinydisplay" and hidden:
@@ -135,20 +140,19 @@ def _output(
         # and its destructor uses that connection: a segmentation fault, if anything still refers to
         # the window. So the connection stays until the process ends.
         pipe.ref()
-    width, height = settings.size if monitor is None else monitor.size
-    window = core.WindowProperties(size=(width, height))
+    desktop = (pipe.get_display_width(), pipe.get_display_height())
+    span = placed(settings, before, desktop)
+    corner, size = span.place
+    window = core.WindowProperties(size=size)
     window.title = title
-    if monitor is not None:
-        window.origin = core.LPoint2i(*monitor.origin)
-        window.undecorated = True
-    elif not hidden:
-        desktop = (pipe.get_display_width(), pipe.get_display_height())
-        place = free_place((width, height), _taken(before, desktop), desktop)
-        window.origin = core.LPoint2i(*place)
+    if not hidden:
+        window.origin = core.LPoint2i(*corner)
+        window.undecorated = bool(settings.all_screens)
     form = core.FrameBufferProperties()
     form.rgb_color = True
     form.set_rgba_bits(8, 8, 8, 0)
     form.depth_bits = 24
+    form.multisamples = samples
     # A picture is drawn where nobody sees it, and shown whole. Without this the X server shows what
     # is drawn so far.
     form.back_buffers = 0 if hidden else 1
@@ -160,60 +164,7 @@ def _output(
         return None
     engine.open_windows()
     engine.render_frame()
-    return output if output.is_valid() else None
-
-
-def _taken(before: Sequence[ViewSettings], desktop: Pixels) -> list[Place]:
-    """Return the places of windows, in the order in which they were given them."""
-    known = monitors() if any(view.screen is not None for view in before) else []
-    places: list[Place] = []
-    for view in before:
-        if view.display == "hidden":
-            continue
-        if view.screen is None:
-            places.append((free_place(view.size, places, desktop), view.size))
-        elif (monitor := _find(known, view.screen)) is not None:
-            places.append((monitor.origin, monitor.size))
-        # A view on a monitor that is not there has no window, which it says itself.
-    return places
-
-
-def free_place(size: Pixels, taken: Sequence[Place], desktop: Pixels) -> Pixels:
-    """Return where a window covers none of those that are there.
-
-    The upper left corner, right of one, or below one; where there is no room for the whole window,
-    where the least of others is covered.
-    """
-    corners = [(0, 0)]
-    for (left, top), (width, height) in taken:
-        corners += [(left + width, top), (left, top + height)]
-    width, height = size
-    inside = [
-        (max(0, min(left, desktop[0] - width)), max(0, min(top, desktop[1] - height)))
-        for left, top in corners
-    ]
-    return min(inside, key=lambda corner: sum(_common((corner, size), each) for each in taken))
-
-
-def _common(one: Place, other: Place) -> int:
-    """Return how many pixels two places have in common."""
-    sides = [
-        min(a + wide, b + broad) - max(a, b) for a, wide, b, broad in zip(*one, *other, strict=True)
-    ]
-    return max(0, sides[0]) * max(0, sides[1])
-
-
-def _monitor(wanted: int | str) -> Monitor:
-    found = monitors()
-    if (monitor := _find(found, wanted)) is not None:
-        return monitor
-    known = ", ".join(f"{n} ({m.name}, {m.size[0]}x{m.size[1]})" for n, m in enumerate(found))
-    raise DeviceError(f"there is no screen {wanted}; there is {known}")
-
-
-def _find(found: Sequence[Monitor], wanted: int | str) -> Monitor | None:
-    named = (m for number, m in enumerate(found) if wanted in (number, m.name))
-    return next(named, None)
+    return (output, span) if output.is_valid() else None
 
 
 def font(path: str | None) -> Any:
@@ -234,11 +185,19 @@ def font(path: str | None) -> Any:
     return loaded
 
 
+def font_name(path: str | None, loaded: Any) -> str:
+    """Return what the record calls a font."""
+    if path is not None:
+        return Path(path).stem
+    return "Panda3D's own" if loaded == core.TextNode.get_default_font() else "DejaVu Sans"
+
+
 def _plain_font() -> Any:
     """Return a font whose digits are all as high as capitals, with the letters of our languages.
 
     The renderer's own has old-style digits, in which 0.00 reads as three small letters. Matplotlib,
-    which labcrane needs in any case, comes with this one; it is found without being imported.
+    which labcrane needs in any case, comes with this one, DejaVu Sans, whose licence lets everybody
+    use and pass it on; it is found without being imported.
     """
     found = find_spec("matplotlib")
     folders = found.submodule_search_locations if found else None
@@ -249,5 +208,7 @@ def _plain_font() -> Any:
                 core.Filename.from_os_specific(str(path)).get_fullpath()
             )
             if loaded is not None and loaded.is_valid():
+                if loaded.get_num_pages() == 0:  # nobody has written with it yet
+                    loaded.set_pixels_per_unit(SHARP)
                 return loaded
     return core.TextNode.get_default_font()

@@ -230,6 +230,27 @@ def test_the_situation_says_what_the_operator_is_to_read() -> None:
     assert now.hint_time == 2.0
 
 
+def test_the_situation_says_why_nobody_is_to_move() -> None:
+    now = SessionState()
+    ended = {"step": 1, "kind": "block", "done": True}
+    for name, data, held, waiting, over in (
+        ("waiting", {"what": "first"}, (), "first", ""),
+        ("pause.start", {"by": "input"}, ("input",), "first", ""),
+        ("pause.start", {"by": "examiner"}, ("input", "examiner"), "first", ""),
+        ("pause.start", {"by": "input"}, ("input", "examiner"), "first", ""),
+        ("pause.end", {"by": "input"}, ("examiner",), "first", ""),
+        ("pause.end", {"by": "examiner"}, (), "first", ""),
+        ("block.start", {"block": 1, "block_name": "a", "practice": False}, (), "", ""),
+        ("break.start", {"seconds": 9.0}, (), "break", ""),
+        ("break.end", {"left": 0.0}, (), "", ""),
+        ("waiting", {"what": "instructions"}, (), "instructions", ""),
+        ("step.end", ended, (), "", ""),
+        ("session.end", {"reason": "complete", "owed": ""}, (), "", "complete"),
+    ):
+        now = situation_after(now, Event(name, 1.0, data))
+        assert (now.held, now.waiting, now.over) == (held, waiting, over), name
+
+
 def test_targets_are_found_among_a_tasks_signals() -> None:
     task = Layout("the task", (*TARGETS, Signal("cost", "1")))
     found = list(TargetFinder(task).find(np.array([1.0, 2.0, 3.0, 0.5, 4.0, 5.0, 6.0, 9.0])))

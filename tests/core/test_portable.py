@@ -47,6 +47,11 @@ TWINS = {
         "os.geteuid", "os.sched_getaffinity", "resource",
     ),  # Linux's priorities; elsewhere nothing is said of them
     "labcrane/files/lock.py": ("fcntl",),  # msvcrt
+    "labcrane/processes/real_time.py": (
+        "os.SCHED_FIFO", "os.SCHED_OTHER", "os.SCHED_RESET_ON_FORK", "os.geteuid",
+        "os.sched_getaffinity", "os.sched_param", "os.sched_setaffinity", "os.sched_setscheduler",
+        "resource",
+    ),  # MMCSS on Windows; elsewhere it is refused
     "labcrane/streams/recorder/own_clock.py": (
         "time.CLOCK_MONOTONIC", "time.CLOCK_MONOTONIC_RAW", "time.clock_gettime",
     ),  # elsewhere there is no clock that nothing turns, and none is logged

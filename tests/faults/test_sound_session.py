@@ -23,7 +23,7 @@ rate_hz: 240
     + FORM
     + """\
 tasks:
-  aiming: {{use: aiming, distances: [2], movements: 200, limit_s: {limit_s}}}
+  aiming: {{use: aiming, distances: [2], movements: 200, limit_s: 1.2}}
 feedback:
   tone: {{use: sonification, driver: jack, block: 1024}}
 sessions:
@@ -36,6 +36,7 @@ sessions:
 SECONDS = 10.0
 
 LIMIT_S = 1.2
+"""Of a trial, which nobody ends sooner."""
 
 
 class Ending(Examiner):
@@ -60,7 +61,7 @@ class Ending(Examiner):
 def test_a_session_is_heard_in_real_time_from_its_first_trial_to_its_end(tmp_path: Path) -> None:
     # That no block is missed on a busy computer is measured by benchmarks.beside.
     session, _ = a_jack_session(
-        STUDY.format(study=unique("sound"), limit_s=LIMIT_S),
+        STUDY.format(study=unique("sound")),
         tmp_path,
         Ending(SECONDS),
         real_time=True,

@@ -15,8 +15,8 @@ from PIL import ImageGrab
 from plugins.whole_picture import counted
 from windows import a_view, an_x_server, make_frame
 
+from labcrane_view.placement import free_place
 from labcrane_view.settings import ViewSettings
-from labcrane_view.window import free_place
 
 GRABS = 40
 SIZE = (480, 320)
@@ -91,16 +91,38 @@ def test_every_grab_of_two_windows_shows_whole_pictures_while_the_crane_moves(
         assert len(seen) > GRABS / 4, "the crane did not move"
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_no_window_lies_over_another_whatever_their_sizes(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    desktop = tuple(random.integers((1000, 700), (4000, 2200)).tolist())
+    taken: list[tuple[tuple[int, int], tuple[int, int]]] = []
+    for _ in range(5):
+        size = tuple(random.integers((100, 100), (1600, 1000)).tolist())
+        place = free_place(size, taken, desktop)
+        if place is None:
+            continue
+        (x, y), (width, height) = place
+        assert 0 <= x <= x + width <= desktop[0]
+        assert 0 <= y <= y + height <= desktop[1]
+        assert width <= size[0]
+        assert abs(width / size[0] - height / size[1]) < 1 / min(size)
+        for (left, top), (wide, high) in taken:
+            beside = x >= left + wide or left >= x + width
+            assert beside or y >= top + high or top >= y + height
+        taken.append(place)
+    assert taken
+
+
 def test_windows_lie_beside_those_before_them_where_there_is_room() -> None:
     desktop = (1920, 1080)
     operator = ((0, 0), (1280, 720))
-    assert free_place((600, 500), [operator], desktop) == (1280, 0)
-    assert free_place((1280, 300), [operator], desktop) == (0, 720)
+    assert free_place((600, 500), [operator], desktop) == ((1280, 0), (600, 500))
+    assert free_place((1280, 300), [operator], desktop) == ((0, 720), (1280, 300))
     second = ((1280, 0), (600, 500))
-    assert free_place((600, 500), [operator, second], desktop) == (1280, 500)
-    x, y = free_place((1900, 1000), [operator], desktop)
-    assert x + 1900 <= 1920
-    assert y + 1000 <= 1080
+    assert free_place((600, 500), [operator, second], desktop) == ((1280, 500), (600, 500))
+    # Right of it there are 640 pixels, below it 360: as much of 960x540 as fits.
+    assert free_place((960, 540), [operator], desktop) == ((1280, 0), (640, 360))
+    assert free_place((600, 500), [((0, 0), (1900, 1000))], desktop) is None
 
 
 def test_paused_covers_the_whole_picture() -> None:

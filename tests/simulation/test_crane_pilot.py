@@ -52,12 +52,12 @@ def test_a_session_waits_for_eeg_and_eye_tracker(study: Study) -> None:
 def test_the_operator_has_two_screens_and_the_examiner_a_third(study: Study) -> None:
     settings = {name: choice.settings.model_dump() for name, choice in study.views.items()}
     assert {name: one["seen_by"] for name, one in settings.items()} == {
-        "left": "operator",
-        "right": "operator",
+        "operator": "operator",
         "examiner": "examiner",
     }
-    assert (settings["left"]["screen"], settings["right"]["screen"]) == (1, 2)
-    assert settings["left"]["camera"]["eye"] == settings["right"]["camera"]["eye"]
+    assert tuple(settings["operator"]["screens"]) == (1, 2)
+    assert settings["operator"]["bezel_mm"] > 0
+    assert settings["examiner"]["screen"] == 0
 
 
 def test_both_protocols_say_in_their_head_what_is_the_papers_and_what_is_ours() -> None:

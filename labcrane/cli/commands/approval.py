@@ -1,4 +1,4 @@
-"""Commands about approval: approve, amend, methods."""
+"""Commands about approval: approve, amend, methods, bundle."""
 
 from datetime import date, datetime
 from pathlib import Path
@@ -87,6 +87,24 @@ def methods(
     out.print(paragraph(lock), markup=False)
     write_text(path, as_csv(lock.content["codebook"]), SHARED_FILE)
     out.print(f"codebook: {path}", markup=False)
+
+
+def bundle(
+    protocol: ProtocolPath,
+    folder: Annotated[Path, typer.Argument(help="a new folder for it: a stick, for instance")],
+) -> None:
+    """Write a folder from which a computer like this one installs the study without network."""
+    from labcrane.approval.bundle import bundle as write
+    from labcrane.protocol.study import load
+    from labcrane.registry.registry import discover
+
+    registry = discover(study=protocol)
+    made = write(load(protocol, registry), registry, folder)
+    out.print(
+        f"{made.path}: {', '.join(made.files)}, and {made.packages} packages, {made.size_mb:.0f} "
+        f"MB; on the other computer: python {made.path.name}/install.py FOLDER",
+        markup=False,
+    )
 
 
 def read_date(text: str) -> date:

@@ -32,6 +32,11 @@ WithFeedback = Annotated[
     ),
 ]
 
+RealTime = Annotated[
+    bool,
+    typer.Option("--real-time", help="the loop before all other programs, on a core of its own"),
+]
+
 
 def run(
     protocol: ProtocolPath,
@@ -46,10 +51,13 @@ def run(
     local: Local = False,
     page: Page = None,
     feedback: WithFeedback = None,
+    real_time: RealTime = False,
 ) -> None:
     """Run a session of a study."""
     if fast and not simulate:
         raise ProtocolError("--fast needs --simulate: people cannot be hurried")
+    if fast and real_time:
+        raise ProtocolError("--fast has no real time to keep; leave out one of --fast, --real-time")
     from labcrane.session.visit import visit_of
 
     visit = visit_of(
@@ -60,6 +68,7 @@ def run(
         simulated=simulate,
         pilot=pilot,
         feedback=not simulate if feedback is None else feedback,
+        real_time=real_time,
     )
     if local or simulate:
         stay_on_this_computer()
@@ -83,6 +92,7 @@ def resume(
     local: Local = False,
     page: Page = None,
     feedback: WithFeedback = None,
+    real_time: RealTime = False,
 ) -> None:
     """Go on with a session that stopped: do what it still owes."""
     from labcrane.session.visit import visit_of
@@ -101,6 +111,7 @@ def resume(
         resumed=True,
         policy=policy,
         feedback=shown,
+        real_time=real_time,
     )
     if visit.study.outdated:
         out.print("gone on with as it was begun; a new session would be refused:", markup=False)
@@ -199,6 +210,7 @@ def _launch(visit: "Visit", *, page: bool) -> None:
     from labcrane.design.plan import plan_session
     from labcrane.launcher.launcher import Launcher
     from labcrane.launcher.pages import pages
+    from labcrane.processes.real_time import a_core_left
     from labcrane.registry.offers import LAB, not_installed
     from labcrane.session.commands import QueueConsole
 
@@ -211,7 +223,12 @@ def _launch(visit: "Visit", *, page: bool) -> None:
     console = QueueConsole()
     keys, asked = not visit.simulated, visit.study.questionnaires
     shown, counts = out.console, TrialCounts.of(plan)
-    with Terminal(console, shown, counts, keys=keys, questionnaires=asked) as terminal:
+    with (
+        # Before any other process is started: they are to leave that core alone.
+        a_core_left() if visit.real_time else nullcontext() as core,
+        Terminal(console, shown, counts, keys=keys, questionnaires=asked) as terminal,
+    ):
+        visit = replace(visit, core=core)
         launcher = Launcher(visit, console, terminal.say)
         with (
             pages(visit, launcher, console, terminal.say, feedback=visit.feedback)

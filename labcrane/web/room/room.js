@@ -48,6 +48,7 @@ export default {
     <button type="button" class="room-button quiet" id="theme" @click="theme()">
       {{ dark ? 'Light' : 'Dark' }}</button>
   </div>
+  <div class="room-reports"><slot name="reports"></slot></div>
   <p v-if="told" class="room-told" id="told" role="alert">{{ told }}</p>
 
   <section v-if="s.report" class="room-card room-report" id="report" :class="s.report.level">

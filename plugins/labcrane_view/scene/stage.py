@@ -23,8 +23,15 @@ THICKNESS = 0.0125
 SUN = (0.45, -0.38, 0.81)
 """Direction to the sun."""
 
-SHADOWS = core.BitMask32.bit(5)
-"""Camera of the shadow map: does not see what glows or is transparent."""
+SHADOWS, STILL = core.BitMask32.bit(5), core.BitMask32.bit(6)
+"""Cameras of the shadow maps, of what moves and of what stands still: neither sees what glows or is
+transparent."""
+
+FULL = 4
+"""Looks at a map of shadows for a soft edge."""
+
+STILL_PICTURES = 3
+"""How often the shadows of what stands still are drawn: textures are there from the second on."""
 
 PAINT = ((0.13, 0.13, 0.14, 1.0), (0.90, 0.66, 0.07, 1.0), (0.12, 0.38, 0.17, 1.0))
 """Colours of the frames: the foot, the column, and everything behind."""
@@ -40,12 +47,16 @@ class Stage:
     shaders
         Whether the renderer runs our shader.
     shadow
-        Edge of the shadow map in pixels; 0 for none.
+        Edge of the shadow maps in pixels; 0 for none.
+    soft
+        Whether the edges of shadows are smoothed.
     scenery
         Whether there is anything but targets and cues.
     """
 
-    def __init__(self, run: Run, *, shaders: bool, shadow: int, scenery: bool) -> None:
+    def __init__(
+        self, run: Run, *, shaders: bool, shadow: int, scenery: bool, soft: bool = True
+    ) -> None:
         self.root = core.NodePath("stage")
         self._shaders = shaders
         self._ball = sphere()
@@ -58,13 +69,17 @@ class Stage:
         self._moving: list[tuple[Any, slice, slice]] = []
         self._carried: list[tuple[Any, slice, slice]] = []
         self._scenery = scenery
+        self._still_left = STILL_PICTURES
+        self._still: Any = None
         if shaders:
-            self._light(shadow)
+            self._light(shadow, soft=soft)
         else:
             self._plain_light()
         if scenery:
             for thing in forest():
-                self._add(self.root, thing.name, thing.mesh, thing.colour, thing.grain)
+                node = self._add(self.root, thing.name, thing.mesh, thing.colour, thing.grain)
+                node.hide(SHADOWS)
+                node.show(STILL)
             self._add_machine(run.bodies)
 
     def place(self, frames: FloatArray, scene: str, state: FloatArray) -> None:
@@ -176,14 +191,19 @@ class Stage:
     ) -> Any:
         node = parent.attach_new_node(_geometry(name, mesh))
         self._colour(node, colour)
-        if self._shaders:
-            node.set_shader_input("grain", grain)
+        if self._shaders and colour[3] == 1.0:
+            rough = shader.GROUND if grain == 1.0 else shader.ROUGH
+            node.set_shader(self._programs[rough if grain > 0.0 else shader.SMOOTH])
         return node
 
     def _colour(self, node: Any, colour: Sequence[float]) -> None:
         red, green, blue, opacity = colour
         if self._shaders:
             node.set_shader_input("rgba", core.LVector4(red, green, blue, opacity))
+            if opacity < 1.0:
+                node.set_shader(self._programs[shader.GLASS])
+            elif node.get_shader() == self._programs[shader.GLASS]:
+                node.set_shader(self._programs[shader.SMOOTH])
         else:
             node.set_color(red, green, blue, opacity)
         if opacity < 1.0:
@@ -196,36 +216,54 @@ class Stage:
             node.set_depth_write(True)
             node.set_bin("opaque", 0)
             node.show(SHADOWS)
+        node.hide(STILL)
 
-    def _light(self, shadow: int) -> None:
-        sun = core.DirectionalLight("sun")
-        node = self.root.attach_new_node(sun)
-        node.set_pos(*(4.0 * (axis == 0) + 40.0 * part for axis, part in enumerate(SUN)))
-        node.look_at(4.0, 0.0, 0.0)
-        if shadow:
-            sun.set_shadow_caster(caster=True, buffer_xsize=shadow, buffer_ysize=shadow)
-            lens = sun.get_lens()
-            lens.set_film_size(48.0, 48.0)
-            lens.set_near_far(5.0, 90.0)
-            sun.set_camera_mask(SHADOWS)
-            state = core.NodePath("depth only")
-            depth = core.Shader.make(
-                core.Shader.SL_GLSL, shader.DEPTH_VERTEX, shader.DEPTH_FRAGMENT
+    def drawn(self, gsg: Any) -> None:
+        """Be told that a picture was drawn: shadows of what stands still need no other one."""
+        if self._still is None or not self._still_left:
+            return
+        self._still_left -= 1
+        if not self._still_left:
+            self._still.get_shadow_buffer(gsg).set_active(False)
+
+    def _light(self, shadow: int, *, soft: bool) -> None:
+        depth = core.Shader.make(core.Shader.SL_GLSL, shader.DEPTH_VERTEX, shader.DEPTH_FRAGMENT)
+        for order, (name, mask, wide) in enumerate(
+            (("still", STILL, 48.0), ("moving", SHADOWS, 30.0))
+        ):
+            sun = core.DirectionalLight(name)
+            sun.set_priority(-order)  # the shader knows them by their places
+            node = self.root.attach_new_node(sun)
+            node.set_pos(*(4.0 * (axis == 0) + 40.0 * part for axis, part in enumerate(SUN)))
+            node.look_at(4.0, 0.0, 0.0)
+            if shadow:
+                sun.set_shadow_caster(caster=True, buffer_xsize=shadow, buffer_ysize=shadow)
+                lens = sun.get_lens()
+                lens.set_film_size(wide, wide)
+                lens.set_near_far(5.0, 90.0)
+                sun.set_camera_mask(mask)
+                state = core.NodePath("depth only")
+                state.set_shader(depth, 100)
+                state.set_attrib(core.ColorWriteAttrib.make(core.ColorWriteAttrib.C_off), 100)
+                sun.set_initial_state(state.get_state())
+                if mask is STILL:
+                    self._still = sun
+            self.root.set_light(node)
+        taps = (FULL if soft else 1) if shadow else 0
+        self._programs = {
+            surface: core.Shader.make(
+                core.Shader.SL_GLSL, shader.VERTEX, shader.fragment(surface, taps)
             )
-            state.set_shader(depth, 100)
-            state.set_attrib(core.ColorWriteAttrib.make(core.ColorWriteAttrib.C_off), 100)
-            sun.set_initial_state(state.get_state())
-        self.root.set_light(node)
-        self.root.set_shader(core.Shader.make(core.Shader.SL_GLSL, shader.VERTEX, shader.FRAGMENT))
+            for surface in (shader.GROUND, shader.ROUGH, shader.SMOOTH, shader.GLASS)
+        }
+        self.root.set_shader(self._programs[shader.SMOOTH])
         length = math.sqrt(sum(part * part for part in SUN))
         self.root.set_shader_inputs(
             sun=core.LVector3(*(part / length for part in SUN)),
             eye=core.LVector3(0.0, 0.0, 0.0),
             haze=core.LVector3(*HAZE),
             thickness=THICKNESS,
-            shadows=int(shadow > 0),
             glow=0.0,
-            grain=0.0,
             rgba=core.LVector4(1.0, 1.0, 1.0, 1.0),
             noise=_noise(),
         )

@@ -1,0 +1,129 @@
+"""Lateness of the loop with a whole laboratory beside it, with ``--real-time`` and without.
+
+    python -m benchmarks.real_time [SECONDS]
+
+Beside it: the pages, two software views, a sound by a JACK server, and 64 channels at 1 kHz that
+are recorded. The reference is an empty loop that ticked alone before. What is promised is promised
+of ``--real-time``; lines above the table say how late it is without. Needs jackd and real-time
+priorities; nothing leaves this computer.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.beside import QUARTER_MS, RATE_HZ, TESTS, late_ms
+from benchmarks.table import Row, dumped, loaded, show
+from labcrane.core.clock import SystemClock
+from labcrane.doctor.scheduling import lateness
+from labcrane.streams.network import LOOPBACK
+
+SECONDS = 60.0
+ALONE_S = 10.0
+PERIOD_MS = 1e3 / RATE_HZ
+QUANTILES = {"50 %": 0.5, "99 %": 0.99, "99.9 %": 0.999, "all": 1.0}
+PROMISED = ("99 %", "99.9 %")
+
+BESIDE = """\
+feedback:
+  tone: {{use: sonification, driver: jack, block: 1024}}
+views:
+  operator: {{use: view, display: hidden, renderer: software, size: [640, 360], rate_hz: 30}}
+  examiner: {{use: view, display: hidden, renderer: software, size: [640, 360], rate_hz: 30}}
+"""
+
+
+def rows() -> list[Row]:
+    """Return all figures; in a process of its own, for the network that liblsl is told of."""
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks.real_time", "--json"],
+        check=True, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    return loaded(done.stdout.splitlines()[-1])
+
+
+def measure(folder: Path, seconds: float) -> list[Row]:
+    """Measure here: an empty loop, a session without, and one with."""
+    from jack_server import a_jack_server  # noqa: PLC0415 - needs the path
+
+    alone = 1e3 * lateness(SystemClock(), RATE_HZ, ALONE_S)
+    late = {}
+    with a_jack_server(folder, real_time=True) as (server, _):
+        os.environ["JACK_DEFAULT_SERVER"] = server
+        for name, words in (("P001", ()), ("P002", ("--real-time",))):
+            late[name] = session(folder, name, seconds, words)
+    for name, what in (("P001", "without"), ("P002", "with")):
+        told = ", ".join(
+            f"{key} {np.quantile(late[name], at):.3f}" for key, at in QUANTILES.items()
+        )
+        missed = int(np.sum(late[name] > PERIOD_MS))
+        print(f"{what} --real-time: late by at most {told} ms; {missed} of {len(late[name])} late")
+    quantiles = {key: QUANTILES[key] for key in PROMISED}
+    return [
+        *(
+            Row(
+                "real time", f"{key} of ticks late by at most, a laboratory beside, ms",
+                float(np.quantile(late["P002"], at)),
+                float(np.quantile(alone, at)) + QUARTER_MS, "an empty loop, and a quarter tick",
+                1.0,
+            )
+            for key, at in quantiles.items()
+        ),
+        Row(
+            "real time", "ticks late by a period or more, a laboratory beside, and one",
+            1.0 + float(np.sum(late["P002"] > PERIOD_MS)),
+            1.0 + float(np.mean(alone > PERIOD_MS)) * len(late["P002"]),
+            "of an empty loop, and one", 1.0,
+        ),
+    ]  # fmt: skip
+
+
+def session(folder: Path, name: str, seconds: float, words: tuple[str, ...]) -> np.ndarray:
+    """Run a session with everything beside it; return how late its ticks were, in ms."""
+    from faults.sessions import labcrane, unique  # noqa: PLC0415 - needs the path
+    from faults.test_load import NEEDS, a_study  # noqa: PLC0415
+
+    word = unique("real-time")
+    devices = subprocess.Popen(
+        [sys.executable, str(TESTS / "faults" / "laboratory.py"), word, str(3 * seconds + 120)],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        assert devices.stdin is not None
+        assert devices.stdout is not None
+        devices.stdout.readline()
+        devices.stdin.write("go\n")
+        devices.stdin.flush()
+        study = a_study(folder / f"{name}.yaml", seconds, (NEEDS + BESIDE).format(word=word))
+        shown = ["--simulate", "--page", "--feedback", "--data", folder / "data", *words]
+        run = labcrane("run", study, "--participant", name, *shown)
+        said, _ = run.communicate()
+        assert run.returncode == 0, said
+    finally:
+        devices.kill()
+        devices.communicate()
+    _, late = late_ms(folder / "data" / f"{name}-SIMULATED" / f"{name}-SIMULATED.h5")
+    return late
+
+
+def main() -> None:
+    """Measure all, and print it for people, or for the process that asked for it."""
+    sys.path.insert(0, str(TESTS))
+    numbers = [float(word) for word in sys.argv[1:] if word != "--json"]
+    with tempfile.TemporaryDirectory(prefix="labcrane-real-time-") as name:
+        folder = Path(name)
+        config = folder / "lsl_api.cfg"
+        config.write_text(LOOPBACK.replace("[lab]", f"[lab]\nSessionID = rt-{os.getpid()}"))
+        os.environ["LSLAPICFG"] = str(config)
+        found = measure(folder, *(numbers or [SECONDS]))
+    show(found)
+    if "--json" in sys.argv:
+        print(dumped(found))
+
+
+if __name__ == "__main__":
+    main()

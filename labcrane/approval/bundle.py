@@ -1,0 +1,203 @@
+"""Bundle of a study: everything that another computer needs to install and run it without network.
+
+In it are the wheels of all that is installed here, the study with its lock and plugins, a list of
+checksums, and ``install.py``, which needs nothing but Python.
+"""
+
+import json
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib.metadata import Distribution, distributions
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
+
+from labcrane.approval import bundle_install
+from labcrane.approval.decision import otherwise_installed
+from labcrane.approval.environment import (
+    environment,
+    fingerprint,
+    fingerprint_of,
+    is_working_copy,
+    one_name,
+    source,
+)
+from labcrane.approval.lock import lock_path, read_lock
+from labcrane.approval.materials import referred
+from labcrane.errors import ProtocolError
+from labcrane.files.atomic import UNFINISHED, copy, sha256, write_text
+from labcrane.files.yaml import YamlFile
+from labcrane.protocol.study import Study
+from labcrane.registry.registry import Registry
+
+WHEELS, STUDY, REQUIREMENTS = "wheels", "study", "requirements.txt"
+
+
+@dataclass(frozen=True, slots=True)
+class Bundle:
+    """A folder that was written.
+
+    Attributes
+    ----------
+    path
+        Where it is.
+    packages
+        How many wheels are in it.
+    files
+        The study's files, relative to the folder of the protocol.
+    size_mb
+        What all of it takes, in MB.
+    """
+
+    path: Path
+    packages: int
+    files: tuple[str, ...]
+    size_mb: float
+
+
+def bundle(study: Study, registry: Registry, folder: Path) -> Bundle:
+    """Write a study's bundle into a new folder.
+
+    Raises
+    ------
+    ProtocolError
+        What is installed here is not what the study was approved with; the folder is there already;
+        a wheel cannot be had, or holds other files than what is installed here.
+    """
+    if folder.exists():
+        raise ProtocolError(f"{folder} is there already; give the bundle a new folder")
+    files = tuple(_study_files(study, registry))
+    if lock_path(study.path).exists():
+        _check_installed(study)
+    unfinished = folder.with_name(f".{folder.name}{UNFINISHED}")
+    shutil.rmtree(unfinished, ignore_errors=True)  # left by a process that was killed
+    unfinished.mkdir(parents=True)
+    try:
+        packages = _fill(unfinished, study, files)
+        unfinished.rename(folder)
+    finally:
+        shutil.rmtree(unfinished, ignore_errors=True)
+    size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file()) / 1e6
+    return Bundle(folder, packages, files, size)
+
+
+def _fill(folder: Path, study: Study, files: Sequence[str]) -> int:
+    """Write everything into a folder; return how many packages that are."""
+    for name in files:
+        copy(study.path.parent / name, folder / STUDY / name)
+    installed = list(_installed())
+    _fetch(installed, folder / WHEELS)
+    wheels = _checked_wheels(installed, folder / WHEELS)
+    here = environment()
+    pins = [
+        f"{name}=={package['version']} --hash=sha256:{sha256(wheels[name])}"
+        for name, package in here["packages"].items()
+    ]
+    about = {
+        "protocol": f"{STUDY}/{study.path.name}",
+        "system": here["system"],
+        "python": here["python"],
+    }
+    write_text(folder / REQUIREMENTS, "\n".join(pins) + "\n")
+    write_text(folder / bundle_install.ABOUT, json.dumps(about, indent=1) + "\n")
+    copy(Path(bundle_install.__file__), folder / "install.py")
+    sums = [f"{digest}  {name}\n" for name, digest in _sums(folder)]
+    write_text(folder / bundle_install.SUMS, "".join(sums))
+    return len(wheels)
+
+
+def _check_installed(study: Study) -> None:
+    lock = read_lock(study.path)
+    if others := otherwise_installed(lock):
+        listed = "\n".join(f"  {each}" for each in others)
+        raise ProtocolError(
+            f"{study.path} was approved under {lock.approval['reference']!r} with other packages "
+            f"than are installed here:\n{listed}\n"
+            "make the bundle where it was approved, or record the change with labcrane amend"
+        )
+
+
+def _study_files(study: Study, registry: Registry) -> Iterator[str]:
+    """Yield what of the protocol's folder is the study: never data that lie beside it."""
+    folder = study.path.parent
+    found = {study.path, *referred(YamlFile.read(study.path).data, folder)}
+    found |= set(registry.local.values())
+    if (lock := lock_path(study.path)).exists():
+        found |= {lock, read_lock(study.path).consent}
+        found |= set(folder.glob(f"{lock.stem}.[0-9]*.json"))
+    for path in sorted(found):
+        yield path.resolve().relative_to(folder.resolve()).as_posix()
+
+
+def _installed() -> Iterator[Distribution]:
+    """Yield each package that is installed once: the one that is imported."""
+    seen: set[str] = set()
+    for each in distributions():
+        name = one_name(each.name)
+        if name not in seen:
+            seen.add(name)
+            yield each
+
+
+def _fetch(installed: list[Distribution], wheels: Path) -> None:
+    """Have pip fetch or build a wheel of each package, of just the version that is here.
+
+    Raises
+    ------
+    ProtocolError
+        There is no pip, or it fails.
+    """
+    if find_spec("pip") is None:
+        raise ProtocolError("a bundle is made by pip, which is not installed; python -m ensurepip")
+    with TemporaryDirectory() as scratch:
+        wanted = Path(scratch) / REQUIREMENTS
+        wanted.write_text("\n".join(map(_wanted, installed)) + "\n", encoding="utf-8")
+        command = ["-m", "pip", "wheel", "--no-deps", "--disable-pip-version-check", "-q"]
+        done = subprocess.run(
+            [sys.executable, *command, "--wheel-dir", str(wheels), "-r", str(wanted)],
+            stderr=subprocess.PIPE,
+            encoding="utf-8",
+            check=False,
+        )
+    if done.returncode:
+        raise ProtocolError(f"pip cannot make all wheels:\n{done.stderr.strip()[-2000:]}")
+
+
+def _wanted(package: Distribution) -> str:
+    """Return what pip is asked for: a version of an index, or the folder it was installed from."""
+    url = source(package).get("url", "")
+    if url.startswith("file:"):
+        return str(Path(url2pathname(urlsplit(url).path)))
+    return f"{package.name} @ {url}" if url else f"{package.name}=={package.version}"
+
+
+def _checked_wheels(installed: list[Distribution], folder: Path) -> dict[str, Path]:
+    """Return the wheel of each package by its name, if it holds what is installed here."""
+    wheels = {one_name(path.name.partition("-")[0]): path for path in folder.glob("*.whl")}
+    for package in installed:
+        name = one_name(package.name)
+        if name not in wheels:
+            raise ProtocolError(f"pip made no wheel of {name} {package.version}; install it anew")
+        if not is_working_copy(package) and fingerprint(package) != _of_wheel(wheels[name]):
+            raise ProtocolError(
+                f"the wheel of {name} {package.version} that pip finds has other files than what "
+                "is installed here; install it anew, and record the change with labcrane amend"
+            )
+    return wheels
+
+
+def _of_wheel(path: Path) -> str:
+    with zipfile.ZipFile(path) as wheel:
+        (record,) = (name for name in wheel.namelist() if name.endswith(".dist-info/RECORD"))
+        return fingerprint_of(wheel.read(record).decode("utf-8"))
+
+
+def _sums(folder: Path) -> Iterator[tuple[str, str]]:
+    for path in sorted(file for file in folder.rglob("*") if file.is_file()):
+        yield path.relative_to(folder).as_posix(), sha256(path)

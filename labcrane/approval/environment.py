@@ -1,0 +1,120 @@
+"""Environment of a study: what is installed, by version and by what the installer wrote down."""
+
+import csv
+import hashlib
+import json
+import platform
+import re
+import sys
+import sysconfig
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from importlib.metadata import Distribution, distributions
+from typing import Any
+
+OF_THE_INSTALLER = frozenset(
+    {"INSTALLER", "RECORD", "REQUESTED", "direct_url.json", "uv_cache.json", "uv_build.json"}
+)
+"""Files that say how a package came here, and not what it is."""
+
+Environment = Mapping[str, Any]
+
+
+def environment() -> dict[str, Any]:
+    """Return what is installed, ready for JSON.
+
+    Returns
+    -------
+    dict
+        ``system``, ``python``, and ``packages``: for each a ``version`` and ``sha256``, a hash of
+        the names and hashes of its files as its installer recorded them. That is None of a package
+        whose files are a working copy or whose installer kept no record.
+    """
+    return _environment(tuple(sys.path))
+
+
+@lru_cache(maxsize=1)
+def _environment(path: tuple[str, ...]) -> dict[str, Any]:
+    packages: dict[str, Any] = {}
+    for each in distributions(path=list(path)):
+        # Of two on the path the first is the one that is imported.
+        packages.setdefault(
+            one_name(each.name),
+            {"version": each.version, "sha256": fingerprint(each)},
+        )
+    return {
+        "system": sysconfig.get_platform(),
+        "python": platform.python_version(),
+        "packages": dict(sorted(packages.items())),
+    }
+
+
+def one_name(project: str) -> str:
+    """Return the one way to write a project's name, by PEP 503."""
+    return re.sub(r"[-_.]+", "-", project).lower()
+
+
+def fingerprint(of: Distribution) -> str | None:
+    """Return a hash of what a package consists of, equal wherever the same wheel is installed."""
+    record = of.read_text("RECORD")
+    if record is None or is_working_copy(of):
+        return None
+    return fingerprint_of(record)
+
+
+def fingerprint_of(record: str) -> str:
+    """Return the hash of a wheel's or an installed package's ``RECORD``.
+
+    Files without a hash are not counted, as the record itself and what Python compiled; nor those
+    outside the folder of packages, whose first line says where Python is.
+    """
+    lines = sorted(f"{name} {digest}" for name, digest in _counted(record))
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
+
+
+def _counted(record: str) -> Iterator[tuple[str, str]]:
+    for name, digest, *_ in filter(None, csv.reader(record.splitlines())):
+        folder, _, file = name.replace("\\", "/").rpartition("/")
+        from_installer = folder.endswith(".dist-info") and file in OF_THE_INSTALLER
+        outside = name.startswith((".", "/")) or ".data/" in name
+        if digest and not from_installer and not outside:
+            yield f"{folder}/{file}", digest
+
+
+def is_working_copy(of: Distribution) -> bool:
+    """Return whether a package is imported from where it is worked on."""
+    return bool(source(of).get("dir_info", {}).get("editable"))
+
+
+def source(of: Distribution) -> dict[str, Any]:
+    """Return where a package was installed from, if not from an index; else nothing."""
+    found: dict[str, Any] = json.loads(of.read_text("direct_url.json") or "{}")
+    return found
+
+
+def changes(before: Environment, now: Environment) -> list[str]:
+    """Return one line for everything that is installed in another way; nothing when nothing is.
+
+    On another system packages have other files under the same version: only versions are compared.
+    """
+    lines = [
+        f"{word} was {before[key]}, is {now[key]}"
+        for key, word in (("system", "the system"), ("python", "Python"))
+        if before[key] != now[key]
+    ]
+    alike = before["system"] == now["system"]
+    for name in sorted({*before["packages"], *now["packages"]}):
+        old, new = before["packages"].get(name), now["packages"].get(name)
+        if new is None:
+            lines.append(f"{name} {old['version']} is not installed")
+        elif old is None:
+            lines.append(f"{name} {new['version']} is new")
+        elif old["version"] != new["version"]:
+            lines.append(f"{name} was {old['version']}, is {new['version']}")
+        elif alike and _other_files(old["sha256"], new["sha256"]):
+            lines.append(f"{name} {new['version']} has other files than the {name} of then")
+    return lines
+
+
+def _other_files(before: str | None, now: str | None) -> bool:
+    return before is not None and now is not None and before != now

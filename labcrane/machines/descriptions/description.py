@@ -1,0 +1,117 @@
+"""Description of a machine in a protocol: a URDF or MJCF file, and which joints are driven."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field, PositiveFloat, ValidationError, model_validator
+
+from labcrane.errors import ProtocolError
+from labcrane.files.model import StrictModel
+from labcrane.files.system import is_file
+from labcrane.machines.machine import FEWEST_JOINTS, Machine
+
+NAME = r"^[a-z][a-z0-9_]*$"
+
+
+class MachineDescription(StrictModel):
+    """A machine of another program's file: ``{urdf: arm.urdf, joints: [...], tip: hook}``."""
+
+    urdf: str | None = None
+    """A URDF file; a path counts from the protocol's folder."""
+
+    mjcf: str | None = None
+    """An MJCF file, which is read by MuJoCo."""
+
+    joints: tuple[str, ...] | dict[str, str] = Field(min_length=FEWEST_JOINTS)
+    """Joints that are driven, from the base outward, by their names in the file; as a mapping, the
+    study's names for them come first: ``{slew: joint_1}``."""
+
+    tip: str
+    """Link (URDF), site or body (MJCF) whose origin is the tip."""
+
+    title: str = ""
+    """What the machine is called; the file's name for it by default."""
+
+    rest_deg: dict[str, float] = Field(default_factory=dict)
+    """Joint angles at which a session begins, in degrees, by the study's names; 0 by default."""
+
+    speeds_deg_s: dict[str, PositiveFloat] = Field(default_factory=dict)
+    """Largest joint speeds, in degrees per second, instead of the file's; MJCF has none."""
+
+    efforts: dict[str, PositiveFloat] = Field(default_factory=dict)
+    """Largest joint torques, in newton metres, instead of the file's."""
+
+    thickness: PositiveFloat = 0.1
+    """Height and width of the beams that stand for links, in metres."""
+
+    meshes: bool = True
+    """Whether links look like the first mesh that a URDF file gives them: STL, OBJ or glTF."""
+
+    @model_validator(mode="after")
+    def _is_one_file_and_known_joints(self) -> "MachineDescription":
+        if (self.urdf is None) == (self.mjcf is None):
+            raise ValueError("a machine is described by one file; write urdf or mjcf")
+        for key in ("rest_deg", "speeds_deg_s", "efforts"):
+            if unknown := set(getattr(self, key)) - set(self.names):
+                raise ValueError(
+                    f"{key} names {', '.join(sorted(unknown))}; joints are {', '.join(self.names)}"
+                )
+        return self
+
+    @property
+    def names(self) -> dict[str, str]:
+        """The file's names of joints by the study's."""
+        if isinstance(self.joints, dict):
+            return self.joints
+        return {name: name for name in self.joints}
+
+    @property
+    def file(self) -> str:
+        """The file that describes it."""
+        return self.urdf or self.mjcf or ""
+
+    def read(self, folder: Path) -> tuple[Machine, str]:
+        """Return the machine, and what its own YAML would be.
+
+        Raises
+        ------
+        ProtocolError
+            The file is not there, or is of another kind of machine.
+        """
+        # A study with a machine of labcrane's own is checked without NumPy.
+        from labcrane.machines.descriptions.chain import ChainError, machine_fields  # noqa: PLC0415
+
+        path = folder / self.file
+        if not is_file(path):
+            raise ProtocolError(
+                f"machine file {str(path)!r} does not exist; a path counts from the protocol's "
+                "folder"
+            )
+        try:
+            found = self._file(path, folder)
+            speeds = {name: math.radians(each) for name, each in self.speeds_deg_s.items()}
+            axes = found.axes(self.names, self.tip, speeds, self.efforts)
+            fields = machine_fields(axes, found.tip(self.tip), self.rest_deg, self.thickness)
+        except ChainError as error:
+            raise ProtocolError(f"{path}: {error}") from error
+        fields = {"title": self.title or found.title, "source": f"{path.name}", **fields}
+        try:
+            machine = Machine.model_validate(fields, context={"folder": folder})
+            return machine, json.dumps(fields, indent=1) + "\n"
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(map(str, first["loc"]))
+            raise ProtocolError(
+                f"{path} as a machine: {where}: {first['msg'].removeprefix('Value error, ')}"
+            ) from error
+
+    def _file(self, path: Path, folder: Path) -> Any:
+        if self.urdf is not None:
+            from labcrane.machines.descriptions.urdf_file import UrdfFile  # noqa: PLC0415
+
+            return UrdfFile(path, folder, meshes=self.meshes)
+        from labcrane.machines.descriptions.mjcf_file import MjcfFile  # noqa: PLC0415
+
+        return MjcfFile(path)

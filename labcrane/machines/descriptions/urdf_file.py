@@ -1,0 +1,274 @@
+"""URDF file as it is read: links with their masses, joints with their axes.
+
+Of the format of the Robot Operating System, what says how a machine moves: revolute, continuous and
+fixed joints, origins, axes, limits and inertias. A joint that a study does not name stays at zero.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from labcrane.errors import nearest
+from labcrane.files.system import is_file
+from labcrane.machines.descriptions.chain import Axis, ChainError, Look, Mass, together
+from labcrane.types import FloatArray
+
+TURNING = ("revolute", "continuous")
+WHOLE_TURN = (-math.pi, math.pi)
+
+
+class UrdfFile:
+    """What a URDF file says.
+
+    Parameters
+    ----------
+    folder
+        Of the study: meshes are named from there.
+    meshes
+        Whether links look like their meshes.
+
+    Raises
+    ------
+    ChainError
+        It is no URDF, or its links form no tree.
+    """
+
+    def __init__(self, path: Path, folder: Path, *, meshes: bool = True) -> None:
+        self._path, self._folder, self._meshes = path.resolve(), folder.resolve(), meshes
+        try:
+            root = ElementTree.parse(path).getroot()  # noqa: S314 - expat refuses entity bombs
+        except (ElementTree.ParseError, OSError, ValueError) as error:
+            raise ChainError(f"it cannot be read: {error}") from error
+        if root.tag != "robot":
+            raise ChainError(f"it is no URDF: its root is <{root.tag}>, and must be <robot>")
+        self.title = root.get("name", path.stem)
+        self._links = {_name(each): each for each in root.findall("link")}
+        self._joints = {_name(each): each for each in root.findall("joint")}
+        self._above: dict[str, str] = {}
+        for name, joint in self._joints.items():
+            child, parent = _link(joint, "child"), _link(joint, "parent")
+            for link in (child, parent):
+                if link not in self._links:
+                    raise ChainError(f"joint {name!r} names a link {link!r} that is not there")
+            if child in self._above:
+                raise ChainError(f"link {child!r} hangs on two joints; a tree is needed")
+            self._above[child] = name
+        self._poses = {name: self._pose(name, set()) for name in self._links}
+
+    @property
+    def joint_names(self) -> list[str]:
+        """The joints that turn."""
+        return [name for name, each in self._joints.items() if each.get("type") in TURNING]
+
+    def tip(self, link: str) -> FloatArray:
+        """Return where the origin of a link is at zero, in m, shape ``(3,)``."""
+        if link not in self._links:
+            raise ChainError(f"there is no link {link!r}; {nearest(link, self._links, 'it has')}")
+        return self._poses[link][:3, 3]
+
+    def axes(
+        self,
+        names: Mapping[str, str],
+        tip: str,
+        speeds: Mapping[str, float],
+        efforts: Mapping[str, float],
+    ) -> Sequence[Axis]:
+        """Return joints by the study's names, which are the keys of ``names``, outward to the tip.
+
+        ``speeds`` in rad/s and ``efforts`` in N m stand for limits that the file lacks.
+        """
+        for name in names.values():
+            if name not in self._joints:
+                there = nearest(name, self.joint_names, "it has")
+                raise ChainError(f"there is no joint {name!r}; {there}")
+        self.tip(tip)  # refused first, if it is not there
+        way = self._way(tip)
+        in_order = [name for name in way if name in names.values()]
+        if in_order != list(names.values()):
+            raise ChainError(
+                f"the joints on the way to {tip!r} are {', '.join(way)}; name them in this order"
+            )
+        moved = self._moved(in_order)
+        return [
+            self._axis(called, name, moved[name], speeds, efforts) for called, name in names.items()
+        ]
+
+    def _axis(
+        self,
+        called: str,
+        name: str,
+        links: Sequence[str],
+        speeds: Mapping[str, float],
+        efforts: Mapping[str, float],
+    ) -> Axis:
+        joint = self._joints[name]
+        if (kind := joint.get("type")) not in TURNING:
+            raise ChainError(f"joint {name!r} is {kind}, and must be revolute")
+        limit = joint.find("limit")
+        given: Mapping[str, str] = {} if limit is None else limit.attrib
+        limits = (
+            WHOLE_TURN
+            if kind == "continuous"
+            else (_number(given, "lower", name), _number(given, "upper", name))
+        )
+        pose = self._poses[_link(joint, "child")]
+        direction = pose[:3, :3] @ _vector(joint.find("axis"), "xyz", (1.0, 0.0, 0.0))
+        carries = together([self._mass(each) for each in links])
+        if carries.mass <= 0.0:
+            raise ChainError(f"nothing that moves with joint {name!r} has a mass")
+        return Axis(
+            name,
+            called,
+            pose[:3, 3],
+            direction / np.linalg.norm(direction),
+            limits,
+            speeds[called] if called in speeds else _positive(given, "velocity", name),
+            efforts[called] if called in efforts else _positive(given, "effort", name),
+            carries,
+            self._look(_link(joint, "child")) if self._meshes else None,
+        )
+
+    def _look(self, link: str) -> Look | None:
+        """Return the first mesh of a link; None of one that is drawn of simple shapes."""
+        for visual in self._links[link].findall("visual"):
+            mesh = visual.find("geometry/mesh")
+            if mesh is None:
+                continue
+            scale = _vector(mesh, "scale", (1.0, 1.0, 1.0))
+            if not np.allclose(scale, scale[0]) or scale[0] <= 0.0:
+                raise ChainError(
+                    f"the mesh of {link!r} is scaled by {mesh.get('scale')}, which must be the "
+                    "same along x, y and z; or write meshes: false"
+                )
+            file = self._found(mesh.get("filename", ""), link)
+            return Look(file, float(scale[0]), self._poses[link] @ _origin(visual))
+        return None
+
+    def _found(self, written: str, link: str) -> str:
+        """Return a mesh's path from the folder of the study: also of ``package://name/...``."""
+        inside = written.removeprefix("file://")
+        if inside.startswith("package://"):
+            inside = inside.removeprefix("package://").partition("/")[2]
+        for above in (self._path.parent, *self._path.parent.parents):
+            if not above.is_relative_to(self._folder):
+                break
+            if is_file(above / inside):
+                return (above / inside).relative_to(self._folder).as_posix()
+        raise ChainError(
+            f"the mesh {written!r} of {link!r} is not beside the file, nor in a folder above it; "
+            "put it into the study's folder, or write meshes: false"
+        )
+
+    def _moved(self, names: Sequence[str]) -> dict[str, list[str]]:
+        """Return the links that move with each of the joints and with none behind it."""
+        moved: dict[str, list[str]] = {name: [] for name in names}
+        for link in self._links:
+            for joint in reversed(self._way(link)):
+                if joint in moved:
+                    moved[joint].append(link)
+                    break
+        return moved
+
+    def _way(self, link: str) -> list[str]:
+        """Return the joints from the base to a link."""
+        way: list[str] = []
+        while link in self._above:
+            joint = self._above[link]
+            way.append(joint)
+            link = _link(self._joints[joint], "parent")
+        return way[::-1]
+
+    def _pose(self, link: str, seen: set[str]) -> FloatArray:
+        if link in seen:
+            raise ChainError(f"link {link!r} hangs on itself; a tree is needed")
+        if link not in self._above:
+            return np.eye(4)
+        joint = self._joints[self._above[link]]
+        return self._pose(_link(joint, "parent"), {*seen, link}) @ _origin(joint)
+
+    def _mass(self, link: str) -> Mass:
+        inertial = self._links[link].find("inertial")
+        if inertial is None:
+            return Mass(0.0, self._poses[link][:3, 3], np.zeros((3, 3)))
+        pose = self._poses[link] @ _origin(inertial)
+        mass, inertia = inertial.find("mass"), inertial.find("inertia")
+        moments = {} if inertia is None else inertia.attrib
+        ixx, iyy, izz, ixy, ixz, iyz = (
+            _number(moments, key, link, 0.0) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+        )
+        own = np.array([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]])
+        turned = pose[:3, :3] @ own @ pose[:3, :3].T
+        attributes: Mapping[str, str] = {} if mass is None else mass.attrib
+        return Mass(_number(attributes, "value", link, 0.0), pose[:3, 3], turned)
+
+
+def _name(element: ElementTree.Element) -> str:
+    if name := element.get("name"):
+        return name
+    raise ChainError(f"a <{element.tag}> has no name")
+
+
+def _link(joint: ElementTree.Element, which: str) -> str:
+    found = joint.find(which)
+    if found is None or not found.get("link"):
+        raise ChainError(f"joint {_name(joint)!r} has no {which}")
+    return str(found.get("link"))
+
+
+def _origin(element: ElementTree.Element) -> FloatArray:
+    """Return the pose of an element in its parent, shape ``(4, 4)``: fixed axes, x, y, then z."""
+    origin = element.find("origin")
+    roll, pitch, yaw = _vector(origin, "rpy", (0.0, 0.0, 0.0))
+    pose = np.eye(4)
+    pose[:3, :3] = _turn(2, yaw) @ _turn(1, pitch) @ _turn(0, roll)
+    pose[:3, 3] = _vector(origin, "xyz", (0.0, 0.0, 0.0))
+    return pose
+
+
+def _turn(axis: int, angle: float) -> FloatArray:
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    turn = np.eye(3)
+    turn[first, first] = turn[second, second] = math.cos(angle)
+    turn[second, first], turn[first, second] = math.sin(angle), -math.sin(angle)
+    return turn
+
+
+def _vector(
+    element: ElementTree.Element | None, key: str, otherwise: tuple[float, float, float]
+) -> FloatArray:
+    written = None if element is None else element.get(key)
+    if written is None:
+        return np.array(otherwise)
+    try:
+        vector = np.array([float(part) for part in written.split()])
+    except ValueError:
+        vector = np.array([])
+    if vector.shape != (3,) or not np.all(np.isfinite(vector)):
+        raise ChainError(f"{key}={written[:40]!r} must be three numbers")
+    return vector
+
+
+def _number(given: Mapping[str, Any], key: str, of: str, otherwise: float | None = None) -> float:
+    if key not in given:
+        if otherwise is None:
+            raise ChainError(f"{of!r} has no {key}")
+        return otherwise
+    try:
+        number = float(given[key])
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise ChainError(f"{of!r}: {key}={str(given[key])[:40]!r} is no number")
+    return number
+
+
+def _positive(given: Mapping[str, Any], key: str, of: str) -> float:
+    number = _number(given, key, of, 0.0)
+    if number <= 0.0:
+        what = "speeds_deg_s" if key == "velocity" else "efforts"
+        raise ChainError(f"joint {of!r} has no {key}; give it in the protocol, under {what}")
+    return number
