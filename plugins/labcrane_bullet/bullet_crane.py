@@ -69,6 +69,9 @@ class BulletCrane(Crane):
         return {**super().metadata(), "engine": f"pybullet {version('pybullet')}"}
 
     def twin(self) -> Twin | None:
+        slew, *_ = joints = self._machine.joints
+        if slew.a or any(joint.inertia_kgm2 or joint.centre_m for joint in joints):
+            return None  # its equations are those of beams on the slew axis
         from labcrane_bullet.compiled import step_engine  # noqa: PLC0415 - loads numba
 
         return self.twin_of(step_engine, _links(self._machine), DEVIATION)

@@ -45,7 +45,8 @@ def put_tip(own: FloatArray, angles: FloatArray, speeds: FloatArray, tip: FloatA
     """Fill the tip's position and velocity."""
     n = len(angles)
     length, offset = TABLES + 3 * n, TABLES + 4 * n
-    pitch = turning = radius = outward = upward = 0.0
+    pitch = turning = outward = upward = 0.0
+    radius = own[length]  # the first pitch axis may be before the slew axis
     height = own[HEIGHT]
     for j in range(1, n):
         pitch += angles[j] + own[offset + j]

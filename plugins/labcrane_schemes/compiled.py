@@ -150,7 +150,7 @@ def _solve(
         radius += own[length + k + 1] * math.cos(pitches[k])
         drop += own[length + k + 1] * math.sin(pitches[k])
         column_r[k], column_z[k] = -drop, -radius
-    reach = -column_z[0]
+    reach = own[length] - column_z[0]  # the first pitch axis may be before the slew axis
     reach2 = reach * reach
     slew = tangential * reach / (reach2 + _damp(own, at, reach2))
     if own[at + HOLDS] != 0.0:

@@ -8,8 +8,11 @@ import h5py
 import numpy as np
 import pytest
 
+from labcrane.machines.library import find_machine
 from labcrane.simulation import fast_forward
 from labcrane.simulation.simulation import WAY, SimulationJob, simulate
+
+AHEAD = "ahead.yaml"
 
 HEAD = """\
 labcrane: 1
@@ -68,7 +71,7 @@ def drawn_study(seed: int, scheme: str, rule: str) -> str:
     return "\n".join(
         [
             HEAD + f"rate_hz: {draw.choice([60, 100, 240])}",
-            f"machine: {draw.choice(['ch8', 'ch8_cranelike'])}",
+            f"machine: {draw.choice(['ch8', 'ch8_cranelike', AHEAD])}",
             f"scheme: {{{law}}}",
             operator,
             f"dynamics: {{use: kinematic_crane, actuator: {actuator}}}",
@@ -77,6 +80,15 @@ def drawn_study(seed: int, scheme: str, rule: str) -> str:
             "",
         ]
     )
+
+
+def written(folder: Path, text: str) -> Path:
+    """Write a study, and beside it a machine whose boom stands before its slew axis."""
+    ch8 = find_machine("ch8").read_text(encoding="utf-8")
+    assert "name: slew, d:" in ch8
+    (folder / AHEAD).write_text(ch8.replace("name: slew, d:", "name: slew, a: 0.3, d:"))
+    (folder / "protocol.yaml").write_text(text)
+    return folder / "protocol.yaml"
 
 
 def held(path: Path) -> dict[str, tuple[str, bytes]]:
@@ -115,8 +127,8 @@ def test_twins_make_the_bits_of_the_loop_in_journals_and_participant_files(
     tmp_path: Path, scheme: str, rule: str
 ):
     pytest.importorskip("numba")
-    protocol = tmp_path / "protocol.yaml"
-    protocol.write_text(drawn_study(SCHEMES.index(scheme) * 3 + RULES.index(rule), scheme, rule))
+    seed = SCHEMES.index(scheme) * 3 + RULES.index(rule)
+    protocol = written(tmp_path, drawn_study(seed, scheme, rule))
     fast, way = simulated(protocol, tmp_path / "fast")
     slow, other = simulated(protocol, tmp_path / "slow", "asked for")
     assert way["compiled"] is True
@@ -138,7 +150,7 @@ def test_a_study_with_one_component_without_a_twin_is_simulated_by_the_loop_and_
 
     monkeypatch.setattr(JointVelocity, "twin", lambda scheme: None)
     protocol = tmp_path / "protocol.yaml"
-    protocol.write_text(drawn_study(1, "joint_velocity", "rest_inside"))
+    written(tmp_path, drawn_study(1, "joint_velocity", "rest_inside"))
     _, way = simulated(protocol, tmp_path / "data")
     assert way["compiled"] is False
     assert way["why"] == "scheme has no compiled twin"
@@ -149,9 +161,8 @@ def test_without_numba_the_loop_simulates_and_says_what_to_install(
 ):
     monkeypatch.setattr(fast_forward, "find_spec", lambda name: None)
     protocol = tmp_path / "protocol.yaml"
-    protocol.write_text(
-        drawn_study(1, "joint_velocity", "rest_inside").replace("limit_s: 12", "limit_s: 4")
-    )
+    text = drawn_study(1, "joint_velocity", "rest_inside")
+    written(tmp_path, text.replace("limit_s: 12", "limit_s: 4"))
     _, way = simulated(protocol, tmp_path / "data")
     assert way["compiled"] is False
     assert way["why"] == "numba is not installed; labcrane[fast] brings it"
