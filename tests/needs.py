@@ -39,8 +39,6 @@ PACKAGES = {
     "sha256sum": "coreutils",
     "ufw": "ufw",
     "unshare": "util-linux",
-    "node": "nodejs",
-    "npm": "npm",
 }
 """Programs, and the Debian packages that they are in."""
 
@@ -122,6 +120,10 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
     "bids-validator-deno": (
         lambda: shutil.which("bids-validator-deno", path=Path(sys.executable).parent) is not None,
         "pip install bids-validator-deno",
+    ),
+    "yaml-language-server": (
+        lambda: shutil.which("yaml-language-server") is not None,
+        "npm install --global yaml-language-server@1.25.0",  # as .ci/run has it
     ),
     "lerobot": (
         lambda: _learner_has("lerobot"),

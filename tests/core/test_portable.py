@@ -57,6 +57,7 @@ TWINS = {
     ),  # elsewhere there is no clock that nothing turns, and none is logged
     "labcrane/web/service.py": ("os.nice",),  # where there is none the page has the same priority
     "plugins/labcrane_joystick/kernel.py": ("fcntl", "os.O_NONBLOCK"),  # "not read" elsewhere
+    "plugins/labcrane_ttl/parallel_port.py": ("fcntl",),  # serial_ttl and box_ttl
     "plugins/labcrane_sonification/real_time.py": (
         "os.SCHED_FIFO", "os.SCHED_OTHER", "os.SCHED_RESET_ON_FORK", "os.SCHED_RR",
         "os.sched_getscheduler", "os.sched_param", "os.sched_setscheduler",

@@ -15,12 +15,13 @@ from labcrane.core.records import Event, Frame
 from labcrane.errors import StreamError
 from labcrane.machines.library import load_machine
 from labcrane.recording.journal import event_text
+from labcrane.recording.labels import KNOWN
 from labcrane.streams.markers import CODES, OTHER
 from labcrane.streams.outlets import Outlets, check_clock
 from labcrane.testing import make_frame, make_run
 
 SOURCE = "study/P001/ses-01"
-STREAMS = ("state", "input", "markers", "codes")
+STREAMS = ("state", "input", "markers", "labels", "codes")
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ def received(run):
     """What was sent, and what another process received."""
     outlets = Outlets(run, SOURCE)
     ids = [f"labcrane/{SOURCE}/labcrane.{name}" for name in STREAMS]
-    counts = dict(zip(ids, (200, 200, 2, 2), strict=True))
+    counts = dict(zip(ids, (200, 200, 2, 2, 2), strict=True))
     arguments = [str(part) for pair in counts.items() for part in pair]
     command = [sys.executable, str(Path(__file__).with_name("consumer.py")), *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, encoding="utf-8") as consumer:
@@ -84,6 +85,9 @@ def test_markers_carry_the_event_and_the_time_it_happened(received):
     assert [text for (text,) in heard["markers"]["samples"]] == told  # as in the journal
     assert heard["markers"]["stamps"] == [frames[50].tick.due, frames[150].tick.due + 0.001]
     assert heard["codes"]["stamps"] == heard["markers"]["stamps"]
+    assert heard["labels"]["stamps"] == heard["markers"]["stamps"]
+    names = [label for (label,) in heard["labels"]["samples"]]
+    assert names == ["trial_start/pair=Aé", "crane_wobble/pair=Aé"]
 
 
 def test_codes_are_explained_in_their_streams_header(received):
@@ -95,6 +99,13 @@ def test_codes_are_explained_in_their_streams_header(received):
     }
     assert table == {**CODES, "any other event": OTHER}
     assert len(set(table.values())) == len(table)
+
+
+def test_labels_are_explained_in_their_streams_header(received):
+    _, heard = received
+    table = ET.fromstring(heard["labels"]["xml"]).findall("desc/labels/label")
+    told = {entry.findtext("name"): entry.findtext("hed") for entry in table}
+    assert told == {name: meaning.hed for name, meaning in KNOWN.items()}
 
 
 def test_channels_say_what_they_are(received, run):

@@ -1,0 +1,62 @@
+"""Labels of events: few, the same in every session, and with what the trial is about."""
+
+import random
+
+import pytest
+
+from labcrane.recording.labels import KNOWN, LONGEST, labelled, plain
+from labcrane.streams.markers import CODES
+
+BLOCK = {"block": 2, "block_name": "learning", "task": "aiming", "practice": False}
+TRIAL = {
+    "trial": 3, "attempt": 1, **BLOCK, "counted": True, "group": "a", "reference": True,
+    "pair": "2m far/right", "distance": 2.0, "movement": 1, "loaded": True,
+    "scene": "x" * (LONGEST + 1), "feedback": "ball+tone",
+}  # fmt: skip
+LEVELS = "block=learning/pair=2m_far_right/loaded=true/feedback=ball+tone"
+
+
+def test_a_trial_s_events_have_its_block_and_condition_and_others_have_none() -> None:
+    told = [
+        ("session.start", {"title": "a study"}), ("pause.start", {"why": "tired"}),
+        ("block.start", BLOCK), ("order.note", {"text": "a note"}), ("trial.start", TRIAL),
+        ("target.entered", {"trial": 3}),
+        ("trial.end", {**TRIAL, "outcome": "success", "mood": "good", "error": 0.1}),
+        ("pause.start", {}), ("block.end", BLOCK), ("session.end", {}),
+    ]  # fmt: skip
+    assert labelled(told) == [
+        "session_start", "pause_start", "block_start/block=learning", "order_note/block=learning",
+        f"trial_start/{LEVELS}", f"target_entered/{LEVELS}", f"trial_end/{LEVELS}/outcome=success",
+        "pause_start/block=learning", "block_end/block=learning", "session_end",
+    ]  # fmt: skip
+
+
+def test_a_trial_whose_process_died_is_ended_under_its_own_levels() -> None:
+    told = [
+        ("trial.start", TRIAL), ("session.start", {}),
+        ("trial.end", {**TRIAL, "outcome": "interrupted"}), ("pause.start", {}),
+        ("block.start", {**BLOCK, "practice": True}),
+    ]  # fmt: skip
+    assert labelled(told)[1:] == [
+        "session_start", f"trial_end/{LEVELS}/outcome=interrupted", "pause_start",
+        "block_start/block=learning/practice",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_whatever_a_condition_says_a_label_has_its_parts_and_no_others(seed: int) -> None:
+    draws = random.Random(seed)
+    signs = "aZ9é /=\\,;\"'\n{}|+-._"
+    condition = {
+        "".join(draws.choices(signs, k=6)): "".join(draws.choices(signs, k=draws.randint(0, 12)))
+        for _ in range(draws.randint(0, 5))
+    }
+    (label,) = labelled([("trial.start", {**BLOCK, **condition})])
+    name, block, *levels = label.split("/")
+    assert (name, block) == ("trial_start", "block=learning")
+    assert levels == [f"{plain(key)}={plain(value)}" for key, value in condition.items()]
+    assert all(level.count("=") == 1 for level in levels)
+
+
+def test_every_label_that_is_explained_is_of_an_event_that_there_is() -> None:
+    assert set(KNOWN) <= {name.replace(".", "_") for name in CODES}
