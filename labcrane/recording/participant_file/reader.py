@@ -121,8 +121,8 @@ class Stream:
                     dataset.asstr("utf-8")[cut] if holds_texts(dataset) else dataset[cut]
                 )
         raise RecordingError(
-            f"stream {self.name!r} of {self._path} has no column {name!r}; it has time, "
-            + ", ".join(self._paths)
+            f"stream {self.name!r} of {self._path} has no column {name!r}; it has "
+            + ", ".join((*self._paths, "time"))
         )
 
     def batches(
