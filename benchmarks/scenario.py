@@ -39,10 +39,10 @@ RETRIEVAL = Path(__file__).parents[1] / "protocols" / "retrieval"
 RATE_HZ = 240
 ROUNDS, WARM_UP = 2, 200
 TICKS = {"kinematic": 4800, "casualty": 7200, "carry": 4800}
-PICTURES = 40
+PICTURES = 10
 SIZE = (960, 540)
 
-LIMITS = {"casualty": 60.0, "carry": 20.0}
+LIMITS = {"casualty": 50.0, "carry": 20.0}
 """How much longer than a tick of the kinematic study one of a scenario may take, in the median."""
 
 HELD = 0.8

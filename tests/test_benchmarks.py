@@ -10,6 +10,7 @@ import time
 import types
 from pathlib import Path
 
+import numpy as np
 import pytest
 from needs import needs
 
@@ -295,3 +296,19 @@ def test_what_has_become_slower_since_a_commit_is_named(
     said = capsys.readouterr().out
     assert "step: a: only before, not compared" in said
     assert "step: c: only now, not compared" in said
+
+
+def test_a_scenario_whose_ticks_are_slower_than_promised_or_too_long_is_missed() -> None:
+    scenario = importlib.import_module("benchmarks.scenario")
+    tick = 1.0 / scenario.RATE_HZ
+
+    missed = importlib.import_module("benchmarks.table").missed
+
+    def told(casualty: float) -> list[str]:
+        taken = {"kinematic": 4e-5, "casualty": casualty, "carry": 6e-4}
+        return missed(scenario.tick_rows({name: [np.full(9, one)] for name, one in taken.items()}))
+
+    assert not told(49.0 * 4e-5)
+    (slow,) = told(51.0 * 4e-5)
+    assert "casualty, median" in slow
+    assert len(told(0.81 * tick)) == 2

@@ -287,14 +287,15 @@ def faults(study: str, text: str, seed: int = 0) -> Iterator[Wrong]:
             cut = text[: entry.left] + text[entry.right :]
             line = line_at.get(holder, 1)
             yield Wrong(study, REMOVED, entry.place, cut.encode(), line, must=False)
+        around = set()  # what only the whole of something knows is told there
+        for depth in range(1, len(entry.place)):
+            whole = at_place[entry.place[:depth]]
+            around |= {_column(text, whole.begin), _column(text, whole.start)}
         for what, must in _instead(entry, rng):
             new = f"{text[: entry.start]} {what}{text[entry.end :]}"
             begins = _column(new, entry.start + 1)
             inside = {begins + 1} if what[0] in "[{" else set()
-            columns = frozenset({_column(text, entry.begin), begins, *inside})
-            for depth in range(1, len(entry.place)):  # what only the whole of something knows
-                part = at_place[entry.place[:depth]]
-                columns |= {_column(text, part.begin), _column(text, part.start)}
+            columns = frozenset({_column(text, entry.begin), begins, *inside, *around})
             yield Wrong(
                 study, f"written as {what}", entry.place, new.encode(), entry.line, must, columns
             )

@@ -2,11 +2,12 @@
 
 A gaze stream is a stream of LSL type ``Gaze`` with a channel labelled ``aoi``: for each sample the
 name of the area of interest that is looked at, or its number from 1; an empty text or 0 for none,
-NaN for a blink. Whoever shows the scene knows its areas, so areas are named by the source and not
-computed here.
+NaN for a blink. A source that knows only where on the screen it is looked at is joined to the areas
+that a view recorded with its pictures: :func:`looks_on_screen`.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -62,6 +63,128 @@ def looks(session: SessionRecord) -> Looks | None:
         if stream.attrs.get("type") == KIND and CHANNEL in stream.data:
             return Looks(stream.time, [_name(value) for value in stream.data[CHANNEL]])
     return None
+
+
+def looks_on_screen(
+    time: FloatArray,
+    gaze: FloatArray,
+    shown: FloatArray,
+    areas: Mapping[str, FloatArray],
+    delay_s: float,
+) -> Looks:
+    """Return which area was looked at in the picture that was on the glass at that moment.
+
+    A picture handed to the screen at ``shown`` is seen from ``shown + delay_s`` on, until the next
+    one is; its areas are where the objects were in it, however far they have moved since.
+
+    Parameters
+    ----------
+    time
+        Of the gaze samples, on our clock, in seconds, shape ``(n,)``.
+    gaze
+        Where in the window it is looked at, in pixels, x and y from the upper left corner, shape
+        ``(n, 2)``; NaN for a blink.
+    shown
+        ``flip.time`` of the view's pictures, in seconds, rising, shape ``(m,)``.
+    areas
+        Left, top, right and bottom of each area in each picture, in pixels, shape ``(m, 4)``; NaN
+        while it is not in the picture. Where areas overlap, the smallest is looked at.
+    delay_s
+        From ``flip.time`` to light, in seconds, as ``labcrane doctor --display`` measures it.
+
+    Raises
+    ------
+    ValueError
+        The delay is not known, or shapes do not fit.
+    """
+    if not math.isfinite(delay_s):
+        raise ValueError(
+            "the display's delay is not known, so nobody knows which picture was looked at; "
+            "measure it with labcrane doctor --display"
+        )
+    if gaze.shape != (len(time), 2):
+        raise ValueError(f"gaze is {gaze.shape}, and {len(time)} times need ({len(time)}, 2)")
+    names = list(areas)
+    for name in names:
+        if areas[name].shape != (len(shown), 4):
+            raise ValueError(
+                f"area {name!r} is {areas[name].shape}, and {len(shown)} pictures need "
+                f"({len(shown)}, 4)"
+            )
+    if not names or not len(shown):
+        return Looks(time, [""] * len(time))
+    picture = np.searchsorted(shown + delay_s, time, side="right") - 1
+    boxes = np.stack([areas[name] for name in names], axis=1)[np.maximum(picture, 0)]
+    left, top, right, bottom = np.moveaxis(boxes, -1, 0)
+    x, y = gaze[:, :1], gaze[:, 1:]
+    within = (left <= x) & (x <= right) & (top <= y) & (y <= bottom) & (picture >= 0)[:, None]
+    sizes = np.where(within, (right - left) * (bottom - top), np.inf)
+    smallest = np.argmin(sizes, axis=1)
+    found = np.isfinite(sizes[np.arange(len(time)), smallest])
+    return Looks(time, [names[at] if on else "" for at, on in zip(smallest, found, strict=True)])
+
+
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """How far from a fixation target somebody seemed to look at it.
+
+    Attributes
+    ----------
+    right_deg, down_deg
+        The median offset, in degrees of visual angle.
+    spread_deg
+        Median distance of the samples from that, in degrees: the precision.
+    """
+
+    right_deg: float
+    down_deg: float
+    spread_deg: float
+
+    @property
+    def deg(self) -> float:
+        """The offset's size, in degrees."""
+        return math.hypot(self.right_deg, self.down_deg)
+
+
+def drift(
+    gaze: FloatArray,
+    target: tuple[float, float],
+    centre: tuple[float, float],
+    px_per_m: float,
+    viewing_m: float,
+) -> Drift:
+    """Return how far gaze is from a fixation target, as angles at the eye.
+
+    The eye is in front of the screen's ``centre``. Medians: a blink's edge or a short look away
+    moves them little.
+
+    Parameters
+    ----------
+    gaze
+        Samples while the target was looked at, in pixels, shape ``(n, 2)``; NaN for a blink.
+    target, centre
+        In pixels, from the upper left corner.
+    px_per_m
+        Pixels in a metre of the glass.
+    viewing_m
+        From the eye to the screen, in metres.
+
+    Raises
+    ------
+    ValueError
+        No sample is a number.
+    """
+    there = gaze[np.isfinite(gaze).all(axis=1)]
+    if not len(there):
+        raise ValueError(
+            "no gaze sample was valid while the target was to be looked at; calibrate again"
+        )
+    metres = (np.vstack([there, target]) - centre) / px_per_m
+    angles = np.degrees(np.arctan2(metres, np.hypot(viewing_m, metres[:, ::-1])))
+    away = angles[:-1] - angles[-1]
+    right, down = np.median(away, axis=0).tolist()
+    spread = float(np.median(np.hypot(away[:, 0] - right, away[:, 1] - down)))
+    return Drift(right, down, spread)
 
 
 def _name(value: object) -> str:

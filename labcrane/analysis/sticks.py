@@ -67,7 +67,8 @@ def reversals(axis: FloatArray, hysteresis: float) -> int:
     steps = np.diff(axis)
     moved = np.flatnonzero(steps)
     # Only where the axis turns can anything change; a loop over every sample takes long.
-    turns = moved[:-1][steps[moved[:-1]] * steps[moved[1:]] < 0.0] + 1
+    ways = np.sign(steps[moved])
+    turns = moved[:-1][ways[:-1] != ways[1:]] + 1
     count, direction = 0, 0
     lowest = highest = float(axis[0])
     for value in [*axis[turns].tolist(), float(axis[-1])]:

@@ -60,8 +60,8 @@ class TrialCounts:
         numbers = list(wanted)
         practice = [self.practice[number] for number in numbers if number in self.practice]
         counted = [self.counted[number] for number in numbers if number in self.counted]
-        found = [f"practice trials {spans(practice)}"] * bool(practice)
-        found += [f"trials {spans(counted)} of {self.total}"] * bool(counted)
+        found = [f"practice {_trials(practice)}"] * bool(practice)
+        found += [f"{_trials(counted)} of {self.total}"] * bool(counted)
         return ", ".join(found) or "no trial that is counted"
 
 
@@ -74,7 +74,11 @@ class TableNumbers:
 
     def names(self, wanted: Iterable[int]) -> str:
         """Return what the trials of these numbers in the plan are called."""
-        return f"trials {spans(list(wanted))}"
+        return _trials(list(wanted))
+
+
+def _trials(wanted: Sequence[int]) -> str:
+    return f"trial{'s' if len(wanted) > 1 else ''} {spans(wanted)}"
 
 
 def spans(wanted: Sequence[int]) -> str:

@@ -145,6 +145,7 @@ WANTED = {
     "dict_type": "a mapping of keys: {key: value}",
     "model_type": "a mapping of keys: {key: value}",
     "string_type": "text; put it in quotation marks if it is",
+    "string_too_short": "text that is not empty",
     "bool_type": "true or false",
     "int_type": "a whole number",
     "int_parsing": "a whole number",

@@ -1,10 +1,9 @@
 """Power of a planned test: cohorts drawn from a pool of simulated participants."""
 
 import re
-import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +15,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 ALPHA = 0.05
+ROUNDING = 1e-12
+"""Standard error, as a share of the largest number, that is no spread of people."""
 _EFFECT = re.compile(r"(log\()?([a-z0-9_]+)(\))?~([a-z0-9_]+)(?:\[(.+),(.+)\])?(?:=(.+))?")
 
 
@@ -58,6 +59,73 @@ def read_effect(text: str) -> Effect:
         )
     between = (found[5], found[6]) if found[5] else ()
     return Effect(found[2], bool(found[1]), found[4], between, size)
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """What a planned test is to show.
+
+    Attributes
+    ----------
+    kind
+        ``difference``: p below :data:`ALPHA`. ``equivalence``: both one-sided tests against the
+        margin (Schuirmann 1987). ``non_inferiority``: the one against the margin.
+    margin
+        In the unit of the effect, above 0 for equivalence. For non-inferiority it is how much the
+        effect may be above 0 at most or, below 0, how much below.
+    """
+
+    kind: Literal["difference", "equivalence", "non_inferiority"] = "difference"
+    margin: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.kind == "difference" and self.margin:
+            raise ProtocolError(
+                f"a margin of {self.margin:g} is for equivalence or non-inferiority; name one with "
+                "--claim, or leave out --margin"
+            )
+        if (self.kind == "equivalence" and self.margin <= 0.0) or (
+            self.kind == "non_inferiority" and self.margin == 0.0
+        ):
+            raise ProtocolError(
+                f"{self.kind} is shown against a margin, and {self.margin:g} is none; give "
+                "--margin in the unit of the effect"
+            )
+
+    def shown(self, tested: "Tested") -> npt.NDArray[np.bool_]:
+        """Say of each cohort whether its test shows it, shape ``(cohorts,)``."""
+        from scipy.stats import t
+
+        with np.errstate(invalid="ignore", divide="ignore"):
+            below = t.cdf((tested.estimate - self.margin) / tested.error, tested.freedom) < ALPHA
+            above = t.sf((tested.estimate + abs(self.margin)) / tested.error, tested.freedom)
+            match self.kind:
+                case "difference":
+                    size = np.abs(tested.estimate) / tested.error
+                    return np.asarray(2.0 * t.sf(size, tested.freedom) < ALPHA)
+                case "equivalence":
+                    return np.asarray(below & (above < ALPHA))
+            return np.asarray(below if self.margin > 0.0 else above < ALPHA)
+
+
+DIFFERENCE = Claim()
+
+
+@dataclass(frozen=True, slots=True)
+class Tested:
+    """What a test works out of each cohort, in the unit of the effect; shapes ``(cohorts,)``.
+
+    Attributes
+    ----------
+    estimate, error
+        The effect and its standard error.
+    freedom
+        Degrees of freedom of the t test; Welch's between groups.
+    """
+
+    estimate: FloatArray
+    error: FloatArray
+    freedom: FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +207,12 @@ class Power:
     power, power_low, power_high
         Share of the cohorts with p below :data:`ALPHA`, and its 95 % Wilson interval.
     null, null_low, null_high
-        The same with the labels permuted: how often something is found where nothing is.
+        The same with the labels permuted: how often something is found where nothing is. For
+        equivalence and non-inferiority, with an effect as large as the margin.
+    type_m, type_s
+        Of the cohorts in which something was found: by what the effect is overstated on average,
+        and in which share it has the wrong sign (Gelman and Carlin 2014). NaN where nothing was
+        found, or where there is no effect to overstate.
     """
 
     participants: int
@@ -150,6 +223,8 @@ class Power:
     null: float
     null_low: float
     null_high: float
+    type_m: float
+    type_s: float
 
 
 def power(
@@ -160,6 +235,7 @@ def power(
     seed: int,
     *,
     fresh: bool = False,
+    claim: Claim = DIFFERENCE,
 ) -> Iterator[Power]:
     """Yield the power of the test for each size of the cohort.
 
@@ -170,6 +246,8 @@ def power(
     fresh
         Whether cohorts are made of participants of their own, in the pool's order, rather than
         drawn with replacement.
+    claim
+        What is to be shown.
 
     Raises
     ------
@@ -182,13 +260,27 @@ def power(
         plain = pool.means[drawn]
         labels = None if pool.groups is None else pool.groups[drawn]
         permuted, shuffled = _permuted(plain, labels, random)
-        null = _p(permuted, shuffled, pool) < ALPHA
+        added = pool.steps if shuffled is None else pool.steps[shuffled][..., None]
+        null = claim.shown(_tested(permuted + claim.margin * added, shuffled, pool))
         if effect.size is None:
-            found = _p(plain, labels, pool) < ALPHA
+            tested, true = _tested(plain, labels, pool), _effect_of(pool)
         else:
-            added = pool.steps if shuffled is None else pool.steps[shuffled][..., None]
-            found = _p(permuted + effect.size * added, shuffled, pool) < ALPHA
-        yield Power(size, len(found), *_share(found), *_share(null))
+            tested, true = _tested(permuted + effect.size * added, shuffled, pool), effect.size
+        found = claim.shown(tested)
+        seen = tested.estimate[found]
+        wrong = np.nan, np.nan
+        if claim.kind == "difference" and true != 0.0 and found.any():
+            wrong = float(np.abs(seen).mean() / abs(true)), float((seen * true < 0.0).mean())
+        yield Power(size, len(found), *_share(found), *_share(null), *wrong)
+
+
+def _effect_of(pool: Pool) -> float:
+    """Return the effect in the whole pool, in its unit."""
+    numbers = pool.means @ pool.weights
+    if pool.groups is None:
+        return float(numbers.mean())
+    one, other = (float(numbers[pool.groups == group].mean()) for group in (0, 1))
+    return other - one
 
 
 def _drawn(
@@ -224,23 +316,26 @@ def _permuted(
     return means, random.permuted(labels, axis=1)
 
 
-def _p(means: FloatArray, labels: npt.NDArray[np.intp] | None, pool: Pool) -> FloatArray:
-    """Return the p-value of each cohort, shape ``(cohorts,)``."""
-    from scipy.stats import ttest_1samp, ttest_ind_from_stats
-
+def _tested(means: FloatArray, labels: npt.NDArray[np.intp] | None, pool: Pool) -> Tested:
+    """Return the effect of each cohort: of one sample, or Welch's of two."""
     numbers = means @ pool.weights
     if labels is None:
-        with warnings.catch_warnings():
-            # A small cohort may be the same participant again and again; p is then no number, and
-            # nothing is found.
-            warnings.filterwarnings("ignore", "Precision loss", RuntimeWarning)
-            return np.asarray(ttest_1samp(numbers, 0.0, axis=1).pvalue)
-    known: list[FloatArray] = []
+        count = numbers.shape[1]
+        error = numbers.std(axis=1, ddof=1) / np.sqrt(count)
+        # A small cohort may be the same participant again and again: its error is rounding.
+        error = np.where(error < ROUNDING * np.abs(numbers).max(axis=1), np.nan, error)
+        return Tested(numbers.mean(axis=1), error, np.full(len(numbers), count - 1.0))
+    means_of, squares, freedoms = [], [], []
     for group in (0, 1):
         own = np.where(labels == group, numbers, np.nan)
-        known += [np.nanmean(own, axis=1), np.nanstd(own, axis=1, ddof=1)]
-        known.append(np.isfinite(own).sum(axis=1).astype(float))
-    return np.asarray(ttest_ind_from_stats(*known, equal_var=False).pvalue)
+        count = np.isfinite(own).sum(axis=1)
+        means_of.append(np.nanmean(own, axis=1))
+        squares.append(np.nanvar(own, axis=1, ddof=1) / count)
+        freedoms.append(count - 1.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        both = squares[0] + squares[1]
+        freedom = both**2 / (squares[0] ** 2 / freedoms[0] + squares[1] ** 2 / freedoms[1])
+    return Tested(means_of[1] - means_of[0], np.sqrt(both), freedom)
 
 
 def _share(found: npt.NDArray[np.bool_]) -> tuple[float, float, float]:

@@ -36,6 +36,19 @@ def signal_names(path: Path) -> dict[str, str]:
     return found
 
 
+def every_signal(path: Path) -> tuple[str, ...]:
+    """Return every signal of a DBC file as ``Message.Signal``.
+
+    Raises
+    ------
+    ProtocolError
+        The file cannot be read.
+    """
+    return tuple(
+        f"{message.name}.{signal.name}" for message in _messages(path) for signal in message.signals
+    )
+
+
 def described(settings: ValveMap) -> "dict[int, tuple[Message, dict[str, str]]]":
     """Return, by frame id, the messages with valves in them, and which signal moves which joint."""
     messages = {message.name: message for message in _messages(settings.map)}

@@ -1,6 +1,7 @@
 """Settings of a panel on a CAN bus."""
 
 import re
+from importlib.util import find_spec
 from typing import Annotated
 
 from pydantic import (
@@ -13,7 +14,7 @@ from pydantic import (
 )
 
 from labcrane import Machine, Settings
-from labcrane.core import JointName, Names, StudyPath, was_run
+from labcrane.core import JointName, Names, Once, Reference, StudyPath, was_run
 
 Node = Annotated[int, Field(ge=0, le=253)]
 """Source address on the bus; 254 and 255 are no node."""
@@ -24,10 +25,14 @@ Valve = Annotated[int, Field(ge=1, le=15)]
 """Number of an auxiliary valve; 0 is "power beyond" and moves no joint."""
 
 
+DbcSignal = Annotated[str, Reference("signal of the map", own=True)]
+"""Name of a message of the DBC file, and of a signal of it: ``Levers.Boom``."""
+
+
 class ValveMap(Settings):
     """Which messages are the commands of which joints."""
 
-    valves: dict[JointName, Valve | str]
+    valves: Annotated[dict[JointName, Valve | DbcSignal], Once()]
     """For each joint the number of its auxiliary valve, or with ``map`` the name of message and
     signal: ``Levers.Boom``."""
 
@@ -50,7 +55,16 @@ class ValveMap(Settings):
 
     def provides(self, machine: Machine) -> Names:
         pairs = [f"{what}.{joint}" for what in ("valve", "float") for joint in self.valves]
-        return {"axis": [*pairs, "panel.connected"]}
+        named: Names = {"axis": [*pairs, "panel.connected"]}
+        if self.map is not None and self.map.exists() and find_spec("cantools"):
+            from labcrane_can.dbc import every_signal  # noqa: PLC0415 - loads for a moment
+
+            return {**named, "signal of the map": every_signal(self.map)}
+        return named
+
+    def needs(self, machine: Machine) -> Names:
+        self.provides(machine)  # a file that is no map is told with the protocol
+        return {}
 
     @model_validator(mode="after")
     def _names_need_a_map(self) -> "ValveMap":

@@ -124,6 +124,8 @@ class SupervisorSettings(Settings):
     sent."""
 
 
+DepthCue = Literal["tip_shadow", "plumb_line", "ground_grid"]
+
 HudLine = Literal["block", "trial", "distance", "time", "speed", "load", "lateness"]
 """What a line of text can say."""
 
@@ -140,7 +142,7 @@ class ViewSettings(Settings):
     size: tuple[Pixels, Pixels] = (1280, 720)
     """Width and height, in pixels; a full screen has its own."""
 
-    screen: NonNegativeInt | str | None = None
+    screen: NonNegativeInt | Annotated[str, Field(min_length=1)] | None = None
     """The monitor to fill: its name (``HDMI-1``), or its number, counted from 0; a window by
     default."""
 
@@ -188,6 +190,11 @@ class ViewSettings(Settings):
 
     targets: bool = True
     """Whether targets are drawn."""
+
+    depth_cues: tuple[DepthCue, ...] = ()
+    """What tells how high the tip is and where it is above the ground: a spot below it, a line down
+    to it, lines on the ground a metre apart. Every group sees them: views have the same settings in
+    all of them."""
 
     delay_s: NonNegativeFloat = 0.0
     """How long ago what is shown happened: a teleoperator's delay, in seconds."""

@@ -30,6 +30,10 @@ BOX = ("left", "top", "right", "bottom")
 PREVIEW_S = 0.5
 """Between two pictures of a preview, in seconds."""
 
+SPOT, SPOT_COLOUR = 0.22, (0.02, 0.02, 0.02, 1.0)
+PLUMB, LINE_COLOUR = 0.012, (0.95, 0.95, 0.95, 1.0)
+"""Radii in metres, and colours, of what tells how high the tip is."""
+
 STEM = (0.75, 0.75, 0.72, 1.0)
 
 
@@ -108,6 +112,8 @@ class View(Feedback):
         self.stage = Stage(
             run, shaders=window.shaders, shadow=shadow, scenery=scenery, soft=quality.soft
         )
+        if "ground_grid" in settings.depth_cues:
+            self.stage.grid()
         if quality.samples and window.shaders:
             self.stage.root.set_antialias(core.AntialiasAttrib.M_multisample)
         self._hud = Hud(settings.hud_lines, settings.language, run)
@@ -272,7 +278,7 @@ class View(Feedback):
     def _set(self, frame: Frame) -> tuple[FloatArray, list[Shape]]:
         """Set the stage for a frame; return the machine's frames and the shapes shown."""
         poses = link_frames(self._machine, frame.state[self._angles].tolist())
-        shapes = [*self._task_shapes(frame), *frame.shapes]
+        shapes = [*self._task_shapes(frame), *self._depth_shapes(poses), *frame.shapes]
         self.stage.place(poses, self._situation.scene, frame.state)
         self._areas.update(self._situation.scene)
         self.stage.show(shapes)
@@ -288,6 +294,17 @@ class View(Feedback):
             if z > target.radius:
                 foot, top = (x, y, 0.0), (x, y, z - target.radius)
                 shapes.append(Cylinder(f"{target.name} stem", foot, top, 0.03, STEM))
+        return shapes
+
+    def _depth_shapes(self, poses: FloatArray) -> list[Shape]:
+        """Return what tells how high the tip is."""
+        x, y, z = poses[-1][:3, 3].tolist()
+        shapes: list[Shape] = []
+        if "tip_shadow" in self._settings.depth_cues:
+            low, high = (x, y, 0.004), (x, y, 0.02)
+            shapes.append(Cylinder("tip shadow", low, high, SPOT, SPOT_COLOUR))
+        if "plumb_line" in self._settings.depth_cues and z > PLUMB:
+            shapes.append(Cylinder("plumb line", (x, y, 0.0), (x, y, z), PLUMB, LINE_COLOUR))
         return shapes
 
     def _write(self, frame: Frame) -> float:

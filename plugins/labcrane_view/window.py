@@ -28,6 +28,10 @@ textures-power-2 none
 """
 
 
+BACK_BUFFERS = 1
+"""A picture is drawn where nobody sees it, and shown whole; without one the X server shows what is
+drawn so far."""
+
 SHARP = 64
 """Pixels of a line of text as it is kept: larger text is blurred a little."""
 
@@ -153,9 +157,7 @@ def _output(
     form.set_rgba_bits(8, 8, 8, 0)
     form.depth_bits = 24
     form.multisamples = samples
-    # A picture is drawn where nobody sees it, and shown whole. Without this the X server shows what
-    # is drawn so far.
-    form.back_buffers = 0 if hidden else 1
+    form.back_buffers = 0 if hidden else BACK_BUFFERS
     kind = core.GraphicsPipe.BF_refuse_window if hidden else core.GraphicsPipe.BF_require_window
     output = engine.make_output(
         pipe, title, 0, form, window, kind | core.GraphicsPipe.BF_fb_props_optional

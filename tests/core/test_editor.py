@@ -1,10 +1,8 @@
 """What is found in a protocol, in an editor, on the supervisor's page and on the terminal."""
 
 import json
-import os
 import random
 import shutil
-import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +11,7 @@ from typing import Any
 
 import pytest
 from core.language_client import Editor
-from needs import SKIP_NOTHING, needs
+from needs import needs
 from wrong_protocols import PROTOCOLS, Wrong, everything, faults
 
 from labcrane.cli.app import main
@@ -21,7 +19,6 @@ from labcrane.protocol.study import load
 from labcrane.registry.hookspecs import roles_by_key
 from labcrane.registry.registry import Registry, discover
 
-SERVER = "yaml-language-server@1.25.0"
 MODELINE = "# yaml-language-server: $schema=protocol.schema.json\n"
 AIMING = (PROTOCOLS / "aiming" / "protocol.yaml").read_text(encoding="utf-8")
 
@@ -39,23 +36,10 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "study"
 
 
-@pytest.fixture(scope="module")
-def yaml_server(tmp_path_factory: pytest.TempPathFactory) -> Sequence[str]:
-    """The server that editors use, from npm."""
-    place = tmp_path_factory.mktemp("npm")
-    options = ["--no-audit", "--no-fund", "--ignore-scripts", "--no-update-notifier"]
-    try:
-        subprocess.run(
-            ["npm", "install", "--prefix", str(place), *options, SERVER],
-            check=True, capture_output=True, timeout=240,
-        )  # fmt: skip
-    except (subprocess.CalledProcessError, subprocess.TimeoutExpired) as error:
-        reason = f"needs {SERVER}, which npm cannot install: {error}"
-        if SKIP_NOTHING in os.environ:
-            pytest.fail(reason)
-        pytest.skip(reason)
-    package = place / "node_modules" / "yaml-language-server"
-    return ["node", str(package / "bin" / "yaml-language-server"), "--stdio"]
+@pytest.fixture
+def yaml_server() -> Sequence[str]:
+    """The server that editors use."""
+    return ["yaml-language-server", "--stdio"]
 
 
 def told(path: Path, capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]:
@@ -98,8 +82,7 @@ BY_SCHEMA = {
 
 
 @pytest.mark.long
-@needs("node", "npm")
-@pytest.mark.xdist_group("npm")
+@needs("yaml-language-server")
 def test_the_yaml_language_server_marks_what_a_schema_can_say_in_its_line_and_nothing_else(
     folder: Path, registry: Registry, yaml_server: Sequence[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -134,8 +117,7 @@ def test_the_yaml_language_server_marks_what_a_schema_can_say_in_its_line_and_no
 
 
 @pytest.mark.long
-@needs("node", "npm")
-@pytest.mark.xdist_group("npm")
+@needs("yaml-language-server")
 def test_the_yaml_language_server_shows_units_and_offers_what_is_installed(
     folder: Path, registry: Registry, yaml_server: Sequence[str]
 ) -> None:

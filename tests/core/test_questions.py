@@ -153,7 +153,7 @@ def test_a_protocol_with_units_is_the_one_with_plain_numbers(
 def test_a_wrong_unit_is_told_with_its_line(tmp_path: Path) -> None:
     with pytest.raises(ProtocolError) as told:
         a_study(tmp_path, ("distances: [2]", "distances: [2], width: 50 kg"))
-    assert "study.yaml:12:46: tasks.aiming.width: '50 kg' is a mass, where a length" in str(
+    assert "study.yaml:12:48: tasks.aiming.width: '50 kg' is a mass, where a length" in str(
         told.value
     )
 

@@ -255,7 +255,7 @@ def kill_and_go_on(lab: Lab, data: Path, victims: tuple[str, ...], seed: int) ->
     if killed & {"session", "launcher"} and len(said) > 1:
         unbegun = "left to do: step 1: practice 'aiming', practice trials 1-2;" in said[0]
         # All trials are left where the first was reached, or not: it is repeated, or nothing is.
-        none, some = r"nothing|practice trials 1\b(?!-)", r"practice trials \d|trials \d"
+        none, some = r"nothing|practice trial 1\b", r"practice trials? \d|trials? \d"
         which = f"({none if unbegun else some}|no trial that is counted)"
         again = rf"repeated, as new attempts \(redo_trial\): {which}"
         assert re.search(again, said[0]), said[0]

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import pytest
 from faults.sessions import unique, wait_for
-from pages.room import STUDY, a_room, photograph, press, shown, text
+from pages.room import STUDY, a_room, photograph, press, shown
 from pages.test_rights import ask
 from selenium import webdriver
+from selenium.webdriver.common.by import By
 
 from labcrane import open_recording
 
@@ -24,20 +25,18 @@ STEPS = """\
       - block: {task: looking}
       - block: {task: looking}
 """
-TASK = "  looking: {use: scenario, scenes: [lying.yaml], limit_s: 600, find_m: 20}\n"
+TASK = "  looking: {use: scenario, scenes: [lying.yaml], limit_s: 600, find_m: 20}"
 
 
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("reports")
     (folder / "lying.yaml").write_text(SCENE, encoding="utf-8")
-    text = STUDY.format(study=unique("reports"), steps=STEPS)
-    text = text.replace("sessions:\n", f"{TASK}sessions:\n").replace("title: Pages", PAGE)
-    (folder / "study.yaml").write_text(text, encoding="utf-8")
+    lines = STUDY.format(study=unique("reports"), steps=STEPS).splitlines()
+    text = "\n".join(TASK if line.startswith("  aiming:") else line for line in lines)
+    text = text.replace("title: Pages", "title: Pages\npage: {language: de}")
+    (folder / "study.yaml").write_text(f"{text}\n", encoding="utf-8")
     return folder / "study.yaml"
-
-
-PAGE = "title: Pages\npage: {language: de}"
 
 
 def test_a_deformity_is_reported_from_either_page_and_nothing_else_is(
@@ -55,7 +54,8 @@ def test_a_deformity_is_reported_from_either_page_and_nothing_else_is(
         participant = browser.current_window_handle
         browser.get(links["participant"])
         shown(browser, "wait", "Bitte warten")
-        assert not text(browser, "report-deformity"), "no trial runs"
+        button = browser.find_element(By.ID, "report-deformity")
+        assert not button.is_displayed(), "no trial runs"
 
         # In the first trial, the operator; what no task asks about is refused in the record.
         browser.switch_to.window(supervisor)
@@ -71,8 +71,9 @@ def test_a_deformity_is_reported_from_either_page_and_nothing_else_is(
         browser.refresh()
         shown(browser, "reported", "Verformung: gemeldet")
         browser.switch_to.window(supervisor)
-        shown(browser, "events", '"by": "operator"')
+        shown(browser, "events", "by operator")
         press(browser, "order-skip")
+        press(browser, "order-skip-sure")
 
         # In the second, the supervisor.
         shown(browser, "stage", "waits to start")
@@ -80,10 +81,11 @@ def test_a_deformity_is_reported_from_either_page_and_nothing_else_is(
         shown(browser, "stage", "trial")
         press(browser, "report-deformity")
         shown(browser, "reported", "deformity: reported")
-        shown(browser, "events", '"by": "supervisor", "limb"')
+        shown(browser, "events", "by supervisor, limb")
         photograph(browser, "reports-supervisor")
         press(browser, "order-end")
         press(browser, "order-end-sure")
+        press(browser, "close-page")
         room.ended()
     session = open_recording(data / "P001-PILOT" / "P001-PILOT.h5").session(1)
     events = session.events

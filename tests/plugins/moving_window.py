@@ -1,5 +1,7 @@
 """Two views with windows of their own, in which the crane turns until the input is closed.
 
+With a fourth argument there is no back buffer, as the windows of before had none.
+
 Prints what a whole picture holds of each of their colours, as counted in the picture itself.
 """
 
@@ -13,10 +15,13 @@ from windows import MACHINE, POSE, a_scene, make_frame
 
 from labcrane.core import SessionState
 from labcrane.testing import crane_at
+from labcrane_view import window
 from labcrane_view.settings import ViewSettings
 from labcrane_view.view import View
 
-renderer, name, title = sys.argv[1:4]
+renderer, name, title, *bare = sys.argv[1:]
+if bare:
+    window.BACK_BUFFERS = 0
 before = [ViewSettings(size=(480, 320))] if name == "examiner" else []
 settings = ViewSettings(size=(480, 320), renderer=renderer, camera="free", seen_by=name, shadow=0)
 view = View(settings, MACHINE)

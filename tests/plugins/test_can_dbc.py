@@ -1,12 +1,16 @@
 """Panels whose messages a DBC file describes."""
 
+import shutil
 from pathlib import Path
 
 import can
 import pytest
+from wrong_protocols import PROTOCOLS
 
 from labcrane import ProtocolError
 from labcrane.__main__ import main
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
 from labcrane_can.command_state import PanelCommands
 from labcrane_can.settings import ValveMap
 
@@ -37,6 +41,38 @@ def test_a_dbc_file_maps_another_panel(panel: Path) -> None:
         ProtocolError, match=r"has no 'Levers.Bom' for joint 'elbow'; it has Levers"
     ):
         PanelCommands(ValveMap(valves={"elbow": "Levers.Bom"}, map=panel))
+
+
+@pytest.mark.parametrize(
+    ("valves", "wrong", "said"),
+    [
+        (
+            "{base: Levers.Bom, arm: Levers.Arm}, map: panel.dbc",
+            "Levers.Bom,",
+            "input.valves.base is 'Levers.Bom', and there is no such signal of the map; did you "
+            "mean 'Levers.Boom'? it has Levers.Arm, Levers.Boom",
+        ),
+        (
+            "{base: Levers.Arm, arm: Levers.Arm}, map: panel.dbc",
+            "Levers.Arm}",
+            "input.valves has 'Levers.Arm' for both 'base' and 'arm'; give each its own",
+        ),
+        ("{base: 3, arm: 3}", "3}", "input.valves has '3' for both 'base' and 'arm'; give each"),
+        ("{base: Levers.Boom}, map: protocol.yaml", "{use: can", "map "),
+    ],
+)
+def test_a_check_looks_into_the_dbc_file(panel: Path, valves: str, wrong: str, said: str) -> None:
+    shutil.copytree(PROTOCOLS / "retrieval", panel.parent, dirs_exist_ok=True)
+    path = panel.parent / "protocol.yaml"
+    text = path.read_text(encoding="utf-8")
+    text = text.replace("{base: 1, arm: 2, boom: 3, jaws: 4}", valves)
+    path.write_text(text, encoding="utf-8")
+    line = text[: text.index("input:")].count("\n") + 1
+    column = text.splitlines()[line - 1].index(wrong) + 1
+    with pytest.raises(ProtocolError) as told:
+        load(path, discover())
+    found = [each for each in str(told.value).splitlines() if f"{line}:{column}: {said}" in each]
+    assert len(found) == 1, str(told.value)
 
 
 BRIDGE = ("gateway", "can", "--bus", "virtual:by-name", "--seconds", "0.01")

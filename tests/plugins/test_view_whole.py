@@ -23,12 +23,12 @@ SIZE = (480, 320)
 
 
 @contextmanager
-def moving(display: str, renderer: str, name: str) -> Iterator[dict[str, int]]:
+def moving(display: str, renderer: str, name: str, *bare: str) -> Iterator[dict[str, int]]:
     """Open a window in which the crane turns; give what its whole pictures hold at least."""
     program = Path(__file__).with_name("moving_window.py")
     tests = str(Path(__file__).parents[1])
     process = subprocess.Popen(
-        [sys.executable, str(program), renderer, name, f"{name} - whole"],
+        [sys.executable, str(program), renderer, name, f"{name} - whole", *bare],
         env={**os.environ, "DISPLAY": display, "PYTHONPATH": tests},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
@@ -62,13 +62,11 @@ def windows(display: str) -> dict[str, tuple[int, int]]:
     return found
 
 
-@pytest.mark.parametrize("renderer", [pytest.param("auto", marks=pytest.mark.long), "software"])
-def test_every_grab_of_two_windows_shows_whole_pictures_while_the_crane_moves(
-    renderer: str,
-) -> None:
+def grabbed(renderer: str, grabs: int, *bare: str, every_s: float = 0.013) -> tuple[list[str], int]:
+    """Return what grabs of two windows with a moving crane lack, and how many pictures differ."""
     with an_x_server() as display, ExitStack() as both:
         least = {
-            name: both.enter_context(moving(display, renderer, name))
+            name: both.enter_context(moving(display, renderer, name, *bare))
             for name in ("operator", "examiner")
         }
         places = windows(display)
@@ -77,18 +75,40 @@ def test_every_grab_of_two_windows_shows_whole_pictures_while_the_crane_moves(
         (left, top), (right, below) = halves.values()
         assert abs(right - left) >= SIZE[0] or abs(below - top) >= SIZE[1]
         broken, seen = [], set()
-        for number in range(GRABS):
+        for number in range(grabs):
             grab = np.asarray(ImageGrab.grab(xdisplay=display))
             for name, (x, y) in halves.items():
                 picture = grab[y : y + SIZE[1], x : x + SIZE[0]]
-                seen.add((name, picture.tobytes()))
+                seen.add((name, hash(picture.tobytes())))
                 has = counted(picture)
                 lacking = [each for each, count in least[name].items() if has[each] < 0.8 * count]
                 if lacking:
                     broken.append(f"grab {number} of {name} lacks {lacking}, and has {dict(has)}")
-            time.sleep(0.013)  # not in step with the pictures
-        assert not broken, "\n".join(broken)
-        assert len(seen) > GRABS / 4, "the crane did not move"
+            time.sleep(every_s)  # not in step with the pictures
+        return broken, len(seen)
+
+
+@pytest.mark.parametrize("renderer", [pytest.param("auto", marks=pytest.mark.long), "software"])
+def test_every_grab_of_two_windows_shows_whole_pictures_while_the_crane_moves(
+    renderer: str,
+) -> None:
+    broken, pictures = grabbed(renderer, GRABS)
+    assert not broken, "\n".join(broken)
+    assert pictures > GRABS / 4, "the crane did not move"
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("renderer", ["auto", "software"])
+def test_300_grabs_in_two_minutes_are_all_whole(renderer: str) -> None:
+    broken, pictures = grabbed(renderer, 300, every_s=0.35)
+    assert not broken, "\n".join(broken)
+    assert pictures > 150, "the crane did not move"
+
+
+@pytest.mark.long
+def test_half_drawn_pictures_are_found_where_there_is_no_back_buffer() -> None:
+    broken, _ = grabbed("software", GRABS, "bare")
+    assert broken, "the check would not have found what participants saw"
 
 
 @pytest.mark.parametrize("seed", range(20))

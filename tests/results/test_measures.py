@@ -9,6 +9,7 @@ from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.gaze import Looks, gaze_measures, looks
 from labcrane.analysis.measures import MEASURES, MeasureSettings, measure_session, measures_of
 from labcrane.analysis.movements import cut, groups, machine_of
+from labcrane.analysis.sticks import reversals
 from labcrane.testing.exporters import MOVEMENT_S, a_participant
 
 
@@ -85,3 +86,28 @@ def test_a_gap_in_the_eyes_is_no_look() -> None:
     seen = Looks(np.array([0.0, 0.1, 0.2, 5.0, 5.1]), ["a"] * 5)
     assert seen.dwell("a", 0.0, 10.0) == pytest.approx(0.1 + 0.1 + 0.2 + 0.1 + 0.1)
     assert math.isnan(seen.first("b", 0.0, 10.0))
+
+
+def turns_one_by_one(axis: list[float], hysteresis: float) -> int:
+    """Count turning points that are more than a hysteresis apart, a sample at a time."""
+    count, direction = 0, 0
+    lowest = highest = axis[0]
+    for value in axis:
+        lowest, highest = min(lowest, value), max(highest, value)
+        if direction <= 0 and value - lowest > hysteresis:
+            count += direction < 0
+            direction, highest = 1, value
+        elif direction >= 0 and highest - value > hysteresis:
+            count += direction > 0
+            direction, lowest = -1, value
+    return count
+
+
+def test_reversals_are_those_that_are_counted_sample_by_sample() -> None:
+    random = np.random.default_rng(1)
+    for trial in range(400):
+        steps = random.normal(size=random.integers(1, 300)) * random.choice([1e-200, 0.05, 0.3])
+        kinds = (steps, np.cumsum(steps), np.round(np.cumsum(steps), 1), np.maximum(steps, 0.0))
+        hysteresis = float(random.choice([0.0, 0.02, 0.1, 0.3]))
+        for axis in kinds:
+            assert reversals(axis, hysteresis) == turns_one_by_one(axis.tolist(), hysteresis), trial

@@ -1,14 +1,17 @@
 """The power of planned tests, against the power that theory gives them."""
 
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from statsmodels.stats.power import TTestIndPower, TTestPower
 
+from labcrane.cli.app import main
 from labcrane.errors import ProtocolError
-from labcrane.simulation.power import Effect, make_pool, power, read_effect
+from labcrane.simulation.power import Claim, Effect, Pool, make_pool, power, read_effect
+from labcrane.simulation.sample_size import paragraph, sample_size
 
 SIZES = (8, 16, 32)
 COHORTS = 2000
@@ -134,3 +137,122 @@ def test_what_cannot_be_tested_is_said(text: str, message: str) -> None:
     movements["pair"] = ["a", "b", "c"] * 6
     with pytest.raises(ProtocolError, match=message):
         make_pool(movements, read_effect(text))
+
+
+def normal_pool(effect: float, participants: int, seed: int) -> Pool:
+    """Return differences between two words with a standard deviation of 1."""
+    values = np.random.default_rng(seed).normal(effect, 1.0, participants)
+    means = np.stack([np.zeros(participants), values], axis=1)
+    return Pool(means, np.array([-1.0, 1.0]), np.array([-0.5, 0.5]), None, ())
+
+
+ONE = read_effect("movement_time~half")
+
+
+def test_the_intervals_of_power_hold_the_power_as_often_as_they_say() -> None:
+    size, cohorts, repetitions = 20, 100, 300
+    true = TTestPower().power(0.5, size, 0.05)
+    inside = 0
+    for repetition in range(repetitions):
+        pool = normal_pool(0.5, size * cohorts, repetition)
+        (found,) = power(pool, ONE, [size], cohorts, seed=1, fresh=True)
+        inside += found.power_low <= true <= found.power_high
+    assert 0.93 <= inside / repetitions <= 0.97
+
+
+def exact(pool: Pool, goal: float) -> int:
+    numbers = pool.means @ pool.weights
+    size = float(numbers.mean() / numbers.std())
+    return next(n for n in range(4, 1000) if TTestPower().power(size, n, 0.05) >= goal)
+
+
+@pytest.mark.parametrize("goal", [0.8, 0.9])
+def test_the_smallest_cohort_is_that_of_theory(goal: float) -> None:
+    pool = normal_pool(0.5, 20000, 5)
+    found = sample_size(pool, ONE, goal, 4000, seed=3)
+    assert found.low <= found.participants <= found.high
+    assert found.low - 1 <= exact(pool, goal) <= found.high + 1
+    assert found.high - found.low <= 6
+
+
+def test_an_effect_that_no_cohort_shows_is_said_so() -> None:
+    with pytest.raises(ProtocolError, match="2000 participants have a power of 0"):
+        sample_size(normal_pool(0.001, 2000, 5), read_effect("m~half=0.0001"), 0.8, 50, seed=3)
+
+
+def test_small_studies_overstate_what_they_find_and_err_in_its_sign() -> None:
+    """Against a simulation of its own: z tests of one normal number."""
+    pool = normal_pool(0.2, 40000, 6)
+    few, many = power(pool, ONE, [8, 400], 20000, seed=2)
+    draws = np.random.default_rng(9).normal(0.2, 1.0, (20000, 8))
+    from scipy.stats import ttest_1samp
+
+    seen = draws.mean(axis=1)[ttest_1samp(draws, 0.0, axis=1).pvalue < 0.05]
+    true = float((pool.means @ pool.weights).mean())
+    assert few.type_m == pytest.approx(np.abs(seen).mean() / 0.2, rel=0.05)
+    assert few.type_s == pytest.approx((seen < 0).mean(), abs=0.02)
+    assert many.type_m == pytest.approx(1.0, abs=0.05)
+    assert many.type_s == 0.0
+    assert true == pytest.approx(0.2, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("claim", "larger"),
+    [(Claim("equivalence", 0.6), 0.0), (Claim("non_inferiority", 0.6), -np.inf)],
+)
+def test_equivalence_and_non_inferiority_are_shown_as_often_as_statsmodels_shows_them(
+    claim: Claim, larger: float
+) -> None:
+    from statsmodels.stats.weightstats import DescrStatsW
+
+    pool = normal_pool(0.1, 4000, 7)
+    (found,) = power(pool, ONE, [24], 300, seed=1, fresh=True, claim=claim)
+    drawn = (pool.means @ pool.weights)[: 24 * 166].reshape(166, 24)
+    shown = []
+    for cohort in drawn:
+        stats = DescrStatsW(cohort)
+        if claim.kind == "equivalence":
+            shown.append(stats.ttost_mean(-0.6, 0.6)[0] < 0.05)
+        else:
+            shown.append(stats.ttest_mean(0.6, alternative="smaller")[1] < 0.05)
+    assert found.cohorts == 166
+    assert found.power == np.mean(shown)
+    assert found.null == pytest.approx(0.05, abs=4 * np.sqrt(0.05 / 166))
+
+
+@pytest.mark.parametrize(
+    ("kind", "margin", "message"),
+    [
+        ("difference", 0.3, "a margin of 0.3 is for equivalence or non-inferiority"),
+        ("equivalence", 0.0, "equivalence is shown against a margin, and 0 is none"),
+        ("non_inferiority", 0.0, "non_inferiority is shown against a margin, and 0 is none"),
+    ],
+)
+def test_a_margin_belongs_to_its_claim(kind: str, margin: float, message: str) -> None:
+    with pytest.raises(ProtocolError, match=message):
+        Claim(kind, margin)
+
+
+def test_the_paragraph_says_sizes_intervals_and_what_was_tested() -> None:
+    found = sample_size(normal_pool(0.5, 4000, 5), ONE, 0.8, 500, seed=3)
+    text = paragraph("movement_time~half", Claim(), 4000, [found])
+    assert f"For a power of 80 %, {found.participants} participants are needed" in text
+    assert f"({found.low} to {found.high} by the 95 % interval of 500 cohorts" in text
+    assert "movement_time~half was tested" in text
+    assert "overstated by a factor of 1." in text
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--claim", "equivalent"], "did you mean 'equivalence'?"),
+        (["--claim", "equivalence"], "equivalence is shown against a margin"),
+        (["--goal", "much"], "--goal 'much' is no list of powers; write 0.8,0.9"),
+    ],
+)
+def test_what_cannot_be_shown_is_refused_before_anybody_is_simulated(
+    tmp_path: Path, words: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["power", "protocol.yaml", "--out", str(tmp_path / "out"), *words]) == 2
+    assert message in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "out").exists()

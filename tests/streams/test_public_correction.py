@@ -82,6 +82,33 @@ def test_two_devices_of_one_computer_agree(seed: int) -> None:
     assert np.abs(apart[1]).max() < np.abs(apart[0]).max()
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_markers_agree_with_the_samples_beside_them_while_their_clock_is_turned(seed: int) -> None:
+    """Every probe waits meanwhile, and only the samples show the turn."""
+    random = np.random.default_rng(seed)
+    clock = Clock(random)
+    clock.slew(random.choice([-1, 1]) * random.uniform(1e-3, 4e-3), 1050.0, 1070.0)
+
+    def busy(t: float, random: np.random.Generator) -> np.ndarray:
+        return random.exponential(0.004 if 1040.0 < t < 1080.0 else 1e-5, (2, 8))
+
+    samples = regular(random, 250.0, 120, 160)
+    markers = np.sort(random.uniform(1001.0, samples[-1] - 1.0, 400))
+    given = [
+        RawStream.of(clock(times), probes(clock, 1000.5, samples[-1], random, congestion=busy))
+        for times in (samples, markers)
+    ]
+    off = []
+    for raws in (given, pooled(given, ["lab", "lab"])):
+        placed, told = (
+            correct_raw(raw, Treatment(rate)).time
+            for raw, rate in zip(raws, (250.0, 0.0), strict=True)
+        )
+        off.append(told - markers - np.interp(markers, samples, placed - samples))
+    assert np.abs(off[1]).max() < 5e-5
+    assert np.abs(off[0]).max() > 5e-4
+
+
 def test_clocks_that_differ_are_not_pooled_whatever_their_host_is_called(
     random: np.random.Generator,
 ) -> None:

@@ -1,7 +1,7 @@
 """Commands that rehearse a study without people: simulate and power."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from labcrane.simulation.power import Effect
+    from labcrane.simulation.power import Claim, Effect
 
 CohortPath = Annotated[
     Path | None,
@@ -86,6 +86,15 @@ def power(
     resimulate: Annotated[
         int | None, typer.Option(help="simulate so many cohorts afresh and draw none", min=2)
     ] = None,
+    claim: Annotated[
+        str, typer.Option(help="what is to be shown: difference, equivalence or non_inferiority")
+    ] = "difference",
+    margin: Annotated[
+        float, typer.Option(help="of equivalence or non-inferiority, in the effect's unit")
+    ] = 0.0,
+    goal: Annotated[
+        str, typer.Option(help="powers for which the smallest cohort is searched: 0.8,0.9")
+    ] = "",
     cohort: CohortPath = None,
     workers: Workers = 1,
     scheduler: Scheduler = None,
@@ -100,7 +109,7 @@ def power(
     from labcrane.registry.registry import discover
     from labcrane.simulation.power import read_effect
 
-    tested = read_effect(effect)
+    tested, to_show, goals = read_effect(effect), _claim(claim, margin), _goals(goal)
     sizes = _sizes(participants)
     study = load(protocol, discover())
     count = pool or 2 * max(sizes)
@@ -110,7 +119,58 @@ def power(
     simulate_all(protocol, folder / "pool", names, cohort, workers, scheduler)
     movements = _movements(folder / "pool", names, workers, scheduler)
     movements.to_csv(folder / "movements.csv", index=False)
-    _print_power(folder, study.protocol.study, movements, tested, sizes, cohorts, resimulate)
+    _print_power(
+        folder, study.protocol.study, movements, tested, sizes, cohorts, resimulate, to_show
+    )
+    if goals:
+        _search(folder, study.protocol.study, movements, effect, goals, cohorts, to_show)
+
+
+def _claim(kind: str, margin: float) -> "Claim":
+    from typing import cast, get_args, get_type_hints
+
+    from labcrane.errors import ProtocolError, suggestion
+    from labcrane.simulation.power import Claim
+
+    kinds = get_args(get_type_hints(Claim)["kind"])
+    if kind not in kinds:
+        raise ProtocolError(f"--claim {kind!r} is nothing to be shown; {suggestion(kind, kinds)}")
+    return Claim(cast("Any", kind), margin)
+
+
+def _goals(text: str) -> list[float]:
+    from labcrane.errors import ProtocolError
+
+    try:
+        return [float(word) for word in text.split(",") if word]
+    except ValueError:
+        raise ProtocolError(f"--goal {text!r} is no list of powers; write 0.8,0.9") from None
+
+
+def _search(
+    folder: Path,
+    study: str,
+    movements: "pd.DataFrame",
+    effect: str,
+    goals: "Sequence[float]",
+    cohorts: int,
+    claim: "Claim",
+) -> None:
+    from labcrane.design.seeds import derive
+    from labcrane.files.atomic import write_text
+    from labcrane.simulation.power import make_pool, read_effect
+    from labcrane.simulation.sample_size import paragraph, sample_size
+
+    tested = read_effect(effect)
+    pool, seed = make_pool(movements, tested), derive(study, "sample size")
+    found = [sample_size(pool, tested, goal, cohorts, seed, claim) for goal in goals]
+    for each in found:
+        out.print(
+            f"power {each.goal:g}: {each.participants} participants ({each.low} to {each.high})",
+            markup=False,
+        )
+    write_text(folder / "sample_size.md", paragraph(effect, claim, len(pool.means), found) + "\n")
+    out.print(f"for the ethics application: {folder / 'sample_size.md'}", markup=False)
 
 
 def _sizes(text: str) -> list[int]:
@@ -159,6 +219,7 @@ def _print_power(
     sizes: "Sequence[int]",
     cohorts: int,
     resimulate: int | None,
+    claim: "Claim",
 ) -> None:
     from dataclasses import asdict
 
@@ -173,10 +234,13 @@ def _print_power(
     pool = make_pool(movements, tested)
     if pool.left_out:
         out.print(f"left out, without a value at some level: {', '.join(pool.left_out)}")
-    table = whole_table("participants", "cohorts", "power", "95 %", "found in nothing", "95 %")
+    table = whole_table(
+        "participants", "cohorts", "power", "95 %", "in nothing", "type M", "type S"
+    )
     found = []
     seed = derive(study, "power")
-    for one in power_of(pool, tested, sizes, cohorts, seed, fresh=resimulate is not None):
+    fresh = resimulate is not None
+    for one in power_of(pool, tested, sizes, cohorts, seed, fresh=fresh, claim=claim):
         found.append(asdict(one))
         table.add_row(
             str(one.participants),
@@ -184,7 +248,8 @@ def _print_power(
             f"{one.power:.3f}",
             f"{one.power_low:.3f} to {one.power_high:.3f}",
             f"{one.null:.3f}",
-            f"{one.null_low:.3f} to {one.null_high:.3f}",
+            f"{one.type_m:.2f}",
+            f"{one.type_s:.3f}",
         )
     out.print(table)
     curve = pd.DataFrame(found)

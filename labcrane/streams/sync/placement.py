@@ -67,7 +67,7 @@ _Piece = tuple[int, int, Epoch, OffsetCurve | None]
 
 def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> Placement:
     """Place every sample, by its own clock's probes, else by arrivals, else not at all (NaN)."""
-    curves = _curves(raw.stamps if regular else None, stretches)
+    curves = _curves(raw, stretches, regular=regular)
     arrival = raw.arrival()
     least = _least_lag(raw.stamps, arrival, stretches, curves, regular=regular)
     whose = ""
@@ -86,11 +86,8 @@ def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> Placement
     return Placement(time, error, segments, probed, least, whose)
 
 
-def _curves(steady: FloatArray | None, stretches: list[Epoch]) -> list[OffsetCurve | None]:
-    """Return each clock's curve, the longest known first: it lends its slope to brief ones.
-
-    ``steady`` are the stamps of a regular stream.
-    """
+def _curves(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> list[OffsetCurve | None]:
+    """Return each clock's curve, the longest known first: it lends its slope to brief ones."""
     curves: list[OffsetCurve | None] = [None] * len(stretches)
     slope = 0.0
     lengths = [
@@ -98,11 +95,19 @@ def _curves(steady: FloatArray | None, stretches: list[Epoch]) -> list[OffsetCur
     ]
     for k in sorted(range(len(stretches)), key=lambda k: -lengths[k]):
         if len(stretches[k].probes):
-            part = slice(stretches[k].start, stretches[k].stop)
-            sampler = None if steady is None else SteadySampler.of(steady[part])
+            sampler = _sampler(raw, stretches[k], regular=regular)
             curve = curves[k] = fit(stretches[k].probes, slope, sampler)
             slope = slope or curve.slope
     return curves
+
+
+def _sampler(raw: RawStream, epoch: Epoch, *, regular: bool) -> SteadySampler | None:
+    """Return a sampler that the clock stamps: that of its computer, else the stream's own."""
+    if len(raw.steady):
+        first, last = epoch.probes[:, REMOTE].min(), epoch.probes[:, REMOTE].max()
+        near = (raw.steady > first - ORDER_S) & (raw.steady < last + ORDER_S)
+        return SteadySampler.of(raw.steady[near])
+    return SteadySampler.of(raw.stamps[epoch.start : epoch.stop]) if regular else None
 
 
 def _least_lag(

@@ -7,6 +7,7 @@ import numpy as np
 
 from labcrane.streams.sync.epochs import in_order
 from labcrane.streams.sync.raw import LOCAL, OFFSET, REMOTE, RTT, RawStream
+from labcrane.streams.sync.steady_sampler import SteadySampler
 from labcrane.types import FloatArray
 
 SAME_S = 5e-4
@@ -17,8 +18,9 @@ def pooled(streams: Sequence[RawStream], hosts: Sequence[str]) -> list[RawStream
     """Return the streams with all probes of their computer's clock.
 
     Two devices on one computer are then mapped by one curve, and agree with each other whatever the
-    network does. That they share a clock is seen in their probes: a program in a container, or
-    under a debugger of clocks, may have one of its own.
+    network does; markers, too, have the steady sampler of a regular stream beside them. That they
+    share a clock is seen in their probes: a program in a container, or under a debugger of clocks,
+    may have one of its own.
 
     Parameters
     ----------
@@ -28,19 +30,26 @@ def pooled(streams: Sequence[RawStream], hosts: Sequence[str]) -> list[RawStream
         The computer of each; empty where it is not known.
     """
     ordered = [in_order(stream.probes) for stream in streams]
+    is_steady = [
+        hosts.count(host) > 1 and SteadySampler.of(stream.stamps) is not None
+        for stream, host in zip(streams, hosts, strict=True)
+    ]
     result = []
     for k, (stream, host) in enumerate(zip(streams, hosts, strict=True)):
         others = [
-            ordered[j]
+            j
             for j in range(len(streams))
             if j != k and host and hosts[j] == host and _is_one_clock(ordered[k], ordered[j])
         ]
         if not others:
             result.append(stream)
             continue
-        together = np.concatenate([ordered[k], *others])
+        together = np.concatenate([ordered[j] for j in (k, *others)])
         together = together[np.argsort(together[:, LOCAL], kind="stable")]
-        result.append(replace(stream, probes=together))
+        same = [streams[j].stamps for j in sorted((k, *others)) if is_steady[j]]
+        # The same one for all streams of a computer, so that they agree where it is followed.
+        steady = max(same, key=np.ptp, default=np.empty(0))
+        result.append(replace(stream, probes=together, steady=steady))
     return result
 
 
@@ -53,6 +62,8 @@ def _is_one_clock(one: FloatArray, other: FloatArray) -> bool:
     if not inside.any():
         return False
     apart = np.abs(one[inside, OFFSET] - np.interp(at[inside], other[:, LOCAL], other[:, OFFSET]))
-    hidden = (np.median(one[:, RTT]) + np.median(other[:, RTT])) / 2.0
+    after = np.clip(np.searchsorted(other[:, LOCAL], at[inside]), 1, len(other) - 1)
+    held_up = np.maximum(other[after, RTT], other[after - 1, RTT])
+    apart -= (one[inside, RTT] + held_up) / 2.0
     near = np.abs(one[inside, REMOTE] - np.interp(at[inside], other[:, LOCAL], other[:, REMOTE]))
-    return bool(np.quantile(apart, 0.9) < SAME_S + hidden and np.median(near) < 10.0)  # noqa: PLR2004
+    return bool(np.quantile(apart, 0.9) < SAME_S and np.median(near) < 10.0)  # noqa: PLR2004

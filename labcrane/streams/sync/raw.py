@@ -44,6 +44,9 @@ class RawStream:
         The source's own sample counter, unwrapped, shape ``(n,)``; None when it has none.
     own
         Our clock, and at the same moments one that nothing turns, shape ``(n_readings, 2)``.
+    steady
+        Stamps, on the same clock, of a regular stream of the same computer, whose sampler shows
+        what probes do not, shape ``(n_steady,)``; its own where none are given and it is regular.
     """
 
     stamps: FloatArray
@@ -52,6 +55,7 @@ class RawStream:
     resets: FloatArray
     index: FloatArray | None = None
     own: FloatArray = field(default_factory=lambda: _nothing(2))
+    steady: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         for name, columns in (("probes", 4), ("arrivals", 2), ("resets", 3), ("own", 2)):

@@ -75,10 +75,16 @@ void main() {
 #ifndef SMOOTH
   float coarse = texture(noise, world.xy * 0.021).r;
   float fine = texture(noise, world.xy * 0.17 + world.z * 0.11).r;
+  float earth_share = 0.0;
 #ifdef GROUND
   float trodden = smoothstep(13.0, 5.0, length(world.xy - vec2(3.5, 0.0)));
   float earth = smoothstep(0.42, 0.75, coarse + 0.30 * trodden + 0.15 * (fine - 0.5));
   base = mix(base, vec3(0.37, 0.29, 0.20), earth);
+  earth_share = earth;
+#endif
+#if TAPS == 4
+  float grit = texture(noise, world.xy * 1.7).r;
+  base *= 1.0 + 0.9 * (grit - 0.5) * earth_share;
 #endif
   base *= 0.72 + 0.56 * mix(coarse, fine, 0.6);
 #endif
@@ -140,3 +146,24 @@ void main() {
   colour = vec4(vec3(clamp((range.y - away) / (range.y - range.x), 0.0, 1.0)), 1.0);
 }
 """
+
+SKY_VERTEX = """#version 330
+in vec4 p3d_Vertex;
+uniform mat4 p3d_ModelViewProjectionMatrix;
+out vec3 way;
+void main() {
+  gl_Position = p3d_ModelViewProjectionMatrix * p3d_Vertex;
+  way = p3d_Vertex.xyz;
+}
+"""
+
+SKY_FRAGMENT = """#version 330
+in vec3 way;
+uniform vec3 haze;
+out vec4 colour;
+void main() {
+  float up = clamp(way.z / length(way), 0.0, 1.0);
+  colour = vec4(mix(haze, vec3(0.42, 0.60, 0.82), smoothstep(0.0, 0.45, up)), 1.0);
+}
+"""
+"""Haze at the horizon, blue above."""

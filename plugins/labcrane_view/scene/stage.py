@@ -11,9 +11,10 @@ from labcrane import FloatArray, Run
 from labcrane.core import Shape, Sphere
 from labcrane.machines import Body, read_placed, segments, stands
 from labcrane_view.scene import shader
-from labcrane_view.scene.forest import forest
+from labcrane_view.scene.forest import forest, grid
 from labcrane_view.scene.mesh import Mesh, bevelled_box, cone, sphere
 from labcrane_view.scene.mesh_reader import painted, read_mesh
+from labcrane_view.scene.rams import Ram, hoses, rams
 from labcrane_view.scene.things import pieces
 
 HAZE = (0.66, 0.75, 0.82)
@@ -37,6 +38,14 @@ PAINT = ((0.13, 0.13, 0.14, 1.0), (0.90, 0.66, 0.07, 1.0), (0.12, 0.38, 0.17, 1.
 """Colours of the frames: the foot, the column, and everything behind."""
 LAST = (0.90, 0.66, 0.07, 1.0)
 STEEL = (0.42, 0.44, 0.46, 1.0)
+BARREL = (0.22, 0.23, 0.25, 1.0)
+CHROME = (0.72, 0.74, 0.77, 1.0)
+RUBBER = (0.05, 0.05, 0.055, 1.0)
+
+GRID = (0.78, 0.80, 0.80, 1.0)
+
+SKY_M = 150.0
+"""Radius of the sky, in metres: behind everything that is drawn."""
 
 
 class Stage:
@@ -62,6 +71,7 @@ class Stage:
         self._ball = sphere()
         self._bar = cone((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0))
         self._parts: list[tuple[int, Any]] = []
+        self._rams: list[tuple[Ram, Any, Any]] = []
         self._shown: dict[str, Any] = {}
         self._state = run.state
         self._scene = ""
@@ -81,6 +91,9 @@ class Stage:
                 node.hide(SHADOWS)
                 node.show(STILL)
             self._add_machine(run.bodies)
+            self._add_rams(run)
+            if shaders:
+                self._add_sky()
 
     def place(self, frames: FloatArray, scene: str, state: FloatArray) -> None:
         """Set the machine's bodies and what stands around.
@@ -95,6 +108,11 @@ class Stage:
             node.set_pos_quat(core.LPoint3(*state[position].tolist()), core.LQuaternion(w, x, y, z))
         for number, node in self._parts:
             node.set_mat(core.LMatrix4f(*frames[number].T.ravel().tolist()))
+        for ram, barrel, rod in self._rams:
+            foot, eye = ram.ends(frames)
+            way = (eye - foot) / np.linalg.norm(eye - foot)
+            _stretch(barrel, foot, foot + ram.barrel * way, ram.radius)
+            _stretch(rod, foot, eye, 0.5 * ram.radius)
 
     def _furnish(self, scene: str) -> None:
         """Set up what stands around; what moves is placed by the state from then on."""
@@ -178,13 +196,15 @@ class Stage:
             across, round_ = 0.5 * body.size[2] + 0.06, 0.62 * thick
             pin = cone((inner, 0.0, -across), (inner, 0.0, across), (round_, round_), 20)
             self._add(node, f"{body.name} pin", pin, STEEL, 0.0)
-            rod = cone(
-                (inner + 0.12 * body.size[0], -0.72 * thick, 0.0),
-                (inner + 0.55 * body.size[0], -0.66 * thick, 0.0),
-                (0.20 * thick, 0.20 * thick),
-                12,
-            )
-            self._add(node, f"{body.name} cylinder", rod, STEEL, 0.0)
+            if (pipes := hoses(body)) is not None:
+                self._add(node, f"{body.name} hoses", pipes, RUBBER, 0.0)
+
+    def _add_rams(self, run: Run) -> None:
+        """Add the cylinders, whose rods go in and out as the joints turn."""
+        for ram in rams(run.machine, run.bodies):
+            barrel = self._add(self.root, f"{ram.name} barrel", self._bar, BARREL, 0.0)
+            rod = self._add(self.root, f"{ram.name} rod", self._bar, CHROME, 0.0)
+            self._rams.append((ram, barrel, rod))
 
     def _add(
         self, parent: Any, name: str, mesh: Mesh, colour: Sequence[float], grain: float
@@ -223,8 +243,29 @@ class Stage:
         if self._still is None or not self._still_left:
             return
         self._still_left -= 1
-        if not self._still_left:
-            self._still.get_shadow_buffer(gsg).set_active(False)
+        if self._still_left:
+            return
+        buffer = self._still.get_shadow_buffer(gsg)
+        if buffer is None:  # nothing lit has been drawn yet, so there is none
+            self._still_left = 1
+            return
+        buffer.set_active(False)
+
+    def grid(self) -> None:
+        """Draw lines on the ground, a metre apart, as far as it is level."""
+        node = self._add(self.root, "grid", grid(), GRID, 0.0)
+        node.hide(SHADOWS)
+
+    def _add_sky(self) -> None:
+        node = self.root.attach_new_node(_geometry("sky", self._ball))
+        node.set_scale(SKY_M)
+        node.set_shader(
+            core.Shader.make(core.Shader.SL_GLSL, shader.SKY_VERTEX, shader.SKY_FRAGMENT)
+        )
+        node.set_two_sided(True)
+        node.set_depth_write(False)
+        node.set_bin("background", 0)
+        node.hide(SHADOWS | STILL)
 
     def _light(self, shadow: int, *, soft: bool) -> None:
         depth = core.Shader.make(core.Shader.SL_GLSL, shader.DEPTH_VERTEX, shader.DEPTH_FRAGMENT)

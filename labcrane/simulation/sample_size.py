@@ -1,0 +1,110 @@
+"""Sample size of a planned test: the smallest cohort that has a wanted power."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from labcrane.errors import ProtocolError
+from labcrane.simulation.power import ALPHA, DIFFERENCE, Claim, Effect, Pool, Power, power
+
+FEWEST = 4
+MOST = 2000
+"""Participants: the search ends here."""
+
+
+@dataclass(frozen=True, slots=True)
+class SampleSize:
+    """How many participants a power needs.
+
+    Attributes
+    ----------
+    goal
+        The wanted power.
+    participants
+        The smallest cohort whose power is the goal or more.
+    low, high
+        The smallest cohorts at which the upper and the lower end of the power's 95 % interval are:
+        what more cohorts could move it to.
+    found
+        The power with as many.
+    """
+
+    goal: float
+    participants: int
+    low: int
+    high: int
+    found: Power
+
+
+def sample_size(
+    pool: Pool, effect: Effect, goal: float, cohorts: int, seed: int, claim: Claim = DIFFERENCE
+) -> SampleSize:
+    """Return the smallest cohort with a power of ``goal``, by halving; power grows with its size.
+
+    Raises
+    ------
+    ProtocolError
+        Not even :data:`MOST` participants have it, or it is no power.
+    """
+    if not ALPHA < goal < 1.0:
+        raise ProtocolError(f"a power of {goal:g} cannot be aimed at; write 0.8 or 0.9")
+    known: dict[int, Power] = {}
+
+    def at(size: int) -> Power:
+        if size not in known:
+            # Seeded by the size, so that a size has one power whoever asks.
+            (known[size],) = power(pool, effect, [size], cohorts, seed + size, claim=claim)
+        return known[size]
+
+    def smallest(end: str) -> int:
+        enough = FEWEST
+        while getattr(at(enough), end) < goal:
+            if enough >= MOST:
+                raise ProtocolError(
+                    f"{MOST} participants have a power of {at(MOST).power:.2f}, below {goal:g}: "
+                    "the effect is too small for any study; look at --effect, or at the population"
+                )
+            enough = min(2 * enough, MOST)
+        too_few = enough // 2 if enough > FEWEST else FEWEST - 1
+        while enough - too_few > 1:
+            middle = (enough + too_few) // 2
+            enough, too_few = (
+                (middle, too_few) if getattr(at(middle), end) >= goal else (enough, middle)
+            )
+        return enough
+
+    found = smallest("power")
+    ends = sorted((smallest("power_high"), found, smallest("power_low")))
+    return SampleSize(goal, found, ends[0], ends[-1], at(found))
+
+
+def paragraph(effect: str, claim: Claim, pool: int, sizes: Iterable[SampleSize]) -> str:
+    """Return what an application to an ethics board says of the number of participants."""
+    shown = {
+        "difference": f"an effect (two-sided test at {100 * ALPHA:g} %)",
+        "equivalence": f"equivalence within a margin of {claim.margin:g} (two one-sided tests at "
+        f"{100 * ALPHA:g} % each)",
+        "non_inferiority": f"non-inferiority with a margin of {claim.margin:g} (one-sided test at "
+        f"{100 * ALPHA:g} %)",
+    }[claim.kind]
+    sentences = [
+        f"The number of participants was planned by simulation. {pool} participants were simulated "
+        f"with the study's own protocol, and cohorts of each size were drawn from them; in each, "
+        f"{effect} was tested as it is planned, to show {shown}."
+    ]
+    for each in sizes:
+        found = each.found
+        sentences.append(
+            f"For a power of {100 * each.goal:g} %, {each.participants} participants are needed "
+            f"({each.low} to {each.high} by the 95 % interval of {found.cohorts} cohorts; with "
+            f"{each.participants} the power is {100 * found.power:.1f} %, 95 % interval "
+            f"{100 * found.power_low:.1f} to {100 * found.power_high:.1f} %)."
+        )
+        if found.type_m == found.type_m:
+            sentences.append(
+                f"An effect that is found is then overstated by a factor of {found.type_m:.2f} on "
+                f"average, and has the wrong sign in {100 * found.type_s:.1f} % of cases."
+            )
+    sentences.append(
+        "The simulated operators are a model; the numbers hold for people as far as they do."
+    )
+    return " ".join(sentences)
