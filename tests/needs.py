@@ -83,6 +83,15 @@ def _may_run_in_real_time() -> bool:
     return _succeeds(sys.executable, "-c", asked)  # in a process of its own: it would stay so
 
 
+LEARNERS = "LABCRANE_LEARNERS"
+"""Names the Python of an environment with what learns, which brings torch."""
+
+
+def _learner_has(package: str) -> bool:
+    asked = f"import sys, importlib.util as u; sys.exit(u.find_spec({package!r}) is None)"
+    return LEARNERS in os.environ and _succeeds(os.environ[LEARNERS], "-c", asked)
+
+
 GRAPHICS = tuple(LIBRARIES)
 """What any picture is drawn with, a hidden one by the software renderer too."""
 
@@ -115,6 +124,14 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
     "yaml-language-server": (
         lambda: shutil.which("yaml-language-server") is not None,
         "npm install --global yaml-language-server@1.25.0",  # as .ci/run has it
+    ),
+    "lerobot": (
+        lambda: _learner_has("lerobot"),
+        f"pip install lerobot into an environment of its own, and name its Python in {LEARNERS}",
+    ),
+    "robomimic": (
+        lambda: _learner_has("robomimic"),
+        f"pip install robomimic into an environment of its own, and name its Python in {LEARNERS}",
     ),
     "alsa.conf": (
         lambda: Path("/usr/share/alsa/alsa.conf").exists(),

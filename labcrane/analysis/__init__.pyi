@@ -8,9 +8,11 @@ from .exporter import Exporter
 from .measures import measures_of
 from .movements import Movement, movements_of
 from .questionnaires import answers_of, asked_in, beside_trials, scores_of
+from .tables.dataset import Dataset, open_dataset
 
 __all__ = [
     "EEG_READERS",
+    "Dataset",
     "Exporter",
     "Movement",
     "Participant",
@@ -25,6 +27,7 @@ __all__ = [
     "find_cohort",
     "measures_of",
     "movements_of",
+    "open_dataset",
     "sampled",
     "scores_of",
     "to_mne",

@@ -11,6 +11,7 @@ from labcrane.analysis.gaze import gaze_measures, looks
 from labcrane.analysis.movements import Groups, Movement, cut, groups, machine_of
 from labcrane.analysis.smoothness import ldlj, path_ratio, sparc, sub_movements
 from labcrane.analysis.sticks import coordination, effort, limit_hits, reversals, stick_use
+from labcrane.analysis.tables.measure_cache import kept
 from labcrane.errors import LabcraneError
 from labcrane.machines.machine import Machine
 from labcrane.recording.participant_file.reader import SessionRecord
@@ -97,19 +98,27 @@ class Measured(Participant):
 
 
 def measures_of(participant: Participant, settings: MeasureSettings = DEFAULTS) -> "pd.DataFrame":
-    """Return one row per counted movement of all sessions: condition, results, measures."""
-    import pandas as pd
+    """Return one row per counted movement of all sessions: condition, results, measures.
 
+    Worked out once, and kept beside the participant file (:mod:`~.analysis.tables.measure_cache`).
+    """
     if isinstance(participant, Measured):
         return participant.table
+    about = {"measures": settings.as_dict()}
+    table = kept(participant.path, about, lambda: _all_sessions(participant, settings))
+    table.insert(0, "participant", participant.name)
+    table.insert(1, "status", str(participant.status))
+    return table
+
+
+def _all_sessions(participant: Participant, settings: MeasureSettings) -> "pd.DataFrame":
+    import pandas as pd
 
     tables = []
     for number, session in participant.sessions():
         table = measure_session(session, settings)
-        table.insert(0, "participant", participant.name)
-        table.insert(1, "status", str(participant.status))
-        table.insert(2, "session", number)
-        table.insert(3, "session_name", str(session.attrs.get("session_name", "")))
+        table.insert(0, "session", number)
+        table.insert(1, "session_name", str(session.attrs.get("session_name", "")))
         tables.append(table)
     return pd.concat(tables, ignore_index=True)
 

@@ -26,7 +26,7 @@ MODULES = {
     "language_server": ("language_server",),
     "record": ("streams", "record", "recover", "resync"),
     "score": ("score",),
-    "results": ("export", "report", "replay"),
+    "results": ("export", "report", "replay", "view"),
     "simulate": ("simulate", "power"),
     "engines": ("compare_engines",),
     "approval": ("approve", "amend", "methods", "bundle"),

@@ -12,7 +12,7 @@ SECTIONS = {
         "bundle", "plugins", "new-plugin", "schema", "language-server",
     ),
     "Run it": ("demo", "run", "resume", "consent", "streams", "record"),
-    "Analyse it": ("report", "score", "export", "replay", "compare-engines"),
+    "Analyse it": ("view", "report", "score", "export", "replay", "compare-engines"),
     "Keep people and data": (
         "participants", "where", "note", "exclude", "waive", "deviations", "recover", "resync",
         "erase", "relabel", "transfer",

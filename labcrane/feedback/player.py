@@ -46,22 +46,30 @@ def play(study: Study, frames: Sequence[Frame], scene: str, say: Callable[[str],
     orders = [replace(order, recorded=False) for order in host_orders(study, run, source)]
     keepers = [FeedbackHandle(order, "continue") for order in orders]
     try:
-        _wait(keepers, say)
+        wait_for_all(keepers, say, "--to FOLDER writes files instead")
         _present(run, source, frames, scene, [*study.cues, *study.sounds], keepers)
     finally:
         for keeper in keepers:
             keeper.stop()
 
 
-def _wait(keepers: Sequence[FeedbackHandle], say: Callable[[str], None]) -> None:
-    """Wait until each is ready or left out."""
+def wait_for_all(
+    keepers: Sequence[FeedbackHandle], say: Callable[[str], None], instead: str
+) -> None:
+    """Wait until each is ready or left out.
+
+    Raises
+    ------
+    DeviceError
+        All are left out; its words end with what to do ``instead``.
+    """
     while not all(keeper.ready or keeper.given_up for keeper in keepers):
         for keeper in keepers:
             for news in keeper.watch():
                 say(f"feedback {news}")
         time.sleep(LOOK_S)
     if all(keeper.given_up for keeper in keepers):
-        raise DeviceError("nothing can be shown or sounded here; --to FOLDER writes files instead")
+        raise DeviceError(f"nothing can be shown or sounded here; {instead}")
 
 
 def _present(
@@ -82,7 +90,7 @@ def _present(
         about: dict[str, Value] = {"trial": first.trial, "feedback": "+".join(active) or "none"}
         placed = Event(SCENE_PLACED, now, {"things": scene})
         show(first, placed, Event("trial.start", now, about))
-        _hold(lambda: show(first), keepers)
+        hold(lambda: show(first), keepers)
         began = time.perf_counter()
         for frame in frames:
             due = began + frame.tick.due - first.tick.due
@@ -102,7 +110,7 @@ def _send(pushes: Sequence[Callable[[Frame], None]], frame: Frame, *events: Even
         push(sent)
 
 
-def _hold(show: Callable[[], None], keepers: Sequence[FeedbackHandle]) -> None:
+def hold(show: Callable[[], None], keepers: Sequence[FeedbackHandle]) -> None:
     """Show the first frame until all present it, and for a while.
 
     Whoever finds the streams now is told what is switched on within the second.

@@ -88,6 +88,7 @@ class Launcher:
         self._kept: list[Message] = []
         self._owes = False
         self.sync_report: SyncReport | None = None
+        self.outcome: Outcome | None = None
 
     def run(self) -> Outcome:
         """Run the visit to its end and make its participant file.
@@ -138,7 +139,8 @@ class Launcher:
                 report = self.sync_report = finish(visit)
         where = read_whereabouts(visit.whereabouts) if died is not None else None
         owed = still_owed(visit, admission) if self._owes and parts(visit.journal) else ""
-        return Outcome(died, str(where or ""), report, owed)
+        self.outcome = Outcome(died, str(where or ""), report, owed)
+        return self.outcome
 
     @property
     def streams_status(self) -> dict[str, Any]:

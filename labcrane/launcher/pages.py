@@ -9,11 +9,16 @@ from labcrane.errors import ProtocolError
 from labcrane.session.commands import QueueConsole
 
 if TYPE_CHECKING:
-    from labcrane.launcher.launcher import Launcher
+    from labcrane.launcher.launcher import Launcher, Outcome
     from labcrane.protocol.pages import PageSettings
     from labcrane.session.visit import Visit
+    from labcrane.streams.sync.report.sync_report import SyncReport
+    from labcrane.web.state import Ended
 
+MOST_LOGO = 2_000_000
+"""Bytes: every tablet loads it."""
 
+LEVELS = {"PASS": "ok", "WARN": "warn", "FAIL": "bad"}
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 
@@ -46,12 +51,14 @@ def pages(
         cameras_of(visit.study) if feedback else {},
         *_tls(visit.study.path, where),
         recorded=visit.study.recorded,
+        data=visit.folder.path,
     )
     if where.host not in LOOPBACK and order.certificate is None:
         say(
             f"the pages are served on {where.host} without TLS: who listens on that network can "
             "read along; give page: certificate and key"
         )
+    _check_logo(visit.study.path, where)
     handle = PageHandle(order, console.give, say, lambda: launcher.streams_status)
     console.listeners.append(handle.tell)
     for page, link in handle.links().items():
@@ -59,9 +66,61 @@ def pages(
     try:
         yield
     finally:
-        report = launcher.sync_report
-        rows = [" · ".join(row) for row in report.table()] + report.advice() if report else []
-        handle.close(rows)
+        handle.close(left_behind(visit, launcher.outcome, launcher.sync_report))
+
+
+def _check_logo(protocol: Path, where: "PageSettings") -> None:
+    """Raise :class:`ProtocolError` where the logo of the pages is not there, or no picture's size.
+
+    Before anybody sits down: a page with a hole looks broken.
+    """
+    if where.logo is None:
+        return
+    logo = protocol.parent / where.logo
+    if not logo.is_file():
+        raise ProtocolError(f"there is no logo {str(logo)!r}; a path counts from the protocol")
+    if (size := logo.stat().st_size) > MOST_LOGO:
+        raise ProtocolError(
+            f"the logo {str(logo)!r} has {size:,} bytes, and pages show {MOST_LOGO:,} at most; "
+            "make it smaller"
+        )
+
+
+def left_behind(visit: "Visit", outcome: "Outcome | None", report: "SyncReport | None") -> "Ended":
+    """Return what the supervisor is shown at the end of a run; no outcome is that of an error."""
+    from labcrane.streams.sync.report.sync_report import COLUMNS
+    from labcrane.web.state import Ended
+
+    file = visit.folder.participant_file
+    saved = []
+    if file.exists():
+        saved.append(f"participant file: {file} ({file.stat().st_size / 1e6:.1f} MB)")
+    journals = [path for path in sorted(visit.journal.parent.glob("*")) if path.is_file()]
+    saved += [f"journal: {path}" for path in journals if path != file]
+    if not saved:
+        saved.append("nothing: the session had not begun")
+    level, verdict, remedy = _verdict(visit, outcome, report)
+    table = tuple(report.table()) if report else ()
+    advice = tuple(report.advice()) if report else ()
+    return Ended(level, verdict, remedy, tuple(saved), COLUMNS if table else (), table, advice)
+
+
+def _verdict(
+    visit: "Visit", outcome: "Outcome | None", report: "SyncReport | None"
+) -> tuple[str, str, str]:
+    """Return how a run ended, in words, and what to do."""
+    again = f"go on with: {visit.resume_command}"
+    if outcome is None:
+        return "bad", "The run ended with an error", "the terminal says which"
+    if outcome.died is not None:
+        where = f" in {outcome.where}" if outcome.where else ""
+        return "bad", f"The session died{where}; what it recorded until then is saved", again
+    level = LEVELS[report.verdict.value if report else "PASS"]
+    doubt = "" if level == "ok" else "; look at its time stamps"
+    if outcome.owed:
+        worst = "warn" if level == "ok" else level
+        return worst, f"The session is saved{doubt}, and not complete: {outcome.owed}", again
+    return level, f"The session is complete and saved{doubt}", "see below" if doubt else ""
 
 
 def _tls(protocol: Path, where: "PageSettings") -> tuple[Path | None, Path | None]:

@@ -3,11 +3,24 @@
 from pathlib import Path
 from typing import Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from labcrane.core.settings import Settings
 
-Language = Literal["en", "de"]
+Language = Literal["en", "de", "pl", "fr", "es"]
+
+
+PICTURES = (".png", ".jpg", ".jpeg", ".svg")
+READABLE = 4.5
+"""Contrast of words and what they stand on, as WCAG 2.2 asks for at AA."""
+
+
+def contrast_to_white(colour: str) -> float:
+    """Return the contrast of white and ``#rrggbb``, 1 to 21, as WCAG 2.2 defines it."""
+    parts = [int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)]
+    linear = [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in parts]  # noqa: PLR2004 - sRGB's own
+    light = sum(v * weight for v, weight in zip(linear, (0.2126, 0.7152, 0.0722), strict=True))
+    return 1.05 / (light + 0.05)
 
 
 class PageSettings(Settings):
@@ -29,6 +42,36 @@ class PageSettings(Settings):
 
     language: Language = "en"
     """In which the participant's page speaks; questionnaires have languages of their own."""
+
+    one_at_a_time: bool = False
+    """Whether the participant's page shows one question a screen instead of all."""
+
+    colour: str = Field(default="#0d47a1", pattern=r"^#[0-9a-fA-F]{6}$")
+    """The study's colour on the participant's page, as ``#rrggbb``: dark enough for white words to
+    be read on it (4.5 to 1)."""
+
+    logo: Path | None = None
+    """The study's logo on the participant's page, PNG, JPEG or SVG; a path counts from the
+    protocol."""
+
+    @field_validator("colour")
+    @classmethod
+    def _can_be_written_on(cls, colour: str) -> str:
+        if (ratio := contrast_to_white(colour)) < READABLE:
+            raise ValueError(
+                f"white words on {colour} have a contrast of {ratio:.1f} to 1, and need "
+                f"{READABLE:g} to be read; take a darker colour"
+            )
+        return colour
+
+    @field_validator("logo")
+    @classmethod
+    def _is_a_picture(cls, logo: Path | None) -> Path | None:
+        if logo is not None and logo.suffix.lower() not in PICTURES:
+            raise ValueError(
+                f"{str(logo)!r} is no picture that pages show; give {', '.join(PICTURES)}"
+            )
+        return logo
 
     @model_validator(mode="after")
     def _both_or_none(self) -> Self:

@@ -1,12 +1,13 @@
 """Reads back what a session's journals hold."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from labcrane.recording.journal import EVENTS, FRAMES, GROUPS, START, Column
 from labcrane.recording.xdf.reader import XdfFile, XdfStream, read_xdf
@@ -71,6 +72,25 @@ class JournalState:
         return notes
 
 
+@dataclass(frozen=True)
+class Frames:
+    """The frames of one part of a journal; its numbers are read when they are asked for.
+
+    Attributes
+    ----------
+    part
+        Which part of the journal, counted from 1.
+    stream
+        Where they are.
+    columns
+        What a row holds.
+    """
+
+    part: int
+    stream: XdfStream
+    columns: list[Column]
+
+
 @dataclass
 class SessionLog:
     """Frames and events of a session, all parts in order.
@@ -79,16 +99,17 @@ class SessionLog:
     ----------
     columns
         What a row holds; the union over the parts.
-    time, part
-        Per frame, in seconds, and which part it is in; shape ``(n_frames,)``.
-    rows
-        Shape ``(n_frames, n_columns)``; NaN where a part has no such column.
+    time
+        Per frame, in seconds; shape ``(n_frames,)``.
+    frames
+        The parts that hold frames.
+    events
+        In the order of the parts.
     """
 
     columns: list[Column] = field(default_factory=list)
     time: FloatArray = field(default_factory=lambda: np.empty(0))
-    part: FloatArray = field(default_factory=lambda: np.empty(0))
-    rows: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    frames: list[Frames] = field(default_factory=list)
     events: list[LoggedEvent] = field(default_factory=list)
 
     @property
@@ -96,11 +117,34 @@ class SessionLog:
         """What the first part says of the session; empty when it was killed before it did."""
         return next((event.data for event in self.events if event.name == START), {})
 
+    @property
+    def part(self) -> FloatArray:
+        """Which part each frame is in, shape ``(n_frames,)``."""
+        counts = [len(frames.stream.stamps) for frames in self.frames]
+        return np.repeat([float(frames.part) for frames in self.frames], counts)
+
+    @property
+    def rows(self) -> FloatArray:
+        """All numbers, shape ``(n_frames, n_columns)``; NaN where a part has no such column."""
+        whole = np.empty((len(self.time), len(self.columns)))
+        end = 0
+        for block in self.blocks():
+            whole[end : end + len(block)] = block
+            end += len(block)
+        return whole
+
+    def blocks(self) -> Iterator[FloatArray]:
+        """Yield :attr:`rows` in blocks of a few MB, each of shape ``(n, n_columns)``."""
+        for frames in self.frames:
+            for block in frames.stream.blocks():
+                yield _widened(block, frames.columns, self.columns)
+
     def column(self, group: str, label: str) -> FloatArray | None:
         """Return one column of all frames; None if there is none."""
         for number, column in enumerate(self.columns):
             if (column.group, column.label) == (group, label):
-                return self.rows[:, number]
+                parts = [block[:, number].copy() for block in self.blocks()]
+                return np.concatenate(parts) if parts else np.empty(0)
         return None
 
 
@@ -125,22 +169,16 @@ def read_journal(paths: Sequence[Path]) -> tuple[SessionLog, list[JournalState]]
 def merge(files: Iterable[XdfFile]) -> SessionLog:
     """Put the parts of a session's journal together."""
     log = SessionLog()
-    frames: list[tuple[int, XdfStream, list[Column]]] = []
     for part, file in enumerate(files, start=1):
         for stream in file.streams:
             if stream.header.name == EVENTS:
                 log.events += _events(stream, part)
             elif stream.header.name == FRAMES:
-                frames.append((part, stream, _columns(stream)))
-    if not frames:
-        return log
-    for _, _, columns in frames:
-        log.columns += [column for column in columns if column not in log.columns]
-    log.time = _joined([stream.stamps for _, stream, _ in frames])
-    log.part = np.concatenate(
-        [np.full(len(stream.stamps), float(part)) for part, stream, _ in frames]
-    )
-    log.rows = _joined([_widened(stream, columns, log.columns) for _, stream, columns in frames])
+                log.frames.append(Frames(part, stream, _columns(stream)))
+    for frames in log.frames:
+        log.columns += [column for column in frames.columns if column not in log.columns]
+    if log.frames:
+        log.time = _joined([frames.stream.stamps for frames in log.frames])
     return log
 
 
@@ -156,8 +194,10 @@ def _columns(stream: XdfStream) -> list[Column]:
     ]
 
 
-def _widened(stream: XdfStream, columns: list[Column], union: list[Column]) -> FloatArray:
-    data = np.asarray(stream.data, np.float64)
+def _widened(
+    block: npt.NDArray[np.generic], columns: list[Column], union: list[Column]
+) -> FloatArray:
+    data = np.asarray(block, np.float64)
     if columns == union:
         return data
     rows = np.full((len(data), len(union)), np.nan)

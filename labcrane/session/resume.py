@@ -195,9 +195,14 @@ def _with_closing(events: Sequence[LoggedEvent]) -> Iterator[tuple[LoggedEvent, 
 
 
 def _last_angles(log: SessionLog, joints: Sequence[str]) -> tuple[float, ...]:
-    columns = [log.column("state", f"joint.angle.{joint}") for joint in joints]
-    whole = [column for column in columns if column is not None and len(column)]
-    return tuple(float(column[-1]) for column in whole) if len(whole) == len(joints) else ()
+    columns = {(column.group, column.label): at for at, column in enumerate(log.columns)}
+    wanted = [columns.get(("state", f"joint.angle.{joint}")) for joint in joints]
+    last = None
+    for block in log.blocks():
+        last = block[-1].copy()
+    if last is None or None in wanted:
+        return ()
+    return tuple(float(last[at]) for at in wanted if at is not None)
 
 
 def check_recorded(plan: SessionPlan, so_far: Progress) -> None:

@@ -1,7 +1,7 @@
 """A questionnaire on a page: every answer is sent the moment it is given."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from labcrane.core.items import Item
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 from labcrane.web.door.access import PARTICIPANT
 
+HEADING = "role=heading aria-level=2"
 MOST_TICKS = 21
 """A scale with more steps is a field to write into."""
 
@@ -30,52 +31,107 @@ class Form:
         self._page = page
         self._words = context.words(page)
         self._refreshers: list[Callable[[], object]] = []
-        self._shown = -1
+        self._shown: tuple[int, bool] = (-1, False)
+        self._at = 0
+        one = context.study.protocol.page.one_at_a_time
+        self._one_at_a_time = one and page == PARTICIPANT
 
     def build(self) -> None:
         """Build it where the page stands, and keep it up to date."""
         from nicegui import ui  # noqa: PLC0415 - loads for a second
 
-        self._area = ui.column().classes("w-full gap-4")
+        self._area = ui.element("div").classes("form")
         ui.timer(0.1, self.update)
 
     def update(self) -> None:
         """Follow the record."""
         session = self._context.session
-        if session.form_version != self._shown:
-            self._shown = session.form_version
+        shown = session.form_version, session.stage.startswith("ended")
+        if shown != self._shown:
+            self._shown = shown
+            self._at = 0
             self._area.clear()
             self._refreshers.clear()
             with self._area:
-                self._rebuild(session.form)
+                self._rebuild(session.form, over=shown[1])
         for refresh in self._refreshers:
             refresh()
 
-    def _rebuild(self, name: str | None) -> None:
+    def _rebuild(self, name: str | None, *, over: bool) -> None:
         from nicegui import ui  # noqa: PLC0415
 
-        if name is None:
-            wait = ui.label().classes("text-lg").props('id="wait"')
-            session = self._context.session
-            self._refreshers.append(
-                lambda: wait.set_text("" if session.consent else self._words.wait)
-            )
+        session = self._context.session
+        if name is None or over:
+            with ui.element("div").classes("form-calm"):
+                if not over:
+                    ui.element("span").classes("form-breath").props("aria-hidden=true")
+                said = ui.label().props('id="wait" role=status')
+            calm = self._words.thanks if over else self._words.wait
+            self._refreshers.append(lambda: said.set_text("" if session.consent else calm))
             return
         questionnaire = self._context.study.questionnaires[name]
-        ui.label(questionnaire.title).classes("text-2xl font-medium").props("role=heading")
-        for item in questionnaire.items():
-            self._item(name, item)
+        items = list(questionnaire.items())
+        ui.label(questionnaire.title).classes("form-title").props(HEADING)
+        self._progress(items)
+        cards = [self._item(name, item) for item in items]
         refusal = ui.label().classes("text-red-900 text-lg").props('role=alert id="refusal"')
         self._refreshers.append(lambda: refusal.set_text(self._refusal()))
-        ui.button(
-            self._words.hand_in, on_click=lambda: self._context.give(self._page, Order.SUBMIT)
-        ).props('size=lg no-caps color=blue-10 id="submit"')
+        with ui.element("div").classes("form-nav"):
+            hand_in = ui.button(
+                self._words.hand_in, on_click=lambda: self._context.give(self._page, Order.SUBMIT)
+            ).props('size=lg no-caps color=primary id="submit"')
+            if self._one_at_a_time and len(cards) > 1:
+                self._one_by_one(cards, hand_in)
 
-    def _item(self, name: str, item: Item) -> None:
+    def _progress(self, items: "Sequence[Item]") -> None:
         from nicegui import ui  # noqa: PLC0415
 
-        with ui.card().classes("w-full").props(f'role=group id="item-{item.name}"'):
-            ui.label(item.text).classes("text-lg")
+        with ui.element("div").classes("form-progress"):
+            bar = ui.element("progress").props(f"value=0 max={max(1, len(items))}")
+            line = ui.label().props('id="answered" role=status')
+        names = [item.name for item in items]
+
+        def refresh() -> None:
+            done = sum(name in self._context.session.answers for name in names)
+            said = self._words.progress.format(done=done, total=len(names))
+            if line.text != said:
+                line.set_text(said)
+                bar.props["value"] = done
+                bar.props["aria-label"] = said
+                bar.update()
+
+        self._refreshers.append(refresh)
+
+    def _one_by_one(self, cards: "Sequence[ui.element]", hand_in: "ui.button") -> None:
+        """Show one question a screen; what is handed in is still the whole."""
+        from nicegui import ui  # noqa: PLC0415
+
+        def go(step: int) -> None:
+            self._at = min(max(self._at + step, 0), len(cards) - 1)
+
+        back = ui.button(self._words.back, on_click=lambda: go(-1))
+        back.props('size=lg outline no-caps color=primary id="back"')
+        on = ui.button(self._words.on, on_click=lambda: go(1))
+        on.props('size=lg no-caps color=primary id="next"')
+
+        def refresh() -> None:
+            last = self._at == len(cards) - 1
+            for at, card in enumerate(cards):
+                card.set_visibility(at == self._at)
+            back.set_visibility(self._at > 0)
+            on.set_visibility(not last)
+            hand_in.set_visibility(last)
+
+        self._refreshers.append(refresh)
+
+    def _item(self, name: str, item: Item) -> "ui.element":
+        from nicegui import ui  # noqa: PLC0415
+
+        card = ui.element("div").classes("form-item")
+        card.props(f'role=group id="item-{item.name}" aria-labelledby="asked-{item.name}"')
+        with card:
+            with ui.element("p").props(f'id="asked-{item.name}"'):
+                ui.label(item.text)
             if item.kind == "choice":
                 self._choices(
                     name, item, dict(zip(item.choices, item.labels or item.choices, strict=True))
@@ -85,31 +141,33 @@ class Form:
                 self._choices(name, item, {value: f"{value:g}" for value in values})
             else:
                 self._field(name, item)
-            with ui.row().classes("items-center gap-4"):
+            with ui.element("div").classes("form-below"):
                 ui.button(
                     self._words.no_answer, on_click=lambda: self._answer(name, item, None)
-                ).props(f'flat dense no-caps color=grey-9 id="decline-{item.name}"')
-                status = ui.label().classes("text-green-900").props(f'id="status-{item.name}"')
+                ).props(f'flat no-caps color=grey-9 id="decline-{item.name}"')
+                status = ui.label().classes("text-green-900")
+                status.props(f'id="status-{item.name}" role=status')
             self._refreshers.append(lambda: status.set_text(self._status(item)))
+        return card
 
     def _choices(
         self, name: str, item: Item, values: "Mapping[float, str] | Mapping[str, str]"
     ) -> None:
         from nicegui import ui  # noqa: PLC0415
 
-        with ui.row().classes("w-full items-center gap-1"):
-            if item.left:
-                ui.label(item.left).classes("font-medium mr-2")
+        if item.left or item.right:
+            with ui.element("div").classes("form-ends"):
+                ui.label(item.left)
+                ui.label(item.right)
+        with ui.element("div").classes("form-choices"):
             for value, label in values.items():
                 button = ui.button(
                     label, on_click=lambda value=value: self._answer(name, item, value)
                 )
-                button.props('outline dense no-caps padding="6px 7px" color=blue-10')
+                button.props("outline no-caps color=primary aria-pressed=false")
                 ident = value if isinstance(value, str) else label
-                button.props(f'id="{item.name}-{ident}"').classes("min-w-8")
+                button.props(f'id="{item.name}-{ident}"')
                 self._refreshers.append(self._marking(button, item, value))
-            if item.right:
-                ui.label(item.right).classes("font-medium ml-2")
 
     def _marking(self, button: "ui.button", item: Item, value: Value) -> Callable[[], None]:
         marked = [False]
@@ -132,6 +190,7 @@ class Form:
         shown = "" if held is None else f"{held:g}" if isinstance(held, float) else str(held)
         field = ui.input(hint, value=shown).classes("w-full")
         field.props(f'outlined for="{item.name}-field"')
+        field.props["aria-label"] = f"{item.text} {hint}".strip()
 
         sent = [shown]
 
@@ -213,7 +272,9 @@ class ConsentCard:
 
         asked, words = self._context.session.consent, self._context.words(self._page)
         with ui.card().classes("w-full").props('id="consent"'):
-            ui.label(words.consent).classes("text-2xl font-medium").props("role=heading")
+            ui.label(words.consent).classes("text-2xl font-medium").props(
+                "role=heading aria-level=2"
+            )
             ui.label(f"{asked['file']}, {words.version} {version}").props('id="consent-version"')
             if asked["text"]:
                 ui.label(str(asked["text"])).classes("whitespace-pre-wrap text-lg")
@@ -223,4 +284,4 @@ class ConsentCard:
             ui.button(
                 words.take_part if self._page == PARTICIPANT else SIGNED,
                 on_click=lambda: self._context.give(self._page, Order.CONSENT, version),
-            ).props('no-caps size=lg color=blue-10 id="order-consent"')
+            ).props('no-caps size=lg color=primary id="order-consent"')

@@ -1,7 +1,9 @@
 """The launcher's side of the pages: starts their process, starts it again, passes on."""
 
+import math
 import socket
 import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -9,7 +11,8 @@ from labcrane.core.records import Event
 from labcrane.errors import DeviceError
 from labcrane.processes.handle import Patience, ProcessHandle
 from labcrane.session.commands import Command
-from labcrane.web.service import PageConfig, Report, Streams, Used
+from labcrane.web.service import Closed, Opened, PageConfig, Report, Streams, Used
+from labcrane.web.state import Ended
 
 MODULE = "labcrane.web.service"
 
@@ -19,7 +22,11 @@ END_S = 3.0
 """How long the process may take to end by itself."""
 
 LAST_LOOK_S = 0.5
-"""How long a page has to show the end before its process ends."""
+"""How long a page has to show the end before its process ends, where nobody looks at it."""
+
+GONE_S = 10.0
+"""How long no browser may have the supervisor's page before it counts as closed: a reload leaves it
+for a moment, and on a busy computer for some seconds."""
 
 
 class PageHandle:
@@ -49,7 +56,11 @@ class PageHandle:
         self._give = give
         self._say = say
         self._streams = streams
-        self._told: list[Event] = []
+        self._told: list[Event | Report] = []
+        self._browsers = 0
+        self._left_at = -math.inf
+        self._closed = threading.Event()
+        self._given_up = False
         self._over = threading.Event()
         self._lock = threading.Lock()
         patience = Patience(stop_s=END_S, restarts=MOST_RESTARTS)
@@ -78,17 +89,38 @@ class PageHandle:
             self._told.append(event)
             self._process.tell(event)
 
-    def close(self, report: list[str]) -> None:
-        """Show the end, and end the process."""
-        self._process.tell(Report(report))
-        self._over.wait(LAST_LOOK_S)
-        self._over.set()
-        self._watcher.join()
-        self._process.stop()
+    def close(self, ended: Ended) -> None:
+        """Show the end until the supervisor has closed the page, and end the process.
+
+        Where no browser has it, nobody is waited for. An interrupt at the terminal closes it too.
+        """
+        with self._lock:
+            self._told.append(Report(ended))
+            self._process.tell(Report(ended))
+        try:
+            self._over.wait(LAST_LOOK_S)
+            if self._open():
+                self._say("the supervisor's page shows what was saved until it is closed; "
+                          "Ctrl-C closes it from here")  # fmt: skip
+            while self._open():
+                self._over.wait(LOOK_S)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            self._over.set()
+            self._watcher.join()
+            self._process.stop()
+
+    def _open(self) -> bool:
+        """Whether some browser has the supervisor's page, or had it a moment ago."""
+        if self._closed.is_set() or self._given_up:
+            return False
+        return self._browsers > 0 or time.monotonic() - self._left_at < GONE_S
 
     def _watch(self) -> None:
         while not self._over.wait(LOOK_S):
             if self._process.exit_code is not None and not self._restart():
+                self._given_up = True
                 self._say("the page keeps dying; the run goes on without it")
                 return
             if not self._process.waiting:  # the newest status, when all before it has gone
@@ -103,9 +135,15 @@ class PageHandle:
         self._say("the page died and is started again")
         return True
 
-    def _take(self, message: Command | Used) -> None:
+    def _take(self, message: Command | Used | Opened | Closed) -> None:
         if isinstance(message, Used):
             self._order.keys.tokens.pop(message.page, None)
+        elif isinstance(message, Opened):
+            if self._browsers and not message.browsers:
+                self._left_at = time.monotonic()
+            self._browsers = message.browsers
+        elif isinstance(message, Closed):
+            self._closed.set()
         else:
             self._give(message)
 

@@ -5,6 +5,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Sequence
+from statistics import median
 from typing import TYPE_CHECKING
 
 from labcrane.streams.frames import FRAME
@@ -19,6 +20,10 @@ PAUSE_S = 0.02
 RECENT_S = 1.0
 """The lateness that is shown is the worst of this time."""
 
+BAND_S = 0.5
+BANDS = 120
+"""Lateness is kept as the median and the worst of so long, for a minute."""
+
 
 class Live:
     """Keeps the newest value of every signal, and some seconds of history for charts.
@@ -31,6 +36,8 @@ class Live:
         The newest value of each column of a frame: ``state.joint.angle.slew``.
     units
         The unit of each column.
+    moved
+        Columns whose value has changed since the first frame.
     age_s
         How old the newest frame was when it came, in seconds.
     """
@@ -38,7 +45,12 @@ class Live:
     def __init__(self, source: str) -> None:
         self.newest: dict[str, float] = {}
         self.units: dict[str, str] = {}
+        self.moved: set[str] = set()
         self.age_s: float | None = None
+        self._came: float | None = None
+        self._bands: deque[tuple[float, float]] = deque(maxlen=BANDS)
+        self._band: list[float] = []
+        self._band_ends = 0.0
         self._source = source
         self._late: deque[tuple[float, float]] = deque()  # due and lateness of late ticks, in s
         self._history: deque[tuple[float, dict[str, float]]] = deque(
@@ -51,6 +63,16 @@ class Live:
         """How late the latest tick of the last second was, in seconds; None before the first."""
         late = [lateness for _, lateness in list(self._late)]
         return max(late) if late else None
+
+    @property
+    def silent_s(self) -> float | None:
+        """How long no frame has come, in seconds; None before the first."""
+        return None if self._came is None else time.monotonic() - self._came
+
+    @property
+    def bands(self) -> list[tuple[float, float]]:
+        """Median and worst lateness of each half second of the last minute, in seconds."""
+        return list(self._bands)
 
     def history(self, signal: str) -> list[tuple[float, float]]:
         """Return times in seconds before now and values of a signal, oldest first."""
@@ -71,6 +93,7 @@ class Live:
             samples, stamps = frames.pull()
             if stamps:
                 self._take(list(self.units), samples)
+                self._came = time.monotonic()
                 self.age_s = pylsl.local_clock() - stamps[-1]
             time.sleep(PAUSE_S)
 
@@ -85,9 +108,16 @@ class Live:
     def _take(self, columns: Sequence[str], samples: Sequence[Sequence[float]]) -> None:
         due, woke = columns.index("due"), columns.index("woke")
         self._late.extend((sample[due], sample[woke] - sample[due]) for sample in samples)
+        self._band.extend(max(0.0, sample[woke] - sample[due]) for sample in samples)
         newest = dict(zip(columns, samples[-1], strict=True))
+        if newest["due"] >= self._band_ends:
+            self._bands.append((median(self._band), max(self._band)))
+            self._band, self._band_ends = [], newest["due"] + BAND_S
         while self._late[0][0] < newest["due"] - RECENT_S:
             self._late.popleft()
+        self.moved |= {
+            name for name, value in newest.items() if self.newest.get(name, value) != value
+        }
         self.newest = newest
         if not self._history or newest["due"] - self._history[-1][0] >= 1.0 / CHART_HZ:
             self._history.append((newest["due"], newest))

@@ -11,10 +11,17 @@ from labcrane.web.door.access import PARTICIPANT, RIGHTS
 from labcrane.web.door.denials import Bucket
 from labcrane.web.live import Live
 from labcrane.web.pictures import Pictures
+from labcrane.web.room.earlier import Earlier
+from labcrane.web.room.shown import ShownShapes
 from labcrane.web.state import SessionView
 from labcrane.web.translations import WORDS, Words
 
 MOST_ORDERS_S = LIMITS["orders of one page"].most
+
+
+def _nothing() -> None:
+    """Do nothing."""
+
 
 PRIMARY = "#0d47a1"
 """The pages' colour for what has the focus, 8.6 to 1 on white; the usual one is too faint."""
@@ -30,6 +37,12 @@ class PageContext:
         Passes a command on to the launcher.
     denied
         Told of what was refused.
+    shown
+        What is to be seen beside the machine.
+    earlier
+        What was measured before, to compare the newest movements with.
+    close
+        Ends the pages, when the supervisor has seen the end.
     buckets
         How many orders each page may give now.
     participant
@@ -44,6 +57,9 @@ class PageContext:
     pictures: Pictures
     send: Callable[[Command], None]
     denied: Callable[[str], None]
+    shown: ShownShapes
+    earlier: Earlier = field(default_factory=Earlier)
+    close: Callable[[], None] = _nothing
     buckets: dict[str, Bucket] = field(
         default_factory=lambda: {page: Bucket(MOST_ORDERS_S, 2 * MOST_ORDERS_S) for page in RIGHTS}
     )
@@ -71,6 +87,13 @@ class PageContext:
         why = f"the {page} page asked for {order.value}: {why}"
         self.denied(why)
         return why
+
+
+def speak(language: str) -> None:
+    """Say in which language the page is that is being built: screen readers pronounce by it."""
+    from nicegui import ui  # noqa: PLC0415
+
+    ui.add_head_html(f"<script>document.documentElement.lang = {language!r}</script>")
 
 
 def _address() -> str:

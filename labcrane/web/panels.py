@@ -1,4 +1,4 @@
-"""Panels of the supervisor's page: performance, joint torques, and the views' cameras."""
+"""Panels of the supervisor's page: loads in words, and the views' cameras."""
 
 import math
 from functools import partial
@@ -11,40 +11,9 @@ from labcrane.web.page import PageContext
 if TYPE_CHECKING:
     from nicegui import ui
 
-RATE_S = 0.25
 LOAD = "state.joint.load"
 SHARE = "1"
 """The unit of loads that are shares of the joints' efforts, with the sign of the torque."""
-
-
-class Loads:
-    """A line for each joint, as long as the machine's state has loads; nothing otherwise."""
-
-    def __init__(self, context: PageContext) -> None:
-        self._context = context
-
-    def build(self) -> None:
-        """Build it where the page stands, and keep it up to date."""
-        from nicegui import ui  # noqa: PLC0415 - loads for a second
-
-        joints = self._context.study.machine.joints
-        with ui.element("div").classes("w-full") as self._all:
-            ui.label("Torques").classes("font-medium")
-            with ui.element("div").classes("grid grid-cols-[auto_1fr] gap-x-4 font-mono text-sm"):
-                self._values = {}
-                for joint in joints:
-                    ui.label(joint.name)
-                    self._values[joint.name] = ui.label().props(f'id="load-{joint.name}"')
-        self._update()
-        ui.timer(RATE_S, self._update)
-
-    def _update(self) -> None:
-        live = self._context.live
-        self._all.set_visibility(any(column.startswith(LOAD) for column in live.newest))
-        for joint in self._context.study.machine.joints:
-            column = f"{LOAD}.{joint.name}"
-            load, unit = live.newest.get(column, math.nan), live.units.get(column, SHARE)
-            self._values[joint.name].set_text(said(load, unit, joint))
 
 
 class Reports:
@@ -68,7 +37,7 @@ class Reports:
                 ui.button(
                     words.seen(what),
                     on_click=partial(self._context.give, self._page, Order.REPORT, what),
-                ).props(f'size=lg no-caps color=blue-10 id="report-{what}"')
+                ).props(f'size=lg no-caps color=primary id="report-{what}"')
             self._said = ui.label().classes("text-lg").props('id="reported" role=status')
         self._update()
         ui.timer(RATE_S, self._update)
@@ -77,31 +46,6 @@ class Reports:
         session = self._context.session
         self._all.set_visibility(bool(session.trial))
         self._said.set_text(", ".join(map(self._context.words(self._page).heard, session.reported)))
-
-
-class PerformancePanel:
-    """The indicator's panel of the page; nothing where no task counts mistakes."""
-
-    def __init__(self, context: PageContext) -> None:
-        self._context = context
-
-    def build(self) -> None:
-        """Build it where the page stands, and keep it up to date."""
-        from nicegui import ui  # noqa: PLC0415 - loads for a second
-
-        with ui.card().classes("w-full") as self._all:
-            ui.label("Performance").classes("font-medium")
-            self._text = ui.label().classes("whitespace-pre-wrap font-mono text-sm")
-            self._text.props('id="performance" role=status')
-        self._update()
-        ui.timer(RATE_S, self._update)
-
-    def _update(self) -> None:
-        context = self._context
-        assessment = context.session.assessment
-        lines = assessment.lines(context.live.newest, context.study.protocol.indicator)
-        self._all.set_visibility(bool(lines))
-        self._text.set_text("\n".join(lines))
 
 
 def said(load: float, unit: str, joint: Joint) -> str:

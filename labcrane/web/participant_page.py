@@ -1,18 +1,28 @@
 """The participant's page: consent, the questionnaire that is asked, what may be reported."""
 
+from pathlib import Path
+
 from labcrane.web.door.access import PARTICIPANT
 from labcrane.web.form import ConsentCard, Form
-from labcrane.web.page import PRIMARY, PageContext
+from labcrane.web.page import PageContext, speak
 from labcrane.web.panels import Reports
+
+STYLE = Path(__file__).with_name("form.css")
 
 
 def participant_page(context: PageContext) -> None:
     """Build the page."""
     from nicegui import ui  # noqa: PLC0415 - loads for a second
 
-    ui.page_title("labcrane")
-    ui.colors(primary=PRIMARY)
-    with ui.column().classes("w-full max-w-4xl mx-auto p-4"):
+    page = context.study.protocol.page
+    ui.page_title(context.study.protocol.title or "labcrane")
+    ui.colors(primary=page.colour)
+    ui.add_css(STYLE)
+    speak(page.language)
+    with ui.column().classes("w-full max-w-4xl mx-auto p-4 gap-4").props("role=main"):
+        if page.logo is not None:
+            logo = ui.element("img").classes("form-logo")
+            logo.props["src"], logo.props["alt"] = "/logo", context.study.protocol.title
         ConsentCard(context, PARTICIPANT).build()
         Form(context, PARTICIPANT).build()
         Reports(context, PARTICIPANT).build()

@@ -1,28 +1,28 @@
-"""The machine in three dimensions, from its joint angles."""
+"""The machine in three dimensions: its links as they look, targets, cues and what stands around."""
 
-import itertools
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 
-import numpy as np
-
-from labcrane.machines.kinematics import link_frames
-from labcrane.machines.machine import Machine
+from labcrane.core.records import Run
+from labcrane.machines.links import link_boxes
 from labcrane.web.page import PageContext
+from labcrane.web.room.model import MachineModel, span
 from labcrane.web.surroundings import Surroundings
 
 RATE_S = 0.1
-THICK = 0.04
-"""Of a beam, as a share of the machine's reach."""
+BACKGROUND = "#27303b"
+"""Neither glares in a dim laboratory nor hides the machine on a bright desk."""
 
-UPRIGHT = 1e-9
-"""Below this a link stands upright, and every direction across it is as good."""
-
-TARGET = tuple(f"task.target.position.{axis}" for axis in "xyz")
+CAMERAS: Mapping[str, tuple[float, float, float]] = {
+    "free": (1.1, -1.6, 1.1),
+    "side": (0.0, -2.2, 0.4),
+    "above": (0.01, -0.01, 2.4),
+    "behind": (-1.6, 0.0, 0.9),
+}
+"""Where cameras stand, as shares of the machine's reach; any can be moved with the mouse."""
 
 
 class Scene:
-    """Draws a beam for each link, the tip, the target if there is one, and what stands around."""
+    """Follows a session: pose, targets, cues and what stands around."""
 
     def __init__(self, context: PageContext) -> None:
         self._context = context
@@ -32,56 +32,56 @@ class Scene:
         from nicegui import ui  # noqa: PLC0415 - loads for a second
 
         machine = self._context.study.machine
-        rest = machine.rest
-        points = _points(machine, rest)
-        span = float(np.abs(points).max())
-        thick = THICK * span
-        with ui.scene(grid=(round(2 * span), 20), background_color="#eef2f6").classes(
-            "w-full h-72"
-        ) as scene:
-            self._beams = [
-                scene.box(float(np.linalg.norm(b - a)) or 0.01, thick, thick).material("#b45309")
-                for a, b in itertools.pairwise(points)
-            ]
-            self._tip = scene.sphere(thick / 2).material("#111827")
-            self._target = scene.sphere(0.8 * thick).material("#15803d", opacity=0.6)
-        scene.move_camera(
-            x=1.1 * span, y=-1.6 * span, z=1.1 * span, look_at_z=0.2 * span, duration=0
-        )
-        self._surroundings = Surroundings(self._context, scene)
-        self._place(points)
+        self._span = span(machine)
+        with ui.row().classes("gap-2 mb-2").props('role=group aria-label="Cameras"'):
+            for name in CAMERAS:
+                ui.element("button").classes("room-button").props(
+                    f'type=button id="look-{name}"'
+                ).on("click", lambda _, name=name: self._look(name)).add_slot(
+                    "default", f"<span>{name}</span>"
+                )
+        with (
+            ui.element("div")
+            .classes("w-full")
+            .props('role=img aria-label="The machine as the session has it"')
+        ):
+            self._canvas = ui.scene(
+                grid=(round(2 * self._span), 20), background_color=BACKGROUND
+            ).classes("w-full")
+        self._look("free", seconds=0.0)
+        self._surroundings = Surroundings(self._canvas)
+        self._model = MachineModel(self._canvas, machine, link_boxes(machine))
+        self._model.place(machine.rest, {})
+        self._run: Run | None = None
+        self._placed: tuple[object, ...] = ()
         ui.timer(RATE_S, self._update)
 
+    def _look(self, name: str, seconds: float = 0.5) -> None:
+        x, y, z = (self._span * share for share in CAMERAS[name])
+        self._canvas.move_camera(x=x, y=y, z=z, look_at_z=0.2 * self._span, duration=seconds)
+
     def _update(self) -> None:
-        machine, newest = self._context.study.machine, self._context.live.newest
+        context = self._context
+        machine, newest = context.study.machine, context.live.newest
+        self._follow_run()
         angles = [newest.get(f"state.joint.angle.{name}") for name in machine.names]
         given = [angle for angle in angles if angle is not None]
-        if len(given) == len(angles):
-            self._place(_points(machine, given))
-        self._surroundings.update()
+        if len(given) == len(angles) and (*given,) != self._placed:
+            self._placed = (*given,)
+            state = {
+                name.removeprefix("state."): value
+                for name, value in newest.items()
+                if name.startswith("state.")
+            }
+            self._model.place(given, state)
+        self._model.show(context.shown.shapes(newest))
+        self._surroundings.update(context.session.things, newest)
 
-    def _place(self, points: "Sequence[np.ndarray]") -> None:
-        for beam, a, b in zip(self._beams, points, points[1:], strict=False):
-            beam.move(*((a + b) / 2).tolist())
-            beam.rotate_R(_along(b - a))
-        self._tip.move(*points[-1].tolist())
-        where = [self._context.live.newest.get(name, math.nan) for name in TARGET]
-        known = all(map(math.isfinite, where))
-        self._target.visible(known)
-        if known:
-            self._target.move(*where)
-
-
-def _points(machine: Machine, angles: Sequence[float]) -> "list[np.ndarray]":
-    """Return where the joints are, shape ``(3,)`` each, in m, base first."""
-    return [pose[:3, 3] for pose in link_frames(machine, angles)]
-
-
-def _along(way: "np.ndarray") -> list[list[float]]:
-    """Return the rotation that turns the x axis along ``way``, row by row."""
-    length = float(np.linalg.norm(way))
-    x = way / length if length else np.array([1.0, 0.0, 0.0])
-    side = np.cross([0.0, 0.0, 1.0], x)
-    across = float(np.linalg.norm(side))
-    y = side / across if across > UPRIGHT else np.array([0.0, 1.0, 0.0])
-    return [list(row) for row in np.column_stack([x, y, np.cross(x, y)]).tolist()]
+    def _follow_run(self) -> None:
+        """Draw what the machine really looks like, as soon as the session has told."""
+        run = self._context.shown.run
+        if run is not None and run is not self._run:
+            self._run, self._placed = run, ()
+            self._model.remove()
+            self._model = MachineModel(self._canvas, run.machine, run.bodies)
+            self._model.place(run.machine.rest, {})

@@ -26,7 +26,9 @@ from labcrane.web.door.denials import Denials
 from labcrane.web.live import Live
 from labcrane.web.page import PageContext
 from labcrane.web.pictures import Pictures
-from labcrane.web.state import SessionView
+from labcrane.web.room.earlier import Earlier, read_behind
+from labcrane.web.room.shown import ShownShapes
+from labcrane.web.state import Ended, SessionView
 
 FORBIDDEN, NOT_FOUND = 403, 404
 NICENESS = 5
@@ -57,6 +59,8 @@ class PageConfig:
         Which session's LSL streams are shown: ``"aiming/P001/ses-01"``.
     cameras
         Names of the cameras whose pictures are shown, by the view that sends them.
+    data
+        The participant's folder, beside those of the others; None for no comparison.
     certificate, key
         Of the lab, in PEM; without them the pages are served without TLS.
     """
@@ -73,6 +77,7 @@ class PageConfig:
     key: Path | None = None
     keys: Keys = field(default_factory=Keys)
     recorded: bool = False
+    data: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +96,21 @@ class Streams:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """Said by the launcher at the end: the lines of the sync report."""
+    """Said by the launcher at the end: what the session left behind."""
 
-    lines: list[str]
+    ended: Ended
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """Said to the launcher: the supervisor's page is open in some browser, or in none."""
+
+    browsers: int
+
+
+@dataclass(frozen=True, slots=True)
+class Closed:
+    """Said to the launcher: the supervisor has seen the end, and closed the page."""
 
 
 def main() -> int:
@@ -121,12 +138,26 @@ def serve(order: PageConfig, parent: Parent) -> None:
     plan = plan_session(study, order.participant, order.session)
     denials = Denials(lambda why: parent.tell(Command(Order.DENIED, why, "page")))
     live, pictures = Live(order.source), Pictures(order.source, order.cameras)
-    view = SessionView()
+    view, shown = SessionView(), ShownShapes(study.cues)
+    shown.follow(order.source)
+    measures = [
+        name for task in study.tasks.values() for one in task.results for name in one.columns
+    ]
     context = PageContext(
-        study, plan, order.folder_name, view, live, pictures, parent.tell, denials
+        study,
+        plan,
+        order.folder_name,
+        view,
+        live,
+        pictures,
+        parent.tell,
+        denials,
+        shown,
+        _earlier(order, study.protocol.study, measures),
+        close=lambda: parent.tell(Closed()),
     )
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    _routes(app, context)
+    _routes(app, context, lambda browsers: parent.tell(Opened(browsers)))
     ui.run_with(app, title="labcrane", show_welcome_message=False, message_history_length=MISSED)
     secure = order.certificate is not None
     gate = Gate(app, order.keys, lambda page: parent.tell(Used(page)), denials, secure=secure)
@@ -151,6 +182,13 @@ def serve(order: PageConfig, parent: Parent) -> None:
     pictures.close()
 
 
+def _earlier(order: PageConfig, study: str, measures: list[str]) -> Earlier:
+    """Return what was measured before, as far as there are files to read it from."""
+    if order.data is None:
+        return Earlier()
+    return read_behind(order.data, study, order.session, measures)
+
+
 def _count(denials: Denials) -> None:
     """Tell once a second what else was refused."""
     while True:
@@ -163,35 +201,40 @@ def _listen(parent: Parent, view: SessionView, end: Callable[[], None]) -> None:
         if isinstance(message, Event):
             view.take(message)
         elif isinstance(message, Streams):
-            view.streams = message.status
+            view.hear_of_streams(message.status)
         elif isinstance(message, Report):
-            view.sync_report = message.lines
+            view.ended = message.ended
     end()
 
 
-def _routes(app: Any, context: PageContext) -> None:
+def _routes(app: Any, context: PageContext, opened: Callable[[int], None]) -> None:
     from fastapi import Request, Response  # noqa: PLC0415
-    from nicegui import ui  # noqa: PLC0415
+    from nicegui import Client, ui  # noqa: PLC0415
 
     from labcrane.web.examiner_page import supervisor_page  # noqa: PLC0415
     from labcrane.web.participant_page import participant_page  # noqa: PLC0415
 
+    browsers: set[str] = set()
+
+    def came(client: Client) -> None:
+        browsers.add(client.id)
+        opened(len(browsers))
+
+    def went(client: Client) -> None:
+        browsers.discard(client.id)
+        opened(len(browsers))
+
     @ui.page("/supervisor", reconnect_timeout=AWAY_S)
-    def supervisor() -> None:
+    def supervisor(client: Client) -> None:
+        client.on_connect(came)
+        client.on_disconnect(went)
         supervisor_page(context)
 
     @ui.page("/participant", reconnect_timeout=AWAY_S)
     def participant() -> None:
         participant_page(context)
 
-    @app.get("/consent")  # type: ignore[untyped-decorator]  # app may be any ASGI app
-    def consent() -> Response:
-        """Give the approved consent text, as it is asked for; no other file can be had."""
-        if not context.session.consent:
-            return Response("no consent is asked for", NOT_FOUND)
-        text = read_lock(context.study.path).consent
-        kind, _ = mimetypes.guess_type(text.name)
-        return Response(text.read_bytes(), media_type=kind or "application/octet-stream")
+    _files(app, context)
 
     @app.post("/orders/{word}")  # type: ignore[untyped-decorator]  # app may be any ASGI app
     async def order(word: str, request: Request) -> Response:
@@ -206,6 +249,29 @@ def _routes(app: Any, context: PageContext) -> None:
         ):
             return Response(why, FORBIDDEN)
         return Response(status_code=202)
+
+
+def _files(app: Any, context: PageContext) -> None:
+    """Serve the two files of the study that pages show, and no other one."""
+    from fastapi import Response  # noqa: PLC0415
+
+    @app.get("/consent")  # type: ignore[untyped-decorator]  # app may be any ASGI app
+    def consent() -> Response:
+        """Give the approved consent text, as it is asked for; no other file can be had."""
+        if not context.session.consent:
+            return Response("no consent is asked for", NOT_FOUND)
+        text = read_lock(context.study.path).consent
+        kind, _ = mimetypes.guess_type(text.name)
+        return Response(text.read_bytes(), media_type=kind or "application/octet-stream")
+
+    @app.get("/logo")  # type: ignore[untyped-decorator]  # app may be any ASGI app
+    def logo() -> Response:
+        """Give the study's own logo."""
+        named = context.study.protocol.page.logo
+        if named is None:
+            return Response("the study has no logo", NOT_FOUND)
+        kind, _ = mimetypes.guess_type(named.name)
+        return Response((context.study.path.parent / named).read_bytes(), media_type=kind)
 
 
 if __name__ == "__main__":

@@ -3,13 +3,52 @@
 import json
 from collections import Counter, deque
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from labcrane.core.records import Event, Value, is_done
 from labcrane.web.assessment import Assessment
 
-KEPT = 200
+KEPT = 500
 """Newest events that a page can show."""
+
+RATES = 60
+"""How many of the newest rates of each stream are kept."""
+
+STAGES = {
+    "consent.needed": "waits for the participant's consent",
+    "consent.given": "starting",
+    "trial.start": "trial",
+    **dict.fromkeys(("step.end", "questionnaire.end", "break.end"), "between steps"),
+}
+"""Where the session stands after an event that says nothing more of it."""
+
+LOST = {"input": "the controls", "disk": "the disk", "stream": "stream", "feedback": ""}
+"""What can be lost, and what it is called."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """What a session left behind, as its page shows it.
+
+    Attributes
+    ----------
+    level, verdict, remedy
+        How it ended: ``"ok"``, ``"warn"`` or ``"bad"``, in words, and what to do about it.
+    saved
+        What was saved and where, a line each.
+    columns, rows, advice
+        The sync report.
+    """
+
+    level: str
+    verdict: str
+    remedy: str = ""
+    saved: tuple[str, ...] = ()
+    columns: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+    advice: tuple[str, ...] = ()
+
 
 ROUTINE = ("trial.", "order.", "questionnaire.", "step.", "block.", "pause.", "session.", "signal.")
 """Beginnings of event names that are no counts of a trial."""
@@ -37,10 +76,18 @@ class SessionView:
         What the recorder says of the streams of others.
     consent
         What is asked before the session: file, version and text; nothing when none is.
-    sync_report
-        Lines of the session's sync report, at its end.
     reported
         What was reported as seen in the running trial, in the order in which it came.
+    rates
+        The newest rates of each stream, in Hz, oldest first; None where none is known.
+    faults
+        What is lost now, in words, by what it is.
+    settings
+        Settings that were changed, by name of the cue or sound.
+    rows
+        What was measured in each trial that is counted and over, oldest first.
+    ended
+        What the session left behind; None before its end.
     assessment
         The performance indicator as it stands.
     """
@@ -60,9 +107,13 @@ class SessionView:
         self.refusal = ""
         self.refused_item = ""
         self.streams: Mapping[str, Any] = {}
-        self.sync_report: list[str] = []
-        self.last_trial: Mapping[str, Value] = {}
         self.reported: list[str] = []
+        self.rates: dict[str, deque[float | None]] = {}
+        self.faults: dict[str, str] = {}
+        self.settings: dict[str, dict[str, Value]] = {}
+        self.rows: list[Mapping[str, Value]] = []
+        self.ended: Ended | None = None
+        self.last_trial: Mapping[str, Value] = {}
         self.alarm = ""
         self.consent: Mapping[str, Value] = {}
         self.assessment = Assessment()
@@ -92,33 +143,48 @@ class SessionView:
                 )
             case _ if self.trial and not event.name.startswith(ROUTINE):
                 self.counts[event.name] += 1
-        if event.name == "order.report" and event.data["refused"] is None:
-            self.reported.append(str(event.data["text"]))
         if event.name == "session.standing":
             self.trials_done = int(str(event.data["done"]))
+        if kind in LOST:
+            self._fault(kind, what, event.data)
         self._stage(event)
         self.version += 1
 
+    def hear_of_streams(self, status: Mapping[str, Any]) -> None:
+        """Take in what the recorder says now of the streams of others."""
+        self.streams = status
+        for stream in status.get("streams", ()):
+            kept = self.rates.setdefault(stream["label"], deque(maxlen=RATES))
+            kept.append(stream.get("rate_hz"))
+
+    def _fault(self, kind: str, what: str, data: Mapping[str, Value]) -> None:
+        """Note what was lost, is back, or stands at another value."""
+        name = str(data.get("what", ""))
+        key = f"{kind} {name}".strip()
+        if (kind, what) == ("feedback", "setting"):
+            mine = self.settings.setdefault(str(data["feedback"]), {})
+            mine[str(data["key"])] = data["value"]
+        elif what == "lost":
+            why = f": {data['why']}" if data.get("why") else ""
+            self.faults[key] = f"{LOST[kind]} {name}".strip() + " failed" + why
+        elif what in {"back", "ready"}:
+            self.faults.pop(key, None)
+
     def _stage(self, event: Event) -> None:
+        self.stage = STAGES.get(event.name, self.stage)
         match event.name:
-            case "consent.needed":
-                self.stage = "waits for the participant's consent"
-            case "consent.given":
-                self.stage = "starting"
             case "waiting":
                 self.stage = f"waits to start: {event.data['what']}"
-            case "trial.start":
-                self.stage = "trial"
             case "break.start":
                 self.stage = f"break of {event.data['seconds']} s"
             case "questionnaire.start":
                 self.stage = f"questionnaire: {event.data['title']}"
             case "session.end":
                 self.stage = f"ended: {event.data['reason']}"
-            case "step.end" | "questionnaire.end" | "break.end":
-                self.stage = "between steps"
             case "pause.end":
                 self.alarm = ""
+            case "order.report" if event.data["refused"] is None:
+                self.reported.append(str(event.data["text"]))
 
     def _trial(self, what: str, data: Mapping[str, Value]) -> None:
         if what == "start":
@@ -129,6 +195,8 @@ class SessionView:
             self.trial, self.things = {}, ""
             self.last_trial = data
             self.trials_done += is_done(data)
+            if is_done(data):
+                self.rows.append(data)
 
     def _form(self, what: str, data: Mapping[str, Value]) -> None:
         match what:

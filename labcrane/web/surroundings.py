@@ -1,7 +1,7 @@
 """Surroundings of the machine: objects and the human figure, where they are now."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +10,7 @@ from labcrane.machines.human_figure import Geom, ShapeKind
 from labcrane.machines.jointed_body import Segment, beside, segments, stands
 from labcrane.machines.scene import PlacedObject
 from labcrane.machines.scene_codec import read_placed
-from labcrane.web.page import PageContext
+from labcrane.web.room.model import rotation
 
 if TYPE_CHECKING:
     from nicegui import ui
@@ -33,15 +33,13 @@ class Surroundings:
     ``scene.NAME.position`` and ``.orientation``. What has none stays where it was placed.
     """
 
-    def __init__(self, context: PageContext, canvas: "ui.scene") -> None:
-        self._context = context
+    def __init__(self, canvas: "ui.scene") -> None:
         self._canvas = canvas
         self._drawn = ""
         self._groups: dict[str, Group] = {}
 
-    def update(self) -> None:
-        """Follow the session."""
-        things = self._context.session.things
+    def update(self, things: str, newest: Mapping[str, float]) -> None:
+        """Show what is placed, where it is in the newest frame, by the frame's columns."""
         if things != self._drawn:
             self._drawn = things
             for group in self._groups.values():
@@ -51,13 +49,12 @@ class Surroundings:
                 for placed in read_placed(things)
                 for segment in segments(placed)
             }
-        newest = self._context.live.newest
         for name, group in self._groups.items():
             where = [newest.get(f"state.scene.{name}.position.{axis}", math.nan) for axis in "xyz"]
             turn = [newest.get(f"state.scene.{name}.orientation.{q}", math.nan) for q in "xyzw"]
             if all(map(math.isfinite, (*where, *turn))):
                 group.move(*where)
-                group.rotate_R(_rotation(turn))
+                group.rotate_R(rotation(turn))
 
     def _draw(self, placed: PlacedObject, segment: Segment) -> "Group":
         first = segment.parts[0]
@@ -87,13 +84,3 @@ class Surroundings:
 def _about_z(yaw: float) -> Rows:
     cos, sin = math.cos(yaw), math.sin(yaw)
     return [[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]
-
-
-def _rotation(turn: Sequence[float]) -> Rows:
-    """Return the rotation of a unit quaternion x, y, z, w."""
-    x, y, z, w = turn
-    return [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]

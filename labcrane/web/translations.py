@@ -8,11 +8,57 @@ from labcrane.protocol.pages import Language
 
 
 @dataclass(frozen=True, slots=True)
+class Phrases:
+    """How one language says what an item takes, and why an answer was not taken.
+
+    Attributes
+    ----------
+    one_of, span, stepped
+        Patterns: ``{names}``; ``{low}`` and ``{high}``; and ``{span}`` with ``{step}``.
+    text
+        What an item of words takes.
+    lacking, personal, possible
+        What is said of a questionnaire with gaps, of words that name somebody, and of a value that
+        an item does not take: the last with ``{takes}``.
+    """
+
+    one_of: str
+    span: str
+    stepped: str
+    text: str
+    lacking: str
+    personal: str
+    possible: str
+
+    def takes(self, item: Item) -> str:
+        """Return what an item takes."""
+        if item.kind == "choice":
+            return self.one_of.format(names=", ".join(item.labels or item.choices))
+        if item.kind == "text":
+            return self.text
+        span = self.span.format(low=f"{item.lowest:g}", high=f"{item.highest:g}")
+        return self.stepped.format(span=span, step=f"{item.step:g}") if item.step else span
+
+    def refused(self, why: str, item: Item | None) -> str:
+        """Return why an answer was not taken; ``why`` is in the record's language, English."""
+        del why
+        if item is None:
+            return self.lacking
+        return (
+            self.personal if item.kind == "text" else self.possible.format(takes=self.takes(item))
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Words:
     """One language.
 
     Attributes
     ----------
+    wait, thanks
+        What is said while there is nothing to answer, and when the session is over.
+    progress
+        A pattern with ``{done}`` and ``{total}``.
     takes
         Says what an item takes.
     refused
@@ -24,6 +70,10 @@ class Words:
     """
 
     wait: str
+    thanks: str
+    progress: str
+    back: str
+    on: str
     no_answer: str
     hand_in: str
     saved: str
@@ -39,30 +89,63 @@ class Words:
     heard: Callable[[str], str]
 
 
-NAMES_GERMAN = {"deformity": "Verformung"}
+NAMES: Mapping[Language, Mapping[str, str]] = {
+    "de": {"deformity": "Verformung"},
+    "pl": {"deformity": "zniekształcenie"},
+    "fr": {"deformity": "déformation"},
+    "es": {"deformity": "deformidad"},
+}
 """Of what the bundled tasks ask about."""
 
 
-def _takes_german(item: Item) -> str:
-    if item.kind == "choice":
-        return f"eines von {', '.join(item.labels or item.choices)}"
-    if item.kind == "text":
-        return "Worte"
-    span = f"{item.lowest:g} bis {item.highest:g}"
-    return f"{span} in Schritten von {item.step:g}" if item.step else span
+def _named(language: Language, pattern: str) -> Callable[[str], str]:
+    """Return what says a pattern of what is reported, by its name in a language."""
+    return lambda what: pattern.format(what=NAMES.get(language, {}).get(what, what))
 
 
-def _refused_german(why: str, item: Item | None) -> str:
-    del why  # it is in the record's language
-    if item is None:
-        return "Es fehlen noch Antworten: bitte antworten oder „Keine Angabe“ wählen"
-    if item.kind == "text":
-        return "Bitte ohne E-Mail-Adresse und Telefonnummer schreiben"
-    return f"Möglich ist {_takes_german(item)}"
-
+GERMAN_PHRASES = Phrases(
+    one_of="eines von {names}",
+    span="{low} bis {high}",
+    stepped="{span} in Schritten von {step}",
+    text="Worte",
+    lacking="Es fehlen noch Antworten: bitte antworten oder „Keine Angabe“ wählen",
+    personal="Bitte ohne E-Mail-Adresse und Telefonnummer schreiben",
+    possible="Möglich ist {takes}",
+)
+POLISH_PHRASES = Phrases(
+    one_of="jedna z odpowiedzi: {names}",
+    span="od {low} do {high}",
+    stepped="{span} co {step}",
+    text="tekst",
+    lacking="Brakuje jeszcze odpowiedzi: proszę odpowiedzieć albo wybrać „Bez odpowiedzi”",
+    personal="Proszę pisać bez adresu e-mail i numeru telefonu",
+    possible="Możliwa odpowiedź: {takes}",
+)
+FRENCH_PHRASES = Phrases(
+    one_of="l’une des réponses : {names}",
+    span="de {low} à {high}",
+    stepped="{span} par pas de {step}",
+    text="du texte",
+    lacking="Il manque encore des réponses : répondez ou choisissez « Sans réponse »",
+    personal="Écrivez sans adresse e-mail ni numéro de téléphone",
+    possible="Réponse possible : {takes}",
+)
+SPANISH_PHRASES = Phrases(
+    one_of="una de las respuestas: {names}",
+    span="de {low} a {high}",
+    stepped="{span} en pasos de {step}",
+    text="texto",
+    lacking="Aún faltan respuestas: responda o elija «Sin respuesta»",
+    personal="Escriba sin correo electrónico ni número de teléfono",
+    possible="Respuesta posible: {takes}",
+)
 
 ENGLISH = Words(
     wait="Please wait. There is nothing to answer now.",
+    thanks="Thank you for taking part. The session is over, and nothing more is to be done here.",
+    progress="{done} of {total} answered",
+    back="Back",
+    on="Next",
     no_answer="No answer",
     hand_in="Hand in",
     saved="saved",
@@ -74,12 +157,16 @@ ENGLISH = Words(
     open_file="Open",
     takes=lambda item: item.takes,
     refused=lambda why, item: why,
-    seen=lambda what: f"I see: {what}",
-    heard=lambda what: f"{what}: reported",
+    seen=_named("en", "I see: {what}"),
+    heard=_named("en", "{what}: reported"),
 )
 
 GERMAN = Words(
     wait="Bitte warten. Im Moment ist nichts zu beantworten.",
+    thanks="Vielen Dank für Ihre Teilnahme. Die Sitzung ist zu Ende; hier ist nichts mehr zu tun.",
+    progress="{done} von {total} beantwortet",
+    back="Zurück",
+    on="Weiter",
     no_answer="Keine Angabe",
     hand_in="Abgeben",
     saved="gespeichert",
@@ -89,10 +176,79 @@ GERMAN = Words(
     version="Fassung",
     take_part="Ich habe diesen Text gelesen und nehme teil",
     open_file="Öffnen:",
-    takes=_takes_german,
-    refused=_refused_german,
-    seen=lambda what: f"Ich sehe: {NAMES_GERMAN.get(what, what)}",
-    heard=lambda what: f"{NAMES_GERMAN.get(what, what)}: gemeldet",
+    takes=GERMAN_PHRASES.takes,
+    refused=GERMAN_PHRASES.refused,
+    seen=_named("de", "Ich sehe: {what}"),
+    heard=_named("de", "{what}: gemeldet"),
 )
 
-WORDS: Mapping[Language, Words] = {"en": ENGLISH, "de": GERMAN}
+POLISH = Words(
+    wait="Proszę czekać. W tej chwili nie ma pytań.",
+    thanks="Dziękujemy za udział. Sesja jest zakończona i nie trzeba tu już nic robić.",
+    progress="odpowiedzi: {done} z {total}",
+    back="Wstecz",
+    on="Dalej",
+    no_answer="Bez odpowiedzi",
+    hand_in="Oddaj",
+    saved="zapisano",
+    declined="bez odpowiedzi",
+    not_taken="nie przyjęto",
+    consent="Zgoda na udział",
+    version="wersja",
+    take_part="Przeczytałam lub przeczytałem ten tekst i biorę udział",
+    open_file="Otwórz:",
+    takes=POLISH_PHRASES.takes,
+    refused=POLISH_PHRASES.refused,
+    seen=_named("pl", "Widzę: {what}"),
+    heard=_named("pl", "{what}: zgłoszono"),
+)
+
+FRENCH = Words(
+    wait="Veuillez patienter. Il n’y a rien à répondre pour le moment.",
+    thanks="Merci de votre participation. La séance est terminée ; il n’y a plus rien à faire ici.",
+    progress="{done} réponses sur {total}",
+    back="Retour",
+    on="Suivant",
+    no_answer="Sans réponse",
+    hand_in="Remettre",
+    saved="enregistré",
+    declined="sans réponse",
+    not_taken="non accepté",
+    consent="Consentement",
+    version="version",
+    take_part="J’ai lu ce texte et je participe",
+    open_file="Ouvrir :",
+    takes=FRENCH_PHRASES.takes,
+    refused=FRENCH_PHRASES.refused,
+    seen=_named("fr", "Je vois : {what}"),
+    heard=_named("fr", "{what} : signalé"),
+)
+
+SPANISH = Words(
+    wait="Espere, por favor. Ahora no hay nada que responder.",
+    thanks="Gracias por participar. La sesión ha terminado y aquí ya no hay nada más que hacer.",
+    progress="{done} de {total} respondidas",
+    back="Atrás",
+    on="Siguiente",
+    no_answer="Sin respuesta",
+    hand_in="Entregar",
+    saved="guardado",
+    declined="sin respuesta",
+    not_taken="no aceptado",
+    consent="Consentimiento",
+    version="versión",
+    take_part="He leído este texto y participo",
+    open_file="Abrir:",
+    takes=SPANISH_PHRASES.takes,
+    refused=SPANISH_PHRASES.refused,
+    seen=_named("es", "Veo: {what}"),
+    heard=_named("es", "{what}: comunicado"),
+)
+
+WORDS: Mapping[Language, Words] = {
+    "en": ENGLISH,
+    "de": GERMAN,
+    "pl": POLISH,
+    "fr": FRENCH,
+    "es": SPANISH,
+}

@@ -1,12 +1,53 @@
-"""Streams as tables with the same time column."""
+"""Streams as Arrow tables with the same time column, a stretch in memory at a time."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from labcrane.recording import SessionRecord, Stream
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
+
+ROWS = 1 << 16
+"""Rows that are in memory at once."""
+
+
+@dataclass(frozen=True)
+class StreamTable:
+    """A table of one row per sample that has not been read yet.
+
+    Attributes
+    ----------
+    name
+        ``"frames"``, or the name of a stream of others.
+    streams
+        What it is made of, side by side; they share one time.
+    names
+        What the columns are called in the table.
+    """
+
+    name: str
+    streams: Sequence[Stream]
+    names: Sequence[str]
+
+    def batches(self) -> "Iterator[pa.RecordBatch]":
+        """Yield the rows; what is missing is null. At least one batch, be it empty."""
+        import pyarrow as pa
+
+        at = 0
+        for parts in zip(*(stream.batches(rows=ROWS) for stream in self.streams), strict=True):
+            columns = [parts[0].column(0)]
+            if not is_own(self.streams[0]):
+                columns.append(pa.array(self.streams[0].time_raw[at : at + ROWS]))
+            columns += [column for part in parts for column in part.columns[1:]]
+            arrays = [
+                pa.array(column.to_numpy(zero_copy_only=False), from_pandas=True)
+                for column in columns
+            ]
+            yield pa.record_batch(arrays, names=list(self.names))
+            at += ROWS
 
 
 def is_own(stream: Stream) -> bool:
@@ -14,41 +55,36 @@ def is_own(stream: Stream) -> bool:
     return "corrected" not in stream.attrs
 
 
-def stream_tables(session: SessionRecord) -> Iterator[tuple[str, "pd.DataFrame"]]:
+def stream_tables(session: SessionRecord) -> Iterator[StreamTable]:
     """Yield the session's frames as one table, then each stream of others.
 
     Columns of frames are called after their group: ``state_joint_angle_slew``.
     """
-    import pandas as pd
-
-    parts = []
-    time = None
-    for name, stream in session.streams.items():
-        if is_own(stream):
-            parts.append(stream.data.add_prefix(f"{name}."))
-            time = stream.time
-    frames = pd.concat(parts, axis=1)
-    frames.insert(0, "time", time)
-    yield "frames", snake(frames)
+    own = [stream for stream in session.streams.values() if is_own(stream)]
+    names = [f"{stream.name}.{name}" for stream in own for name in stream.units]
+    yield StreamTable("frames", own, snake_names(["time", *names]))
     for name, stream in session.streams.items():
         if not is_own(stream):
-            table = stream.data.copy()
-            table.insert(0, "time_raw", stream.time_raw)
-            table.insert(0, "time", stream.time)
-            yield name, snake(table)
+            names = snake_names(["time", "time_raw", *stream.units])
+            yield StreamTable(name, [stream], names)
 
 
 def snake(table: "pd.DataFrame") -> "pd.DataFrame":
     """Return a table whose columns are lower-case words with underscores, all different."""
+    return table.set_axis(snake_names([str(column) for column in table]), axis=1)
+
+
+def snake_names(columns: Sequence[str]) -> list[str]:
+    """Return columns as lower-case words with underscores, all different."""
     names: list[str] = []
-    for column in table:
-        name = snake_case(str(column))
+    for column in columns:
+        name = snake_case(column)
         number, unique = 1, name
         while unique in names:
             number += 1
             unique = f"{name}_{number}"
         names.append(unique)
-    return table.set_axis(names, axis=1)
+    return names
 
 
 def snake_case(name: str) -> str:

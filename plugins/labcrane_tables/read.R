@@ -5,7 +5,8 @@
 #   study$streams[["NAME_ses-01_frames"]] one row per tick
 #   study$codebook                        unit, meaning and source of every column
 #
-# Needs no package. Streams that were written as Parquet only are read with arrow or nanoparquet.
+# Streams are Parquet, read with the package arrow or nanoparquet; export with --set streams=csv for
+# those that no package is needed for. Everything else needs none.
 
 read_labcrane <- function(folder = ".") {
   table <- function(name) {
@@ -36,5 +37,7 @@ read_stream <- function(folder, name, files) {
   if (text %in% files) {
     return(read.csv(file.path(folder, text), na.strings = "", check.names = FALSE))
   }
-  stop(name, " is Parquet: install.packages(\"nanoparquet\"), or export with --set streams=csv")
+  warning(name, " is Parquet: install.packages(\"nanoparquet\"), or export with --set streams=csv",
+    call. = FALSE)
+  NULL
 }

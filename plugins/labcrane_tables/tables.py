@@ -2,7 +2,8 @@
 
 import gzip
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from shutil import copyfile
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,7 @@ from labcrane.analysis import (
     scores_of,
 )
 from labcrane.recording import SessionRecord
-from labcrane_tables.frames import snake, stream_tables
+from labcrane_tables.frames import StreamTable, snake, stream_tables
 from labcrane_tables.settings import TableSettings
 
 if TYPE_CHECKING:
@@ -77,12 +78,42 @@ class Tables(Exporter):
         forms = self._settings.streams
         if forms == "none":
             return
-        for name, table in stream_tables(session):
-            path = folder / f"{participant.name}_ses-{number:02}_{name.replace('/', '-')}"
+        for table in stream_tables(session):
+            stem = f"{participant.name}_ses-{number:02}_{table.name.replace('/', '-')}"
             if forms in {"both", "parquet"}:
-                table.to_parquet(path.with_name(f"{path.name}.parquet"), index=False)
+                write_parquet(table, folder / f"{stem}.parquet")
             if forms in {"both", "csv"}:
-                write_csv(table, path.with_name(f"{path.name}.csv.gz"))
+                _write_packed_csv(table, folder / f"{stem}.csv.gz")
+
+
+def write_parquet(table: StreamTable, path: Path) -> None:
+    """Write a table a row group at a time."""
+    from pyarrow import parquet
+
+    batches = table.batches()
+    first = next(batches)
+    with parquet.ParquetWriter(path, first.schema, use_dictionary=False) as out:
+        out.write_batch(first)
+        for batch in batches:
+            out.write_batch(batch)
+
+
+def _write_packed_csv(table: StreamTable, path: Path) -> None:
+    from pyarrow import csv
+
+    batches = table.batches()
+    first = next(batches)
+    with packed(path) as out, csv.CSVWriter(out, first.schema) as rows:
+        rows.write_batch(first)
+        for batch in batches:
+            rows.write_batch(batch)
+
+
+@contextmanager
+def packed(path: Path) -> Iterator[gzip.GzipFile]:
+    """Give a gzipped file whose head says neither what it was called nor when it was made."""
+    with path.open("wb") as file, gzip.GzipFile("", "wb", GZIP_LEVEL, file, mtime=0) as out:
+        yield out
 
 
 def joined(tables: "Sequence[pd.DataFrame]") -> "pd.DataFrame":
@@ -123,11 +154,7 @@ def write_csv(table: "pd.DataFrame", path: Path) -> None:
 
     rows = pa.Table.from_pandas(table, preserve_index=False)  # NaN becomes null, which is empty
     if path.suffix == ".gz":
-        # Its head says nothing: neither what the file was called, nor when it was made.
-        with (
-            path.open("wb") as file,
-            gzip.GzipFile("", "wb", GZIP_LEVEL, file, mtime=0) as out,
-        ):
+        with packed(path) as out:
             csv.write_csv(rows, out)
     else:
         csv.write_csv(rows, path)

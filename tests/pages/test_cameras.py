@@ -119,6 +119,7 @@ def test_the_supervisor_sees_cameras_and_torques(tmp_path: Path, browser: webdri
         np.testing.assert_array_equal(again, depth)
         press(browser, "order-end")
         press(browser, "order-end-sure")
+        press(browser, "close-page")
         assert room.launcher.wait(240) == 0, "".join(room.said)
 
     height, width, _ = depth.shape

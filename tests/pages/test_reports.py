@@ -71,8 +71,9 @@ def test_a_deformity_is_reported_from_either_page_and_nothing_else_is(
         browser.refresh()
         shown(browser, "reported", "Verformung: gemeldet")
         browser.switch_to.window(supervisor)
-        shown(browser, "events", '"by": "operator"')
+        shown(browser, "events", "by operator")
         press(browser, "order-skip")
+        press(browser, "order-skip-sure")
 
         # In the second, the supervisor.
         shown(browser, "stage", "waits to start")
@@ -80,10 +81,11 @@ def test_a_deformity_is_reported_from_either_page_and_nothing_else_is(
         shown(browser, "stage", "trial")
         press(browser, "report-deformity")
         shown(browser, "reported", "deformity: reported")
-        shown(browser, "events", '"by": "supervisor", "limb"')
+        shown(browser, "events", "by supervisor, limb")
         photograph(browser, "reports-supervisor")
         press(browser, "order-end")
         press(browser, "order-end-sure")
+        press(browser, "close-page")
         room.ended()
     session = open_recording(data / "P001-PILOT" / "P001-PILOT.h5").session(1)
     events = session.events

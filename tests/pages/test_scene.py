@@ -18,7 +18,9 @@ ROOT = Path(__file__).parents[2]
 SEEN = """
 const found = {};
 window['scene_' + document.querySelector('.nicegui-scene').id].traverse(o => {
-    if (o.name) found[o.name] = [o.position.x, o.position.y, o.position.z, o.children.length];
+    const body = !o.children.length || o.name.startsWith('body ');
+    const {x, y, z} = o.position;
+    if (o.name && !body) found[o.name] = [x, y, z, o.children.length];
 });
 return found;
 """
@@ -57,6 +59,7 @@ def test_what_stands_around_the_machine_is_drawn_where_the_session_has_it(
         photograph(browser, "scenario")
         press(browser, "order-end")
         press(browser, "order-end-sure")
+        press(browser, "close-page")
         room.ended()
     session = open_recording(room.folder / "P001-PILOT.h5").session(1)
     events = session.events

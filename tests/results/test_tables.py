@@ -20,7 +20,7 @@ from results.consumers import needs_r, r, table, under
 @pytest.fixture(scope="module")
 def folder(cohort: Cohort, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("tables")
-    Tables(TableSettings()).export(iter(cohort.included), out)
+    Tables(TableSettings(streams="both")).export(iter(cohort.included), out)
     return out
 
 
@@ -37,6 +37,15 @@ def test_pandas_and_arrow_read_what_was_measured(folder: Path, cohort: Cohort) -
     np.testing.assert_array_equal(frames["state_tip_position_x"], state.data["tip.position.x"])
     eyes = pd.read_csv(folder / "streams" / "P002_ses-01_eyes.csv.gz")
     np.testing.assert_allclose(eyes["time"] - eyes["time_raw"], 5000.0, atol=1e-6)
+
+
+def test_columns_of_parquet_are_those_of_csv(folder: Path) -> None:
+    for path in (folder / "streams").glob("*.parquet"):
+        pd.testing.assert_frame_equal(
+            pq.read_table(path).to_pandas(),
+            pd.read_csv(path.with_suffix(".csv.gz")),
+            check_dtype=False,  # whole numbers have no point in CSV
+        )
 
 
 def test_the_codebook_has_every_column_and_the_units_of_the_file(folder: Path) -> None:
@@ -62,6 +71,20 @@ cat("\\nslew", sprintf("%.17g", s$streams[["P001_ses-01_frames"]]$state_joint_an
     sep = "|")
 cat("\\ntitle", s$participants$status[1], class(s$trials$pair), sep = "|"); cat("\\n")
 """
+
+
+@needs_r
+def test_read_r_says_which_streams_it_cannot_read_and_loads_the_rest(
+    cohort: Cohort, tmp_path: Path
+) -> None:
+    """Streams are Parquet unless CSV is asked for, and R reads that with a package only."""
+    Tables(TableSettings()).export(cohort.included[:1], tmp_path)
+    hidden = (
+        'requireNamespace <- function(...) FALSE; options(warn = 1); sink(stderr(), type = "m")'
+    )
+    said = table(r(f"{hidden}\n{READ.replace('1000', '1')}", tmp_path))
+    assert said["tables"][0] == "participants trials events codebook streams"
+    assert len(said["time"]) == len(measures_of(cohort.included[0]))
 
 
 @needs_r
@@ -94,6 +117,7 @@ def test_events_are_those_of_the_file_and_the_context_stays_there(
 
 
 def test_streams_are_written_as_asked(cohort: Cohort, tmp_path: Path) -> None:
+    assert TableSettings().streams == "parquet"
     for form, endings in {"parquet": {".parquet"}, "csv": {".gz"}, "none": set()}.items():
         out = tmp_path / form
         out.mkdir()

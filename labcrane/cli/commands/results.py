@@ -10,7 +10,7 @@ import typer
 from labcrane.cli.commands.approval import today
 from labcrane.cli.options import stay_on_this_computer
 from labcrane.cli.output import out
-from labcrane.errors import LabcraneError, ProtocolError, RecordingError
+from labcrane.errors import LabcraneError, PluginError, ProtocolError, RecordingError
 
 if TYPE_CHECKING:
     from labcrane.analysis.cohort import Cohort, Participant, Struck
@@ -38,7 +38,10 @@ LEFT_OUT = 3
 def export(
     data: DataFolder,
     to: Annotated[
-        str, typer.Option(help="tables, matlab, bids, psychds, xdf, zip; see labcrane plugins")
+        str,
+        typer.Option(
+            help="tables, matlab, bids, psychds, xdf, zip, lerobot, robomimic; see labcrane plugins"
+        ),
     ],
     folder: Annotated[Path, typer.Option("--out", help="a folder that is empty or new")],
     include: Include = None,
@@ -197,6 +200,10 @@ def replay(
     speed: Annotated[
         float | None, typer.Option(help="show it over LSL, so many times as fast; 1 as it was")
     ] = None,
+    show: Annotated[
+        bool, typer.Option(help="show and sound it in the study's views and sounds instead")
+    ] = False,
+    begin: Annotated[float, typer.Option("--from", help="the second to show it from")] = 0.0,
     protocol: Annotated[
         Path | None, typer.Option(help="run this protocol instead of the recorded one")
     ] = None,
@@ -210,6 +217,13 @@ def replay(
     """Run a recorded session again from its input, and compare every number."""
     from labcrane.replay.replay import replay_session as run_again
 
+    if speed is not None and not speed > 0.0:
+        raise ProtocolError(f"a speed of {speed:g} shows nothing; give one above 0")
+    if show:
+        _show(recording, session, protocol, 1.0 if speed is None else speed, begin)
+        return
+    if begin:
+        raise ProtocolError("--from is where to show it from; give --show too")
     if speed is not None:
         stay_on_this_computer()
     done = run_again(recording, session, protocol=protocol, machine=machine, speed=speed)
@@ -226,6 +240,51 @@ def replay(
         f"is {first.replayed!r}"
         + ("" if done.parts else "; no part that is recorded differs, so look at the plugins")
     )
+
+
+def _show(recording: Path, session: int, protocol: Path | None, speed: float, begin: float) -> None:
+    """Show a recorded session in the views and sounds of its study."""
+    from tempfile import TemporaryDirectory
+
+    from labcrane.feedback.screening import screen
+    from labcrane.protocol.study import load
+    from labcrane.recording.participant_file.reader import open_recording
+    from labcrane.registry.registry import discover
+    from labcrane.replay.restore import restore
+
+    stay_on_this_computer()
+    record = open_recording(recording).session(session)
+    with TemporaryDirectory(prefix="labcrane-show-") as folder:
+        path = restore(record, Path(folder), protocol, None)
+        study = load(path, discover(study=protocol or path), recorded=True)
+        screen(study, record, speed=speed, start_s=begin, say=out.print)
+
+
+def view(
+    recording: Annotated[Path, typer.Argument(metavar="FILE", help="a participant file")],
+    session: Annotated[int, typer.Option(help="which session")] = 1,
+    beside: Annotated[
+        Path | None, typer.Option(help="another participant file, shown at the same second")
+    ] = None,
+    at: Annotated[float, typer.Option(help="the second to begin at")] = 0.0,
+    port: Annotated[int, typer.Option(help="where it is served; 0 takes a free one")] = 0,
+) -> None:
+    """Look at a recorded session in a browser: machine, time line, signals, events."""
+    from labcrane.recording.participant_file.reader import open_recording
+    from labcrane.registry.offers import LAB, not_installed
+    from labcrane.registry.registry import discover
+
+    if missing := not_installed({"nicegui": LAB}):
+        raise PluginError(f"the viewer {missing}")
+    from labcrane.web.handle import free_port
+    from labcrane.web.viewer.film import Film
+    from labcrane.web.viewer.viewer import HOST, serve
+
+    stay_on_this_computer()
+    paths = [recording, *([beside] if beside else [])]
+    films = [Film(open_recording(path).session(session), path.stem) for path in paths]
+    out.print("Ctrl-C ends it", markup=False)
+    serve(films, discover(), free_port(HOST, port), at, lambda line: out.print(line, markup=False))
 
 
 def _write_measures(recording: Path, session: int, frames: "Groups", path: Path) -> None:

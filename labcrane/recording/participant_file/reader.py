@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from labcrane.errors import RecordingError
 from labcrane.recording.journal import GROUPS
-from labcrane.recording.participant_file.columns import holds_texts, text_of, texts_of
+from labcrane.recording.participant_file.columns import CHUNK, holds_texts, text_of, texts_of
 from labcrane.recording.participant_file.session_group import SYNC_REPORT
 from labcrane.recording.participant_file.stream_group import BASES
 from labcrane.recording.participant_file.writer import group_name, reading
@@ -23,6 +23,7 @@ from labcrane.types import FloatArray
 if TYPE_CHECKING:
     import h5py
     import pandas as pd
+    import pyarrow as pa
 
 _SESSION = re.compile(r"ses-([0-9]+)")
 
@@ -88,6 +89,100 @@ class Stream:
         uneven = self._beside("time_uneven") if "rate_hz" in self.attrs else None
         return self.time if uneven is None else uneven
 
+    def column(self, name: str, start: int = 0, stop: int | None = None) -> npt.NDArray[Any]:
+        """Return samples ``start`` to ``stop`` of one column; nothing else is read from the file.
+
+        Negative numbers count from the end, as in any slice.
+
+        Parameters
+        ----------
+        name
+            ``"time"``, or a name of :attr:`units`: ``"tip.position.x"``.
+        start, stop
+            Numbers of samples; all by default.
+
+        Returns
+        -------
+        numpy.ndarray
+            Shape ``(n,)``: numbers, or texts.
+
+        Raises
+        ------
+        RecordingError
+            The stream has no such column.
+        """
+        with reading(self._path) as file:
+            if name == "time":
+                return np.asarray(file[self._time][start:stop], np.float64)
+            if name in self._paths:
+                dataset = file[self._paths[name]]
+                cut = slice(start, stop)
+                return np.asarray(
+                    dataset.asstr("utf-8")[cut] if holds_texts(dataset) else dataset[cut]
+                )
+        raise RecordingError(
+            f"stream {self.name!r} of {self._path} has no column {name!r}; it has time, "
+            + ", ".join(self._paths)
+        )
+
+    def batches(
+        self,
+        columns: Sequence[str] | None = None,
+        start: int = 0,
+        stop: int | None = None,
+        rows: int = CHUNK,
+    ) -> "Iterator[pa.RecordBatch]":
+        """Yield time and columns as Arrow's record batches, one in memory at a time.
+
+        Parameters
+        ----------
+        columns
+            Names of :attr:`units`; all by default.
+        start, stop
+            Numbers of samples, from 0; all by default.
+        rows
+            How many samples a batch holds at most.
+
+        Raises
+        ------
+        RecordingError
+            The stream has no such column.
+        """
+        import pyarrow as pa  # noqa: PLC0415 - loads for a quarter of a second
+
+        wanted = list(self._paths) if columns is None else list(columns)
+        if unknown := [name for name in wanted if name not in self._paths]:
+            raise RecordingError(
+                f"stream {self.name!r} of {self._path} has no column {unknown[0]!r}; it has "
+                + ", ".join(self._paths)
+            )
+        first, last, _ = slice(start, stop).indices(len(self))
+        with reading(self._path) as file:
+            chosen = {"time": file[self._time]}
+            chosen |= {name: file[self._paths[name]] for name in wanted}
+            for at in range(first, max(last, first + 1), rows):
+                cut = slice(at, min(at + rows, last))
+                arrays = [
+                    pa.array(each.asstr("utf-8")[cut] if holds_texts(each) else each[cut])
+                    for each in chosen.values()
+                ]
+                yield pa.record_batch(arrays, names=list(chosen))
+
+    def table(
+        self, columns: Sequence[str] | None = None, start: int = 0, stop: int | None = None
+    ) -> "pa.Table":
+        """Return :meth:`batches` as one Arrow table."""
+        import pyarrow as pa  # noqa: PLC0415
+
+        return pa.Table.from_batches(self.batches(columns, start, stop))
+
+    def __len__(self) -> int:
+        with reading(self._path) as file:
+            return len(file[self._time])
+
+    def __bool__(self) -> bool:
+        return True
+
     @cached_property
     def data(self) -> "pd.DataFrame":
         """One column per number, named by its dotted path; one row per time."""
@@ -98,12 +193,39 @@ class Stream:
                 {name: _values(dataset) for name, dataset in _columns(file[self._group])}
             )
 
+    def column(self, name: str, first: int = 0, last: int | None = None) -> FloatArray:
+        """Return rows ``first`` to ``last`` of one column of numbers, shape ``(n,)``.
+
+        Nothing else is read, and nothing is kept: an hour of many channels needs no memory.
+        """
+        with reading(self._path) as file:
+            for found, dataset in _columns(file[self._group]):
+                if found == name:
+                    return np.asarray(dataset[first:last], np.float64)
+        known = ", ".join(self.units)
+        raise RecordingError(f"stream {self.name!r} has no column {name!r}; it has {known}")
+
+    def rows(self, first: int, last: int) -> dict[str, FloatArray]:
+        """Return rows ``first`` to ``last`` of every column of numbers, by column."""
+        with reading(self._path) as file:
+            return {
+                name: np.asarray(dataset[first:last], np.float64)
+                for name, dataset in _columns(file[self._group])
+                if dataset.dtype.kind in "fiub"
+            }
+
     @cached_property
     def units(self) -> dict[str, str]:
         """The unit of each column."""
         with reading(self._path) as file:
             columns = _columns(file[self._group])
             return {name: str(dataset.attrs.get("unit", "")) for name, dataset in columns}
+
+    @cached_property
+    def _paths(self) -> dict[str, str]:
+        """Where each column is in the file."""
+        with reading(self._path) as file:
+            return {name: str(dataset.name) for name, dataset in _columns(file[self._group])}
 
     @cached_property
     def header(self) -> StreamHeader | None:

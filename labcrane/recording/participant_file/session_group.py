@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from labcrane.recording.journal_reader import JournalState, LoggedEvent, SessionLog
+from labcrane.recording.participant_file.column_writer import ColumnWriter
 from labcrane.recording.participant_file.columns import (
     node_names,
     write_attributes,
@@ -60,9 +61,14 @@ def _write_journals(group: "h5py.Group", journals: Sequence[JournalState]) -> No
 def _write_frames(group: "h5py.Group", log: SessionLog) -> None:
     write_numbers(group, "time", log.time, "s")
     write_numbers(group, "part", log.part, "1")
-    for number, column in enumerate(log.columns):
-        path = f"{column.group}/{column.label.replace('.', '/')}"
-        write_numbers(group, path, log.rows[:, number], column.unit)
+    columns = [
+        (f"{column.group}/{column.label.replace('.', '/')}", column.unit) for column in log.columns
+    ]
+    writer = ColumnWriter(group, columns, len(log.time))
+    for block in log.blocks():
+        writer.write(block)
+    writer.close()
+    for number, (path, _) in enumerate(columns):
         write_attributes(group[path], {"position": number})
 
 
@@ -71,18 +77,18 @@ def _write_events(group: "h5py.Group", log: SessionLog) -> None:
     write_numbers(group, "time", np.array([event.time for event in events]), "s")
     write_numbers(group, "tick", np.array([event.tick for event in events]), "1")
     write_numbers(group, "part", np.array([float(event.part) for event in events]), "1")
-    write_numbers(group, "trial", np.array(_trials_of(log)), "1")
+    write_numbers(group, "trial", np.array(_trials_of(log, group.parent)), "1")
     write_texts(group, "name", [event.name for event in events])
     write_texts(
         group, "data", [json.dumps(dict(event.data), ensure_ascii=False) for event in events]
     )
 
 
-def _trials_of(log: SessionLog) -> list[float]:
+def _trials_of(log: SessionLog, session: "h5py.Group") -> list[float]:
     """Return each event's trial: what it says itself, else that of its frame, else NaN."""
-    tick, trial = log.column("loop", "tick"), log.column("loop", "trial")
     frames: dict[tuple[float, float], float] = {}
-    if tick is not None and trial is not None:
+    if "loop/tick" in session and "loop/trial" in session:
+        tick, trial = session["loop/tick"][:], session["loop/trial"][:]
         wanted = {(float(event.part), event.tick) for event in log.events}
         ticks = np.isin(tick, [number for _, number in wanted])
         frames = dict(

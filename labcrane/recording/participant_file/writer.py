@@ -19,12 +19,13 @@ from labcrane.files.lock import alone_in
 from labcrane.recording.foreign_streams import RecordedStream, read_streams
 from labcrane.recording.journal_reader import JournalState, SessionLog, read_journal
 from labcrane.recording.participant_file.about import ABOUT, write_about
-from labcrane.recording.participant_file.columns import node_names, write_attributes
+from labcrane.recording.participant_file.columns import CHUNK, node_names, write_attributes
 from labcrane.recording.participant_file.containment import check_containment, check_heaps
 from labcrane.recording.participant_file.session_group import write_session
 from labcrane.recording.participant_file.signal_faults import write_signal_faults
 from labcrane.recording.participant_file.stream_group import write_streams
 from labcrane.recording.paths import parts, session_of
+from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import h5py
@@ -218,11 +219,11 @@ def opened(path: Path) -> Iterator["h5py.File"]:
     import h5py  # noqa: PLC0415
 
     try:
-        check_heaps(path)
         file = h5py.File(path, "r")
     except (OSError, RuntimeError, ValueError) as error:  # ValueError: no name of a file
         raise RecordingError(f"cannot read {path}: {error}") from error
     with file:
+        check_heaps(file, path)
         if file.attrs.get("format") != FORMAT:
             raise RecordingError(
                 f"{path} is an HDF5 file, but not a participant file of labcrane; give the .h5 "
@@ -280,7 +281,7 @@ def _verify(beside: Path, path: Path, session: _Session) -> None:
         for (_, name), stream in zip(names, session.streams, strict=True):
             expected[f"streams/{name}/time_raw"] = stream.time_raw
         for name, values in expected.items():
-            if not np.array_equal(group[name][:], values, equal_nan=True):
+            if not _holds(group[name], values):
                 raise RecordingError(
                     f"{session.group}/{name} of {beside} is not what the journals hold; "
                     f"{path} is left as it is: check the disk"
@@ -294,6 +295,14 @@ def _verify(beside: Path, path: Path, session: _Session) -> None:
                 )
         if path.exists():
             _compare(new, path, session.group)
+
+
+def _holds(dataset: "h5py.Dataset", values: FloatArray) -> bool:
+    """Whether a column holds just these values; compared in pieces, for memory's sake."""
+    return dataset.shape == values.shape and all(
+        np.array_equal(dataset[at : at + CHUNK], values[at : at + CHUNK], equal_nan=True)
+        for at in range(0, len(values), CHUNK)
+    )
 
 
 def _compare(new: "h5py.File", path: Path, but: str) -> None:

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from labcrane.recording.xdf.chunk import BOUNDARY, Tag, pack, sample_dtype, samples_head
+from labcrane.recording.xdf.file_bytes import FileBytes
 from labcrane.recording.xdf.header import Channel, StreamHeader
 
 CHECK_ID = 0x4B434843  # "CHCK": found without its header, should that be what is damaged
@@ -117,12 +118,12 @@ class FileState(NamedTuple):
     checked: int
 
 
-def verify(data: bytes) -> FileState:
+def verify(data: FileBytes) -> FileState:
     """Compare a file with the checks it holds."""
     last = _last_block(data)
     if last is None:
         return FileState([], [], 0)
-    if _crc(data, 0, last.start, 0) == last.crcs[-1]:
+    if data.crc(0, last.start) == last.crcs[-1]:
         return FileState([], [], last.stop)
     damaged: list[Span] = []
     unchecked: list[Span] = []
@@ -136,19 +137,19 @@ def verify(data: bytes) -> FileState:
     return FileState(damaged, unchecked, last.stop)
 
 
-def _mismatches(data: bytes, block: _Block, end: int, crc: int) -> list[Span]:
+def _mismatches(data: FileBytes, block: _Block, end: int, crc: int) -> list[Span]:
     """Return the spans of a block that differ from their checks; ``crc`` is known up to ``end``."""
-    if _crc(data, end, block.start, crc) == block.crcs[-1]:
+    if data.crc(end, block.start, crc) == block.crcs[-1]:
         return []
     bad = []
     ends = itertools.pairwise([end, *block.ends])
     for span, (before, after) in zip(ends, itertools.pairwise([crc, *block.crcs]), strict=True):
-        if _crc(data, *span, before) != after:
+        if data.crc(*span, before) != after:
             bad.append(Span(*span))
     return bad
 
 
-def _blocks(data: bytes) -> Iterator[_Block]:
+def _blocks(data: FileBytes) -> Iterator[_Block]:
     """Yield the chunks of checks behind boundaries that make sense in themselves."""
     position = data.find(BOUNDARY)
     while position >= 0:
@@ -158,7 +159,7 @@ def _blocks(data: bytes) -> Iterator[_Block]:
         position = data.find(BOUNDARY, start)
 
 
-def _last_block(data: bytes) -> _Block | None:
+def _last_block(data: FileBytes) -> _Block | None:
     position = data.rfind(BOUNDARY)
     while position >= 0:
         if (block := _block(data, position + len(BOUNDARY))) is not None:
@@ -167,18 +168,14 @@ def _last_block(data: bytes) -> _Block | None:
     return None
 
 
-def _crc(data: bytes, start: int, stop: int, before: int) -> int:
-    return zlib.crc32(memoryview(data)[start:stop], before)
-
-
-def _block(data: bytes, start: int) -> _Block | None:
+def _block(data: FileBytes, start: int) -> _Block | None:
     body = start + len(_HEAD)
     count = int.from_bytes(data[body - 4 : body], "little")
     stop = body + count * _ENTRY.size
     head = samples_head(CHECK_ID, count, count * _ENTRY.size) if stop <= len(data) else b""
     if not count or data[start:body] != head:
         return None
-    entries = np.frombuffer(data, _ENTRY_DTYPE, count, body)
+    entries = np.frombuffer(data[body:stop], _ENTRY_DTYPE, count)
     values = entries["values"]
     if not np.isfinite(values).all() or values.min() < 0 or values.max() >= 2**53:
         return None

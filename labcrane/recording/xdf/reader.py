@@ -6,7 +6,9 @@ they hold; in other files damage shows only where it breaks the structure of the
 
 import struct
 from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +17,9 @@ import numpy.typing as npt
 from labcrane.errors import RecordingError
 from labcrane.recording.xdf.checksums import CHECK_ID, FileState, Span, verify
 from labcrane.recording.xdf.chunk import MAGIC, Tag
+from labcrane.recording.xdf.file_bytes import FileBytes
 from labcrane.recording.xdf.header import StreamHeader
-from labcrane.recording.xdf.samples import Texts, unpack
+from labcrane.recording.xdf.samples import Texts, numbers, unpack
 from labcrane.recording.xdf.scanner import Chunk, ChunkScanner
 from labcrane.types import FloatArray
 
@@ -38,8 +41,6 @@ class XdfStream:
         As it was written.
     stamps
         Seconds on the clock of the stream's source, shape ``(n_samples,)``.
-    data
-        Shape ``(n_samples, n_channels)``, in the stream's number format; empty for texts.
     texts
         One tuple of texts per sample; empty for numbers.
     offsets
@@ -51,10 +52,29 @@ class XdfStream:
     number: int
     header: StreamHeader
     stamps: FloatArray
-    data: npt.NDArray[np.generic]
     texts: Texts
     offsets: FloatArray
     footer: str | None
+    _bytes: FileBytes
+    _chunks: Sequence[Chunk]
+
+    def blocks(self) -> Iterator[npt.NDArray[np.generic]]:
+        """Yield the numbers of all samples, read anew, in blocks of a few MB at most.
+
+        Each of shape ``(n, n_channels)``, in the stream's number format; none of a stream of texts.
+        """
+        return numbers(self._bytes, self.header, self._chunks)
+
+    @cached_property
+    def data(self) -> npt.NDArray[np.generic]:
+        """All numbers, shape ``(n_samples, n_channels)``; empty for texts."""
+        dtype = np.dtype(np.float64) if self.header.dtype is None else self.header.dtype
+        whole = np.empty((0 if self.texts else len(self.stamps), len(self.header.channels)), dtype)
+        end = 0
+        for block in self.blocks():
+            whole[end : end + len(block)] = block
+            end += len(block)
+        return whole
 
 
 @dataclass
@@ -122,30 +142,25 @@ def read_xdf(path: Path) -> XdfFile:
     RecordingError
         The file cannot be opened, or is no XDF file.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise RecordingError(f"cannot read {path}: {error.strerror}") from error
+    data = FileBytes(path)
     verdict = verify(data)
-    if not data.startswith(MAGIC) and not verdict.checked:
-        if MAGIC.startswith(data):  # killed before the first chunk
+    if (start := data[: len(MAGIC)]) != MAGIC and not verdict.checked:
+        if MAGIC.startswith(start):  # killed before the first chunk
             return XdfFile(path, "", [], len(data), [], [], 0, [])
-        raise RecordingError(
-            f"{path} is not an XDF file: it starts with {data[:4]!r}, not {MAGIC!r}"
-        )
+        raise RecordingError(f"{path} is not an XDF file: it starts with {start!r}, not {MAGIC!r}")
     return _read(path, data, verdict)
 
 
-def _read(path: Path, data: bytes, verdict: FileState) -> XdfFile:
+def _read(path: Path, data: FileBytes, verdict: FileState) -> XdfFile:
     walk = ChunkScanner(data, verdict.damaged, verdict.unchecked)
     parts = _sort(data, walk)
     streams = []
     for number, header in parts.headers.items():
         chunks = parts.samples.pop(number, [])
-        stamps, values, texts = unpack(data, header, chunks, walk.skipped)
+        stamps, texts, whole = unpack(data, header, chunks, walk.skipped)
         offsets = np.array(parts.offsets[number], np.float64).reshape(-1, 2)
         footer = parts.footers.get(number)
-        streams.append(XdfStream(number, header, stamps, values, texts, offsets, footer))
+        streams.append(XdfStream(number, header, stamps, texts, offsets, footer, data, whole))
     return XdfFile(
         path=path,
         header=parts.file_header,
@@ -158,7 +173,7 @@ def _read(path: Path, data: bytes, verdict: FileState) -> XdfFile:
     )
 
 
-def _sort(data: bytes, walk: ChunkScanner) -> _Parts:
+def _sort(data: FileBytes, walk: ChunkScanner) -> _Parts:
     """Sort the chunks by stream and content; what makes no sense is added to ``walk.skipped``."""
     parts = _Parts()
     for chunk in walk:
@@ -168,13 +183,15 @@ def _sort(data: bytes, walk: ChunkScanner) -> _Parts:
             if chunk.stop - chunk.body < _ID.size:
                 walk.skipped.append(Span(chunk.start, chunk.stop))
                 continue
-            (stream,) = _ID.unpack_from(data, chunk.body)
+            (stream,) = _ID.unpack(data[chunk.body : chunk.body + _ID.size])
             if stream != CHECK_ID:
                 _sort_in(parts, data, chunk, stream, walk.skipped)
     return parts
 
 
-def _sort_in(parts: _Parts, data: bytes, chunk: Chunk, stream: int, skipped: list[Span]) -> None:
+def _sort_in(
+    parts: _Parts, data: FileBytes, chunk: Chunk, stream: int, skipped: list[Span]
+) -> None:
     content = slice(chunk.body + _ID.size, chunk.stop)
     if chunk.tag == Tag.SAMPLES:
         parts.samples[stream].append(chunk)
@@ -188,6 +205,6 @@ def _sort_in(parts: _Parts, data: bytes, chunk: Chunk, stream: int, skipped: lis
     elif chunk.tag == Tag.STREAM_FOOTER:
         parts.footers[stream] = data[content].decode(errors="replace")
     elif chunk.stop - content.start == _OFFSET.size:
-        parts.offsets[stream].append(_OFFSET.unpack_from(data, content.start))
+        parts.offsets[stream].append(_OFFSET.unpack(data[content]))
     else:
         skipped.append(Span(chunk.start, chunk.stop))

@@ -1,7 +1,7 @@
 """Unpacks the samples of one stream of an XDF file."""
 
 import struct
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from labcrane.recording.xdf.checksums import Span
 from labcrane.recording.xdf.chunk import sample_dtype
+from labcrane.recording.xdf.file_bytes import WINDOW, FileBytes
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.recording.xdf.scanner import Chunk, read_length
 from labcrane.types import FloatArray
@@ -21,42 +22,74 @@ Texts = list[tuple[str, ...]]
 
 
 class Samples(NamedTuple):
-    """Stamps in seconds, and numbers of shape ``(n_samples, n_channels)`` or texts."""
+    """Stamps in seconds, shape ``(n_samples,)``, texts, and the chunks that hold them."""
 
     stamps: FloatArray
-    data: npt.NDArray[np.generic]
     texts: Texts
+    chunks: list[Chunk]
 
 
 def unpack(
-    data: bytes, header: StreamHeader, chunks: Iterable[Chunk], skipped: list[Span]
+    data: FileBytes, header: StreamHeader, chunks: Iterable[Chunk], skipped: list[Span]
 ) -> Samples:
-    """Unpack the samples of one stream; chunks that do not fit its header are skipped."""
+    """Unpack the stamps and texts of one stream; chunks that do not fit its header are skipped.
+
+    Numbers stay in the file until they are asked for: :func:`numbers`.
+    """
     stamps: list[FloatArray] = []
-    values: list[npt.NDArray[np.generic]] = []
     texts: Texts = []
+    whole: list[Chunk] = []
     last = 0.0
-    for chunk in chunks:
+    for chunk in _pieces(chunks):
+        window, here = _held(data, chunk)
         try:
             if header.dtype is None:
-                times, rows = _texts(data, chunk, header, last)
+                times, rows = _texts(window, here, header, last)
                 texts += rows
             else:
-                times, numbers = _numbers(data, chunk, header, header.dtype, last)
-                values.append(numbers)
+                times, _ = _numbers(window, here, header, header.dtype, last)
         except (struct.error, ValueError):
-            skipped.append(Span(chunk.start, chunk.stop))
+            skipped.append(Span(chunk.start, chunk.start + chunk.count * _size(chunk)))
             continue
         if len(times):
             last = float(times[-1])
-            stamps.append(times)
-    shape = (0, len(header.channels))
-    empty = np.empty(shape, header.dtype if header.dtype is not None else np.float64)
-    return Samples(
-        np.concatenate(stamps) if stamps else np.empty(0),
-        np.concatenate(values) if values else empty,
-        texts,
-    )
+            stamps.append(times.copy())
+            whole.append(chunk)
+    return Samples(np.concatenate(stamps) if stamps else np.empty(0), texts, whole)
+
+
+def numbers(
+    data: FileBytes, header: StreamHeader, chunks: Iterable[Chunk]
+) -> Iterator[npt.NDArray[np.generic]]:
+    """Yield the numbers of chunks that :func:`unpack` found whole, ``(n_samples, n_channels)``."""
+    if header.dtype is None:
+        return
+    for chunk in chunks:
+        yield _numbers(*_held(data, chunk), header, header.dtype, 0.0)[1]
+
+
+def _size(chunk: Chunk) -> int:
+    return chunk.stop - chunk.start
+
+
+def _pieces(chunks: Iterable[Chunk]) -> Iterator[Chunk]:
+    """Yield runs of chunks cut where they would fill more than a window."""
+    for chunk in chunks:
+        size = _size(chunk)
+        most = max(WINDOW // size, 1)
+        for first in range(0, chunk.count, most):
+            yield _moved(chunk, first * size)._replace(count=min(most, chunk.count - first))
+
+
+def _moved(chunk: Chunk, by: int) -> Chunk:
+    moved = Chunk(chunk.start + by, chunk.stop + by, chunk.tag, chunk.body + by)
+    return moved._replace(count=chunk.count)
+
+
+def _held(data: FileBytes, chunk: Chunk) -> tuple[bytes, Chunk]:
+    """Return bytes that hold a run of chunks, and where it lies in them."""
+    window, at = data.window(chunk.start, chunk.start + chunk.count * _size(chunk))
+    return window, _moved(chunk, -at)
 
 
 def _count(data: bytes, chunk: Chunk) -> tuple[int, int]:

@@ -8,10 +8,12 @@ import numpy as np
 
 from labcrane.recording.xdf.checksums import Span
 from labcrane.recording.xdf.chunk import BOUNDARY, Tag
+from labcrane.recording.xdf.file_bytes import WINDOW, FileBytes
 
 _WIDTHS = {1: "<B", 4: "<I", 8: "<Q"}
 _TAG = struct.Struct("<H")
 _TAGS = frozenset(Tag)
+_LONGEST_HEAD = 1 + 8 + 2
 _RUN_HEAD = 5 + 2 + 4 + 5 + 1
 """Bytes that the single samples of one stream have in common: length, tag, stream, count, flag."""
 
@@ -55,12 +57,11 @@ class ChunkScanner:
     """
 
     def __init__(
-        self, data: bytes, damaged: Sequence[Span] = (), unchecked: Sequence[Span] = ()
+        self, data: FileBytes, damaged: Sequence[Span] = (), unchecked: Sequence[Span] = ()
     ) -> None:
         self.skipped: list[Span] = list(damaged)
         self.torn = 0
         self._data = data
-        self._bytes = np.frombuffer(data, np.uint8)
         # A chunk is known to start behind every such span, whatever came before.
         starts = [0, *(span.stop for span in (*damaged, *unchecked))]
         stops = [*(span.start for span in damaged), *(span.stop for span in unchecked), len(data)]
@@ -77,13 +78,28 @@ class ChunkScanner:
         if position == 0:
             position = 4  # the magic
         while position < stop:
-            chunk = read_chunk(self._data, position, stop)
+            chunk = self._chunk(position, stop)
             if chunk is None:
                 position = self._skip(position, stop)
                 continue
             chunk = self._extend(chunk, stop)
             yield chunk
             position = chunk.start + chunk.count * (chunk.stop - chunk.start)
+
+    def _chunk(self, position: int, stop: int) -> Chunk | None:
+        """Return the chunk at ``position``; None when what lies there is no whole chunk."""
+        head, at = self._data.window(position, min(position + _LONGEST_HEAD, stop))
+        found = read_length(head, position - at, min(stop - at, len(head)))
+        if found is None or (end := at + found[1] + found[0]) > stop or found[0] < _TAG.size:
+            return None
+        body = at + found[1] + _TAG.size
+        (tag,) = _TAG.unpack_from(head, body - _TAG.size - at)
+        # A chunk that swallows a boundary has a damaged length.
+        if tag not in _TAGS or (tag != Tag.BOUNDARY and self._data.find(BOUNDARY, body, end) >= 0):
+            return None
+        if tag == Tag.BOUNDARY and self._data[body:end] != BOUNDARY:
+            return None
+        return Chunk(position, end, tag, body)
 
     def _skip(self, position: int, stop: int) -> int:
         """Return where to go on: behind the next boundary, or at the end."""
@@ -104,41 +120,23 @@ class ChunkScanner:
         if (
             chunk.tag != Tag.SAMPLES
             or size <= _RUN_HEAD
-            or not self._data.startswith(head, chunk.stop)
+            or self._data[chunk.stop : chunk.stop + _RUN_HEAD] != head
         ):
             return chunk
         template = np.frombuffer(head, np.uint8)
         count, window = 1, 64
         most = (stop - chunk.start) // size
         while count < most:
-            window = min(4 * window, most - count)
+            window = min(4 * window, most - count, max(WINDOW // size, 1))
             start = chunk.start + count * size
-            rows = self._bytes[start : start + window * size].reshape(window, size)
+            rows = np.frombuffer(self._data[start : start + window * size], np.uint8)
+            rows = rows.reshape(window, size)
             equal = (rows[:, :_RUN_HEAD] == template).all(axis=1)
             if not equal.all():
                 count += int(equal.argmin())
                 break
             count += window
         return chunk._replace(count=count)
-
-
-def read_chunk(data: bytes, start: int, stop: int) -> Chunk | None:
-    """Return the chunk at ``start``; None when what lies there is no whole chunk."""
-    found = read_length(data, start, stop)
-    if found is None:
-        return None
-    length, tag_at = found
-    end = tag_at + length
-    body = tag_at + _TAG.size
-    if length < _TAG.size or end > stop:
-        return None
-    (tag,) = _TAG.unpack_from(data, tag_at)
-    # A chunk that swallows a boundary has a damaged length.
-    if tag not in _TAGS or (tag != Tag.BOUNDARY and data.find(BOUNDARY, body, end) >= 0):
-        return None
-    if tag == Tag.BOUNDARY and data[body:end] != BOUNDARY:
-        return None
-    return Chunk(start, end, tag, body)
 
 
 def read_length(data: bytes, start: int, stop: int) -> tuple[int, int] | None:

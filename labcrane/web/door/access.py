@@ -29,6 +29,10 @@ def _secret() -> str:
     return secrets.token_urlsafe(24)
 
 
+VIEWER = "viewer"
+"""The page of a recording; it orders nothing."""
+
+
 @dataclass
 class Keys:
     """The secrets of one run; they end with it.
@@ -78,11 +82,11 @@ class Gate:
             return
         path = scope["path"].strip("/")
         given = parse_qs(scope.get("query_string", b"").decode(errors="replace")).get("token")
-        if given and path in RIGHTS:
+        if given and path in self._keys.cookies:
             await self._exchange(scope, receive, send, path, given[0])
             return
         pages = self._opened(scope)
-        if not pages or (path in RIGHTS and path not in pages):
+        if not pages or (path in self._keys.cookies and path not in pages):
             await self._refuse(scope, receive, send, "no right to see it" if pages else "no token")
             return
         await self._inner({**scope, SCOPE: pages}, receive, send)
@@ -91,7 +95,7 @@ class Gate:
         shown = HTTPConnection(dict(scope)).cookies
         return frozenset(
             page
-            for page in RIGHTS
+            for page in self._keys.cookies
             if secrets.compare_digest(
                 shown.get(_name(page), "").encode(), self._keys.cookies[page].encode()
             )

@@ -1,0 +1,1 @@
+"""Tables of a cohort: one Arrow dataset over all participants, and measures that are kept."""

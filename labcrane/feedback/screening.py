@@ -1,0 +1,175 @@
+"""Screening of a recorded session: its own frames to views and sounds, at any speed."""
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from labcrane.core.clock import Tick
+from labcrane.core.records import Event, Frame, Run
+from labcrane.core.signals import Layout, signals_of
+from labcrane.errors import DeviceError, RecordingError
+from labcrane.feedback.handle import FeedbackHandle
+from labcrane.feedback.player import END_S, hold, wait_for_all
+from labcrane.feedback.processes import host_orders
+from labcrane.protocol.rig import Rig
+from labcrane.protocol.study import Study
+from labcrane.recording.frame_log import LOOP, FrameRow
+from labcrane.recording.participant_file.reader import SessionRecord
+
+GROUPS = ("input", "command", "state", "task")
+WINDOW = 4096
+"""Rows that are read at once: an hour is never held in memory."""
+
+
+class Reel:
+    """The frames of a recorded session by number, with the events of each."""
+
+    def __init__(self, record: SessionRecord) -> None:
+        self._streams = {name: record.streams[name] for name in ("loop", *GROUPS)}
+        self.time = self._streams["loop"].time
+        units = self._streams["input"].units
+        self.axes = Layout("the input", signals_of(list(units), units))
+        self._frame = FrameRow(len(self._streams[name].units) for name in GROUPS).frame
+        self._events: dict[int, list[Event]] = {}
+        table = record.events
+        ticks = table["tick"].to_numpy()
+        for tick, name, at, data in zip(
+            ticks, table["name"], table["time"], table["data"], strict=True
+        ):
+            self._events.setdefault(int(tick), []).append(Event(str(name), float(at), data))
+        self._ticks = sorted(self._events)
+        self._first, self._rows = 0, np.empty((0, 0))
+
+    def frame(self, row: int) -> Frame:
+        """Return the frame in a row."""
+        if not self._first <= row < self._first + len(self._rows):
+            parts = [self._streams[name].rows(row, row + WINDOW) for name in self._streams]
+            head, others = parts[0], parts[1:]
+            columns = [head[label] for label, _ in LOOP]
+            columns += [values for part in others for values in part.values()]
+            self._first, self._rows = row, np.column_stack(columns)
+        frame: Frame = self._frame(self._rows[row - self._first])
+        return frame
+
+    def events(self, first: int, last: int) -> list[Event]:
+        """Return what happened after tick ``first``, up to tick ``last``."""
+        return [one for tick in self._ticks if first < tick <= last for one in self._events[tick]]
+
+
+def screened(
+    reel: Reel,
+    start_s: float,
+    speed: float,
+    now: Callable[[], float],
+    rest: Callable[[float], None],
+) -> Iterator[tuple[Frame, list[Event]]]:
+    """Yield the frame that is due whenever another one is, and what happened since the last.
+
+    Parameters
+    ----------
+    start_s
+        The second to begin at; what happened before comes with the first frame.
+    now, rest
+        A clock in seconds, and what waits for so many of them.
+
+    Raises
+    ------
+    RecordingError
+        The session has no such second.
+    """
+    length = float(reel.time[-1] - reel.time[0]) if len(reel.time) else 0.0
+    if not 0.0 <= start_s <= length:
+        raise RecordingError(
+            f"the session lasts {length:.1f} s and has no second {start_s:g}; give one from 0 on"
+        )
+    begun, origin = now(), reel.time[0] + start_s
+    row, told = int(np.searchsorted(reel.time, origin - 1e-9)), -1
+    while True:
+        frame = reel.frame(row)
+        yield frame, reel.events(told, frame.tick.number)
+        told = frame.tick.number
+        if row + 1 >= len(reel.time):
+            return
+        rest(max(0.0, (reel.time[row + 1] - origin) / speed - (now() - begun)))
+        reached = origin + (now() - begun) * speed
+        row = max(row + 1, int(np.searchsorted(reel.time, reached + 1e-9)) - 1)
+
+
+def screen(
+    study: Study,
+    record: SessionRecord,
+    *,
+    speed: float,
+    start_s: float,
+    say: Callable[[str], None],
+) -> None:
+    """Show and sound a recorded session in the views and sounds of its study.
+
+    Nothing is run again: what is shown are the recorded numbers, with the cues, the settings and
+    the scene of each moment.
+
+    Raises
+    ------
+    DeviceError
+        The study has neither views nor sounds, or none can be started here.
+    RecordingError
+        The session has no second ``start_s``.
+    """
+    if not (study.views or study.sounds):
+        raise DeviceError(
+            "the study has neither views nor sounds, so nothing can be shown; labcrane view shows "
+            "any session in a browser"
+        )
+    reel = Reel(record)
+    run = _run_of(study, reel)
+    source = f"{study.protocol.study}/replay-{os.getpid()}"
+    orders = [replace(order, recorded=False) for order in host_orders(study, run, source)]
+    keepers = [FeedbackHandle(order, "continue") for order in orders]
+    try:
+        wait_for_all(keepers, say, "labcrane view shows any session in a browser")
+        _send_all(run, source, reel, keepers, speed=speed, start_s=start_s)
+    finally:
+        for keeper in keepers:
+            keeper.stop()
+
+
+def _run_of(study: Study, reel: Reel) -> Run:
+    run = Rig.build(study, simulated=True).describe(study, participant_seed=0)
+    return replace(run, axes=reel.axes)  # what was recorded may have had other controls
+
+
+def _send_all(
+    run: Run,
+    source: str,
+    reel: Reel,
+    keepers: list[FeedbackHandle],
+    *,
+    speed: float,
+    start_s: float,
+) -> None:
+    from labcrane.streams.context import ContextOutlet  # noqa: PLC0415 - loads liblsl
+    from labcrane.streams.frames import FrameOutlet  # noqa: PLC0415
+
+    outlets = (FrameOutlet(run, source), ContextOutlet(run, source))
+
+    def send(frame: Frame, events: list[Event]) -> None:
+        at = time.perf_counter()
+        stamped = tuple(replace(event, time=at) for event in events)
+        now = replace(frame, tick=Tick(frame.tick.number, at, at), events=stamped)
+        for outlet in outlets:
+            outlet.push(now)
+
+    try:
+        first, events = next(screened(reel, start_s, speed, time.perf_counter, time.sleep))
+        send(first, events)
+        hold(lambda: send(first, []), keepers)
+        for frame, happened in screened(reel, start_s, speed, time.perf_counter, time.sleep):
+            again = frame.tick.number == first.tick.number
+            send(frame, [] if again else happened)
+        time.sleep(END_S)
+    finally:
+        for outlet in outlets:
+            outlet.close()

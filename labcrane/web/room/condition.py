@@ -1,0 +1,110 @@
+"""Condition of a session: which state it is in, and one lamp with its reason in words."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from labcrane.web.live import Live
+from labcrane.web.state import SessionView
+
+EXAMINER = "examiner"
+SILENT_S = 1.0
+"""A running session sends frames all the time; after so long without one it is said."""
+
+STATES = (
+    "starting", "consent", "waiting", "running", "paused", "fault", "break", "questionnaire",
+    "decision", "between", "ended",
+)  # fmt: skip
+"""What a session can be doing; the page has a look for each."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lamp:
+    """Whether all is well: ``"ok"``, ``"warn"`` or ``"bad"``, why, and what to do."""
+
+    level: str
+    reason: str
+    remedy: str = ""
+
+
+REMEDIES: Mapping[str, str] = {
+    "input": "check the controls' cable and power; the session goes on when they are back",
+    "disk": "free space or connect the disk again; nothing is lost meanwhile",
+    "stream": "check the device and its program; the recorder goes on looking for it",
+    "feedback": "it is started again; end the session if it keeps failing",
+}
+"""What to do about each kind of fault."""
+
+
+def state_of(view: SessionView) -> str:
+    """Return which of :data:`STATES` a session is in."""
+    if view.stage.startswith("ended") or view.ended is not None:
+        return "ended"
+    if view.consent:
+        return "consent"
+    if view.alarm:
+        return "decision"
+    if view.holds - {EXAMINER}:
+        return "fault"
+    if EXAMINER in view.holds:
+        return "paused"
+    if view.form is not None:
+        return "questionnaire"
+    if view.trial:
+        return "running"
+    begins = {"waits": "waiting", "break": "break", "starting": "starting"}
+    return begins.get(view.stage.partition(" ")[0], "between")
+
+
+def lamp_of(view: SessionView, live: Live, period_s: float) -> Lamp:
+    """Return the lamp of a session: the worst of what is known."""
+    if state_of(view) == "ended":
+        return _at_the_end(view)
+    if view.alarm:
+        return Lamp("bad", view.alarm, "decide with the participant")
+    for fault, why in view.faults.items():
+        return Lamp("bad", why, REMEDIES.get(fault.partition(" ")[0], ""))
+    silent = live.silent_s
+    if view.trial and silent is not None and silent > SILENT_S:
+        return Lamp(
+            "bad", f"no frame of the session for {silent:.0f} s", "look at the terminal; the "
+            "session is ended and saved by itself if it hangs",
+        )  # fmt: skip
+    found = [*_of_streams(view.streams), *_of_the_loop(live, period_s)]
+    worst = next((one for one in found if one.level == "bad"), None)
+    if worst or found:
+        return worst or found[0]
+    paused = EXAMINER in view.holds
+    return Lamp("ok", "paused by you; all is well" if paused else "all is well")
+
+
+def _at_the_end(view: SessionView) -> Lamp:
+    ended = view.ended
+    if ended is None:
+        return Lamp("ok", "the session is being saved", "leave the computer on")
+    return Lamp(ended.level, ended.verdict, ended.remedy)
+
+
+def _of_streams(status: Mapping[str, Any]) -> list[Lamp]:
+    found = []
+    for stream in status.get("streams", ()):
+        label, condition = stream["label"], stream["condition"]
+        if stream.get("required") and condition in {"absent", "silent"}:
+            found.append(Lamp("bad", f"stream {label} is {condition}", REMEDIES["stream"]))
+        elif stream["warnings"]:
+            found.append(Lamp("warn", f"stream {label} {stream['warnings'][0]}"))
+        elif stream["signals"]:
+            found.append(Lamp("warn", f"signal of {label}: {stream['signals'][0]['message']}"))
+    return found
+
+
+def _of_the_loop(live: Live, period_s: float) -> list[Lamp]:
+    late = live.lateness_s
+    if late is None or late <= period_s:
+        return []
+    return [
+        Lamp(
+            "warn", f"the loop was {1000 * late:.0f} ms late in the last second, a tick has "
+            f"{1000 * period_s:.1f} ms", "close other programs on this computer",
+        )
+    ]  # fmt: skip

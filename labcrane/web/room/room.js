@@ -1,0 +1,337 @@
+// Control room: draws what the server says of a session, and says what the supervisor wants.
+// Everything it shows comes from `show`; what people write leaves by `order`, and a field is
+// emptied only when the server has taken its words: a message lost with a connection is sent again.
+
+const AGAIN_MS = 2000;
+const TYPES_IN = new Set(["INPUT", "TEXTAREA", "SELECT"]);
+
+export default {
+  template: `
+<div class="room" :data-state="s.state" :data-level="s.lamp.level">
+  <header class="room-head">
+    <div class="room-lamp" :class="s.lamp.level" role="status">
+      <span class="room-bulb" aria-hidden="true">{{ mark }}</span>
+      <span><strong id="lamp">{{ s.lamp.reason }}</strong>
+        <span v-if="s.lamp.remedy" class="room-remedy" id="remedy">{{ s.lamp.remedy }}</span></span>
+    </div>
+    <div class="room-who">
+      <h1 id="who">{{ s.who }}</h1>
+      <p id="condition">{{ s.condition }}</p>
+    </div>
+    <div class="room-now">
+      <p class="room-big" id="now">{{ s.now }}</p>
+      <p><span class="room-faint">next</span> <span id="next">{{ s.next }}</span></p>
+      <p class="room-faint" id="stage" role="status">{{ s.stage }}</p>
+    </div>
+    <div class="room-left">
+      <p class="room-big" id="left">{{ s.left }}</p>
+      <progress :value="s.done" :max="s.total || 1" aria-label="trials done"></progress>
+      <p class="room-faint" id="progress">{{ s.done }} of {{ s.total }} trials</p>
+    </div>
+    <p class="room-faint room-facts" id="facts">{{ s.facts }}</p>
+  </header>
+
+  <p v-if="s.alarm" id="alarm" role="alert" class="room-alarm">{{ s.alarm }}</p>
+  <p v-for="question in s.questions" :key="question.ident" :id="question.ident"
+     class="room-question">{{ question.text }}</p>
+
+  <div class="room-actions" role="toolbar" aria-label="Orders" v-show="s.state !== 'ended'">
+    <button v-for="b in safe" :key="b.ident" :id="b.ident" type="button" @click="press(b)"
+      class="room-button" :class="{primary: b.primary}" :aria-disabled="b.why ? 'true' : 'false'"
+      :title="b.why || b.label">{{ b.label }} <kbd aria-hidden="true">{{ b.key }}</kbd></button>
+    <span class="room-gap"></span>
+    <button v-for="b in dangerous" :key="b.ident" :id="b.ident" type="button" @click="press(b)"
+      class="room-button danger" :aria-disabled="b.why ? 'true' : 'false'"
+      :title="b.why || b.label">{{ b.label }} <kbd aria-hidden="true">{{ b.key }}</kbd></button>
+    <button type="button" class="room-button quiet" id="help" @click="open('keys')"
+      aria-label="Keys">?</button>
+    <button type="button" class="room-button quiet" id="theme" @click="theme()">
+      {{ dark ? 'Light' : 'Dark' }}</button>
+  </div>
+  <div class="room-reports"><slot name="reports"></slot></div>
+  <p v-if="told" class="room-told" id="told" role="alert">{{ told }}</p>
+
+  <section v-if="s.report" class="room-card room-report" id="report" :class="s.report.level">
+    <h2 id="report-verdict">{{ s.report.verdict }}</h2>
+    <p v-if="s.report.remedy" id="report-remedy">{{ s.report.remedy }}</p>
+    <h3>Saved</h3>
+    <ul id="saved"><li v-for="line in s.report.saved" :key="line">{{ line }}</li></ul>
+    <h3>How right the time stamps are</h3>
+    <div class="room-scroll" tabindex="0" role="group" aria-label="Sync report">
+      <table id="sync"><thead><tr><th v-for="head in s.report.columns" :key="head" scope="col">
+        {{ head }}</th></tr></thead>
+        <tbody><tr v-for="(row, at) in s.report.rows" :key="at">
+          <td v-for="(cell, of) in row" :key="of">{{ cell }}</td></tr></tbody></table>
+    </div>
+    <ul><li v-for="line in s.report.advice" :key="line">{{ line }}</li></ul>
+    <p><button type="button" class="room-button primary" id="close-page" @click="close()">
+      Close this page</button> <span class="room-faint">It stays until it is closed, also after a
+      reload.</span></p>
+  </section>
+  <section v-else-if="s.state === 'ended'" class="room-card room-report" id="saving">
+    <h2>Saving</h2><p>The participant file is being made and its clocks are being corrected.</p>
+  </section>
+
+  <div class="room-grid">
+    <div class="room-column">
+      <section class="room-card room-form" v-show="s.state === 'consent' || s.asked"
+        aria-label="Questionnaire and consent"><slot name="form"></slot></section>
+      <section class="room-card"><h2>Machine</h2><slot name="machine"></slot></section>
+      <section class="room-card room-cameras" v-show="s.cameras"><slot name="cameras"></slot></section>
+      <section class="room-card" v-show="s.state !== 'ended'" aria-label="Notes and hints">
+        <form v-for="field in words" :key="field.order" class="room-words"
+          @submit.prevent="send(field)">
+          <label :for="field.order + '-field'">{{ field.label }} <kbd aria-hidden="true">{{ field.key }}</kbd></label>
+          <input :id="field.order + '-field'" v-model="field.text" autocomplete="off"
+            :maxlength="field.most">
+          <button class="room-button" :id="'order-' + field.order" type="submit">Send</button>
+        </form>
+      </section>
+      <section class="room-card room-log"><h2>Events</h2>
+        <div class="room-filter"><label class="room-field">Show <select id="filter" v-model="kind">
+          <option value="">everything</option>
+          <option v-for="k in s.kinds" :key="k">{{ k }}</option></select></label>
+          <label class="room-field">Find <input id="find" v-model="find" autocomplete="off"></label></div>
+        <div id="events" class="room-scroll" tabindex="0" role="log" aria-label="Events">
+          <p v-if="!listed.length" class="room-faint">Nothing has happened yet that is shown here.</p>
+          <details v-for="e in listed" :key="e.n" class="room-event" :class="[e.level, e.kind]">
+            <summary><time>{{ e.time }}</time> {{ e.text }}</summary><pre>{{ e.raw }}</pre></details>
+        </div>
+      </section>
+    </div>
+    <div class="room-column">
+      <section class="room-card" aria-label="Controls and joints">
+        <div v-for="group in s.bars" :key="group.title" class="room-bars">
+          <h2>{{ group.title }}</h2>
+          <p v-if="group.none" class="room-faint">{{ group.none }}</p>
+          <div v-for="bar in group.bars" :key="bar.name" class="room-bar" :class="bar.level">
+            <span>{{ bar.name }}</span>
+            <span class="room-track" aria-hidden="true"><span class="room-zero"
+              :style="{left: bar.zero + '%'}"></span><span class="room-fill"
+              :style="{left: bar.from + '%', width: bar.width + '%'}"></span></span>
+            <span class="room-value" :id="bar.ident">{{ bar.text }}</span>
+          </div>
+        </div>
+      </section>
+      <section class="room-card" v-show="s.performance"><h2>Performance</h2>
+        <p class="room-lines" id="performance" role="status">{{ s.performance }}</p></section>
+      <section class="room-card"><h2>Newest movements</h2>
+        <p v-if="!s.measures.length" class="room-faint">The tasks of this study measure nothing.</p>
+        <template v-else>
+          <label class="room-field">Measure <select id="measure" v-model="measure">
+            <option v-for="m in s.measures" :key="m.name" :value="m.name">{{ m.label }}</option>
+          </select></label>
+          <svg class="room-chart" viewBox="0 0 400 150" role="img" :aria-label="said">
+            <rect v-if="band" class="room-band" :x="40" :width="352" :y="band.top" :height="band.high"/>
+            <line v-if="band" class="room-median" x1="40" x2="392" :y1="band.median" :y2="band.median"/>
+            <line class="room-axis" x1="40" x2="40" y1="8" y2="132"/>
+            <line class="room-axis" x1="40" x2="392" y1="132" y2="132"/>
+            <text x="36" y="14" text-anchor="end">{{ top }}</text>
+            <text x="36" y="132" text-anchor="end">{{ bottom }}</text>
+            <circle v-for="(p, at) in dots" :key="at" :cx="p.x" :cy="p.y" :r="p.now ? 4.5 : 2.5"
+              :class="p.kind"/>
+            <text x="216" y="147" text-anchor="middle">trials, the newest on the right</text>
+          </svg>
+          <p class="room-faint" id="movements">{{ said }}</p>
+        </template>
+      </section>
+    </div>
+    <div class="room-column">
+      <section class="room-card"><h2>Lateness</h2>
+        <p v-if="!s.late.length" class="room-faint">Shown as soon as the session sends frames.</p>
+        <template v-else><svg class="room-chart small" viewBox="0 0 400 70" role="img"
+          :aria-label="s.lateText"><line class="room-limit" x1="0" x2="400" :y1="tick" :y2="tick"/>
+          <path class="room-late" :d="lateness"/></svg>
+        <p class="room-faint" id="lateness">{{ s.lateText }}</p></template>
+        <div v-for="one in s.presented" :key="one.label" class="room-stream" :class="one.level">
+          <svg viewBox="0 0 90 24" role="img" :aria-label="'rate of ' + one.label">
+            <path :d="trace(one.trace)"/></svg>
+          <span><strong>{{ one.label }}</strong> {{ one.words }}</span></div>
+      </section>
+      <section class="room-card" id="streams"><h2>Streams of others</h2>
+        <p v-if="!s.streams.length" class="room-faint">The study records no streams of others.</p>
+        <div v-for="one in s.streams" :key="one.label" class="room-stream" :class="one.level">
+          <svg viewBox="0 0 90 24" role="img" :aria-label="'rate of ' + one.label">
+            <path :d="trace(one.trace)"/></svg>
+          <span><strong>{{ one.label }}</strong> {{ one.words }}
+            <span v-for="line in one.lines" :key="line" class="room-line">{{ line }}</span></span>
+        </div>
+      </section>
+      <section class="room-card" id="settings" v-show="s.state !== 'ended'">
+        <h2>Cues and sounds</h2>
+        <p v-if="!s.settings.length" class="room-faint">This study has none that can be changed.</p>
+        <details v-for="one in s.settings" :key="one.name" open><summary>{{ one.name }}
+          <span class="room-faint">{{ one.use }}</span></summary>
+          <div v-for="c in one.controls" :key="c.ident" class="room-slider">
+            <label :for="'setting-' + c.ident" :title="c.about">{{ c.key }}</label>
+            <input v-if="c.kind === 'range'" type="range" :id="'setting-' + c.ident" :min="c.low"
+              :max="c.high" :step="c.step" :value="c.now" :aria-valuetext="valued(c)"
+              @change="set(c, $event.target.value)">
+            <select v-else :id="'setting-' + c.ident" :value="String(c.now)"
+              @change="set(c, $event.target.value)">
+              <option v-for="choice in c.choices" :key="choice">{{ choice }}</option></select>
+            <output v-if="c.kind === 'range'" :id="'now-' + c.ident" :class="{changed: c.now !== c.protocol}">{{ valued(c) }}</output>
+          </div>
+        </details>
+      </section>
+    </div>
+  </div>
+
+  <dialog ref="sure" class="room-dialog" aria-labelledby="sure-asks">
+    <p id="sure-asks">{{ asked?.asks }}</p>
+    <p><button type="button" class="room-button danger" :id="asked ? asked.ident + '-sure' : 'sure'"
+      @click="sure()">{{ asked?.label }}</button>
+      <button type="button" class="room-button" id="sure-not" @click="$refs.sure.close()">Cancel</button></p>
+  </dialog>
+  <dialog ref="keys" class="room-dialog" aria-labelledby="keys-title">
+    <h2 id="keys-title">Keys</h2>
+    <dl class="room-keys"><template v-for="k in keys" :key="k.key">
+      <dt><kbd>{{ k.key }}</kbd></dt><dd>{{ k.does }}</dd></template></dl>
+    <p><button type="button" class="room-button primary" @click="$refs.keys.close()">Close</button></p>
+  </dialog>
+</div>`,
+  props: { first: Object, keys: Array },
+  data() {
+    return {
+      s: this.first, kind: "", find: "", measure: "", told: "", asked: null, dark: false,
+      waiting: {}, count: 0,
+      words: [
+        { order: "note", label: "Note", key: "N", text: "", most: 4000 },
+        { order: "hint", label: "Hint to the operator", key: "H", text: "", most: 500 },
+      ],
+    };
+  },
+  computed: {
+    mark() { return { ok: "✓", warn: "!", bad: "✕" }[this.s.lamp.level]; },
+    safe() { return this.s.buttons.filter((b) => !b.danger); },
+    dangerous() { return this.s.buttons.filter((b) => b.danger); },
+    listed() {
+      const words = this.find.toLowerCase();
+      return this.s.events.filter((e) => (!this.kind || e.kind === this.kind) &&
+        (!words || (e.text + e.raw).toLowerCase().includes(words)));
+    },
+    points() { return this.s.results[this.measure] ?? { mine: [], before: [], cohort: null }; },
+    range() {
+      const { mine, before, cohort } = this.points;
+      const all = [...mine, ...before, ...(cohort ? cohort.slice(0, 3) : [])];
+      if (!all.length) return [0, 1];
+      const low = Math.min(0, ...all), high = Math.max(...all);
+      return high > low ? [low, high * 1.05] : [low, low + 1];
+    },
+    top() { return this.short(this.range[1]); },
+    bottom() { return this.short(this.range[0]); },
+    dots() {
+      const { mine, before } = this.points;
+      const all = [...before.map((v) => [v, "before"]), ...mine.map((v) => [v, "mine"])].slice(-60);
+      const step = 344 / Math.max(1, all.length - 1);
+      return all.map(([v, kind], at) => ({
+        x: all.length > 1 ? 44 + at * step : 216, y: this.height(v), kind,
+        now: at === all.length - 1,
+      }));
+    },
+    band() {
+      const cohort = this.points.cohort;
+      if (!cohort) return null;
+      const [low, median, high] = cohort.map((v) => this.height(v));
+      return { top: high, high: Math.max(1, low - high), median };
+    },
+    said() {
+      const { mine, before, cohort } = this.points;
+      const unit = this.s.measures.find((m) => m.name === this.measure)?.unit ?? "";
+      const newest = mine.length ? `newest ${this.short(mine.at(-1))} ${unit}` : "no movement yet";
+      const own = before.length ? ` · this person before: ${before.length}` : "";
+      const others = cohort
+        ? ` · cohort of ${cohort[3]}: median ${this.short(cohort[1])} ${unit}, middle half shaded`
+        : " · no cohort to compare with yet";
+      return newest + own + others;
+    },
+    most() { return Math.max(2 * this.s.tickMs, ...this.s.late.map((one) => one[1])); },
+    tick() { return 66 - 62 * (this.s.tickMs / this.most); },
+    lateness() {
+      const y = (v) => (66 - 62 * (v / this.most)).toFixed(1);
+      const x = (at) => (at * 400 / Math.max(1, this.s.late.length - 1)).toFixed(1);
+      const up = this.s.late.map(([, high], at) => `${x(at)},${y(high)}`);
+      const down = this.s.late.map(([low], at) => `${x(at)},${y(low)}`).reverse();
+      return `M${[...up, ...down].join("L")}Z`;
+    },
+  },
+  watch: {
+    "s.measures": { immediate: true, handler(now) {
+      if (now.length && !now.some((m) => m.name === this.measure)) this.measure = now[0].name;
+    } },
+  },
+  mounted() {
+    let kept = null;
+    try { kept = localStorage.getItem("labcrane-theme"); } catch { /* a browser that keeps nothing */ }
+    this.dark = kept ? kept === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
+    this.paint();
+    addEventListener("keydown", this.key);
+    this.timer = setInterval(this.again, AGAIN_MS);
+  },
+  beforeUnmount() {
+    removeEventListener("keydown", this.key);
+    clearInterval(this.timer);
+  },
+  methods: {
+    show(part) { Object.assign(this.s, part); },
+    taken(ident, why) {
+      const field = this.waiting[ident]?.field;
+      if (field && !why && field.text.trim() === this.waiting[ident].text) field.text = "";
+      delete this.waiting[ident];
+      this.told = why;
+    },
+    again() { for (const ident in this.waiting) this.$emit("order", this.waiting[ident].given); },
+    give(order, text, field) {
+      const ident = `${Date.now()}-${this.count++}`, given = { ident, order, text };
+      this.waiting[ident] = { given, text, field };
+      this.$emit("order", given);
+    },
+    press(b) {
+      if (b.why) { this.told = `${b.label}: ${b.why}`; return; }
+      this.told = "";
+      if (!b.asks) { this.give(b.order, b.text); return; }
+      this.asked = b;
+      this.$nextTick(() => { if (!this.$refs.sure.open) this.$refs.sure.showModal();
+        this.$refs.sure.querySelector("button").focus(); });
+    },
+    sure() { this.give(this.asked.order, this.asked.text); this.$refs.sure.close(); },
+    send(field) { const text = field.text.trim(); if (text) this.give(field.order, text, field); },
+    set(c, value) { this.give("setting", `${c.place}=${value}`); },
+    close() { this.$emit("close"); },
+    open(which) { if (!this.$refs[which].open) this.$refs[which].showModal(); },
+    key(e) {
+      if (e.ctrlKey || e.altKey || e.metaKey || e.repeat) return;
+      if (TYPES_IN.has(e.target.tagName) || e.target.isContentEditable) return;
+      if (this.$refs.sure.open || this.$refs.keys.open) return;
+      const pressable = e.target.tagName === "BUTTON" || e.target.tagName === "SUMMARY";
+      if (e.key === " " && pressable) return;
+      const key = e.key === " " ? "Space" : e.key.toUpperCase();
+      const b = this.s.buttons.find((one) => one.key.toUpperCase() === key.toUpperCase());
+      const at = { N: "note-field", H: "hint-field" }[key];
+      if (b && this.s.state !== "ended") this.press(b);
+      else if (key === "?") this.open("keys");
+      else if (at) document.getElementById(at)?.focus();
+      else if (key === "F") document.querySelector("#settings input, #settings select")?.focus();
+      else if (key === "Q") document.querySelector(".room-form button, .room-form input")?.focus();
+      else if (key === "D") this.theme();
+      else return;
+      e.preventDefault();
+    },
+    theme() {
+      this.dark = !this.dark;
+      try { localStorage.setItem("labcrane-theme", this.dark ? "dark" : "light"); } catch { /* as above */ }
+      this.paint();
+    },
+    paint() { document.documentElement.dataset.theme = this.dark ? "dark" : "light"; },
+    height(v) { const [low, high] = this.range; return 132 - 122 * (v - low) / (high - low); },
+    short(v) { return Number(v).toPrecision(3).replace(/\.?0+$/, ""); },
+    valued(c) { return typeof c.now === "number" ? `${this.short(c.now)} ${c.unit}`.trim() : String(c.now); },
+    trace(values) {
+      const known = values.filter((v) => v !== null);
+      if (known.length < 2) return "M0,12L90,12";
+      const high = Math.max(...known) || 1;
+      return "M" + values.map((v, at) =>
+        `${(at * 90 / (values.length - 1)).toFixed(1)},${(22 - 20 * (v ?? 0) / high).toFixed(1)}`).join("L");
+    },
+  },
+};

@@ -1,0 +1,278 @@
+"""Snapshot of a session: everything the control room shows, ready for JSON."""
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from labcrane.core.records import Event
+from labcrane.core.signals import Signal
+from labcrane.design.counts import TrialCounts
+from labcrane.protocol.questions import about, questions
+from labcrane.web.page import PageContext
+from labcrane.web.room.bars import groups
+from labcrane.web.room.buttons import buttons
+from labcrane.web.room.condition import lamp_of, state_of
+from labcrane.web.room.earlier import Earlier
+from labcrane.web.room.sentences import KINDS, sentence
+from labcrane.web.room.sliders import sliders
+
+NEWEST = 120
+"""Events that are listed."""
+
+OWN = "labcrane.feedback"
+"""How the names of what views and sounds say of themselves begin."""
+
+STATES: Mapping[str, str] = {
+    "starting": "Getting ready",
+    "consent": "Waits for consent",
+    "waiting": "Ready to start",
+    "paused": "Paused",
+    "fault": "Stopped by a fault",
+    "break": "Break",
+    "questionnaire": "Questionnaire",
+    "decision": "A decision is needed",
+    "between": "Between two steps",
+    "ended": "Ended",
+}
+"""What is said large of each state; of a running trial, its name is."""
+
+
+class Snapshot:
+    """Puts together what the page shows."""
+
+    def __init__(self, context: PageContext, earlier: Earlier) -> None:
+        self._context = context
+        self._earlier = earlier
+        self._counts = TrialCounts.of(context.plan)
+        self._signals = _measures(context)
+        self._told: list[tuple[Event, dict[str, Any]]] = []
+        self._number = 0
+        self._began: float | None = None
+        self._period_s = 1.0 / context.study.protocol.rate_hz
+
+    def parts(self) -> dict[str, Any]:
+        """Return everything that is shown, by name."""
+        return {**self._head(), **self._body()}
+
+    def _head(self) -> dict[str, Any]:
+        context = self._context
+        session, plan = context.session, context.plan
+        state = state_of(session)
+        held = f" · HELD by {', '.join(sorted(session.holds))}" if session.holds else ""
+        lamp = lamp_of(session, context.live, self._period_s)
+        return {
+            "who": f"{context.participant} · session {plan.number}",
+            "condition": " · ".join(filter(None, [
+                context.study.protocol.title or context.study.protocol.study, plan.name,
+                plan.group and f"group {plan.group}", self._practice(),
+            ])),
+            "state": state,
+            "now": self._running() if state == "running" else STATES.get(state, ""),
+            "stage": session.stage + held,
+            "next": self._next(),
+            "facts": " · ".join(self._facts()),
+            "left": self._left(state),
+            "done": session.trials_done,
+            "total": len(plan.trials),
+            "lamp": {"level": lamp.level, "reason": lamp.reason, "remedy": lamp.remedy},
+            "alarm": session.alarm,
+            "asked": session.form is not None,
+            "buttons": [button.as_json() for button in buttons(session)],
+            "report": self._report(),
+        }  # fmt: skip
+
+    def _body(self) -> dict[str, Any]:
+        context = self._context
+        live, session = context.live, context.session
+        lines = session.assessment.lines(live.newest, context.study.protocol.indicator)
+        streams = self._streams()
+        return {
+            "questions": [
+                {"ident": f"question-{question.key}", "text": _asked(context, question)}
+                for question in questions(context.study)
+            ],
+            "bars": groups(live.newest, live.units, context.study.machine.joints, live.moved),
+            "performance": "\n".join(lines),
+            "measures": [
+                {"name": name, "unit": _unit(signal), "label": _label(name, signal)}
+                for name, signal in self._signals.items()
+            ],
+            "results": self._results(),
+            "late": [[round(1000 * part, 2) for part in band] for band in live.bands],
+            "lateText": self._lateness(),
+            "tickMs": 1000 * self._period_s,
+            "streams": [one for name, one in streams if not name.startswith(OWN)],
+            "presented": [one for name, one in streams if name.startswith(OWN)],
+            "settings": self._settings(),
+            "kinds": list(KINDS),
+            "events": self._events(),
+            "cameras": any(context.pictures.cameras.values()),
+        }
+
+    def _running(self) -> str:
+        called = self._called(self._context.session.trial["trial"])
+        return called[:1].upper() + called[1:]
+
+    def _called(self, number: object) -> str:
+        return self._counts.name(int(str(number)))
+
+    def _practice(self) -> str:
+        trial = self._context.session.trial
+        feedback = trial.get("feedback")
+        return " · ".join(filter(None, [
+            str(trial.get("block_name", "")), "practice" if trial.get("practice") else "",
+            f"feedback {feedback}" if feedback else "",
+        ]))  # fmt: skip
+
+    def _next(self) -> str:
+        session, plan = self._context.session, self._context.plan
+        if session.ended or session.stage.startswith("ended"):
+            return "nothing: the session is over"
+        if session.trials_done < len(plan.trials):
+            running = session.trial.get("trial") if session.trial else None
+            left = [one for one in plan.trials[session.trials_done :] if one.number != running]
+            if left:
+                return self._called(left[0].number)
+        return "the end of the session" if plan.trials else "see the events"
+
+    def _facts(self) -> list[str]:
+        session, live = self._context.session, self._context.live
+        found = []
+        if session.trial:
+            found.append(f"attempt {session.trial['attempt']}")
+        found += [f"{name} {count}" for name, count in sorted(session.counts.items())]
+        if live.lateness_s is not None:
+            found.append(f"loop at most {1000 * live.lateness_s:.1f} ms late")
+        return found
+
+    def _left(self, state: str) -> str:
+        trials = self._context.plan.trials
+        left = sum(
+            trial.planned.expected_s for trial in trials[self._context.session.trials_done :]
+        )
+        if state == "ended" or not trials:
+            return "over" if state == "ended" else "-"
+        return f"{left / 60:.0f} min left" if left >= 60 else f"{left:.0f} s left"  # noqa: PLR2004
+
+    def _report(self) -> dict[str, Any] | None:
+        ended = self._context.session.ended
+        if ended is None:
+            return None
+        return {
+            "level": ended.level, "verdict": ended.verdict, "remedy": ended.remedy,
+            "saved": list(ended.saved), "columns": list(ended.columns),
+            "rows": [list(row) for row in ended.rows], "advice": list(ended.advice),
+        }  # fmt: skip
+
+    def _results(self) -> dict[str, Any]:
+        rows = self._context.session.rows
+        return {
+            name: {
+                "mine": [_value(row[name]) for row in rows if _value(row.get(name)) is not None],
+                "before": self._earlier.mine.get(name, []),
+                "cohort": self._earlier.cohort(name),
+            }
+            for name in self._signals
+        }
+
+    def _lateness(self) -> str:
+        bands = self._context.live.bands
+        if not bands:
+            return ""
+        middle, worst = bands[-1][0], max(most for _, most in bands)
+        return (
+            f"loop: median {1000 * middle:.2f} ms now, at most {1000 * worst:.1f} ms in the last "
+            f"minute; a tick has {1000 * self._period_s:.1f} ms (dashed)"
+        )
+
+    def _streams(self) -> list[tuple[str, dict[str, Any]]]:
+        session = self._context.session
+        return [
+            (
+                str(stream.get("name", "")),
+                _stream(stream, list(session.rates.get(stream["label"], ()))),
+            )
+            for stream in session.streams.get("streams", ())
+        ]
+
+    def _settings(self) -> list[dict[str, Any]]:
+        study, changed = self._context.study, self._context.session.settings
+        found = []
+        for name, part in {**study.cues, **study.sounds}.items():
+            controls = sliders(name, part.settings, changed.get(name, {}))
+            if controls:
+                found.append({"name": name, "use": part.name, "controls": controls})
+        return found
+
+    def _events(self) -> list[dict[str, Any]]:
+        kept = list(self._context.session.events)[-NEWEST:]
+        known = {id(event): told for event, told in self._told}
+        self._told = [(event, known.get(id(event)) or self._tell(event)) for event in kept]
+        return [told for _, told in reversed(self._told)]
+
+    def _tell(self, event: Event) -> dict[str, Any]:
+        self._number += 1
+        if self._began is None:
+            self._began = event.time
+        said = sentence(event, self._counts.name)
+        data = {key: value for key, value in event.data.items() if value not in {None, ""}}
+        return {
+            "n": self._number, "time": clock(event.time - self._began), "text": said.text,
+            "kind": said.kind, "level": said.level,
+            "raw": f"{event.time:.3f}  {event.name}  {json.dumps(data, ensure_ascii=False)[:2000]}",
+        }  # fmt: skip
+
+
+def clock(seconds: float) -> str:
+    """Return a time as minutes and seconds, with hours where there are some."""
+    whole = max(0, int(seconds))
+    minutes = f"{whole // 60 % 60}:{whole % 60:02}"
+    return minutes if whole < 3600 else f"{whole // 3600}:{minutes.zfill(5)}"  # noqa: PLR2004
+
+
+def _measures(context: PageContext) -> dict[str, Signal]:
+    """Return what the study's tasks measure, by the column of the trial table."""
+    return {
+        column: signal
+        for task in context.study.tasks.values()
+        for signal in task.results
+        for column in signal.columns
+    }
+
+
+def _unit(signal: Signal) -> str:
+    return "" if signal.unit == "1" else signal.unit
+
+
+def _label(name: str, signal: Signal) -> str:
+    unit = _unit(signal)
+    return name.replace("_", " ") + (f", {unit}" if unit else "")
+
+
+def _value(value: object) -> float | None:
+    number = float(value) if isinstance(value, int | float) else math.nan
+    return round(number, 6) if math.isfinite(number) else None
+
+
+def _stream(stream: Mapping[str, Any], trace: list[float | None]) -> dict[str, Any]:
+    faults = [f"{each['channel'] or 'all'}: {each['kind']}: {each['message']}"
+              for each in stream["signals"]]  # fmt: skip
+    absent = stream["condition"] in {"absent", "silent"}
+    level = "bad" if absent and stream.get("required") else ""
+    level = level or ("warn" if absent or stream["warnings"] or faults else "")
+    rate, nominal = stream.get("rate_hz"), stream.get("nominal_hz")
+    words = [str(stream["condition"])]
+    if rate is not None:
+        words.append(f"{rate:.0f} Hz" + (f" of {nominal:g}" if nominal else ""))
+    if stream.get("rtt_s") is not None:
+        words.append(f"clock asked in {1000 * stream['rtt_s']:.1f} ms")
+    return {
+        "label": stream["label"], "level": level, "words": ", ".join(words),
+        "trace": trace, "lines": [*stream["warnings"], *faults],
+    }  # fmt: skip
+
+
+def _asked(context: PageContext, question: Any) -> str:
+    said = about(context.study, question)
+    return f"line {said['line']} of {context.study.path.name}: {said['message']}"

@@ -1,0 +1,253 @@
+"""Film of a recorded session: its frames at any time, its events, and its signals as curves.
+
+An hour is never held in memory: of frames some seconds about the time that is shown, of signals the
+one that is drawn, and only while it is summed up.
+"""
+
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from labcrane.core.records import Event, Run, SessionState
+from labcrane.core.roles import Cue
+from labcrane.core.settings import Settings
+from labcrane.core.signals import Layout, signals_of
+from labcrane.design.counts import TableNumbers
+from labcrane.errors import LabcraneError, RecordingError
+from labcrane.files.yaml import parse_yaml
+from labcrane.machines.links import link_boxes
+from labcrane.machines.machine import Machine
+from labcrane.recording.participant_file.reader import SessionRecord, Stream
+from labcrane.registry.offers import Offer
+from labcrane.registry.registry import Registry
+from labcrane.streams.context import situation_after
+from labcrane.types import FloatArray
+from labcrane.web.room.sentences import sentence
+
+GROUPS = ("loop", "input", "command", "state", "task")
+FRAME = {"loop": "", "input": "axes."}
+"""What a column of a frame is called there, by group; the others by the group's name."""
+
+WINDOW_S = 20.0
+"""How much of the frames is read at once."""
+
+POINTS = 600
+"""How many steps a curve has, each with the lowest and highest value in it."""
+
+KEPT = 6
+"""Signals that are kept while they are looked at."""
+
+GAP_S = 0.1
+"""A pause between two ticks that is longer is shown as a gap."""
+
+MOST_EVENTS = 20_000
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedCue:
+    """What draws a cue as it was recorded."""
+
+    offer: Offer[Cue]
+    settings: Settings
+
+
+class Film:
+    """A session as it can be looked at. Times are seconds from its first frame.
+
+    Parameters
+    ----------
+    record
+        The session.
+    called
+        What it is called beside another one.
+
+    Attributes
+    ----------
+    run
+        What was run, as far as drawing it goes; nobody can steer it.
+    """
+
+    def __init__(self, record: SessionRecord, called: str) -> None:
+        self.called = called
+        self._record = record
+        try:
+            self._own: Mapping[str, Stream] = {name: record.streams[name] for name in GROUPS}
+        except KeyError as error:
+            raise RecordingError(
+                f"{called} has no frames of {error}; there is nothing to see"
+            ) from None
+        self.time: FloatArray = self._own["loop"].time
+        if not len(self.time):
+            raise RecordingError(f"{called} has no frame; there is nothing to see")
+        self.start = float(self.time[0])
+        self.length = float(self.time[-1]) - self.start
+        context = record.context
+        text = parse_yaml(context["machine"], "the machine as it was", recorded=True)
+        self.machine = Machine.model_validate(text)
+        self.run = Run(
+            rate_hz=float(context["rate_hz"]),
+            machine=self.machine,
+            participant_seed=0,
+            inverse=_nobody,
+            bodies=link_boxes(self.machine),
+            axes=self._layout("input"),
+            command=self._layout("command"),
+            state=self._layout("state"),
+            task=self._layout("task"),
+        )
+        self._window = (0, 0)
+        self._rows: dict[str, FloatArray] = {}
+        self._curves: OrderedDict[tuple[str, str], tuple[FloatArray, FloatArray]] = OrderedDict()
+
+    def _layout(self, group: str) -> Layout:
+        units = self._own[group].units
+        return Layout(group, signals_of(list(units), units))
+
+    def index(self, at: float) -> int:
+        """Return the newest frame at a time, or the first one."""
+        found = int(np.searchsorted(self.time, self.start + at + 1e-9, side="right")) - 1
+        return min(max(found, 0), len(self.time) - 1)
+
+    def frame(self, at: float) -> dict[str, float]:
+        """Return the newest frame at a time, by the columns of a frame stream."""
+        row = self.index(at)
+        first, last = self._window
+        if not first <= row < last:
+            span = round(WINDOW_S * self.run.rate_hz)
+            first = max(0, row - span // 4)
+            last = min(len(self.time), first + span)
+            self._rows = {
+                FRAME.get(group, f"{group}.") + name: values
+                for group, stream in self._own.items()
+                for name, values in stream.rows(first, last).items()
+            }
+            self._window = (first, last)
+        return {name: float(values[row - first]) for name, values in self._rows.items()}
+
+    def situation(self, at: float) -> SessionState:
+        """Return what the session was about at a time."""
+        times = self._times
+        last = int(np.searchsorted(times, self.start + at + 1e-9, side="right"))
+        return self._situations[last]
+
+    @cached_property
+    def _happened(self) -> list[Event]:
+        table = self._record.events.sort_values("time", kind="stable")
+        return [
+            Event(str(name), float(time), data)
+            for name, time, data in zip(table["name"], table["time"], table["data"], strict=True)
+        ]
+
+    @cached_property
+    def _times(self) -> FloatArray:
+        return np.array([event.time for event in self._happened])
+
+    @cached_property
+    def _situations(self) -> list[SessionState]:
+        found = [SessionState()]
+        for event in self._happened:
+            found.append(situation_after(found[-1], event))
+        return found
+
+    @cached_property
+    def events(self) -> list[dict[str, Any]]:
+        """What happened, in words, ready for JSON."""
+        called = TableNumbers().name
+        found = []
+        for event in self._happened[:MOST_EVENTS]:
+            said = sentence(event, called)
+            found.append(
+                {"t": round(event.time - self.start, 4), "text": said.text, "kind": said.kind,
+                 "level": said.level}
+            )  # fmt: skip
+        return found
+
+    @cached_property
+    def trials(self) -> list[dict[str, Any]]:
+        """When each attempt at a trial was, and how it ended, ready for JSON."""
+        found: list[dict[str, Any]] = []
+        for event in self._happened:
+            at = round(event.time - self.start, 4)
+            if event.name == "trial.start":
+                found.append(
+                    {"from": at, "to": self.length, "trial": event.data["trial"],
+                     "attempt": event.data["attempt"], "outcome": "unfinished",
+                     "counted": bool(event.data.get("counted"))}
+                )  # fmt: skip
+            elif event.name == "trial.end" and found:
+                found[-1] |= {"to": at, "outcome": event.data["outcome"]}
+        return found
+
+    @cached_property
+    def gaps(self) -> list[tuple[float, float]]:
+        """From when to when no frame was recorded."""
+        steps = np.diff(self.time)
+        at = np.flatnonzero(steps > max(GAP_S, 2.5 / self.run.rate_hz))
+        return [
+            (float(self.time[one] - self.start), float(self.time[one + 1] - self.start))
+            for one in at.tolist()
+        ]
+
+    @cached_property
+    def signals(self) -> list[dict[str, str]]:
+        """Every signal that can be drawn: of the session, and of the streams of others."""
+        return [
+            {"stream": stream, "column": column, "unit": unit, "label": f"{stream} {column}"}
+            for stream, each in self._record.streams.items()
+            for column, unit in each.units.items()
+            if stream != "loop" or column not in {"tick", "due", "woke"}
+        ]
+
+    def curve(self, stream: str, column: str, begin: float, end: float) -> dict[str, Any]:
+        """Return a signal between two times: for each step its lowest and highest value.
+
+        Where there is no value in a step, or none that is a number, it is None: a gap stays one.
+        """
+        time, values = self._signal(stream, column)
+        edges = np.linspace(begin, end, POINTS + 1)
+        places = np.searchsorted(time, edges)
+        low: list[float | None] = []
+        high: list[float | None] = []
+        for first, last in zip(places[:-1].tolist(), places[1:].tolist(), strict=True):
+            part = values[first:last]
+            part = part[np.isfinite(part)]
+            low.append(float(part.min()) if len(part) else None)
+            high.append(float(part.max()) if len(part) else None)
+        return {"low": low, "high": high}
+
+    def _signal(self, stream: str, column: str) -> tuple[FloatArray, FloatArray]:
+        key = stream, column
+        if key not in self._curves:
+            if len(self._curves) >= KEPT:
+                self._curves.popitem(last=False)
+            source = self._record.streams[stream]
+            self._curves[key] = source.time - self.start, source.column(column)
+        self._curves.move_to_end(key)
+        return self._curves[key]
+
+    def cues(self, registry: Registry) -> tuple[dict[str, RecordedCue], list[str]]:
+        """Return what draws the recorded cues, and why some of them cannot be drawn."""
+        found, lacking = {}, []
+        for name, use, settings in self._recorded_cues():
+            try:
+                offer = registry.find(Cue, use)
+                found[name] = RecordedCue(offer, offer.settings.model_validate(settings))
+            except (LabcraneError, ValueError) as error:
+                lacking.append(f"cue {name!r} is not shown: {str(error).partition(chr(10))[0]}")
+        return found, lacking
+
+    def _recorded_cues(self) -> Iterator[tuple[str, str, Mapping[str, Any]]]:
+        used = {"+".join(state.active) for state in self._situations}
+        active = {name for names in used for name in names.split("+") if name}
+        for part, about in self._record.context["components"].items():
+            name = part.rpartition(".")[2]
+            if part.startswith("feedback.") and name in active:
+                yield name, about["use"], about["settings"]
+
+
+def _nobody(velocity: FloatArray, state: FloatArray) -> FloatArray:
+    raise RecordingError("a recorded session was asked to steer; it can only be looked at")

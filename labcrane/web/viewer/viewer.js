@@ -1,0 +1,161 @@
+// Viewer of a recorded session: a time line, curves and events about a time that the server is told.
+
+const STEP_MS = 60;
+
+export default {
+  template: `
+<div class="room view">
+  <header class="view-head">
+    <h1 id="title">{{ about.title }}</h1>
+    <p class="room-faint" id="said">{{ about.said }}</p>
+    <p v-for="line in about.lacking" :key="line" class="room-question">{{ line }}</p>
+  </header>
+  <div class="view-grid">
+    <section class="room-card view-machine"><slot name="machine"></slot></section>
+    <section class="room-card"><h2>Curves</h2>
+      <div v-for="(chart, at) in charts" :key="at" class="view-chart">
+        <label class="room-field">Signal {{ at + 1 }} <select :id="'signal-' + at" v-model="chart.signal"
+          @change="ask(at)"><option value="">none</option>
+          <option v-for="(one, n) in about.signals" :key="n" :value="n">{{ one.label }}{{ one.unit && one.unit !== '1' ? ', ' + one.unit : '' }}</option>
+        </select></label>
+        <svg v-if="chart.path" class="room-chart" viewBox="0 0 600 110" preserveAspectRatio="none" role="img"
+          :aria-label="'signal ' + (at + 1)" @click="into($event)"><path class="room-late" :d="chart.path"/>
+          <line class="view-now" :x1="place(t)" :x2="place(t)" y1="0" y2="110"/></svg>
+        <p v-if="chart.path" class="room-faint" :id="'range-' + at">{{ chart.said }}</p>
+      </div>
+    </section>
+  </div>
+  <section class="room-card view-time" aria-label="Time">
+    <div class="view-controls" role="toolbar" aria-label="Playing">
+      <button type="button" class="room-button primary" id="play" @click="play()">{{ playing ? 'Pause' : 'Play' }} <kbd aria-hidden="true">Space</kbd></button>
+      <button type="button" class="room-button" id="before" @click="trial(-1)">Trial before</button>
+      <button type="button" class="room-button" id="after" @click="trial(1)">Trial after</button>
+      <label class="room-field">Speed <select id="speed" v-model.number="speed">
+        <option v-for="one in [0.1, 0.25, 0.5, 1, 2, 5, 10, 50]" :key="one" :value="one">{{ one }}×</option></select></label>
+      <label class="room-field">Second <input id="second" type="number" min="0" :max="about.length" step="any"
+        :value="t.toFixed(2)" @change="go(Number($event.target.value))"></label>
+      <label class="room-field">Shown <select id="span" v-model.number="span" @change="go(t); askAll()">
+        <option :value="0">all</option><option v-for="one in [600, 60, 20, 5]" :key="one" :value="one">{{ one }} s</option></select></label>
+      <strong id="clock">{{ clock(t) }} of {{ clock(about.length) }}</strong>
+    </div>
+    <input type="range" id="scrub" class="view-scrub" aria-label="Time in seconds" min="0" :max="about.length" step="0.01"
+      :value="t" :aria-valuetext="clock(t)" @input="go(Number($event.target.value))">
+    <svg class="view-line" viewBox="0 0 600 46" preserveAspectRatio="none" role="img"
+      :aria-label="about.trials.length + ' trials and ' + about.events.length + ' events'" @click="into($event)">
+      <rect v-for="(one, n) in spans" :key="n" :class="one.kind" :x="one.x" :width="one.width" y="2" height="20"/>
+      <rect v-for="(one, n) in holes" :key="'g' + n" class="view-gap" :x="one.x" :width="one.width" y="0" height="46"/>
+      <path class="view-ticks" :d="ticks"/>
+      <line class="view-now" :x1="place(t)" :x2="place(t)" y1="0" y2="46"/></svg>
+    <p class="room-faint view-legend"><span class="view-swatch success"></span>success
+      <span class="view-swatch other"></span>other end <span class="view-swatch approach"></span>not counted
+      <span class="view-swatch gap"></span>no frames</p>
+  </section>
+  <section class="room-card"><h2>Events</h2>
+    <label class="room-field">Find <input id="find" v-model="find" autocomplete="off"></label>
+    <div id="events" class="room-scroll" tabindex="0" role="group" aria-label="Events">
+      <button v-for="(e, n) in listed" :key="n" type="button" class="view-event" :class="e.level"
+        @click="go(e.t)"><span>{{ clock(e.t) }}</span> {{ e.text }}</button></div>
+  </section>
+</div>`,
+  props: { about: Object },
+  data() {
+    return { t: 0, speed: 1, span: 0, playing: false, find: "", came: 0, asked: 0,
+      charts: [0, 1, 2].map(() => ({ signal: "", path: "", said: "" })) };
+  },
+  computed: {
+    begin() { return this.span ? Math.min(Math.max(0, this.t - this.span / 2), Math.max(0, this.about.length - this.span)) : 0; },
+    end() { return this.span ? Math.min(this.begin + this.span, this.about.length) : this.about.length; },
+    spans() {
+      return this.about.trials.filter((one) => one.to >= this.begin && one.from <= this.end).map((one) => ({
+        x: this.place(one.from), width: Math.max(0.5, this.place(one.to) - this.place(one.from)),
+        kind: !one.counted ? "approach" : one.outcome === "success" ? "success" : "other",
+      }));
+    },
+    holes() {
+      return this.about.gaps.map(([from, to]) => ({ x: this.place(from), width: Math.max(1, this.place(to) - this.place(from)) }));
+    },
+    ticks() {
+      return this.about.events.filter((e) => e.t >= this.begin && e.t <= this.end)
+        .map((e) => `M${this.place(e.t).toFixed(1)},${e.kind === "notes" ? 24 : 30}V44`).join("");
+    },
+    listed() {
+      const words = this.find.toLowerCase();
+      const some = this.about.events.filter((e) => !words || e.text.toLowerCase().includes(words));
+      const near = some.findIndex((e) => e.t >= this.t - 5);
+      return words ? some.slice(0, 200) : some.slice(Math.max(0, near), Math.max(0, near) + 60);
+    },
+  },
+  mounted() {
+    addEventListener("keydown", this.key);
+    document.documentElement.dataset.theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
+    const first = this.about.signals.findIndex((one) => one.column.startsWith("tip.position"));
+    this.charts[0].signal = first < 0 ? "" : first;
+    this.timer = setInterval(this.step, STEP_MS);
+    this.askAll();
+    this.go(this.about.at);
+  },
+  beforeUnmount() { removeEventListener("keydown", this.key); clearInterval(this.timer); },
+  methods: {
+    place(t) { return 600 * (t - this.begin) / Math.max(1e-9, this.end - this.begin); },
+    go(t) {
+      const before = this.begin;
+      this.t = Math.min(Math.max(0, t || 0), this.about.length);
+      this.$emit("at", this.t);
+      if (this.begin !== before) this.askSoon();
+    },
+    step() {
+      const now = performance.now(), passed = (now - this.came) / 1000;
+      this.came = now;
+      if (!this.playing) return;
+      if (this.t >= this.about.length) { this.playing = false; return; }
+      this.go(this.t + passed * this.speed);
+    },
+    play() { this.playing = !this.playing; if (this.playing && this.t >= this.about.length) this.go(0); },
+    trial(way) {
+      const starts = this.about.trials.filter((one) => one.counted).map((one) => one.from);
+      const next = way > 0 ? starts.find((t) => t > this.t + 1e-6) : starts.filter((t) => t < this.t - 0.5).at(-1);
+      if (next !== undefined) this.go(next);
+    },
+    into(e) {
+      const box = e.currentTarget.getBoundingClientRect();
+      this.go(this.begin + (this.end - this.begin) * (e.clientX - box.left) / box.width);
+    },
+    askSoon() { clearTimeout(this.soon); this.soon = setTimeout(this.askAll, 150); },
+    askAll() { this.charts.forEach((_, at) => this.ask(at)); },
+    ask(at) {
+      const chart = this.charts[at];
+      if (chart.signal === "") { chart.path = ""; return; }
+      const { stream, column } = this.about.signals[chart.signal];
+      this.$emit("curve", { at, stream, column, begin: this.begin, end: this.end });
+    },
+    curve(at, { low, high, unit }) {
+      const known = [...low, ...high].filter((v) => v !== null);
+      const chart = this.charts[at];
+      if (!known.length) { chart.path = "M0,55"; chart.said = "no value here"; return; }
+      const least = Math.min(...known), most = Math.max(...known), range = most - least || 1;
+      const y = (v) => (105 - 100 * (v - least) / range).toFixed(1), x = (n) => n * 600 / (low.length - 1);
+      let path = "", run = [];
+      const close = () => {
+        if (run.length) path += "M" + run.map((n) => `${x(n)},${y(high[n])}`).join("L") + "L" +
+          run.slice().reverse().map((n) => `${x(n)},${y(low[n])}`).join("L") + "Z";
+        run = [];
+      };
+      low.forEach((v, n) => { if (v === null) { if (n - (run.at(-1) ?? n) > 2) close(); } else run.push(n); });
+      close();
+      chart.path = path;
+      chart.said = `${least.toPrecision(4)} to ${most.toPrecision(4)} ${unit === "1" ? "" : unit}`;
+    },
+    key(e) {
+      if (e.ctrlKey || e.altKey || e.metaKey || ["INPUT", "SELECT", "BUTTON"].includes(e.target.tagName)) return;
+      const far = e.shiftKey ? 10 : 1;
+      const does = { " ": () => this.play(), ArrowRight: () => this.go(this.t + far), ArrowLeft: () => this.go(this.t - far),
+        ".": () => this.go(this.t + 1 / this.about.rate), ",": () => this.go(this.t - 1 / this.about.rate),
+        n: () => this.trial(1), b: () => this.trial(-1), Home: () => this.go(0), End: () => this.go(this.about.length) }[e.key];
+      if (does) { does(); e.preventDefault(); }
+    },
+    clock(t) {
+      const minutes = Math.floor(t / 60);
+      return `${Math.floor(minutes / 60)}:${String(minutes % 60).padStart(2, "0")}:${(t % 60).toFixed(2).padStart(5, "0")}`;
+    },
+  },
+};

@@ -1,0 +1,160 @@
+"""Viewer's page: the machine as it was recorded, beside its time line and its signals."""
+
+import math
+import secrets
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from labcrane.limits import LIMITS
+from labcrane.registry.registry import Registry
+from labcrane.web.door.access import VIEWER, Gate, Keys
+from labcrane.web.page import PRIMARY, speak
+from labcrane.web.room.model import MachineModel, span
+from labcrane.web.room.shown import ShownShapes
+from labcrane.web.scene import BACKGROUND, CAMERAS
+from labcrane.web.surroundings import Surroundings
+from labcrane.web.viewer.film import Film
+
+HERE = Path(__file__).parent
+HOST = "127.0.0.1"
+MOST_HEAD = 16_384
+
+
+class Screen:
+    """The machine of one film in three dimensions."""
+
+    def __init__(self, film: Film, shapes: ShownShapes) -> None:
+        self._film = film
+        self._shapes = shapes
+
+    def build(self) -> None:
+        """Build it where the page stands."""
+        from nicegui import ui  # noqa: PLC0415 - loads for a second
+
+        film, reach = self._film, span(self._film.machine)
+        with ui.element("div").props(f'role=img aria-label="{film.called}: the machine"'):
+            ui.label(film.called).classes("font-medium")
+            canvas = ui.scene(grid=(round(2 * reach), 20), background_color=BACKGROUND)
+            canvas.classes("w-full")
+        x, y, z = (reach * share for share in CAMERAS["free"])
+        canvas.move_camera(x=x, y=y, z=z, look_at_z=0.2 * reach, duration=0.0)
+        self._canvas = canvas
+        self._model = MachineModel(canvas, film.machine, film.run.bodies)
+        self._around = Surroundings(canvas)
+        self.show(0.0)
+
+    def look(self, name: str) -> None:
+        """Look from one of the cameras."""
+        reach = span(self._film.machine)
+        x, y, z = (reach * share for share in CAMERAS[name])
+        self._canvas.move_camera(x=x, y=y, z=z, look_at_z=0.2 * reach, duration=0.3)
+
+    def show(self, at: float) -> None:
+        """Show a time, in seconds from the film's start."""
+        frame, situation = self._film.frame(at), self._film.situation(at)
+        names = self._film.machine.names
+        angles = [frame.get(f"state.joint.angle.{name}", math.nan) for name in names]
+        if all(map(math.isfinite, angles)):
+            state = {
+                name.removeprefix("state."): value
+                for name, value in frame.items()
+                if name.startswith("state.")
+            }
+            self._model.place(angles, state)
+        self._shapes.situate(situation)
+        self._model.show(self._shapes.shapes(frame))
+        self._around.update(situation.scene if situation.trial else "", frame)
+
+
+def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
+    """Build the page: one machine for each film, side by side at the same second."""
+    from nicegui import ui  # noqa: PLC0415
+
+    from labcrane.web.room.element import STYLE  # noqa: PLC0415
+    from labcrane.web.viewer.element import Timeline  # noqa: PLC0415
+
+    first = films[0]
+    ui.page_title(f"{first.called} · labcrane")
+    ui.colors(primary=PRIMARY)
+    ui.add_css(STYLE)
+    ui.add_css(HERE / "viewer.css")
+    speak("en")
+    screens, lacking = [], []
+    for film in films:
+        cues, why = film.cues(registry)
+        shapes = ShownShapes(cues)
+        shapes.take(film.run)
+        screens.append(Screen(film, shapes))
+        lacking += why
+
+    def show(second: float) -> None:
+        for screen in screens:
+            screen.show(second)
+
+    def look(name: str) -> None:
+        for screen in screens:
+            screen.look(name)
+
+    def curve(stream: str, column: str, begin: float, end: float) -> dict[str, Any]:
+        units = {(one["stream"], one["column"]): one["unit"] for one in first.signals}
+        return {**first.curve(stream, column, begin, end), "unit": units[stream, column]}
+
+    about = {
+        "title": " and ".join(film.called for film in films),
+        "said": f"{len(first.trials)} attempts at trials, {len(first.events)} events, "
+        f"{first.length / 60:.1f} min at {first.run.rate_hz:g} Hz",
+        "lacking": lacking,
+        "length": first.length,
+        "rate": first.run.rate_hz,
+        "at": at,
+        "trials": first.trials,
+        "events": first.events,
+        "gaps": first.gaps,
+        "signals": first.signals,
+    }
+    line = Timeline(about, show, curve)
+    with line.add_slot("machine"):
+        with ui.row().classes("gap-2 mb-2").props('role=group aria-label="Cameras"'):
+            for name in CAMERAS:
+                ui.element("button").classes("room-button").props(f"type=button id=look-{name}").on(
+                    "click", lambda _, name=name: look(name)
+                ).add_slot("default", f"<span>{name}</span>")
+        with ui.element("div").classes("view-machines"):
+            for screen in screens:
+                screen.build()
+
+
+def serve(
+    films: Sequence[Film], registry: Registry, port: int, at: float, say: Callable[[str], None]
+) -> None:
+    """Serve the viewer to this computer until it is interrupted; ``say`` is told its link."""
+    import uvicorn  # noqa: PLC0415
+    from fastapi import FastAPI  # noqa: PLC0415
+    from nicegui import ui  # noqa: PLC0415
+
+    from labcrane.web.door.guard import BoundedProtocol, Guard  # noqa: PLC0415
+
+    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+
+    @ui.page("/viewer")
+    def viewer() -> None:
+        viewer_page(films, registry, at)
+
+    ui.run_with(app, title="labcrane", show_welcome_message=False)
+    keys = Keys({VIEWER: secrets.token_urlsafe(24)}, {VIEWER: secrets.token_urlsafe(24)})
+    link = f"http://{HOST}:{port}/{VIEWER}?token={keys.tokens[VIEWER]}"
+    gate = Gate(app, keys, lambda _: None, say)
+    config = uvicorn.Config(
+        Guard(gate, HOST, port, say),
+        host=HOST,
+        port=port,
+        log_level="error",
+        server_header=False,
+        http=BoundedProtocol,
+        h11_max_incomplete_event_size=MOST_HEAD,
+        ws_max_size=LIMITS["message of a page"].most,
+        ws_per_message_deflate=False,
+    )
+    say(f"viewer: {link}")
+    uvicorn.Server(config).run()

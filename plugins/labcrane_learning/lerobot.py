@@ -1,0 +1,241 @@
+"""LeRobot's data sets, version 3.0: episodes in Parquet, and what is in them in JSON.
+
+The layout is that of https://huggingface.co/docs/lerobot/lerobot-dataset-v3.
+"""
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from labcrane import RecordingError
+from labcrane.analysis import Exporter, Participant
+from labcrane_learning.episodes import Episode, Layout, episodes_of, layout_of
+from labcrane_learning.settings import EpisodeSettings
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+FORMAT = "v3.0"
+FILES_PER_CHUNK = 1000
+DATA_FILE_MB = 100
+VIDEO_FILE_MB = 200
+PLACE = "chunk-{chunk_index:03d}/file-{file_index:03d}"
+OBSERVATION, ACTION = "observation.state", "action"
+COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
+QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
+
+
+class LeRobot(Exporter):
+    """One data file per participant, and the tables that LeRobot looks episodes up in.
+
+    ``observation.state`` is the machine's state and the task's signals, ``action`` the axes of the
+    operator's controls in the next tick; names stand in ``meta/info.json``, units beside them.
+    """
+
+    def __init__(self, settings: EpisodeSettings) -> None:
+        self._settings = settings
+
+    def export(self, participants: Iterable[Participant], folder: Path) -> None:
+        book = _Book()
+        for number, participant in enumerate(participants):
+            book.begin(participant)
+            _write_data(folder, number, book, participant, self._settings.task)
+        book.write(folder)
+
+
+@dataclass
+class _Book:
+    """Everything that is known of the data set when its last episode is written."""
+
+    layout: Layout | None = None
+    rate_hz: float = 0.0
+    machine: str = ""
+    frames: int = 0
+    tasks: dict[str, int] = field(default_factory=dict)
+    episodes: list[dict[str, Any]] = field(default_factory=list)
+
+    def begin(self, participant: Participant) -> None:
+        for _, session in participant.sessions():
+            rate_hz = float(session.attrs["rate_hz"])
+            if self.layout is None:
+                self.layout, self.rate_hz = layout_of(session), rate_hz
+                self.machine = str(participant.context.get("machine_name", "")) or "crane"
+            if rate_hz != self.rate_hz or rate_hz != int(rate_hz):
+                raise RecordingError(
+                    f"{participant.name} was recorded at {rate_hz:g} Hz; a data set of LeRobot has "
+                    f"one whole number of frames a second for all, here {self.rate_hz:g}"
+                )
+
+    def add(self, episode: Episode, file: tuple[int, int]) -> "dict[str, np.ndarray[Any, Any]]":
+        """Enter an episode; return its columns."""
+        count, number = len(episode.action), len(self.episodes)
+        task = self.tasks.setdefault(episode.task, len(self.tasks))
+        columns: dict[str, np.ndarray[Any, Any]] = {
+            OBSERVATION: episode.observation,
+            ACTION: episode.action,
+            "next.success": np.r_[np.zeros(count - 1, bool), episode.success],
+            "timestamp": (np.arange(count) / episode.rate_hz).astype(np.float32),
+            "frame_index": np.arange(count),
+            "episode_index": np.full(count, number),
+            "index": self.frames + np.arange(count),
+            "task_index": np.full(count, task),
+        }
+        row: dict[str, Any] = {
+            "episode_index": number,
+            "tasks": [episode.task],
+            "length": count,
+            "data/chunk_index": file[0],
+            "data/file_index": file[1],
+            "dataset_from_index": self.frames,
+            "dataset_to_index": self.frames + count,
+            "meta/episodes/chunk_index": 0,
+            "meta/episodes/file_index": 0,
+            "participant": episode.participant,
+            "session": episode.session,
+            "trial": episode.trial,
+            "attempt": episode.attempt,
+            "success": episode.success,
+            "operator_skill": episode.skill,
+        }
+        for name, values in columns.items():
+            for what, value in _statistics(values).items():
+                row[f"stats/{name}/{what}"] = value
+        self.episodes.append(row)
+        self.frames += count
+        return columns
+
+    def write(self, folder: Path) -> None:
+        import pyarrow as pa
+        from pyarrow import parquet
+
+        if self.layout is None or not self.episodes:
+            raise RecordingError("no trial was recorded that could be an episode")
+        meta = folder / "meta"
+        (meta / "episodes" / "chunk-000").mkdir(parents=True)
+        parquet.write_table(
+            pa.Table.from_pylist(self.episodes),
+            meta / "episodes" / "chunk-000" / "file-000.parquet",
+        )
+        _write_tasks(self.tasks, meta / "tasks.parquet")
+        _write_json(meta / "stats.json", _together(self.episodes))
+        _write_json(meta / "info.json", self._info(self.layout))
+
+    def _info(self, layout: Layout) -> dict[str, Any]:
+        features: dict[str, Any] = {
+            key: {
+                "dtype": "float32",
+                "shape": [len(names)],
+                "names": list(names),
+                "units": [layout.units[name] for name in names],
+            }
+            for key, names in ((OBSERVATION, layout.observation), (ACTION, layout.action))
+        }
+        features["next.success"] = {"dtype": "bool", "shape": [1], "names": None}
+        for name in COUNTERS:
+            dtype = "float32" if name == "timestamp" else "int64"
+            features[name] = {"dtype": dtype, "shape": [1], "names": None}
+        return {
+            "codebase_version": FORMAT,
+            "robot_type": self.machine,
+            "total_episodes": len(self.episodes),
+            "total_frames": self.frames,
+            "total_tasks": len(self.tasks),
+            "chunks_size": FILES_PER_CHUNK,
+            "data_files_size_in_mb": DATA_FILE_MB,
+            "video_files_size_in_mb": VIDEO_FILE_MB,
+            "fps": int(self.rate_hz),
+            "splits": {"train": f"0:{len(self.episodes)}"},
+            "data_path": f"data/{PLACE}.parquet",
+            "video_path": None,
+            "features": features,
+        }
+
+
+def _write_data(
+    folder: Path, number: int, book: _Book, participant: Participant, words: str
+) -> None:
+    """Write a participant's episodes, one in memory at a time."""
+    from pyarrow import parquet
+
+    chunk, file = divmod(number, FILES_PER_CHUNK)
+    path = folder / "data" / f"{PLACE.format(chunk_index=chunk, file_index=file)}.parquet"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    writer = None
+    if book.layout is None:
+        raise AssertionError("a participant that counts has a session")
+    for episode in episodes_of(participant, book.layout, words):
+        table = _table(book.add(episode, (chunk, file)))
+        if writer is None:
+            writer = parquet.ParquetWriter(path, table.schema)
+        writer.write_table(table)
+    if writer is not None:
+        writer.close()
+
+
+def _table(columns: "dict[str, np.ndarray[Any, Any]]") -> "pa.Table":
+    import pyarrow as pa
+
+    arrays = {
+        name: pa.FixedSizeListArray.from_arrays(pa.array(values.reshape(-1)), values.shape[1])
+        if values.ndim > 1
+        else pa.array(values)
+        for name, values in columns.items()
+    }
+    return pa.table(arrays)
+
+
+def _statistics(values: "np.ndarray[Any, Any]") -> dict[str, list[float] | list[int]]:
+    """Return what LeRobot keeps of a column: one number for each of its elements."""
+    flat = values.reshape(len(values), -1).astype(np.float64)
+    found: dict[str, list[float] | list[int]] = {
+        "min": flat.min(axis=0).tolist(),
+        "max": flat.max(axis=0).tolist(),
+        "mean": flat.mean(axis=0).tolist(),
+        "std": flat.std(axis=0).tolist(),
+        "count": [len(flat)],
+    }
+    for name, at in QUANTILES.items():
+        found[name] = np.quantile(flat, at, axis=0).tolist()
+    return found
+
+
+def _together(episodes: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return the statistics of all episodes of those of each, as LeRobot puts them together.
+
+    Means and deviations are exact; quantiles are means of the episodes' own, weighted by length.
+    """
+    names = {key.split("/")[1] for key in episodes[0] if key.startswith("stats/")}
+    found: dict[str, dict[str, Any]] = {}
+    for name in sorted(names):
+
+        def of(what: str, name: str = name) -> "np.ndarray[Any, Any]":
+            return np.array([row[f"stats/{name}/{what}"] for row in episodes], np.float64)
+
+        count, mean = of("count"), of("mean")
+        weight = count / count.sum()
+        whole = (weight * mean).sum(axis=0)
+        variance = (weight * (of("std") ** 2 + (mean - whole) ** 2)).sum(axis=0)
+        found[name] = {
+            "min": of("min").min(axis=0).tolist(),
+            "max": of("max").max(axis=0).tolist(),
+            "mean": whole.tolist(),
+            "std": np.sqrt(variance).tolist(),
+            "count": [int(count.sum())],
+            **{what: (weight * of(what)).sum(axis=0).tolist() for what in QUANTILES},
+        }
+    return found
+
+
+def _write_tasks(tasks: dict[str, int], path: Path) -> None:
+    """Write the numbers of tasks; LeRobot looks them up by the words, which are the index."""
+    import pandas as pd
+
+    pd.DataFrame({"task_index": list(tasks.values())}, index=list(tasks)).to_parquet(path)
+
+
+def _write_json(path: Path, content: object) -> None:
+    path.write_text(json.dumps(content, indent=4, ensure_ascii=False) + "\n", encoding="utf-8")

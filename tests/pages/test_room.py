@@ -1,0 +1,226 @@
+"""The control room, from events to what is shown: states, lamp, buttons, sliders, sentences."""
+
+import random
+import re
+from pathlib import Path
+
+import pytest
+
+from labcrane.cli.terminal import KEYS as TERMINAL_KEYS
+from labcrane.core.records import Event
+from labcrane.session.commands import Command, Order, SettingChange, read_request
+from labcrane.session.live_settings import FeedbackSettings
+from labcrane.testing import ch8
+from labcrane.web.examiner_page import KEYS
+from labcrane.web.room.bars import groups
+from labcrane.web.room.buttons import buttons
+from labcrane.web.room.condition import STATES, Lamp, lamp_of, state_of
+from labcrane.web.room.earlier import FEWEST, Earlier
+from labcrane.web.room.sentences import KINDS, SAID, sentence
+from labcrane.web.room.sliders import sliders
+from labcrane.web.room.snapshot import clock
+from labcrane.web.state import Ended, SessionView
+from labcrane_sonification.settings import SonificationSettings
+from labcrane_sphere.settings import SphereSettings
+
+README = Path(__file__).parents[2] / "README.md"
+TRIAL = {"trial": 1, "attempt": 1, "counted": True}
+PERIOD_S = 1 / 240
+
+
+class Punctual:
+    """A loop that is in time."""
+
+    lateness_s: float | None = 0.0
+    silent_s: float | None = 0.0
+
+
+def after(*events: tuple[str, dict]) -> SessionView:
+    view = SessionView()
+    for at, (name, data) in enumerate(events):
+        view.take(Event(name, float(at), data))
+    return view
+
+
+BEGUN = {
+    "starting": (),
+    "consent": (("consent.needed", {"file": "c.txt", "version": "a", "text": ""}),),
+    "waiting": (("waiting", {"what": "aiming"}),),
+    "running": (("trial.start", TRIAL),),
+    "paused": (("trial.start", TRIAL), ("pause.start", {"by": "examiner"})),
+    "fault": (("input.lost", {"why": "gone"}), ("pause.start", {"by": "input"})),
+    "break": (("break.start", {"seconds": 60}),),
+    "questionnaire": (
+        ("questionnaire.start", {"questionnaire": "kss", "title": "Sleep", "kept": "{}"}),
+    ),
+    "decision": (
+        ("stop_rule.met", {"questionnaire": "ssq", "score": "x", "value": 9, "above": 5}),
+        ("pause.start", {"by": "stop rule"}),
+    ),
+    "between": (("trial.start", TRIAL), ("step.end", {"step": 1})),
+    "ended": (("session.end", {"reason": "complete", "owed": ""}),),
+}
+
+
+def test_every_state_is_reached_by_what_a_session_says() -> None:
+    assert set(BEGUN) == set(STATES)
+    found = {name: state_of(after(*events)) for name, events in BEGUN.items()}
+    found["between"] = state_of(after(("step.end", {"step": 1})))
+    assert found == {name: name for name in STATES}
+
+
+def test_at_most_one_button_is_primary_and_those_that_lose_something_ask() -> None:
+    for name, events in BEGUN.items():
+        found = buttons(after(*events))
+        primary = [one for one in found if one.primary]
+        assert len(primary) <= 1, name
+        assert all(not one.why and not one.danger for one in primary)
+        for one in found:
+            assert bool(one.asks) == one.danger
+            assert one.order in set(Order)
+    by_state = {
+        name: next((one.ident for one in buttons(after(*events)) if one.primary), "")
+        for name, events in BEGUN.items()
+    }
+    assert by_state["waiting"] == by_state["paused"] == by_state["decision"] == "order-start"
+    assert by_state["running"] == by_state["break"] == "order-pause"
+    assert by_state["ended"] == ""
+
+
+def test_the_lamp_names_what_is_lost_until_it_is_back() -> None:
+    lost = BEGUN["fault"]
+    lamp = lamp_of(after(*lost), Punctual(), PERIOD_S)
+    assert lamp.level == "bad"
+    assert lamp.reason == "the controls failed: gone"
+    assert "cable" in lamp.remedy
+    back = (*lost, ("input.back", {}), ("pause.end", {"by": "input"}))
+    assert lamp_of(after(*back), Punctual(), PERIOD_S) == Lamp("ok", "all is well")
+
+
+def test_the_lamp_tells_a_late_loop_and_one_that_says_nothing() -> None:
+    live = Punctual()
+    live.lateness_s = 0.05
+    lamp = lamp_of(after(*BEGUN["running"]), live, PERIOD_S)
+    assert (lamp.level, "50 ms late" in lamp.reason) == ("warn", True)
+    live.silent_s = 3.2
+    lamp = lamp_of(after(*BEGUN["running"]), live, PERIOD_S)
+    assert (lamp.level, lamp.reason) == ("bad", "no frame of the session for 3 s")
+
+
+def test_a_required_stream_that_is_silent_outweighs_the_warning_of_another() -> None:
+    view = after(*BEGUN["running"])
+    quiet = {"warnings": [], "signals": [], "rate_hz": None}
+    view.hear_of_streams({"streams": [
+        {**quiet, "label": "gaze", "condition": "flows", "required": True, "warnings": ["is slow"]},
+        {**quiet, "label": "eeg", "condition": "silent", "required": True},
+    ]})  # fmt: skip
+    assert lamp_of(view, Punctual(), PERIOD_S).reason == "stream eeg is silent"
+    view.streams["streams"][1]["required"] = False
+    assert lamp_of(view, Punctual(), PERIOD_S).reason == "stream gaze is slow"
+
+
+def test_the_lamp_at_the_end_is_what_was_left_behind() -> None:
+    view = after(*BEGUN["ended"])
+    assert lamp_of(view, Punctual(), PERIOD_S).reason == "the session is being saved"
+    view.ended = Ended("warn", "The session is saved, and not complete: trial 3", "go on with: x")
+    assert lamp_of(view, Punctual(), PERIOD_S) == Lamp(
+        "warn", "The session is saved, and not complete: trial 3", "go on with: x"
+    )
+
+
+def test_every_key_of_readme_is_on_the_page() -> None:
+    """README names the keys of the terminal, and says that the page does all of it too."""
+    said = README.read_text().split("While a session runs,")[1].split("does all of it too")[0]
+    named = set(re.findall(r"`([a-z])`", said)) | ({" "} if "space bar" in said else set())
+    assert named == {*TERMINAL_KEYS, "q"}
+    page = {" " if key == "Space" else key.lower() for key, _ in KEYS}
+    assert named <= page
+    ordered = {one.key for one in buttons(SessionView())}
+    assert ordered <= {key for key, _ in KEYS}
+
+
+class Chosen:
+    def __init__(self, settings: object) -> None:
+        self.settings = settings
+
+
+@pytest.mark.parametrize("settings", [SphereSettings(), SonificationSettings()])
+def test_whatever_a_slider_can_say_the_session_takes_or_refuses_in_words(settings: object) -> None:
+    live = FeedbackSettings({"it": Chosen(settings)})
+    draw = random.Random(23)
+    controls = sliders("it", settings, {})
+    assert len(controls) >= 5
+    taken = 0
+    for control in controls:
+        if control["kind"] == "choice":
+            values = control["choices"]
+        else:
+            assert control["low"] <= control["now"] <= control["high"], control
+            steps = round((control["high"] - control["low"]) / control["step"])
+            some = [draw.randint(0, steps) for _ in range(8)]
+            values = [f"{control['low'] + control['step'] * at:.6g}" for at in some]
+        for value in values:
+            request = read_request(Command(Order.SETTING, f"{control['place']}={value}"))
+            assert isinstance(request, SettingChange)
+            why = live.refusal(request)
+            taken += why is None
+            assert why is None or control["key"].replace(" ", "_") in why
+    assert taken > 20
+
+
+def test_a_slider_stands_at_what_was_changed_and_knows_what_the_protocol_says() -> None:
+    (far,) = (one for one in sliders("b", SphereSettings(), {"far": 3.0}) if one["key"] == "far")
+    assert (far["now"], far["protocol"], far["unit"]) == (3.0, 4.0, "m")
+
+
+def test_events_are_sentences_with_the_names_of_trials_and_without_holes() -> None:
+    def called(number: int) -> str:
+        return f"trial {number - 1} of 9"
+
+    for name, (words, kind, _) in SAID.items():
+        data = dict.fromkeys(re.findall(r"{(\w+)}", words), "x")
+        said = sentence(Event(name, 0.0, data), called)
+        assert said.kind == kind in KINDS
+        assert "?" not in said.text
+        assert said.text[0].isupper()
+    targets = sentence(Event("target.entered", 0.0, {"trial": 4}), called)
+    assert targets.text == "Target entered: trial 3 of 9"
+    refused = Event("order.start", 0.0, {"by": "supervisor", "refused": "nothing waits to start"})
+    assert sentence(refused, called).text == "Start was refused: nothing waits to start"
+    assert sentence(refused, called).level == "warn"
+
+
+def test_a_bar_reaches_from_zero_to_the_value_between_the_limits() -> None:
+    machine = ch8()
+    draw = random.Random(7)
+    for joint in machine.joints:
+        low, high = joint.limits
+        angle = draw.uniform(low, high)
+        newest = {f"state.joint.angle.{joint.name}": angle}
+        ((bar,),) = (
+            group["bars"]
+            for group in groups(newest, {}, machine.joints, set())
+            if group["title"] == "Joints"
+        )
+        ends = bar["from"], bar["from"] + bar["width"]
+        at = 100 * (angle - low) / (high - low)
+        zero = 100 * (0 - low) / (high - low)
+        assert sorted((at, zero)) == pytest.approx(sorted(ends), abs=0.11)
+    sticks = groups({"axes.left.x": 0.5, "axes.left.y": 0.0}, {}, machine.joints, {"axes.left.x"})[
+        0
+    ]
+    assert [bar["name"] for bar in sticks["bars"]] == ["left.x"]
+    assert sticks["none"] == "at rest: left.y"
+
+
+def test_a_cohort_of_few_is_not_shown() -> None:
+    earlier = Earlier(others={"error": [0.1] * (FEWEST - 1)})
+    assert earlier.cohort("error") is None
+    earlier.others["error"] = [4.0, 1.0, 3.0, 2.0, 5.0]
+    assert earlier.cohort("error") == (2.0, 3.0, 4.0, 5)
+    assert earlier.cohort("nothing") is None
+
+
+def test_times_are_minutes_and_seconds_and_hours_where_there_are_some() -> None:
+    assert [clock(each) for each in (0.9, 61, 3599.9, 3661)] == ["0:00", "1:01", "59:59", "1:01:01"]
+    assert clock(-0.2) == "0:00"

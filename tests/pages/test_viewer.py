@@ -1,0 +1,188 @@
+"""The viewer: poses, curves and events are those of the record; its page shows them."""
+
+import random
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from faults.sessions import unique, wait_for
+from pages.looks import check
+from pages.room import shown, text
+from selenium import webdriver
+from selenium.webdriver.common.by import By
+from simple_crane import FORM
+
+from labcrane import open_recording
+from labcrane.cli.app import main
+from labcrane.errors import RecordingError
+from labcrane.machines.kinematics import link_frames
+from labcrane.registry.registry import discover
+from labcrane.web.room.shown import ShownShapes
+from labcrane.web.viewer.film import POINTS, Film
+
+STUDY = (
+    "labcrane: 1\nstudy: {study}\ntitle: Viewed\nrate_hz: 240\n"
+    + FORM.replace("dual_joystick", "simulated_operator")
+    + "feedback:\n  ball: {{use: sphere, at: target, far: 4.0}}\n"
+    "tasks:\n  aiming: {{use: aiming, distances: [3], movements: 2, limit_s: 20}}\n"
+    "sessions:\n  - name: only\n    steps:\n"
+    "      - block: {{task: aiming, pairs: 1, feedback: [ball]}}\n"
+)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("viewed")
+    protocol = folder / "study.yaml"
+    protocol.write_text(STUDY.format(study=unique("viewed")))
+    words = ["run", str(protocol), "--participant", "P001", "--simulate", "--fast"]
+    assert main([*words, "--data", str(folder / "data")]) == 0
+    return folder / "data" / "P001-SIMULATED" / "P001-SIMULATED.h5"
+
+
+@pytest.fixture(scope="module")
+def film(file: Path) -> Film:
+    return Film(open_recording(file).session(1), file.stem)
+
+
+def moments(length: float, count: int = 100) -> list[float]:
+    draw = random.Random(23)
+    return [draw.uniform(0.0, length) for _ in range(count)]
+
+
+def test_a_frame_of_a_film_is_the_newest_recorded_row_at_any_time(file: Path, film: Film) -> None:
+    record = open_recording(file).session(1)
+    time_s = record.streams["state"].time
+    tables = {name: record.streams[name].data for name in ("state", "task", "input")}
+    for at in moments(film.length):
+        row = int(np.flatnonzero(time_s - time_s[0] <= at + 1e-9)[-1])
+        frame = film.frame(at)
+        for name, table in tables.items():
+            begins = {"input": "axes."}.get(name, f"{name}.")
+            found = [frame[begins + column] for column in table]
+            np.testing.assert_array_equal(found, table.iloc[row].to_numpy(float))
+
+
+def test_a_curve_has_the_lowest_and_highest_value_of_every_step(file: Path, film: Film) -> None:
+    record = open_recording(file).session(1)
+    state = record.streams["state"]
+    time_s, values = state.time - state.time[0], state.data["joint.angle.slew"].to_numpy()
+    draw = random.Random(5)
+    for _ in range(5):
+        begin, end = sorted(draw.uniform(0.0, film.length) for _ in range(2))
+        found = film.curve("state", "joint.angle.slew", begin, end)
+        edges = np.linspace(begin, end, POINTS + 1)
+        for at in draw.sample(range(POINTS), 40):
+            part = values[(time_s >= edges[at]) & (time_s < edges[at + 1])]
+            expected = (part.min(), part.max()) if len(part) else (None, None)
+            assert (found["low"][at], found["high"][at]) == expected
+
+
+def test_trials_are_those_of_the_record_and_a_pause_in_the_frames_is_a_gap(
+    file: Path, film: Film
+) -> None:
+    table = open_recording(file).session(1).trials
+    counted = [trial for trial in film.trials if trial["counted"]]
+    assert [trial["trial"] for trial in counted] == table["trial"].tolist()
+    assert [trial["outcome"] for trial in counted] == table["outcome"].tolist()
+    begun = [trial["from"] + film.start for trial in counted]
+    assert begun == pytest.approx(table["started"].tolist(), abs=1e-4)
+    assert film.gaps == []
+    cut = Film(open_recording(file).session(1), "cut")
+    cut.time = np.delete(cut.time, np.s_[100:200])
+    ((begin, end),) = cut.gaps
+    assert end - begin == pytest.approx(101 / 240, abs=1e-6)
+
+
+def test_the_target_and_the_cue_are_drawn_where_the_record_has_them(file: Path, film: Film) -> None:
+    cues, lacking = film.cues(discover())
+    assert (list(cues), lacking) == (["ball"], [])
+    shapes = ShownShapes(cues)
+    shapes.take(film.run)
+    task = open_recording(file).session(1).streams["task"].data
+    seen = 0
+    for at in moments(film.length, 40):
+        shapes.situate(film.situation(at))
+        drawn = {shape.name: shape for shape in shapes.shapes(film.frame(at))}
+        row = task.iloc[film.index(at)]
+        where = row[[f"target.position.{axis}" for axis in "xyz"]].tolist()
+        if "target" in drawn:
+            assert list(drawn["target"].centre) == where
+        if "sphere" in drawn:
+            seen += 1
+            assert list(drawn["sphere"].centre) == where
+    assert seen > 20
+
+
+def test_a_session_without_frames_says_that_there_is_nothing_to_see(file: Path) -> None:
+    record = open_recording(file).session(1)
+    del record.streams["state"]
+    with pytest.raises(RecordingError, match=r"P001 has no frames of 'state'; there is nothing"):
+        Film(record, "P001")
+    with pytest.raises(RecordingError, match=r"has no column 'joint'; it has joint.angle.slew"):
+        open_recording(file).session(1).streams["state"].column("joint")
+
+
+POSES = """
+const found = {};
+window['scene_' + document.querySelector('.nicegui-scene').id].traverse(o => {
+    if (o.name.startsWith('body ')) { o.updateWorldMatrix(true, false);
+        found[o.name.slice(5)] = o.matrixWorld.elements; }
+});
+return found;
+"""
+GO = """
+const field = document.getElementById('second');
+field.value = arguments[0];
+field.dispatchEvent(new Event('change'));
+"""
+
+
+@pytest.mark.long
+def test_the_page_shows_the_recorded_pose_at_any_time(
+    file: Path, browser: webdriver.Chrome
+) -> None:
+    record = open_recording(file).session(1)
+    film = Film(record, file.stem)
+    words = [sys.executable, "-m", "labcrane", "view", str(file), "--beside", str(file)]
+    viewer = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+    try:
+        link = next(line for line in viewer.stdout if line.startswith("viewer: ")).split()[1]
+        wait_for(lambda: reached(browser, link))
+        shown(browser, "clock", "of 0:00:")
+        wait_for(lambda: text(browser, "range-0"))
+        check(browser, "viewer")
+        machine, times = film.machine, moments(film.length)
+        angles = record.streams["state"].data[[f"joint.angle.{n}" for n in machine.names]]
+        for at in times:
+            row = angles.iloc[film.index(at)].to_numpy(float)
+            frames = link_frames(machine, row)
+            wanted = {body.name: frames[body.frame] for body in film.run.bodies}
+            browser.execute_script(GO, at)
+            wait_for(lambda wanted=wanted: apart(browser, wanted) < 1e-6, 10.0)
+    finally:
+        viewer.terminate()
+        viewer.wait(30)
+        viewer.stdout.close()
+
+
+def reached(browser: webdriver.Chrome, link: str) -> bool:
+    """Whether the viewer is served: its link is printed before it is."""
+    from selenium.common.exceptions import WebDriverException
+
+    try:
+        browser.get(link)
+    except WebDriverException:
+        return False
+    return bool(browser.find_elements(By.ID, "scrub"))
+
+
+def apart(browser: webdriver.Chrome, wanted: dict[str, np.ndarray]) -> float:
+    """Return how far the bodies on the page are from these poses at most, in m and as cosines."""
+    found = browser.execute_script(POSES)
+    return max(
+        float(np.abs(np.array(found[name]).reshape(4, 4).T - pose).max())
+        for name, pose in wanted.items()
+    )
