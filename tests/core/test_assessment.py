@@ -8,7 +8,10 @@ from labcrane.analysis.indicator import Performance, indicate
 from labcrane.analysis.indicator_settings import IndicatorSettings
 from labcrane.analysis.operator_tests import COUNTS
 from labcrane.core.records import Event
+from labcrane.session.commands import Order
 from labcrane.web.assessment import LIVE, Assessment
+from labcrane.web.door.access import RIGHTS
+from labcrane.web.state import SessionView
 
 SETTINGS = IndicatorSettings()
 
@@ -119,3 +122,19 @@ def test_practice_and_tests_without_a_reference_have_no_indicator() -> None:
     assert "ratings not yet given" in followed.lines({}, SETTINGS)[-1]
     followed.take(Event("trial.end", 0.0, {"trial": 10, "outcome": "success"}))  # another task's
     assert followed.lines({}, SETTINGS) == []
+
+
+def test_what_was_reported_as_seen_is_shown_until_the_next_trial_begins() -> None:
+    session = SessionView()
+    about = {"by": "participant", "text": "deformity"}
+    session.take(Event("trial.start", 0.0, {"trial": 1, "attempt": 1}))
+    session.take(Event("order.report", 1.0, {**about, "text": "fire", "refused": "no task asks"}))
+    assert session.reported == []
+    session.take(Event("order.report", 2.0, {**about, "refused": None}))
+    assert session.reported == ["deformity"]
+    session.take(Event("trial.start", 3.0, {"trial": 2, "attempt": 1}))
+    assert session.reported == []
+
+
+def test_participants_may_report_what_is_seen_and_still_lead_nothing() -> None:
+    assert RIGHTS["participant"] == {Order.ANSWER, Order.SUBMIT, Order.CONSENT, Order.REPORT}

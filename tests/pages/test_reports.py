@@ -1,17 +1,21 @@
 """What people report as seen, from both pages in a real browser; and what neither may report."""
 
+import shutil
 from pathlib import Path
 
 import pytest
+from cranes import needs_bullet
+from dmd_arms import RETRIEVAL
 from faults.sessions import unique, wait_for
-from pages.room import STUDY, a_room, photograph, press, shown
+from pages.room import a_room, photograph, press, shown
 from pages.test_rights import ask
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 
 from labcrane import open_recording
 
-pytestmark = pytest.mark.long
+# On request: not yet seen to pass in the hour of the gate.
+pytestmark = [needs_bullet, pytest.mark.soak]
 
 SCENE = """\
 labcrane_scene: 1
@@ -21,21 +25,35 @@ figure:
   deformity: {limbs: [left_shank]}
 goals: [{position: [30, 0, 0], radius: 0.1}]
 """
-STEPS = """\
-      - block: {task: looking}
-      - block: {task: looking}
+STUDY = """\
+labcrane: 1
+study: {study}
+title: Somebody with a broken leg
+page: {{language: de}}
+rate_hz: 240
+machine: ied_arm.yaml
+input: {{use: scenario_operator}}
+operator: {{use: scenario_operator}}
+scheme: {{use: valve, model: arm.dmd.yaml}}
+dynamics:
+  {{use: dmd_arm, model: arm.dmd.yaml, proportional: [base], jaws: {{}}, scenes: [lying.yaml]}}
+tasks:
+  looking: {{use: scenario, scenes: [lying.yaml], limit_s: 600, find_m: 20}}
+sessions:
+  - name: only
+    steps:
+      - block: {{task: looking}}
+      - block: {{task: looking}}
 """
-TASK = "  looking: {use: scenario, scenes: [lying.yaml], limit_s: 600, find_m: 20}"
 
 
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("reports")
+    for name in ("ied_arm.yaml", "arm.dmd.yaml"):
+        shutil.copy(RETRIEVAL / name, folder)
     (folder / "lying.yaml").write_text(SCENE, encoding="utf-8")
-    lines = STUDY.format(study=unique("reports"), steps=STEPS).splitlines()
-    text = "\n".join(TASK if line.startswith("  aiming:") else line for line in lines)
-    text = text.replace("title: Pages", "title: Pages\npage: {language: de}")
-    (folder / "study.yaml").write_text(f"{text}\n", encoding="utf-8")
+    (folder / "study.yaml").write_text(STUDY.format(study=unique("reports")), encoding="utf-8")
     return folder / "study.yaml"
 
 
@@ -59,11 +77,13 @@ def test_a_deformity_is_reported_from_either_page_and_nothing_else_is(
 
         # In the first trial, the operator; what no task asks about is refused in the record.
         browser.switch_to.window(supervisor)
+        browser.refresh()  # a window in the background is not kept up to date
         press(browser, "order-start")
         shown(browser, "stage", "trial")
         assert ask(room, "POST", "/orders/report", cookie, "fire")[0] == 202
         shown(browser, "events", "this task asks for reports of deformity")
         browser.switch_to.window(participant)
+        browser.refresh()
         shown(browser, "report-deformity", "Ich sehe: Verformung")
         press(browser, "report-deformity")
         shown(browser, "reported", "Verformung: gemeldet")
@@ -71,6 +91,7 @@ def test_a_deformity_is_reported_from_either_page_and_nothing_else_is(
         browser.refresh()
         shown(browser, "reported", "Verformung: gemeldet")
         browser.switch_to.window(supervisor)
+        browser.refresh()  # a window in the background is not kept up to date
         shown(browser, "events", "by operator")
         press(browser, "order-skip")
         press(browser, "order-skip-sure")

@@ -121,7 +121,9 @@ def test_a_session_without_frames_says_that_there_is_nothing_to_see(file: Path) 
     del record.streams["state"]
     with pytest.raises(RecordingError, match=r"P001 has no frames of 'state'; there is nothing"):
         Film(record, "P001")
-    with pytest.raises(RecordingError, match=r"has no column 'joint'; it has joint.angle.slew"):
+    with pytest.raises(
+        RecordingError, match=r"has no column 'joint'; it has time, joint.angle.slew"
+    ):
         open_recording(file).session(1).streams["state"].column("joint")
 
 

@@ -60,8 +60,10 @@ def _keep(place: Path, table: "pd.DataFrame") -> None:
         for other in place.parent.glob("*.parquet"):
             if other != place:
                 other.unlink(missing_ok=True)
-    except (RecordingError, OSError):
-        return  # a full disk keeps nobody from results that are there already
+    except (RecordingError, OSError, ValueError, TypeError):
+        # A full disk, or a column of numbers in one session and words in another, which is nothing
+        # for Parquet, keeps nobody from results that are there already.
+        return
 
 
 def _key(path: Path, about: Mapping[str, object]) -> str:

@@ -121,8 +121,8 @@ class Stream:
                     dataset.asstr("utf-8")[cut] if holds_texts(dataset) else dataset[cut]
                 )
         raise RecordingError(
-            f"stream {self.name!r} of {self._path} has no column {name!r}; it has time, "
-            + ", ".join(self._paths)
+            f"stream {self.name!r} of {self._path} has no column {name!r}; it has "
+            + ", ".join((*self._paths, "time"))
         )
 
     def batches(
@@ -192,18 +192,6 @@ class Stream:
             return pd.DataFrame(
                 {name: _values(dataset) for name, dataset in _columns(file[self._group])}
             )
-
-    def column(self, name: str, first: int = 0, last: int | None = None) -> FloatArray:
-        """Return rows ``first`` to ``last`` of one column of numbers, shape ``(n,)``.
-
-        Nothing else is read, and nothing is kept: an hour of many channels needs no memory.
-        """
-        with reading(self._path) as file:
-            for found, dataset in _columns(file[self._group]):
-                if found == name:
-                    return np.asarray(dataset[first:last], np.float64)
-        known = ", ".join(self.units)
-        raise RecordingError(f"stream {self.name!r} has no column {name!r}; it has {known}")
 
     def rows(self, first: int, last: int) -> dict[str, FloatArray]:
         """Return rows ``first`` to ``last`` of every column of numbers, by column."""

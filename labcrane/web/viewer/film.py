@@ -225,7 +225,10 @@ class Film:
             if len(self._curves) >= KEPT:
                 self._curves.popitem(last=False)
             source = self._record.streams[stream]
-            self._curves[key] = source.time - self.start, source.column(column)
+            values = source.column(column)
+            if values.dtype.kind not in "fiub":  # texts have no curve
+                values = np.full(len(values), np.nan)
+            self._curves[key] = source.time - self.start, values.astype(np.float64)
         self._curves.move_to_end(key)
         return self._curves[key]
 
