@@ -262,6 +262,11 @@ WORDS = {
 }  # fmt: skip
 """What a number may be written as by mistake, and whether it cannot be meant."""
 
+OR_NAMES = {"screen", "screens"}
+"""Keys whose numbers may be names as well: a screen is called HDMI-1."""
+
+A_NAME = {"much", "'1,5'", "50 candelas", "1:30", "no"}
+
 
 def faults(study: str, text: str, seed: int = 0) -> Iterator[Wrong]:
     """Yield every single fault of a protocol, with what is random in it drawn from ``seed``."""
@@ -320,7 +325,9 @@ def _instead(entry: Entry, rng: random.Random) -> Iterator[tuple[str, bool]]:
         for what in ("nope", "5", "[1]", "null"):
             yield what, what in {"[1]", "nope"}
     elif isinstance(value, int | float):
-        yield from {**NUMBERS, **WORDS}.items()
+        named = OR_NAMES & {last, *entry.place[-2:]}
+        for what, must in {**NUMBERS, **WORDS}.items():
+            yield what, must and not (named and what in A_NAME)
     elif isinstance(value, Mapping | list):
         for what in ("word", "5", "null", "true"):
             yield what, what != "null"

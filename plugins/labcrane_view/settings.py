@@ -130,6 +130,10 @@ HudLine = Literal["block", "trial", "distance", "time", "speed", "load", "latene
 """What a line of text can say."""
 
 
+Screen = NonNegativeInt | Annotated[str, Field(min_length=1)]
+"""A monitor: its number, counted from 0, or its name."""
+
+
 class ViewSettings(Settings):
     """A window, what is seen in it, and from where."""
 
@@ -142,11 +146,11 @@ class ViewSettings(Settings):
     size: tuple[Pixels, Pixels] = (1280, 720)
     """Width and height, in pixels; a full screen has its own."""
 
-    screen: NonNegativeInt | Annotated[str, Field(min_length=1)] | None = None
+    screen: Screen | None = None
     """The monitor to fill: its name (``HDMI-1``), or its number, counted from 0; a window by
     default."""
 
-    screens: tuple[NonNegativeInt | str, ...] = ()
+    screens: tuple[Screen, ...] = ()
     """Monitors to fill with one wide picture, from left to right, instead of ``screen``."""
 
     bezel_mm: NonNegativeFloat = 0.0

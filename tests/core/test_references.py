@@ -65,9 +65,9 @@ def told(tmp_path: Path, registry: Registry):
         ("retrieval", "boom: 3, ", "", "13:9: scheme needs the axis 'valve.boom', and there is no such axis"),
         ("retrieval", "fov_deg: 60}", "fov_deg: 60, on: bom}", "38:90: views.operator.camera.on is 'bom', and there is no such link; did you mean 'boom'?"),
         ("aiming", "end: rest_inside", "trigger: left.knob", "20:85: tasks.aiming.trigger is 'left.knob', and there is no such axis;"),
-        ("aiming", "camera: cab_left", "areas: [targt]", "27:33: views.operator.areas[1] is 'targt', and there is no such object; did you mean 'target'?"),
-        ("aiming", "camera: cab_left", "patch: {on: [trial.strat]}", "27:38: views.operator.patch.on[1] is 'trial.strat', and there is no such event; did you mean 'trial.start'?"),
-        ("aiming", "camera: cab_left", "supervisor: {cameras: [moon]}", "27:48: views.operator.supervisor.cameras[1] is 'moon', and there is no such camera;"),
+        ("aiming", "camera: cab", "areas: [targt]", "27:33: views.operator.areas[1] is 'targt', and there is no such object; did you mean 'target'?"),
+        ("aiming", "camera: cab", "patch: {on: [trial.strat]}", "27:38: views.operator.patch.on[1] is 'trial.strat', and there is no such event; did you mean 'trial.start'?"),
+        ("aiming", "camera: cab", "supervisor: {cameras: [moon]}", "27:48: views.operator.supervisor.cameras[1] is 'moon', and there is no such camera;"),
         ("aiming", "wrist: right.x", "wrist: -left.y", "14:45: scheme.map has 'left.y' for both 'elbow' and 'wrist'; give each its own"),
         ("aiming", "width: 0.5", "width: 50", "20:57: tasks.aiming.width: a circle 50 m wide holds the middle of its partner 2 m away; write less than 2"),
         ("aiming", "width: 0.5", "width: 1e300", "20:57: tasks.aiming.width: a circle 1e+300 m wide"),
@@ -101,7 +101,7 @@ def test_a_session_without_steps_is_told(told) -> None:
 
 
 def test_all_wrong_names_are_told_at_once(told) -> None:
-    text = AIMING.replace("left.x", "left.q").replace("cab_left", "cab_left, areas: [tipp]")
+    text = AIMING.replace("left.x", "left.q").replace("camera: cab", "camera: cab, areas: [tipp]")
     assert [line.split(":")[0] for line in told("aiming", text)] == ["14", "27"]
 
 
