@@ -24,8 +24,8 @@ from pathlib import Path
 from benchmarks.table import Row, missed
 
 SUBJECTS = (
-    "tick", "oversight", "beside", "real_time", "recording", "sync", "signals", "view", "sound",
-    "analysis", "cohort", "start_up", "pages",
+    "tick", "scenario", "oversight", "beside", "real_time", "recording", "sync", "signals", "view",
+    "sound", "analysis", "cohort", "start_up", "pages",
 )  # fmt: skip
 RESULTS = Path(__file__).with_name("RESULTS.md")
 HEAD = "| benchmark | figure | labcrane | reference | | ratio | at most | measured |"

@@ -24,6 +24,9 @@ RETRIEVAL = HERE.parent / "protocols" / "retrieval"
 MOMENTS = {"start": 0.0, "way": 0.55, "end": 1.0}
 """Shares of a run."""
 
+SIDE = {"reach_through": {"eye": (2.85, 0.1, 1.3), "look": (1.6, 0.0, 0.85), "fov_deg": 80.0}}
+"""Cameras at the side of scenes that hide from the study's own: here one inside the car."""
+
 SIZE = (1200, 450)
 
 COLOURS = 96
@@ -48,11 +51,17 @@ def draw(name: str) -> None:
         path = study_of(name, Path(place) / "study")
         study = load(path, discover())
         frames, scene = chosen(study, None, 1, None)
+        last = frames[-1]
+        sys.stdout.write(f"{name}: {last.phase.name.lower()} after {last.elapsed:.1f} s\n")
+        sys.stdout.flush()
         run = Rig.build(study, simulated=True).describe(study, participant_seed=0)
         settings = study.choices["views.operator"].settings
         if not isinstance(settings, ViewSettings):
             raise TypeError(f"the operator sees {settings}; pictures need a view")
-        view = View(settings.model_copy(update={"display": "hidden", "size": SIZE}), run.machine)
+        (side,) = settings.beside
+        beside = (side.model_copy(update=SIDE.get(name, {})),)
+        shown = {"display": "hidden", "size": SIZE, "beside": beside}
+        view = View(settings.model_copy(update=shown), run.machine)
         view.open(run)
         try:
             view.update(SessionState(scene=scene))

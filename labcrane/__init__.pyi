@@ -12,6 +12,7 @@ from .core.roles import (
     Questionnaire,
     SignalMonitor,
     Task,
+    Trigger,
 )
 from .core.settings import Settings
 from .core.signals import Signal
@@ -55,6 +56,7 @@ __all__ = [
     "Task",
     "Tick",
     "Trial",
+    "Trigger",
     "analysis",
     "core",
     "hookimpl",

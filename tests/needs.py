@@ -36,6 +36,7 @@ PACKAGES = {
     "jackd": "jackd2",
     "jack_wait": "jackd2",
     "gcc": "gcc libc6-dev",
+    "sha256sum": "coreutils",
     "ufw": "ufw",
     "unshare": "util-linux",
     "node": "nodejs",
@@ -106,6 +107,9 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
     "root": (lambda: os.geteuid() == 0, "only root may ask what a firewall would do"),
     "pybullet": (lambda: find_spec("pybullet") is not None, "Python 3.11: it has no later wheels"),
     "mujoco": (lambda: find_spec("mujoco") is not None, "pip install mujoco"),
+    "mne": (lambda: find_spec("mne") is not None, "pip install 'labcrane[eeg]'"),
+    "mne_bids": (lambda: find_spec("mne_bids") is not None, "pip install mne-bids"),
+    "pybv": (lambda: find_spec("pybv") is not None, "pip install 'labcrane[eeg]'"),
     "bids-validator-deno": (
         lambda: shutil.which("bids-validator-deno", path=Path(sys.executable).parent) is not None,
         "pip install bids-validator-deno",

@@ -82,65 +82,65 @@ def test_a_machine_beside_the_study_is_read_in_degrees_and_gives_radians(tmp_pat
         (
             "    a: 3.0",
             "    lenght: 3.0",
-            "digger.yaml:6: 'lenght' is not a key of joints[2]; possible: name, a, d, alpha_deg,"
+            "digger.yaml:6:5: 'lenght' is not a key of joints[2]; possible: name, a, d, alpha_deg,"
             " offset_deg, range_deg, speed_deg_s, rest_deg, mass_kg, effort, thickness, mesh, "
             "centre_m, inertia_kgm2",
         ),
         (
             "    range_deg:",
             "    rang_deg:",
-            "digger.yaml:7: 'rang_deg' is not a key of joints[2]; did you mean 'range_deg'?\n"
-            "digger.yaml:7: joints[2] needs 'range_deg'; is it what 'rang_deg' is to be?",
+            "digger.yaml:7:5: 'rang_deg' is not a key of joints[2]; did you mean 'range_deg'?\n"
+            "digger.yaml:7:5: joints[2] needs 'range_deg'; is it what 'rang_deg' is to be?",
         ),
         (
             "    a: 3.0",
             "    a: -3.0",
-            "digger.yaml:6: joints[2].a is -3.0; it must be greater than or equal to 0",
+            "digger.yaml:6:8: joints[2].a is -3.0; it must be greater than or equal to 0",
         ),
         (
             "    range_deg: [-60, 60]",
             "    range_deg: [60, -60]",
-            "digger.yaml:5: joints[2]: range_deg must rise, but is 60.0 to -60.0 "
+            "digger.yaml:5:5: joints[2]: range_deg must rise, but is 60.0 to -60.0 "
             "degrees; write the lowest first",
         ),
         (
             "    effort: 9",
             "    effort: 9\n    rest_deg: 61",
-            "digger.yaml:5: joints[2]: rest_deg 61.0 is outside the joint's range; it must "
+            "digger.yaml:5:5: joints[2]: rest_deg 61.0 is outside the joint's range; it must "
             "be -60.0 to 60.0",
         ),
         (
             "name: stick",
             "name: boom",
-            "digger.yaml:1: the file: joints are called slew, boom, boom; give each a name "
+            "digger.yaml:1:1: the file: joints are called slew, boom, boom; give each a name "
             "of its own",
         ),
         (
             "alpha_deg: -90",
             "alpha_deg: 90",
-            "digger.yaml:1: the file: the first joint slews: it needs alpha_deg -90",
+            "digger.yaml:1:1: the file: the first joint slews: it needs alpha_deg -90",
         ),
         (
             "    a: 3.0",
             "    a: 3.0\n    d: 0.1",
-            "digger.yaml:1: the file: joint 'boom' pitches: it needs alpha_deg 0 and d 0",
+            "digger.yaml:1:1: the file: joint 'boom' pitches: it needs alpha_deg 0 and d 0",
         ),
         (
             GOOD[GOOD.index("  - {name: stick") :],
             "",
-            "digger.yaml:1: the file: a machine needs 3 joints or more, but has 2",
+            "digger.yaml:1:1: the file: a machine needs 3 joints or more, but has 2",
         ),
-        ("source: a test\n", "", "digger.yaml:1: the file needs 'source'"),
+        ("source: a test\n", "", "digger.yaml:1:1: the file needs 'source'"),
         (
             "speed_deg_s: 20",
             "speed_deg_s: fast",
-            "digger.yaml:4: joints[1].speed_deg_s is 'fast'; it must be a number in deg/s, or one "
-            "with its unit, as 0.2 rad/s",
+            "digger.yaml:4:77: joints[1].speed_deg_s is 'fast'; it must be a number in deg/s, or "
+            "one with its unit, as 0.2 rad/s",
         ),
         (
             "    mass_kg: 9",
             "    mass_kg: .inf",
-            "digger.yaml:9: joints[2].mass_kg is .inf; it must be a number that is one: neither "
+            "digger.yaml:9:14: joints[2].mass_kg is .inf; it must be a number that is one: neither "
             ".nan nor .inf",
         ),
     ],
@@ -160,7 +160,7 @@ def test_all_mistakes_are_told_at_once_in_the_order_of_the_file(tmp_path: Path) 
 
 def test_what_is_no_yaml_is_told_with_its_line(tmp_path: Path) -> None:
     said = complaint(tmp_path, GOOD.replace("    a: 3.0", "    a: [3.0"))
-    assert said.startswith("digger.yaml:6: '[' opens here and is not closed as it should be")
+    assert said.startswith("digger.yaml:6:8: '[' opens here and is not closed as it should be")
 
 
 def test_an_unknown_machine_is_refused_with_those_there_are() -> None:

@@ -146,6 +146,9 @@ class Wrong:
         The file.
     line
         In which it is; 0 where the file as a whole is meant.
+    columns
+        Where in that line it may be pointed at: the key, or the value; empty where that is not
+        known.
     must
         Whether it must be refused or questioned: it cannot be meant.
     """
@@ -156,6 +159,7 @@ class Wrong:
     text: bytes
     line: int
     must: bool
+    columns: frozenset[int] = frozenset()
 
     def __str__(self) -> str:
         return f"{self.study} {'.'.join(map(str, self.place))}: {self.fault}"
@@ -264,6 +268,7 @@ def faults(study: str, text: str, seed: int = 0) -> Iterator[Wrong]:
     rng = random.Random(f"{study} {seed}")
     there = entries(text)
     line_at = {entry.place: entry.line for entry in there}
+    at_place = {entry.place: entry for entry in there}
     for entry in there:
         last, holder = entry.place[-1], entry.place[:-1]
         if isinstance(last, str) and holder not in OF_LAB and holder[-1:] != ("sums",):
@@ -276,6 +281,7 @@ def faults(study: str, text: str, seed: int = 0) -> Iterator[Wrong]:
                 changed.encode(),
                 entry.line,
                 must=True,
+                columns=frozenset({_column(text, entry.begin)}),
             )
         if isinstance(last, str) and (entry.left != entry.begin or entry.right != entry.end):
             cut = text[: entry.left] + text[entry.right :]
@@ -283,7 +289,19 @@ def faults(study: str, text: str, seed: int = 0) -> Iterator[Wrong]:
             yield Wrong(study, REMOVED, entry.place, cut.encode(), line, must=False)
         for what, must in _instead(entry, rng):
             new = f"{text[: entry.start]} {what}{text[entry.end :]}"
-            yield Wrong(study, f"written as {what}", entry.place, new.encode(), entry.line, must)
+            begins = _column(new, entry.start + 1)
+            inside = {begins + 1} if what[0] in "[{" else set()
+            columns = frozenset({_column(text, entry.begin), begins, *inside})
+            for depth in range(1, len(entry.place)):  # what only the whole of something knows
+                part = at_place[entry.place[:depth]]
+                columns |= {_column(text, part.begin), _column(text, part.start)}
+            yield Wrong(
+                study, f"written as {what}", entry.place, new.encode(), entry.line, must, columns
+            )
+
+
+def _column(text: str, at: int) -> int:
+    return at - text.rfind("\n", 0, at)
 
 
 REMOVED = "removed"

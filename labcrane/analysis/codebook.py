@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from labcrane.analysis.cohort import Participant
 from labcrane.analysis.gaze import gaze_units
 from labcrane.analysis.measures import MEASURES
-from labcrane.analysis.questionnaires import ANSWERS, MEANING, SCORES, asked_in
+from labcrane.analysis.questionnaires import ANSWERS, MEANING, SCORES, asked_in, score_column
 from labcrane.recording.participant_file.reader import SessionRecord
 
 if TYPE_CHECKING:
@@ -27,16 +27,26 @@ def codebook_of(participant: Participant, measures: "pd.DataFrame") -> "pd.DataF
 
     sessions = [session for _, session in participant.sessions()]
     tables = [
-        trial_codebook(measures, sessions[0]),
+        trial_codebook(measures, sessions[0], sessions),
         questionnaire_codebook(sessions),
         *map(stream_codebook, sessions),
     ]
     return pd.concat(tables).drop_duplicates(["table", "column"], ignore_index=True)
 
 
-def trial_codebook(measures: "pd.DataFrame", session: SessionRecord) -> "pd.DataFrame":
-    """Return one row per column of the table of measures: column, unit, description, source."""
+def trial_codebook(
+    measures: "pd.DataFrame", session: SessionRecord, asking: Sequence[SessionRecord] = ()
+) -> "pd.DataFrame":
+    """Return one row per column of the table of measures: column, unit, description, source.
+
+    Parameters
+    ----------
+    asking
+        Sessions whose questionnaires may be columns beside the trials.
+    """
     import pandas as pd
+
+    asked = _asked(asking)
 
     units = session.context.get("trial_units", {})
     gaze = gaze_units(measures.columns)
@@ -49,10 +59,27 @@ def trial_codebook(measures: "pd.DataFrame", session: SessionRecord) -> "pd.Data
             row = (unit, meaning, MEASURED)
         elif column in gaze:
             row = (gaze[column], "gaze on an area of interest", MEASURED)
+        elif column in asked:
+            row = ("", asked[column], WRITTEN)
         else:
             row = (str(units.get(column, "")), column.replace("_", " "), WRITTEN)
         rows.append(("trials", column, *row))
     return pd.DataFrame(rows, columns=["table", "column", "unit", "description", "source"])
+
+
+def _asked(sessions: Sequence[SessionRecord]) -> dict[str, str]:
+    """Return what each column of an answer or a score beside the trials means."""
+    meanings: dict[str, str] = {}
+    for session in sessions:
+        for name, about in asked_in(session).items():
+            items = {f"{name}.{item['name']}": str(item["text"]) for item in about["items"]}
+            scores = {
+                score_column(name, score["name"], items): f"score {score['name']} of {name}, "
+                f"{score['lowest']:g} to {score['highest']:g}"
+                for score in about["scores"]
+            }
+            meanings |= items | scores
+    return meanings
 
 
 def questionnaire_codebook(sessions: Sequence[SessionRecord]) -> "pd.DataFrame":

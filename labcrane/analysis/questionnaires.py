@@ -1,6 +1,6 @@
 """Questionnaires as tidy tables: one row per answer, and one per score."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -146,6 +146,41 @@ def scores_of(participant: Participant) -> "pd.DataFrame":
         for name, value in asked.scores.items()
     ]
     return pd.DataFrame(rows, columns=list(SCORES))
+
+
+def beside_trials(measures: "pd.DataFrame", participant: Participant) -> "pd.DataFrame":
+    """Return the table of trials with what was answered after each, and what that was worth.
+
+    A column is called ``QUESTIONNAIRE.ITEM``; one of a score of the same name as an item,
+    ``QUESTIONNAIRE.score.NAME``. An answer to a questionnaire that follows no trial is in no row.
+    Of a trial that was repeated, the last attempt has it; of one asked twice, the last answer.
+    """
+    answers, scores = answers_of(participant), scores_of(participant)
+    given: dict[tuple[int, int], dict[str, Any]] = {}
+    for row in answers[answers["trial"].notna()].to_dict("records"):
+        name = f"{row['questionnaire']}.{row['item']}"
+        value = row["text"] or row["value"]
+        given.setdefault((int(row["session"]), int(row["trial"])), {})[name] = value
+    asked = {f"{row['questionnaire']}.{row['item']}" for row in answers.to_dict("records")}
+    for row in scores[scores["trial"].notna()].to_dict("records"):
+        name = score_column(row["questionnaire"], row["score"], asked)
+        given.setdefault((int(row["session"]), int(row["trial"])), {})[name] = row["value"]
+    columns = list(dict.fromkeys(name for row in given.values() for name in row))
+    last = ~measures.duplicated(["session", "trial"], keep="last")
+    rows = [
+        given.get((int(session), int(trial)), {}) if newest else {}
+        for session, trial, newest in zip(measures["session"], measures["trial"], last, strict=True)
+    ]
+    beside = measures.copy()
+    for name in columns:
+        beside[name] = [row.get(name) for row in rows]
+    return beside
+
+
+def score_column(questionnaire: str, score: str, asked: Collection[str]) -> str:
+    """Return what the column of a score beside the trials is called, next to those of items."""
+    name = f"{questionnaire}.{score}"
+    return f"{questionnaire}.score.{score}" if name in asked else name
 
 
 def _when(participant: Participant, number: int, asked: Occasion) -> dict[str, Any]:

@@ -62,9 +62,15 @@ def reversals(axis: FloatArray, hysteresis: float) -> int:
     The stick's counterpart of steering reversals: turning points between which the axis moves by
     more than a fraction of full scale.
     """
+    if float(axis.max() - axis.min()) <= hysteresis:
+        return 0
+    steps = np.diff(axis)
+    moved = np.flatnonzero(steps)
+    # Only where the axis turns can anything change; a loop over every sample takes long.
+    turns = moved[:-1][steps[moved[:-1]] * steps[moved[1:]] < 0.0] + 1
     count, direction = 0, 0
     lowest = highest = float(axis[0])
-    for value in axis.tolist():
+    for value in [*axis[turns].tolist(), float(axis[-1])]:
         lowest, highest = min(lowest, value), max(highest, value)
         if direction <= 0 and value - lowest > hysteresis:
             count += direction < 0

@@ -215,7 +215,7 @@ def _event_line(event: Event) -> str | None:
             return f"break of {data['seconds']:g} s"
         case "block.start":
             return f"block {data['block']}: {data['block_name']}"
-        case "input.lost" | "disk.lost" | "plugin.slow":
+        case "input.lost" | "disk.lost" | "plugin.slow" | "trigger.lost":
             return f"{event.name.upper().replace('.', ' ')}: {_short(str(data['why']))}"
         case "stream.lost" | "feedback.awaited":
             return f"{event.name.upper().replace('.', ' ')}: {data['what']}"

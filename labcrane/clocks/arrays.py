@@ -41,7 +41,8 @@ def correct(
     models is weighed by likelihood, and averaged by it.
 
     Where probes leap by more than round trips allow, the clock is another one from there on.
-    Samples without probes are placed by their arrival, and say so.
+    Samples without probes are placed by their arrival, and say so. Where probes show that the clock
+    was turned and a regular stream's sampler went on, its count is followed in place of the clock.
 
     Parameters
     ----------

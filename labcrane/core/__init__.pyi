@@ -1,5 +1,6 @@
 """The public names of this package, and the modules from which they are imported."""
 
+from . import compiled, twin
 from .crane import Crane
 from .crane_settings import CraneSettings, GrappleSettings, LoadedCraneSettings
 from .findings import Finding, Verdict
@@ -8,6 +9,7 @@ from .items import AnswerError, Answers, Item, Score, numeric_answers
 from .primitives import Cylinder, Shape, Sphere, TargetFinder
 from .records import (
     CameraImage,
+    Echo,
     Event,
     Phase,
     PlannedTrial,
@@ -31,6 +33,7 @@ from .references import (
 )
 from .settings import AtMost, Names, StudyPath, Unit, read_csv_text, read_yaml, was_run
 from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
+from .twin import Places, Twin
 
 __all__ = [
     "AnswerError",
@@ -44,6 +47,7 @@ __all__ = [
     "Crane",
     "CraneSettings",
     "Cylinder",
+    "Echo",
     "Event",
     "EventName",
     "Finding",
@@ -57,6 +61,7 @@ __all__ = [
     "Names",
     "Once",
     "Phase",
+    "Places",
     "PlannedTrial",
     "Reference",
     "SceneObject",
@@ -71,13 +76,16 @@ __all__ = [
     "StudyPath",
     "TargetFinder",
     "TrialStatus",
+    "Twin",
     "Unit",
     "Value",
     "Verdict",
     "ViewName",
+    "compiled",
     "numeric_answers",
     "read_csv_text",
     "read_yaml",
     "signals_of",
+    "twin",
     "was_run",
 ]

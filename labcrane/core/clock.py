@@ -78,6 +78,11 @@ def ticks(clock: Clock, rate_hz: float) -> Iterator[Tick]:
     """Yield ticks at ``rate_hz`` for ever, the first one now."""
     start = clock.now()
     for number in itertools.count():
-        due = start + number / rate_hz
-        clock.wait_until(due)
-        yield Tick(number, due, clock.now())
+        yield tick_of(clock, start, number, rate_hz)
+
+
+def tick_of(clock: Clock, start: float, number: int, rate_hz: float) -> Tick:
+    """Wait for a tick of a run that began at ``start`` seconds, and return it."""
+    due = start + number / rate_hz
+    clock.wait_until(due)
+    return Tick(number, due, clock.now())

@@ -3,10 +3,13 @@
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from labcrane.core.crane_settings import CraneSettings
-from labcrane.core.records import Run, Value
+from labcrane.core.records import Frame, Run, Value
 from labcrane.core.roles import Dynamics
 from labcrane.core.signals import Signal
+from labcrane.core.twin import STATE, Places, Twin
 from labcrane.errors import PluginError, ProtocolError
 from labcrane.machines.actuator import Actuator
 from labcrane.machines.crane_state import CraneState
@@ -83,6 +86,45 @@ class Crane(Dynamics):
     def metadata(self) -> Mapping[str, Value]:
         actuator = self._settings.actuator.model_dump()
         return {f"actuator.{name}": value for name, value in actuator.items()}
+
+    def twin_of(self, step: object, further: Sequence[float] = (), deviation: float = 0.0) -> Twin:
+        """Return the twin of a crane that follows the velocity law, for its compiled ``step``.
+
+        ``step`` is told the numbers of the machine and of its actuator, ``further`` ones, then
+        angles, speeds, the actuator's speeds and commands on their way, which it keeps up to date;
+        :meth:`_stand` and :meth:`_motion` are then the crane's own.
+        """
+        joints, actuator = self._machine.joints, self._actuator
+        ideal, share, *most = actuator.constants
+        head = (
+            len(joints), actuator.delay, self._dt, self._machine.base_x, joints[0].d,
+            self._drive.start, 10 + 5 * len(joints) + len(further), ideal, share, 0.0,
+        )  # fmt: skip
+        low, high = zip(*self._machine.limits, strict=True)
+        lengths, offsets = zip(*((joint.a, joint.offset) for joint in joints), strict=True)
+        moving = [0.0] * (len(joints) * (3 + actuator.delay))
+        own = np.array([*head, *most, *low, *high, *lengths, *offsets, *further, *moving])
+        return Twin(step, own, len(own), self._take_over, self._hand_back, deviation=deviation)
+
+    def _take_over(self, own: FloatArray, seen: Frame) -> bool:
+        angles, speeds = self._motion()
+        own[int(own[6]) :] = [*angles, *speeds, *self._actuator.numbers()]
+        return True
+
+    def _hand_back(self, own: FloatArray, rows: FloatArray, places: Places) -> None:
+        joints, at = len(self._machine.joints), int(own[6])
+        self._actuator.go_on(own[at + 2 * joints :].tolist())
+        values = self._state.values
+        values[:] = rows[-1, places[STATE] : places[STATE] + len(values)]
+        self._stand(values[:joints].tolist(), values[joints : 2 * joints].tolist())
+
+    def _motion(self) -> tuple[Sequence[float], Sequence[float]]:
+        """Return where the joints are in rad, and how they move in rad/s, for a twin."""
+        joints, values = len(self._machine.joints), self._state.values.tolist()
+        return values[:joints], values[joints : 2 * joints]
+
+    def _stand(self, angles: Sequence[float], speeds: Sequence[float]) -> None:
+        """Go on from ``angles`` in rad, moving at ``speeds`` in rad/s, to where a twin came."""
 
     @abstractmethod
     def _place(self, angles: Sequence[float]) -> None:

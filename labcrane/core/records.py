@@ -204,6 +204,22 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True)
+class Echo:
+    """A code that came back from where it was sent to.
+
+    Attributes
+    ----------
+    code
+        What came back, 1 to 255; a bare number.
+    time
+        When, in seconds on the session's clock, which is ``time.perf_counter``.
+    """
+
+    code: int
+    time: float
+
+
+@dataclass(frozen=True, slots=True)
 class SessionState:
     """What a session is about now, for whoever presents it.
 

@@ -8,6 +8,7 @@ pluggy, so it must return soon and must not block. ``labcrane.testing`` has a co
 every role; a plugin's tests subclass it.
 
 :class:`~labcrane.analysis.exporter.Exporter` works on what was recorded, long after.
+A Trigger tells other devices of events, in the tick in which they are known.
 A SignalMonitor looks at the streams of other programs, in a process beside the recorder.
 """
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:  # a protocol is checked without loading what it does not need
     from labcrane.core.primitives import Shape, Sphere
     from labcrane.core.records import (
         CameraImage,
+        Echo,
         Frame,
         PlannedTrial,
         Run,
@@ -35,6 +37,7 @@ if TYPE_CHECKING:  # a protocol is checked without loading what it does not need
         Value,
     )
     from labcrane.core.signals import Signal, SignalFault, SignalStream
+    from labcrane.core.twin import Twin
     from labcrane.machines.machine import Body
     from labcrane.types import FloatArray
 
@@ -57,6 +60,14 @@ class Component(ABC):
     def metadata(self) -> Mapping[str, Value]:
         """Return what the record should know of the open component: calibration, versions."""
         return {}
+
+    def twin(self) -> Twin | None:
+        """Return the compiled twin of the open component's tick, for simulations; None for none.
+
+        Of an input device, a controller, a machine or a task: see :mod:`labcrane.core.twin`. Asked
+        for once a session, and only where numba is installed, so import it there.
+        """
+        return None
 
 
 class InputDevice(Component):
@@ -128,6 +139,10 @@ class Task(Component):
 
     condition_units: Mapping[str, str] = {}
     """Units of the numbers in its trials' conditions; ``"1"`` for counts and ratios."""
+
+    reports: tuple[str, ...] = ()
+    """What people may say by a button of either page that they have seen, while a trial of it runs:
+    ``("deformity",)``. It comes as the event ``order.report``, with it as ``text``."""
 
     @abstractmethod
     def factors(self) -> Mapping[str, Sequence[str]]:
@@ -205,6 +220,38 @@ class SignalMonitor(Component):
         samples
             Shape ``(n, n_channels)``, in the units of the stream's header, with whatever the source
             sends; ``n`` is what has come, from 1 to some seconds of it.
+        """
+
+
+class Trigger(Component):
+    """What tells another device of events by a pulse: a port, a box between LSL and TTL.
+
+    Its codes go out in the tick in which the session learns of an event, after the record and
+    before everything else that is told. It is opened in every session but those of ``--fast``.
+    """
+
+    codes: Mapping[str, int] | None = None
+    """Codes by the names of events, 1 to 255; None for the numbers of docs/markers.md."""
+
+    fault: str | None = None
+    """Why nothing can be sent now, in words; None while all is well.
+
+    Looked at after every ``send``. The session goes on, and says so.
+    """
+
+    @abstractmethod
+    def send(self, codes: Sequence[int], now: float) -> Sequence[Echo]:
+        """Send the codes of a tick, mostly none; return what has come back since the last one.
+
+        Called in every tick, and must not wait. A device that is gone is told by ``fault``, not
+        raised.
+
+        Parameters
+        ----------
+        codes
+            1 to 255 each, in the order of their events.
+        now
+            In seconds on the session's clock: for what ends a pulse.
         """
 
 

@@ -1,30 +1,60 @@
 """Random sequences in which no level comes more than so often in a row."""
 
 import random
-from bisect import bisect_right
-from collections import Counter
+from bisect import bisect_right, insort
 from collections.abc import Sequence
-from functools import cache
+from functools import lru_cache
 from itertools import accumulate
 
 from labcrane.errors import ProtocolError
 
+State = tuple[tuple[int, ...], int, int]
+"""How often every other level is still to come, sorted; the last level; how often in a row it
+has."""
 
-@cache
-def _ways(others: tuple[int, ...], left: int, run: int, most: int) -> int:
-    """Count the ways to go on when the last level has come ``run`` times in a row.
 
-    ``left`` is how often that level is still to come, ``others`` the same of all others, sorted.
-    """
-    if left == 0 and not any(others):
-        return 1
-    total = _ways(others, left - 1, run + 1, most) if left and run < most else 0
-    for count, levels in Counter(others).items():
-        if count:
-            rest = list(others)
-            rest.remove(count)
-            total += levels * _ways(tuple(sorted((*rest, left))), count - 1, 1, most)
-    return total
+class Ways:
+    """How many ways there are to go on, with no level more than ``most`` times in a row."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._known: dict[State, int] = {}
+
+    def count(self, state: State) -> int:
+        """Return the ways to go on from a state; without recursion, which so many levels exceed."""
+        known = self._known
+        waiting = [] if state in known else [(state, self._nexts(state))]
+        while waiting:
+            at, nexts = waiting[-1]
+            if missing := [each for each, _ in nexts if each not in known]:
+                waiting += [(each, self._nexts(each)) for each in missing]
+                continue
+            waiting.pop()
+            done = not nexts and at[1] == 0 and not any(at[0])
+            known[at] = 1 if done else sum(levels * known[each] for each, levels in nexts)
+        return known[state]
+
+    def _nexts(self, state: State) -> list[tuple[State, int]]:
+        """Return what can follow, and by how many levels it does."""
+        others, left, run = state
+        found = [((others, left - 1, run + 1), 1)] if left and run < self._most else []
+        at = 0
+        while at < len(others):
+            count, levels = others[at], others.count(others[at])
+            if count:
+                rest = list(others)
+                del rest[at]
+                insort(rest, left)
+                found.append(((tuple(rest), count - 1, 1), levels))
+            at += levels
+        return found
+
+
+@lru_cache(maxsize=4)
+def _ways(most: int, levels: int, times: int) -> Ways:
+    """Return what is counted for every participant's order alike."""
+    del levels, times  # another design counts anew, so that what is kept does not grow
+    return Ways(most)
 
 
 def sequence(levels: Sequence[str], times: int, most: int, seed: int) -> tuple[str, ...]:
@@ -43,13 +73,14 @@ def sequence(levels: Sequence[str], times: int, most: int, seed: int) -> tuple[s
     left = dict.fromkeys(levels, times)
     chosen: list[str] = []
     last, run = None, 0
+    ways = _ways(most, len(left), times)
     while len(chosen) < times * len(left):
         weights = {}
         for level in left:
             again = level == last
             if left[level] and not (again and run >= most):
                 others = tuple(sorted(left[other] for other in left if other != level))
-                weights[level] = _ways(others, left[level] - 1, run + 1 if again else 1, most)
+                weights[level] = ways.count((others, left[level] - 1, run + 1 if again else 1))
         bounds = list(accumulate(weights.values()))
         if not bounds or bounds[-1] == 0:
             raise ProtocolError(

@@ -96,7 +96,11 @@ def _network(study: Study | None, peers: Sequence[str]) -> Iterator[Check]:
     from labcrane.doctor import lsl  # noqa: PLC0415 - loads liblsl, which reads its configuration
 
     needs = study.protocol.streams if study else {}
-    requests = [need.request(label, required=need.required) for label, need in needs.items()]
+    expected = study.protocol.expected if study else ()
+    requests = [
+        need.request(label, required=need.required, expected=expected)
+        for label, need in needs.items()
+    ]
     streams = apart.Call("LSL streams", UNPLUGGED, lsl.examine, (requests,))
     yield from _checks("lsl", apart.examine(streams))
     for peer in peers:

@@ -94,6 +94,7 @@ def _needs(requests: Sequence[StreamRequest], there: Sequence[FoundStream]) -> I
                 "tells whether a firewall is in between"
             )
             yield Finding(verdict, f"stream {request} is not announced", fix)
+        yield from _whose(request, fitting)
         for one in fitting:
             blocked, misfits = _blocked(one), request.misfits(one.channels, one.rate_hz)
             text = f"stream {request} comes from {one.host}"
@@ -105,6 +106,23 @@ def _needs(requests: Sequence[StreamRequest], there: Sequence[FoundStream]) -> I
                 yield Finding(Verdict.FAIL, f"{text}, but it {' and '.join(misfits)}", fix)
             else:
                 yield Finding(Verdict.PASS, text)
+
+
+def _whose(request: StreamRequest, fitting: Sequence[FoundStream]) -> Iterator[Finding]:
+    """Name what fits, where several streams do or any of a type is taken."""
+    if request.several or not fitting:
+        return
+    which = "; ".join(
+        f"{one.name!r} (source_id {one.source_id!r}) of {one.host}" for one in fitting
+    )
+    if len(fitting) > 1:
+        fix = "write the source_id of the one that is meant in the protocol, or several: true"
+        text = f"stream {request} could be any of {len(fitting)}, and no run begins: {which}"
+        yield Finding(Verdict.FAIL if request.required else Verdict.WARN, text, fix)
+    elif taken := request.taken(fitting[0].name, fitting[0].source_id, fitting[0].host):
+        text, _, fix = f"stream {request} {taken}".partition("; ")
+        text = text.replace("was taken", "would be taken")
+        yield Finding(Verdict.PASS if request.any_meant else Verdict.WARN, text, fix)
 
 
 def _info(one: FoundStream) -> "pylsl.StreamInfo":

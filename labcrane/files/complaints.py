@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from difflib import get_close_matches
 from math import isfinite
 from typing import Any
@@ -11,7 +12,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from labcrane.errors import suggestion
-from labcrane.files.units import EXAMPLES, unit_of
+from labcrane.files.units import EXAMPLES, Unread, unit_of
 
 Place = tuple[str | int, ...]
 """The keys and indices that lead to a value: ``("sessions", 0, "steps", 2)``."""
@@ -23,13 +24,25 @@ class Truth(str):
     __slots__ = ()
 
 
+OF_KEYS = "[key]"
+"""How pydantic ends the place of a mapping's key."""
+
 _MEMBER = re.compile(r"\[.*[\]'\"]|^(constrained-)?(str|int|float|bool)$")
 _COMMA = re.compile(r"\s*-?\d+,\d+\s*")
 
 
+@dataclass(frozen=True, slots=True)
+class Complaint:
+    """What is wrong, and where: with the value at a place, or with its key."""
+
+    place: Place
+    message: str
+    key: bool = False
+
+
 def told(
     errors: Sequence[ErrorDetails], place: Place, model: type[BaseModel]
-) -> Iterator[tuple[Place, str]]:
+) -> Iterator[Complaint]:
     """Yield what pydantic complains of; where a value is no member of a union, in one line.
 
     Pydantic complains once for every member, each as if it were the only one.
@@ -42,18 +55,21 @@ def told(
         if each["type"] == "missing" and (meant := _meant(each)):
             holder = named((*place, *loc[:-1]))
             said = f"{holder} needs {str(loc[-1])!r}; is it what {meant!r} is to be?"
-            yield (*loc[:-1], meant), said
+            yield Complaint((*loc[:-1], meant), said, key=True)
             continue
-        at = next((n for n, step in enumerate(loc) if _is_member(step)), None)
+        if of_key := loc[-1:] == (OF_KEYS,):
+            loc = loc[:-1]
+        at = next((n for n, step in enumerate(loc) if is_member(step)), None)
         if at is None or at + 1 < len(loc):
-            yield loc, explain(each, place, model)
+            of_key = of_key or each["type"] == "extra_forbidden"
+            yield Complaint(loc, explain(each, place, model), of_key)
         else:
             unions.setdefault(loc[:at], []).append(each)
     for loc, several in unions.items():
         texts = [explain(each, place, model) for each in several]
         head = texts[0].partition("; it must be ")[0]
         wanted = [text.partition("; it must be ")[2] or text for text in texts]
-        yield loc, f"{head}; it must be {', or '.join(dict.fromkeys(wanted))}"
+        yield Complaint(loc, f"{head}; it must be {', or '.join(dict.fromkeys(wanted))}")
 
 
 def _follows(error: ErrorDetails, errors: Sequence[ErrorDetails]) -> bool:
@@ -94,9 +110,11 @@ def explain(error: ErrorDetails, place: Place, model: type[BaseModel]) -> str:
         return f"{holder} is {shown(error['input'])}; it needs {key + 1} items"
     if error["type"] == "missing":
         return f"{named((*place, *loc[:-1]))} needs {str(key)!r}"
-    name = named((*place, *(step for step in loc if not _is_member(step))))
+    name = named((*place, *(step for step in loc if not is_member(step))))
     if isinstance(error["input"], Truth):
         return f"{name}: {error['input']} is no number; write one"
+    if isinstance(error["input"], Unread):
+        return f"{name}: {error['input'].why}"
     what = error["msg"].removeprefix("Value error, ").removeprefix("Input should be ")
     if error["type"] == "value_error":
         return f"{name}: {what}"
@@ -115,7 +133,7 @@ def _number(error: ErrorDetails, model: type[BaseModel], what: str) -> str:
     """Return which number must be there: in which unit, and with a point."""
     if isinstance(error["input"], str) and _COMMA.fullmatch(error["input"]):
         return f"{what}; write decimals with a point: {error['input'].strip().replace(',', '.')}"
-    keys = [step for step in error["loc"] if isinstance(step, str) and not _is_member(step)]
+    keys = [step for step in error["loc"] if isinstance(step, str) and not is_member(step)]
     field = _field(model, error["loc"])
     unit = unit_of(keys[-1], field.metadata) if field and keys else None
     return f"{what} in {unit}, or one with its unit, as {EXAMPLES[unit]}" if unit else what
@@ -189,7 +207,7 @@ def _how_many(error: ErrorDetails) -> str:
     return f"it can have at most {about.get('max_length')}"
 
 
-def _is_member(step: object) -> bool:
+def is_member(step: object) -> bool:
     """Whether part of pydantic's location is its name for a member of a union."""
     return isinstance(step, str) and bool(_MEMBER.search(step))
 
@@ -201,7 +219,7 @@ def _keys(model: type[BaseModel], place: Place) -> list[str]:
 
 def _field(model: type[BaseModel], loc: Place) -> FieldInfo | None:
     """Return the field of the last key of a place; None where it is no model's."""
-    keys = [at for at, step in enumerate(loc) if isinstance(step, str) and not _is_member(step)]
+    keys = [at for at, step in enumerate(loc) if isinstance(step, str) and not is_member(step)]
     holder = _model_at(model, loc[: keys[-1]]) if keys else None
     return holder.model_fields.get(str(loc[keys[-1]])) if holder else None
 
@@ -209,7 +227,7 @@ def _field(model: type[BaseModel], loc: Place) -> FieldInfo | None:
 def _model_at(model: type[BaseModel], place: Place) -> type[BaseModel] | None:
     fields: Any = model
     for step in place:
-        if isinstance(step, int) or _is_member(step):
+        if isinstance(step, int) or is_member(step):
             continue
         annotation = fields.model_fields[step].annotation if step in fields.model_fields else None
         nested = [a for a in (annotation, *getattr(annotation, "__args__", ())) if _is_model(a)]

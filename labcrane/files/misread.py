@@ -1,4 +1,4 @@
-"""Why a text is no YAML, in the words of those who write one, and the line in which it went wrong.
+"""Why a text is no YAML, in the words of those who write one, and the place where it went wrong.
 
 A parser notices a mistake where it can go on no more, which is often a line later.
 """
@@ -22,26 +22,30 @@ _NO_SPACE = re.compile(r"\s*(?:- +)?([A-Za-z_][\w-]*):([^\s/].*)?$")
 _DUPLICATE = re.compile(r'found duplicate key "(?P<key>[^"]*)"')
 
 
-def misread(error: MarkedYAMLError, text: str) -> tuple[int, str]:
-    """Return the line, from 1, and what is wrong there and what to do."""
+Spot = tuple[int, int]
+"""Line and column, from 1."""
+
+
+def misread(error: MarkedYAMLError, text: str) -> tuple[Spot, str]:
+    """Return line and column, from 1, and what is wrong there and what to do."""
     mark = error.problem_mark or error.context_mark
-    line = mark.line + 1 if mark else 1
+    line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
     problem, context = str(error.problem or ""), str(error.context or "")
     lines = text.split("\n")
     if "'\\t'" in problem:
-        return line, (
+        return (line, column), (
             "there is a tab, which YAML does not take for indentation; write spaces, and set the "
             "editor to do so"
         )
     for number, each in enumerate(lines[:line], start=1):
-        if _WIDE.match(each):
-            return number, (
+        if found := _WIDE.match(each):
+            return (number, found.end()), (
                 "there is a space of another kind, which YAML does not take for indentation, as "
                 "word processors write it; write plain spaces"
             )
     if found := _DUPLICATE.search(problem):
         first = error.context_mark.line + 1 if error.context_mark else line
-        return line, (
+        return (line, column), (
             f"the key {found['key']!r} is there twice in what begins in line {first}; keep one"
         )
     if "flow" in context and error.context_mark and not problem.startswith("found undefined"):
@@ -52,35 +56,35 @@ def misread(error: MarkedYAMLError, text: str) -> tuple[int, str]:
                 f"that, or a comma, before what stands in line {line}"
             )
     if (at := _without_space(lines, line)) is not None:
-        key = _NO_SPACE.match(lines[at - 1])
-        return at, f"there is no space behind the colon of {key[1] if key else 'a key'!r}; add one"
-    return line, _plain(problem)
+        spot, key = at
+        return spot, f"there is no space behind the colon of {key!r}; add one"
+    return (line, column), _plain(problem)
 
 
 CLOSING = {"[": "]", "{": "}"}
 
 
-def _opened(text: str, at: int) -> tuple[int, str]:
-    """Return the line of the bracket that is open at a place, or begins there, and the bracket.
+def _opened(text: str, at: int) -> tuple[Spot, str]:
+    """Return the place of the bracket that is open at a place, or begins there, and the bracket.
 
     Brackets in quotation marks count as well, as a quotation mark may be what is missing.
     """
-    open_at: list[tuple[int, str]] = []
+    open_at: list[tuple[Spot, str]] = []
     for number, line in enumerate(text[: at + 1].split("\n"), start=1):
-        for sign in re.split(r"(?:^|\s)#", line)[0]:
+        for column, sign in enumerate(re.split(r"(?:^|\s)#", line)[0], start=1):
             if sign in CLOSING:
-                open_at.append((number, sign))
+                open_at.append(((number, column), sign))
             elif open_at and sign == CLOSING[open_at[-1][1]]:
                 open_at.pop()
-    return open_at[-1] if open_at else (1, "")
+    return open_at[-1] if open_at else ((1, 1), "")
 
 
-def _without_space(lines: list[str], line: int) -> int | None:
-    """Return the last line until this one, of those at hand, whose colon has no space behind it."""
+def _without_space(lines: list[str], line: int) -> tuple[Spot, str] | None:
+    """Return the last colon until this line, of those at hand, without a space, and its key."""
     for at in range(min(line, len(lines)), max(0, line - 4), -1):
         found = _NO_SPACE.match(lines[at - 1])
         if found and found[2]:
-            return at
+            return (at, found.start(2)), found[1]
     return None
 
 
@@ -121,24 +125,26 @@ _TAG = "tag:yaml.org,2002:"
 
 
 def unreadable(text: str, error: Exception) -> str:
-    """Return the line of the first value that is not what it looks like, and what to do.
+    """Return the place of the first value that is not what it looks like, and what to do.
 
-    A parser that stumbles over such a value says no line. Where no value is found, what the parser
+    A parser that stumbles over such a value says none. Where no value is found, what the parser
     said is returned without one.
     """
     if (found := _first_unlike(text)) is not None:
-        return f":{found[0]}: {found[1]}"
+        (line, column), why = found
+        return f":{line}:{column}: {why}"
     return f": this is no YAML: {str(error) or repr(error)}"
 
 
-def _first_unlike(text: str) -> tuple[int, str] | None:
+def _first_unlike(text: str) -> tuple[Spot, str] | None:
     yaml = YAML(typ="rt", pure=True)
     try:
         for node in _values(yaml.compose(text)):
             try:
                 yaml.constructor.construct_object(node, deep=True)
             except GARBLED:
-                return node.start_mark.line + 1, _unlike(node)
+                mark = node.start_mark
+                return (mark.line + 1, mark.column + 1), _unlike(node)
     except GARBLED:  # told without its line
         return None
     return None

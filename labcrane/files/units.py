@@ -88,6 +88,14 @@ class Unit:
     name: str
 
 
+class Unread(str):
+    """A quantity in a list that cannot be read, with the reason: pydantic says which item it is."""
+
+    __slots__ = ("why",)
+
+    why: str
+
+
 def unit_of(key: str, metadata: list[Any]) -> str | None:
     """Return the unit that a key's numbers have; None where it says none."""
     for mark in metadata:
@@ -165,5 +173,15 @@ def read_quantities(value: Any, unit: str, *, several: bool) -> Any:
         number = in_unit(value, unit)
         return value if number is None else number
     if isinstance(value, list) and several:
-        return [read_quantities(each, unit, several=isinstance(each, list)) for each in value]
+        return [_read_item(each, unit) for each in value]
     return value
+
+
+def _read_item(item: Any, unit: str) -> Any:
+    """Return an item of a list as a number; what cannot be read is complained of in its place."""
+    try:
+        return read_quantities(item, unit, several=isinstance(item, list))
+    except ValueError as error:
+        unread = Unread(item)
+        unread.why = str(error)
+        return unread

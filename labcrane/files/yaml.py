@@ -17,7 +17,7 @@ from ruamel.yaml.reader import ReaderError
 
 from labcrane.errors import ProtocolError
 from labcrane.files.complaints import Place as Place  # noqa: PLC0414 - public here
-from labcrane.files.complaints import named, shown, told
+from labcrane.files.complaints import is_member, named, shown, told
 from labcrane.files.misread import GARBLED, misread, unreadable
 from labcrane.limits import LIMITS, LimitError, check_size, foreign
 
@@ -71,53 +71,34 @@ class YamlFile:
         data = _plain(marked, str(path), recorded=recorded)
         return cls(path, text, data, marked, recorded=recorded)
 
-    def line(self, place: Place) -> int:
-        """Return the line, counted from 1, of the key or list item at ``place``.
+    def position(self, place: Place, *, key: bool = False) -> tuple[int, int]:
+        """Return line and column, from 1, of what stands at ``place``.
 
-        A place that does not exist (a missing key) gives the line of what should hold it.
+        That is the value where it begins in the line of its key, and the key otherwise, or where
+        ``key`` is asked for. What is not there, or came with a merge, gives the place of what holds
+        it.
         """
-        node, line = self._marked, 1
+        node, at = self._marked, (0, 0)
         for step in place:
-            if isinstance(node, CommentedMap) and step in node:
-                line = node.lc.key(step)[0] + 1
-            elif isinstance(node, CommentedSeq) and isinstance(step, int) and step < len(node):
-                line = node.lc.item(step)[0] + 1
-            else:
+            try:
+                named, value, node = _held(node, step)
+            except LookupError:
                 break
-            node = node[step]
-        return line
+            at = value if value[0] == named[0] and not key else named
+        return at[0] + 1, at[1] + 1
 
-    def problem(self, place: Place, message: str) -> None:
-        """Note a mistake at ``place``; those of another file, one a line, are all noted there."""
-        self._problems += [(self.line(place), 0, line) for line in message.splitlines()]
+    def where(self, place: Place) -> str:
+        """Return file, line and column of what stands at ``place``, as an error begins."""
+        line, column = self.position(place)
+        return f"{self.path}:{line}:{column}"
 
-    def misnamed(self, place: Place, message: str, *, key: bool = False) -> None:
-        """Note a mistake in the value at ``place``, or in its key, with line and column."""
-        line, column = self._position(place, key=key)
-        self._problems += [(line, column, each) for each in message.splitlines()]
+    def problem(self, place: Place, message: str, *, key: bool = False) -> None:
+        """Note a mistake in the value at ``place``, or in its ``key``.
 
-    def _position(self, place: Place, *, key: bool) -> tuple[int, int]:
-        """Return line and column, from 1, of the value at ``place``; column 0 where none is known.
-
-        What a merge or a default brought stands somewhere else: its line is that of what holds it.
+        Those of another file, one a line, are all noted there.
         """
-        node = self._marked
-        for step in place[:-1]:
-            inside = isinstance(node, CommentedMap) and step in node
-            if not inside and not (isinstance(node, CommentedSeq) and _is_index(step, node)):
-                return self.line(place), 0
-            node = node[step]
-        last = place[-1] if place else None
-        try:
-            if isinstance(node, CommentedMap) and last in node:
-                line, column = node.lc.key(last) if key else node.lc.value(last)
-            elif isinstance(node, CommentedSeq) and _is_index(last, node):
-                line, column = node.lc.item(last)
-            else:
-                return self.line(place), 0
-        except KeyError:  # merged in from an anchor
-            return self.line(place[:-1]), 0
-        return line + 1, column + 1
+        line, column = self.position(place, key=key)
+        self._problems += [(line, column, each) for each in message.splitlines()]
 
     def check(self, model: type[ModelT], place: Place = (), value: Any = None) -> ModelT | None:
         """Return what stands at ``place`` as a ``model``, or note what is wrong and return None.
@@ -138,8 +119,9 @@ class YamlFile:
             context = {"folder": self.path.parent, "recorded": self.recorded}
             return model.model_validate(value, context=context)
         except ValidationError as error:
-            for at, message in told(error.errors(), place, model):
-                self.problem((*place, *_inside(value, at)), message)
+            for each in told(error.errors(), place, model):
+                at = (*place, *_inside(value, each.place))
+                self.problem(at, each.message, key=each.key)
             return None
 
     def checked(self, model: type[ModelT]) -> ModelT:
@@ -154,10 +136,29 @@ class YamlFile:
         """Raise :class:`ProtocolError` with one line for every mistake, in the file's order."""
         if self._problems:
             lines = [
-                f"{self.path}:{line}:{column}: {text}" if column else f"{self.path}:{line}: {text}"
-                for line, column, text in sorted(self._problems)
+                f"{self.path}:{line}:{at}: {text}" for line, at, text in sorted(self._problems)
             ]
             raise ProtocolError("\n".join(dict.fromkeys(lines)))
+
+
+def _held(node: Any, step: str | int) -> tuple[tuple[int, int], tuple[int, int], Any]:
+    """Return where a key and its value begin, from 0, and the value; of an item both are one.
+
+    Raises
+    ------
+    LookupError
+        It is not there, or was merged in from an anchor.
+    """
+    if isinstance(node, CommentedMap):
+        there = node.lc.data or {}
+        # A key that is a number in the file is a text everywhere else.
+        written = step if step in there else next((key for key in there if str(key) == step), None)
+        if written is None:
+            raise LookupError(step)
+        return node.lc.key(written), node.lc.value(written), node[written]
+    if isinstance(node, CommentedSeq) and isinstance(step, int) and 0 <= step < len(node):
+        return node.lc.item(step), node.lc.item(step), node[step]
+    raise LookupError(step)
 
 
 def _inside(value: Any, loc: Place) -> Place:
@@ -167,14 +168,12 @@ def _inside(value: Any, loc: Place) -> Place:
         is_key = isinstance(value, Mapping) and step in value
         is_item = isinstance(value, list) and isinstance(step, int) and step < len(value)
         if not (is_key or is_item):
+            if is_member(step):
+                continue  # what pydantic calls one of a union's types
             break
         value = value[step]
         place.append(step)
     return tuple(place)
-
-
-def _is_index(step: object, node: CommentedSeq) -> bool:
-    return isinstance(step, int) and 0 <= step < len(node)
 
 
 def read_text(path: Path) -> str:
@@ -200,13 +199,13 @@ def read_text(path: Path) -> str:
         raw: bytes = error.object
         if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
             raise ProtocolError(
-                f"{path}:1: byte 0x{raw[0]:02X} is no UTF-8; the file is in UTF-16: open it in an "
-                "editor and save it as UTF-8"
+                f"{path}:1:1: byte 0x{raw[0]:02X} is no UTF-8; the file is in UTF-16: open it in "
+                "an editor and save it as UTF-8"
             ) from None
-        line = raw.count(b"\n", 0, error.start) + 1
+        at = _place_in(raw[: error.start].decode())
         raise ProtocolError(
-            f"{path}:{line}: byte 0x{raw[error.start]:02X} is no UTF-8; open the file in an "
-            "editor and save it as UTF-8"
+            f"{path}:{at}: byte 0x{raw[error.start]:02X} is no UTF-8; open the file in an editor "
+            "and save it as UTF-8"
         ) from None
     except (OSError, ValueError) as error:  # a path with a NUL
         raise ProtocolError(f"{path} cannot be read: {error}") from error
@@ -243,9 +242,9 @@ def parse_yaml(text: str, name: str, *, recorded: bool = False) -> Any:
 
 
 class _Misfit(Exception):  # noqa: N818 - it is told as an error of the protocol
-    """A value that no file may hold, and the line of what holds it, where that is known."""
+    """A value that no file may hold, and the line and column of what holds it, where known."""
 
-    line: int | None = None
+    at: str | None = None
 
 
 def _scalar(node: Any, *, recorded: bool) -> Any:
@@ -277,32 +276,33 @@ def _load(text: str, name: str, *, recorded: bool = False) -> Any:
             f"{name} has more than {MOST_MARKS} commas, colons, brackets, dashes and line ends; "
             "split it up"
         )
-    if (line := _too_deep(text)) is not None:
-        raise ProtocolError(f"{name}:{line}: nested deeper than {DEEPEST} levels; write it flat")
+    if (at := _too_deep(text)) is not None:
+        where = _place_in(text[:at])
+        raise ProtocolError(f"{name}:{where}: nested deeper than {DEEPEST} levels; write it flat")
     try:
         # Also where no line is asked for: the plain loader copies each merge into the next.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore" if recorded else "error", ReusedAnchorWarning)
             return YAML(typ="rt", pure=True).load(text)
     except ReusedAnchorWarning as error:
-        line = max(map(int, re.findall(r"line (\d+)", str(error))), default=1)
+        # The second of the two places that it tells.
+        where = ":".join(re.findall(r"line (\d+), column (\d+)", str(error))[-1])
         raise ProtocolError(
-            f"{name}:{line}: this is no YAML that can be trusted: an anchor is given twice; give "
+            f"{name}:{where}: this is no YAML that can be trusted: an anchor is given twice; give "
             "each its own name"
         ) from error
     except MarkedYAMLError as error:
-        line, why = misread(error, text)
-        raise ProtocolError(f"{name}:{line}: {why}") from error
+        (line, column), why = misread(error, text)
+        raise ProtocolError(f"{name}:{line}:{column}: {why}") from error
     except ReaderError as error:
-        line = text.count("\n", 0, error.position) + 1
         if text[:4].count("\0") > 1:
             raise ProtocolError(
-                f"{name}:1: every other byte is 0, as in UTF-16; open the file in an editor and "
+                f"{name}:1:1: every other byte is 0, as in UTF-16; open the file in an editor and "
                 "save it as UTF-8"
             ) from error
         raise ProtocolError(
-            f"{name}:{line}: this is no YAML: it holds the character U+{_code(error):04X}, which "
-            "no text may; remove it"
+            f"{name}:{_place_in(text[: error.position])}: this is no YAML: it holds the character "
+            f"U+{_code(error):04X}, which no text may; remove it"
         ) from error
     except RecursionError:
         raise ProtocolError(
@@ -318,19 +318,25 @@ def _code(error: ReaderError) -> int:
     return error.character if isinstance(error.character, int) else ord(error.character)
 
 
+def _place_in(before: str) -> str:
+    """Return line and column, from 1, of what a text stands before."""
+    return f"{before.count(chr(10)) + 1}:{len(before) - before.rfind(chr(10))}"
+
+
 def _too_deep(text: str) -> int | None:
-    """Return the line in which brackets, dashes or indentation nest too deep; None if none does.
+    """Return where brackets, dashes or indentation nest too deep; None where nothing does.
 
     What looks nested inside quotes counts as well: nobody writes so.
     """
-    depth = 0
-    for number, line in enumerate(text.split("\n"), start=1):
-        if _STAIRS.match(line):
-            return number
-        for sign in _BRACKETS.findall(line):
-            depth = depth + 1 if sign in "[{" else max(0, depth - 1)
+    depth, begin = 0, 0
+    for line in text.split("\n"):
+        if stairs := _STAIRS.match(line):
+            return begin + stairs.end() - 1
+        for found in _BRACKETS.finditer(line):
+            depth = depth + 1 if found[0] in "[{" else max(0, depth - 1)
             if depth > DEEPEST:
-                return number
+                return begin + found.start()
+        begin += len(line) + 1
     return None
 
 
@@ -359,24 +365,21 @@ def _plain(node: Any, name: str, *, recorded: bool = False) -> Any:
             else:
                 held = _scalar(node, recorded=recorded)
         except _Misfit as error:
-            error.line = error.line or _line_in(node, at)
+            error.at = error.at or _place_of(node, at)
             raise
         return held
 
     try:
         return plain(node, 0)
     except _Misfit as error:
-        where = f"{name}:{error.line}: it" if error.line else name
+        where = f"{name}:{error.at}: it" if error.at else name
         raise ProtocolError(f"{where} {error}") from None
 
 
-def _line_in(node: Any, at: Any) -> int | None:
-    """Return the line, from 1, of what a mapping or a list holds; None where it is not known."""
+def _place_of(node: Any, at: Any) -> str | None:
+    """Return line and column of what a mapping or a list holds; None where they are not known."""
     try:
-        if isinstance(node, CommentedMap):
-            return int(node.lc.value(at)[0]) + 1
-        if isinstance(node, CommentedSeq):
-            return int(node.lc.item(at)[0]) + 1
-    except KeyError:  # merged in from an anchor
-        pass
-    return None
+        line, column = _held(node, at)[1]
+    except LookupError:
+        return None
+    return f"{line + 1}:{column + 1}"

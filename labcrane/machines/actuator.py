@@ -95,6 +95,27 @@ class Actuator:
         self._speeds = list(self._still)
         self._waiting = deque([self._still] * self._delay)
 
+    @property
+    def delay(self) -> int:
+        """Ticks before a command has any effect."""
+        return self._delay
+
+    @property
+    def constants(self) -> tuple[float, ...]:
+        """Whether it is ideal, the lag's share of a tick, each joint's largest change in rad/s."""
+        return (float(self.ideal), self._share, *self._most)
+
+    def numbers(self) -> list[float]:
+        """Return what a compiled twin goes on from: speeds, then commands under way, in rad/s."""
+        return [*self._speeds, *(speed for command in self._waiting for speed in command)]
+
+    def go_on(self, numbers: Sequence[float]) -> None:
+        """Go on from where a compiled twin came to: :attr:`numbers`, in rad/s."""
+        joints = len(self._speeds)
+        self._speeds = list(numbers[:joints])
+        rows = range(joints, joints * (1 + self._delay), joints)
+        self._waiting = deque(tuple(numbers[at : at + joints]) for at in rows)
+
     def follow(self, command: Sequence[float]) -> Sequence[float]:
         """Return the joint speeds in rad/s that a tick with this command leads to."""
         if self.ideal:

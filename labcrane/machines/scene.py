@@ -225,7 +225,7 @@ def load_scene(path: Path) -> Scene:
     source = YamlFile.read(path)
     if not isinstance(source.data, dict):
         raise ProtocolError(
-            f"{path}: a scene is a mapping of keys, beginning with labcrane_scene: 1"
+            f"{path}:1:1: a scene is a mapping of keys, beginning with labcrane_scene: 1"
         )
     scene = source.checked(Scene)
     _check_parts(scene, source)
@@ -265,11 +265,11 @@ def _check_goals(scene: Scene, source: YamlFile) -> None:
     if scene.figure is not None and scene.figure.jointed:
         known |= {f"figure.{region}" for region in REGIONS if region != REGIONS[0]}
     for number, goal in enumerate(scene.goals):
-        for word in (goal.what, goal.beside or "tip"):
+        for key, word in (("what", goal.what), ("beside", goal.beside or "tip")):
             if word not in known:
                 there = ", ".join(sorted(known))
                 source.problem(
-                    ("goals", number), f"there is no {word!r} in this scene; there is {there}"
+                    ("goals", number, key), f"there is no {word!r} in this scene; there is {there}"
                 )
 
 

@@ -1,6 +1,12 @@
-"""Finds in a text what could lead to a person."""
+"""Finds what could lead to a person, in a text and in files that are given away."""
 
+import csv
+import io
+import json
 import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 _DOMAIN_END = re.compile(r"\.\w\w")
 # Not telephone numbers, though they have many digits.
@@ -33,3 +39,100 @@ def _is_mail(word: str) -> bool:
     """
     at = word.find("@", 1)
     return at > 0 and _DOMAIN_END.search(word, at + 2) is not None
+
+
+_MOMENT = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d(:\d\d(\.\d+)?)?(Z|[+-]\d\d:\d\d)?")
+_DIGEST = re.compile(r"\b[0-9a-f]{16,}\b")
+_HOME = re.compile(r"(?:/home/|/Users/|\b[A-Z]:[\\/]+Users[\\/]+)([^/\\\s\"']+)")
+_HOST = re.compile(r"<hostname>[\s-]*([^<\s-][^<\s]*)\s*</hostname>")
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?|nan|inf|", re.I)
+_TABLES = {".csv": ",", ".tsv": "\t"}
+_HDF5 = (".h5", ".hdf5")
+
+
+def personal_in(path: Path) -> Iterator[str]:
+    """Yield what in a file could lead to a person, in words with its place in the file.
+
+    E-mail addresses and telephone numbers in what people wrote, folders of a person's account and
+    names of computers. Tables, JSON and HDF5 are read cell by cell, so that numbers and digests are
+    no telephone numbers; other files are read as text. Names are not found: a program cannot tell.
+    """
+    for place, text in _texts(path):
+        if _NUMBER.fullmatch(text.strip()):
+            continue
+        found = personal(_DIGEST.sub("|", _MOMENT.sub("|", text)))
+        # Numbers in a program's own texts are no telephone numbers.
+        if found and ("mail" in found or _is_written(place)):
+            yield f"{place}: {found}"
+        if home := _HOME.search(text):
+            yield f"{place}: a folder of the account {home[1]!r}"
+        if host := _HOST.search(text):
+            yield f"{place}: the computer {host[1]!r}"
+
+
+_OWN = ("context", "protocol", "header", "machine", "sync_report", "README", "CITATION")
+"""Texts of a participant file that no participant and no examiner writes."""
+
+
+def _is_written(place: str) -> bool:
+    return not any(own in place.rsplit("/", maxsplit=1)[-1] for own in _OWN)
+
+
+def _texts(path: Path) -> Iterator[tuple[str, str]]:
+    """Yield every text in a file, and where it is."""
+    if path.suffix in _HDF5:
+        yield from _hdf5_texts(path)
+        return
+    text = path.read_text(encoding="utf-8", errors="replace")
+    if path.suffix in _TABLES:
+        reader = csv.reader(io.StringIO(text, newline=""), delimiter=_TABLES[path.suffix])
+        for number, row in enumerate(reader, start=1):
+            for cell in row:
+                yield from _leaves(f"line {number}", cell)
+    elif path.suffix == ".json":
+        yield from _leaves("", text)
+    else:
+        for number, line in enumerate(text.splitlines(), start=1):
+            yield f"line {number}", line
+
+
+def _leaves(place: str, text: str) -> Iterator[tuple[str, str]]:
+    """Yield a text, or the texts in it where it is JSON."""
+    if text[:1] not in {"{", "["}:
+        yield place, text
+        return
+    try:
+        content = json.loads(text)
+    except ValueError:
+        yield place, text
+    else:
+        yield from _walk(place, content)
+
+
+def _walk(place: str, content: Any) -> Iterator[tuple[str, str]]:
+    if isinstance(content, dict):
+        for key, value in content.items():
+            yield from _walk(f"{place} {key}".strip(), value)
+    elif isinstance(content, list):
+        for value in content:
+            yield from _walk(place, value)
+    elif isinstance(content, str):
+        yield place, content
+
+
+def _hdf5_texts(path: Path) -> Iterator[tuple[str, str]]:
+    import h5py  # noqa: PLC0415 - loads for a second
+    import numpy as np  # noqa: PLC0415
+
+    found: list[tuple[str, str]] = []
+
+    def look(name: str, node: Any) -> None:
+        found.extend((f"{name}/header" if key == "machine" else name, value)
+                     for key, value in node.attrs.items() if isinstance(value, str))  # fmt: skip
+        if isinstance(node, h5py.Dataset) and node.dtype.kind in "OS":
+            for value in np.atleast_1d(node.asstr("utf-8")[()]).ravel().tolist():
+                found.extend((name, leaf) for _, leaf in _leaves(name, str(value)))
+
+    with h5py.File(path, "r") as file:
+        file.visititems(look)
+    yield from found

@@ -11,7 +11,7 @@ HERE, AWAY, DUE = "there", "cannot be reached now", "due: to be erased or relabe
 
 
 @dataclass(frozen=True, slots=True)
-class CrashMarker:
+class Whereabout:
     """One place.
 
     Attributes
@@ -29,18 +29,18 @@ class CrashMarker:
     state: str
 
 
-def whereabouts(places: Places, participant: str) -> list[CrashMarker]:
+def whereabouts(places: Places, participant: str) -> list[Whereabout]:
     """Return every place with data of a participant, by exact name."""
     register = read(places)
-    found = [CrashMarker("recordings", str(folder), HERE) for folder in places.all_raw(participant)]
+    found = [Whereabout("recordings", str(folder), HERE) for folder in places.all_raw(participant)]
     found += [
-        CrashMarker("recordings", str(link), "a link, which is never followed")
+        Whereabout("recordings", str(link), "a link, which is never followed")
         for link in places.links(participant)
     ]
     if participant in register.participants:
-        found.append(CrashMarker("register", str(places.register), HERE))
+        found.append(Whereabout("register", str(places.register), HERE))
     if any(stone.participant == participant for stone in register.tombstones):
-        found.append(CrashMarker("register", str(places.register), "tombstone: was erased"))
+        found.append(Whereabout("register", str(places.register), "tombstone: was erased"))
     for export in register.exports:
         if not concerns(export, participant):
             continue
@@ -49,10 +49,10 @@ def whereabouts(places: Places, participant: str) -> list[CrashMarker]:
         state = HERE if there else AWAY
         if export.staging:
             found.append(
-                CrashMarker(export.exporter, str(places.root / export.staging), "not finished")
+                Whereabout(export.exporter, str(places.root / export.staging), "not finished")
             )
         found += [
-            CrashMarker(export.exporter, str(folder / name), state)
+            Whereabout(export.exporter, str(folder / name), state)
             for name, people in sorted(export.files.items())
             if participant in people
         ]
@@ -60,9 +60,9 @@ def whereabouts(places: Places, participant: str) -> list[CrashMarker]:
         if any(name.split("/")[0] == participant for name in files):
             state = HERE if store_reachable(store, register.study, files, ()) else AWAY
             place = in_store(Path(store), register.study, participant)
-            found.append(CrashMarker("store", str(place), state))
+            found.append(Whereabout("store", str(place), state))
     found += [
-        CrashMarker("owed", owed.folder, DUE)
+        Whereabout("owed", owed.folder, DUE)
         for owed in register.owed
         if owed.participant == participant
     ]

@@ -34,7 +34,7 @@ class ComponentSpec:
     settings: Settings
     oversight: CallMonitor = field(default_factory=CallMonitor, compare=False)
     called: str = field(default="", compare=False)
-    """Where it is used, and what it is: ``study.yaml:7: input 'dual_joystick'``."""
+    """Where it is used, and what it is: ``study.yaml:7:14: input 'dual_joystick'``."""
 
     def described(self, folder: Path) -> dict[str, Any]:
         """Return it ready for JSON, with the study's files named from its ``folder``."""
@@ -135,14 +135,13 @@ class ComponentResolver:
         try:
             offer = self._registry.find(role, use.use)
         except PluginError as error:
-            self._source.misnamed(named, str(error))
+            self._source.problem(named, str(error))
             return None
         settings = self._source.check(offer.settings, place, use.settings)
         if settings is None:
             return None
         plugin = self._registry.plugin(role, use.use)
-        where = f"{self._source.path}:{self._source.line(named)}"
-        called = f"{where}: {ROLES[role].word} {use.use!r}"
+        called = f"{self._source.where(named)}: {ROLES[role].word} {use.use!r}"
         return ComponentSpec(use.use, plugin, offer, settings, self.oversight, called)
 
     def choose_feedback(
@@ -183,7 +182,7 @@ class ComponentResolver:
                 return None  # noted by the protocol's own check
             return read_machine(name, folder, recorded=self._source.recorded)
         except ProtocolError as error:
-            self._source.misnamed(("machine",), str(error))
+            self._source.problem(("machine",), str(error))
             return None
 
     def build(

@@ -1,8 +1,9 @@
 """Design section of a protocol."""
 
+from math import comb
 from typing import Annotated, Any
 
-from pydantic import Field, PositiveInt, field_validator
+from pydantic import Field, PositiveInt, ValidationInfo, field_validator
 
 from labcrane.core.settings import Settings
 from labcrane.files.model import AtMost
@@ -12,6 +13,9 @@ RULES = ("as_written", "blocked", "latin_square", "shuffled", "williams")
 
 LIMITED = frozenset({"shuffled", "blocked"})
 """Rules that can be told how often a level may come in a row."""
+
+MOST_COUNTED = 200_000
+"""States whose ways to go on are counted to draw an order: beyond it takes seconds, then hours."""
 
 
 class Order(Settings):
@@ -26,6 +30,40 @@ class Order(Settings):
 
     in_a_row: PositiveInt | None = None
     """How often a level may come in a row, where the order is random."""
+
+    @field_validator("rule")
+    @classmethod
+    def _rule_exists(cls, rule: str) -> str:
+        if rule not in RULES:
+            raise ValueError(f"{rule!r} is no rule; it can be {', '.join(RULES)}")
+        return rule
+
+    @field_validator("in_a_row")
+    @classmethod
+    def _something_is_random(cls, in_a_row: int | None, info: ValidationInfo) -> int | None:
+        rule = info.data.get("rule")
+        if in_a_row is not None and rule is not None and rule not in LIMITED:
+            raise ValueError(f"the rule is {rule!r}, where nothing is random; drop in_a_row")
+        return in_a_row
+
+    def why_not(self, levels: int) -> str:
+        """Return why so many levels cannot be ordered so; nothing where they can."""
+        if self.rule != "shuffled" or self.in_a_row is None:
+            return ""
+        if levels == 1 and self.times > self.in_a_row:
+            return (
+                f"one level, {self.times} times, which cannot come at most {self.in_a_row} in a "
+                "row; allow more in a row, or leave in_a_row out"
+            )
+        # What is left of every other level, of the last one, and how often in a row that came.
+        states = comb(self.times + levels - 1, levels - 1) * (self.times + 1)
+        if states * min(self.in_a_row, self.times) > MOST_COUNTED:
+            return (
+                f"{levels} levels, {self.times} times each, are too many to draw an order at most "
+                f"{self.in_a_row} in a row from; use rule: blocked, fewer times and the block "
+                "repeated, or leave in_a_row out"
+            )
+        return ""
 
 
 RuleName = Annotated[str, Field(json_schema_extra={"enum": list(RULES)})]
@@ -48,20 +86,13 @@ class Design(Settings):
 
     @field_validator("order", mode="before", json_schema_input_type=dict[str, RuleName | Order])
     @classmethod
-    def _rules_exist(cls, order: Any) -> Any:
+    def _in_the_long_form(cls, order: Any) -> Any:
         if not isinstance(order, dict):
             return order
-        long = {
+        return {
             factor: {"rule": said} if isinstance(said, str) else said
             for factor, said in order.items()
         }
-        for factor, said in long.items():
-            rule = said.get("rule") if isinstance(said, dict) else None
-            if isinstance(rule, str) and rule not in RULES:
-                raise ValueError(f"{factor} is {rule!r}; it can be {', '.join(RULES)}")
-            if isinstance(rule, str) and said.get("in_a_row") and rule not in LIMITED:
-                raise ValueError(f"{factor} is {rule!r}, where nothing is random; drop in_a_row")
-        return long
 
 
 class Criterion(Settings):

@@ -91,16 +91,16 @@ what answers a question, and all in one line as people read it."""
 
 def about(study: Study, question: Question) -> Finding:
     """Return what is told of a question."""
-    line = study.source.line(question.place) if study.source else 1
+    line, column = study.source.position(question.place) if study.source else (1, 1)
     return {
         "kind": "question",
         "file": str(study.path),
         "line": line,
-        "column": 0,
+        "column": column,
         "key": question.key,
         "text": question.text,
         "message": question.whole,
-        "whole": f"{study.path}:{line}: question: {question.whole}",
+        "whole": f"{study.path}:{line}:{column}: question: {question.whole}",
     }
 
 

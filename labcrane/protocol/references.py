@@ -80,7 +80,7 @@ class ReferenceChecker:
                 for name in names:
                     if known is not None and name not in known and name not in said:
                         message = f"{_dotted(place)} needs the {kind} {name!r}, and "
-                        self._source.misnamed(place, message + _has(kind, name, known))
+                        self._source.problem(place, message + _has(kind, name, known))
 
     def _refers(
         self, at: Place, mention: Mentioned, mark: Reference, choice: ComponentSpec
@@ -90,11 +90,11 @@ class ReferenceChecker:
         if known is None or name in known:
             return
         message = f"{_dotted(at)} is {mention.value!r}, and {_has(mark.kind, name, known)}"
-        self._source.misnamed(at, message, key=mention.key)
+        self._source.problem(at, message, key=mention.key)
 
     def _is_there(self, at: Place, path: Path) -> None:
         if not is_there(path):
-            self._source.misnamed(at, f"{_dotted(at)} is {path.name!r}, and {absent(path)}")
+            self._source.problem(at, f"{_dotted(at)} is {path.name!r}, and {absent(path)}")
 
     def _needed(self, place: Place, settings: Settings) -> Iterator[tuple[str, Sequence[str]]]:
         try:
@@ -113,7 +113,7 @@ class ReferenceChecker:
             for name in [name for name in self._ordered(mark.kind, known) if name not in value]:
                 message = f"{_dotted(at)} has nothing for the {mark.kind} {name!r}; it needs one "
                 every = ", ".join(self._ordered(mark.kind, known))
-                self._source.misnamed(at, f"{message}for each of {every}")
+                self._source.problem(at, f"{message}for each of {every}")
         elif isinstance(mark, Once):
             items = value.items() if isinstance(value, Mapping) else enumerate(value)
             first: dict[str, object] = {}
@@ -122,7 +122,7 @@ class ReferenceChecker:
                 if name in first:
                     both = f"{first[name]!r} and {key!r}" if isinstance(key, str) else "two of them"
                     message = f"{_dotted(at)} has {name!r} for both {both}; give each its own"
-                    self._source.misnamed((*at, key), message)
+                    self._source.problem((*at, key), message)
                 first.setdefault(name, key)
 
     def _ordered(self, kind: str, known: frozenset[str]) -> Sequence[str]:

@@ -84,6 +84,13 @@ class Step(Section):
     seconds: float = 0.0
     questionnaires: tuple[str, ...] = ()
 
+    @property
+    def planned(self) -> int:
+        """How many steps of a plan it is: one for each repetition, and each round of practice."""
+        if self.block is None:
+            return 1
+        return self.block.repeat * (self.block.until.rounds if self.block.until else 1)
+
 
 class Session(Section):
     """One visit of a participant."""
@@ -142,7 +149,7 @@ def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
     (kind, value), *_ = step.items()
     if kind not in STEPS:
         instead = suggestion(str(kind), STEPS, "possible:")
-        source.problem(place, f"{kind!r} is not a step; {instead}")
+        source.problem((*place, str(kind)), f"{kind!r} is not a step; {instead}", key=True)
         return None
     if kind == "instructions":
         return _instructions(source, place, value)
@@ -150,22 +157,30 @@ def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
         pause = source.check(Break, (*place, kind))
         return {"kind": kind, "seconds": pause.seconds} if pause else None
     if kind == "consent":
-        source.problem(place, "consent is a step by itself: '- consent'")
+        told = "consent is a step by itself; write '- consent'"
+        source.problem((*place, kind), told, key=True)
         return None
     if kind == "questionnaire":
         return _questionnaire(source, place, value)
     block = source.check(Block, (*place, kind))
     if block and block.until and kind != "practice":
-        source.problem((*place, kind, "until"), "only practice has a criterion; drop until")
+        source.problem(
+            (*place, kind, "until"), "only practice has a criterion; drop until", key=True
+        )
         return None
     return {"kind": kind, "block": block} if block else None
 
 
 def _questionnaire(source: YamlFile, place: Place, value: Any) -> dict[str, Any] | None:
     names = [value] if isinstance(value, str) else value
-    if not (isinstance(names, list) and names and all(isinstance(name, str) for name in names)):
+    if not (isinstance(names, list) and names):
         told = f"questionnaire is {shown(value)}; it must be a name, or a list of names"
-        source.problem(place, told)
+        source.problem((*place, "questionnaire"), told)
+        return None
+    if wrong := [at for at, name in enumerate(names) if not isinstance(name, str)]:
+        for at in wrong:
+            told = f"questionnaire[{at + 1}] is {shown(names[at])}; it must be a name"
+            source.problem((*place, "questionnaire", at), told)
         return None
     return {"kind": "questionnaire", "questionnaires": tuple(names)}
 
@@ -173,7 +188,7 @@ def _questionnaire(source: YamlFile, place: Place, value: Any) -> dict[str, Any]
 def _instructions(source: YamlFile, place: Place, value: Any) -> dict[str, Any] | None:
     if not isinstance(value, str):
         told = f"instructions is {shown(value)}; it must be the name of a text file"
-        source.problem(place, told)
+        source.problem((*place, "instructions"), told)
         return None
     path = source.path.parent / value
     try:
@@ -181,5 +196,5 @@ def _instructions(source: YamlFile, place: Place, value: Any) -> dict[str, Any] 
     except ProtocolError as error:
         missing = isinstance(error.__context__, FileNotFoundError)
         told = f" is {value!r}, and {absent(path)}" if missing else f": {error}"
-        source.misnamed((*place, "instructions"), f"instructions{told}")
+        source.problem((*place, "instructions"), f"instructions{told}")
         return None

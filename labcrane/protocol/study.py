@@ -102,6 +102,10 @@ class Study:
             **self.others,
         }
 
+    def where(self, place: Place) -> str:
+        """Return file, line and column of what the protocol has at ``place``."""
+        return self.source.where(place) if self.source else str(self.path)
+
     def check_installed(self, *, simulated: bool = False, feedback: bool = True) -> None:
         """Raise :class:`ProtocolError` unless all that a run of the study needs is installed.
 
@@ -173,7 +177,7 @@ class Checker:
             return  # what follows changes nothing of what was run, and was once accepted
         self._check_names()
         if self._protocol.participants.ends_early:
-            self._source.misnamed(
+            self._source.problem(
                 ("participants", "pattern"),
                 f"participants.pattern '{self._protocol.participants.pattern}' is matched by "
                 "nobody; ^ stands at a name's beginning only and $ at its end, and neither is "
@@ -186,7 +190,7 @@ class Checker:
         for name in twice(names):
             number = len(names) - 1 - names[::-1].index(name)
             message = f"two sessions are called {name!r}; give each a name of its own"
-            self._source.misnamed(("sessions", number, "name"), message)
+            self._source.problem(("sessions", number, "name"), message)
 
     def _check_blocks(self, tasks: Mapping[str, Task]) -> None:
         """Note blocks that name no task, or limit what the task does not vary."""
@@ -194,7 +198,7 @@ class Checker:
             if block.task not in self._protocol.tasks:
                 there = nearest(block.task, self._protocol.tasks, "there is")
                 message = f"there is no task {block.task!r}; {there}"
-                self._source.misnamed((*place, "task"), message)
+                self._source.problem((*place, "task"), message)
             elif task := tasks.get(block.task):
                 self._limits(place, block.limits, task)
                 self._count(place, block, task)
@@ -224,21 +228,29 @@ class Checker:
                 message = f"{factor} is {written(count)}; it must be a whole number, 1 to {most}"
             else:
                 continue
-            self._source.misnamed((*place, factor), message, key=factor not in factors)
+            self._source.problem((*place, factor), message, key=factor not in factors)
 
     def _is_count(self, count: object) -> TypeGuard[int]:
         """Whether a number is whole; ``true``, which Python takes for 1, is so in old records."""
         return isinstance(count, int) and (self._source.recorded or not isinstance(count, bool))
 
     def _check_order(self, tasks: Mapping[str, Task]) -> None:
-        """Note ordered factors that no task has."""
+        """Note ordered factors that no task has, or whose levels cannot come in that order."""
         known = {factor for task in tasks.values() for factor in task.factors()}
         for factor in self._protocol.design.order:
             if factor not in known:
                 message = (
                     f"no task varies {factor!r}; {nearest(factor, sorted(known), 'they vary')}"
                 )
-                self._source.misnamed(("design", "order", factor), message, key=True)
+                self._source.problem(("design", "order", factor), message, key=True)
+        if self._source.recorded:
+            return
+        for name, task in tasks.items():
+            for factor, levels in task.factors().items():
+                order = self._protocol.design.order.get(factor)
+                if order and (why := order.why_not(len(levels))):
+                    place = ("design", "order", factor, "in_a_row")
+                    self._source.problem(place, f"{factor} of task {name!r} has {why}")
 
     def _check_stop_rules(self, asked: Mapping[str, Questionnaire]) -> None:
         """Note stop rules on scores that a questionnaire does not have."""
@@ -246,7 +258,7 @@ class Checker:
             questionnaire = asked.get(rule.questionnaire)
             scores = [score.name for score in questionnaire.scores] if questionnaire else []
             if questionnaire and rule.score not in scores:
-                self._source.misnamed(
+                self._source.problem(
                     ("stop_rules", number, "score"),
                     f"{rule.questionnaire} has no score {rule.score!r}; "
                     f"{nearest(rule.score, scores, 'it has')}",
@@ -270,7 +282,7 @@ class Checker:
         for at, name in enumerate(names):
             if name not in self._protocol.feedback:
                 there = nearest(name, self._protocol.feedback, "there is")
-                self._source.misnamed((*place, at), f"there is no feedback {name!r}; {there}")
+                self._source.problem((*place, at), f"there is no feedback {name!r}; {there}")
 
 
 def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:

@@ -30,6 +30,9 @@ LOOP = (
     ("paused", "1"),
 )
 
+DUE = 1
+"""Which of them says when a tick is due."""
+
 
 def columns(run: Run) -> tuple[Column, ...]:
     """Return what a row holds, in order."""
@@ -269,6 +272,19 @@ class BatchLog(FrameLog):
         if frame.events:
             self._events += [(event, tick.number) for event in frame.events]
         if self._count == FRAMES:
+            self._flush()
+
+    @property
+    def room(self) -> FloatArray:
+        """Rows of the chunk that are still empty, shape ``(n, n_columns)``; to be filled."""
+        return self._rows[self._count :]
+
+    def made(self, count: int) -> None:
+        """Keep the first rows of :attr:`room`, which have been filled."""
+        end = self._count + count
+        self._stamps[self._count : end] = self._rows[self._count : end, DUE]
+        self._count = end
+        if end == FRAMES:
             self._flush()
 
     def close(self) -> None:

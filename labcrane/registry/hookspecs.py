@@ -27,6 +27,7 @@ from labcrane.core.roles import (
     Questionnaire,
     SignalMonitor,
     Task,
+    Trigger,
 )
 from labcrane.registry.offers import CommandOffer, Offer
 
@@ -77,6 +78,12 @@ def labcrane_questionnaires() -> Sequence[Offer[Questionnaire]]:
 @hookspec
 def labcrane_monitors() -> Sequence[Offer[SignalMonitor]]:
     """Offer monitors that tell whether the signal of a stream is alive."""
+    raise NotImplementedError
+
+
+@hookspec
+def labcrane_triggers() -> Sequence[Offer[Trigger]]:
+    """Offer lines by which other devices are told of events."""
     raise NotImplementedError
 
 
@@ -191,6 +198,14 @@ ROLES: Mapping[type[Component], RoleEntry] = {
         "a monitor of other programs' signals",
         ("monitors",),
         several=True,
+    ),
+    Trigger: RoleEntry(
+        labcrane_triggers,
+        "trigger",
+        "a line by which other devices are told of events",
+        ("triggers",),
+        several=True,
+        returns={},
     ),
     Cue: RoleEntry(
         labcrane_cues,

@@ -5,7 +5,7 @@ types, so that nothing else can come out there.
 """
 
 import queue
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Literal, Protocol
@@ -32,6 +32,7 @@ class Order(StrEnum):
     OVERRIDE = "override"  # let the running trial go on past its automatic ends
     COMPLETION = "completion"  # set the completion flag of the running trial: 1 or 0
     HINT = "hint"  # show words to the operator
+    REPORT = "report"  # say that something was seen, of what the running task lists
     ANSWER = "answer"  # to a question, as JSON: questionnaire, item, value
     SUBMIT = "submit"  # hand in the questionnaire that is asked
     CONSENT = "consent"  # to the text of this version, given before the session begins
@@ -82,6 +83,13 @@ class Completion:
 
 
 @dataclass(frozen=True, slots=True)
+class Sighting:
+    """Somebody has seen something that the running task asks about."""
+
+    what: str
+
+
+@dataclass(frozen=True, slots=True)
 class SettingChange:
     """A setting of a cue or sound, and the value that it is to have, as it was written."""
 
@@ -128,6 +136,7 @@ Request = (
     Control
     | Remark
     | Completion
+    | Sighting
     | SettingChange
     | Answer
     | Submission
@@ -136,6 +145,15 @@ Request = (
     | Malformed
 )
 """What an order asks for, read from its words once."""
+
+
+OF_WORDS: Mapping[Order, Callable[[str], Request]] = {
+    Order.ANSWER: Answer,
+    Order.CONSENT: Consent,
+    Order.DENIED: Denial,
+    Order.REPORT: Sighting,
+}
+"""What orders ask for that are their words and nothing else."""
 
 
 def read_request(command: Command) -> Request:
@@ -154,15 +172,9 @@ def read_request(command: Command) -> Request:
             if equals and dot:
                 return SettingChange(feedback, key, written)
             return Malformed(order, f"a setting is written name.key=value, not {text!r}")
-        case Order.ANSWER:
-            return Answer(text)
         case Order.SUBMIT:
             return Submission()
-        case Order.CONSENT:
-            return Consent(text)
-        case Order.DENIED:
-            return Denial(text)
-    return Control(order)
+    return OF_WORDS[order](text) if order in OF_WORDS else Control(order)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,12 +4,16 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from labcrane.core.clock import Clock, Tick, ticks
+from labcrane.core.clock import Clock, Tick, tick_of
 from labcrane.core.records import Frame, Run
 from labcrane.protocol.rig import Rig
 from labcrane.recording.frame_log import FrameLog
 from labcrane.session.commands import Console
 from labcrane.session.sequencer import Sequencer
+
+Forward = Callable[[Frame, float], Frame]
+"""Makes the ticks after a frame in which nothing happens, in a run that began at a time; returns
+the frame of the last, or the one that it was given."""
 
 
 def run(
@@ -20,10 +24,12 @@ def run(
     console: Console,
     log: FrameLog,
     sinks: Sequence[Callable[[Frame], None]],
+    forward: Forward | None = None,
 ) -> None:
     """Tick until the session is over.
 
-    Every frame is written to the journal first, and only then shown to the ``sinks``.
+    Every frame is written to the journal first, and only then shown to the ``sinks``. In a
+    simulation, ``forward`` makes the ticks in which nothing happens.
     """
     dt = 1.0 / run.rate_hz
     read, control, rest = rig.input.read, rig.controller.command, rig.controller.idle
@@ -32,7 +38,9 @@ def run(
     no_task = np.full(run.task.size, np.nan)
 
     frame = _before(rig, run)
-    for tick in ticks(clock, run.rate_hz):
+    start, number = clock.now(), 0
+    while True:
+        tick = tick_of(clock, start, number, run.rate_hz)
         axes = read(tick, frame)
         handle(console.commands(), rig.input.fault, log.trouble)
         command = control(axes, state()) if sequencer.moving else rest()
@@ -43,6 +51,9 @@ def run(
             show(frame)
         if sequencer.over:
             return
+        if forward is not None:
+            frame = forward(frame, start)
+        number = frame.tick.number + 1
 
 
 def _before(rig: Rig, run: Run) -> Frame:

@@ -4,6 +4,7 @@ import hashlib
 import platform
 from dataclasses import asdict
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import version
 from importlib.util import find_spec
 from typing import Any
@@ -42,7 +43,7 @@ def context(visit: Visit, plan: SessionPlan, rig: Rig, run: Run) -> dict[str, An
         "rate_hz": run.rate_hz,
         **_of_study(visit.study, simulated=visit.simulated),
         "facts": rig.metadata(),
-        "versions": _versions(),
+        "versions": dict(_versions()),
         # What a simulation records does not depend on the computer that it is made on.
         "doctor": None if visit.fast else at_start(visit.folder.root),
         "plan": [
@@ -120,6 +121,7 @@ def _started(visit: Visit) -> datetime:
     return datetime.fromtimestamp(0.0, UTC) if visit.fast else datetime.now(UTC)
 
 
+@cache
 def _versions() -> dict[str, str]:
     return {
         "python": platform.python_version(),

@@ -24,6 +24,7 @@ from labcrane.session.commands import (
     Remark,
     Request,
     SettingChange,
+    Sighting,
     Submission,
     beyond_limits,
     by_whom,
@@ -97,9 +98,21 @@ class Sequencer:
         next(self._script, None)  # a session that owes nothing ends at its first tick
 
     @property
+    def step(self) -> int:
+        """Number of the plan's step that runs; 0 before the first."""
+        return self._step
+
+    @property
     def moving(self) -> bool:
         """Whether the operator's command reaches the machine in this tick."""
         return self._attempt is not None and not self._held.by
+
+    @property
+    def going(self) -> TrialRun | None:
+        """The trial under way, if its next tick is like the one before; None if something waits."""
+        attempt = self._attempt
+        waits = self._notes or self._wishes or self._held.by or self._held.ending
+        return None if waits or attempt is None or not attempt.ticks else attempt
 
     def handle(
         self, commands: Sequence[Message], lost_input: str | None, disk_trouble: str | None
@@ -316,13 +329,16 @@ class Sequencer:
             case SettingChange():
                 self._note("feedback.setting", **self._settings.change(request))
             case _:
-                pass  # of a note or hint the event is all there is
+                pass  # of a note, hint or report the event is all there is
 
     def _refusal(self, request: Request) -> str | None:
         """Return why a request makes no sense now, or None when it does."""
         match request:
             case (
-                Control(Order.REPEAT | Order.OVERRIDE) | Completion() | Malformed(Order.COMPLETION)
+                Control(Order.REPEAT | Order.OVERRIDE)
+                | Completion()
+                | Malformed(Order.COMPLETION)
+                | Sighting()
             ) if why := self._without_trial(request):
                 return why
             case Control(Order.SKIP) if self._stage not in STAGES:
@@ -345,8 +361,10 @@ class Sequencer:
 
     def _without_trial(self, request: Request) -> str | None:
         """Return why a request about a trial has none; one that has ended can still be judged."""
-        if request == Control(Order.REPEAT):
-            return None if self._attempt else "no trial is running"
+        if request == Control(Order.REPEAT) or isinstance(request, Sighting):
+            if self._attempt is None:
+                return "no trial is running"
+            return self._attempt.doubt(request.what) if isinstance(request, Sighting) else None
         return None if self._last else "no trial is running, and none has ended"
 
     @property

@@ -11,6 +11,7 @@ import numpy as np
 
 from labcrane.core.clock import Clock, ManualClock, SystemClock
 from labcrane.core.records import Event, Frame, Phase, Run
+from labcrane.core.roles import Trigger
 from labcrane.design.counts import TrialCounts
 from labcrane.design.plan import SessionPlan, plan_session
 from labcrane.doctor.scheduling import lateness
@@ -51,19 +52,31 @@ from labcrane.streams.sync.report.sync_report import SyncReport
 MEASURED_S = 1.0
 """How long an empty loop is measured, before a loop in real time."""
 
+TRIGGERS = "triggers."
+"""How the parts begin that a study's triggers play."""
+
 RESERVE_S = 60.0
 """Seconds of recording for which the disk must always have room; below it the session pauses."""
 
 
-def run(visit: Visit, console: Console) -> Path:
+ForwardMaker = Callable[[Rig, Run, Sequencer, BatchLog], loop.Forward]
+"""Makes what goes forward through the ticks of a simulation, from its open rig."""
+
+
+def run(visit: Visit, console: Console, forward: ForwardMaker | None = None) -> Path:
     """Record a session in this process and consolidate it; return the participant file.
 
     Whatever ends it, what was recorded until then is in the file.
+
+    Parameters
+    ----------
+    forward
+        For sessions on a clock that jumps.
     """
     check_eligibility(visit)
     with running(visit):
         try:
-            record(visit, console)
+            record(visit, console, forward=forward)
         finally:
             if parts(visit.journal):
                 finish(visit)
@@ -136,7 +149,10 @@ def finish(visit: Visit) -> SyncReport:
 
 
 def record(
-    visit: Visit, console: Console, offer: Callable[[Mapping[str, str]], None] | None = None
+    visit: Visit,
+    console: Console,
+    offer: Callable[[Mapping[str, str]], None] | None = None,
+    forward: ForwardMaker | None = None,
 ) -> None:
     """Run a session to its end and write its journal.
 
@@ -144,6 +160,8 @@ def record(
     ----------
     offer
         Is told the streams of frames and context, by name and description, once they are there.
+    forward
+        As of :func:`run`.
 
     Raises
     ------
@@ -154,7 +172,7 @@ def record(
     admission = check_eligibility(visit)
     whole = plan_session(study, visit.participant, visit.session, admission.slot)
     with recording(visit):
-        _record(visit, console, admission, whole, offer)
+        _record(visit, console, admission, whole, offer, forward)
 
 
 def _record(
@@ -163,6 +181,7 @@ def _record(
     admission: Admission,
     whole: SessionPlan,
     offer: Callable[[Mapping[str, str]], None] | None,
+    forward: ForwardMaker | None,
 ) -> None:
     study = visit.study
     so_far, plan = go_on(visit, whole) if visit.resumed else (None, whole)
@@ -196,12 +215,18 @@ def _record(
         try:
             for event in opening:
                 log.note(event)
-            with _outlets(visit, whole, done, run, offer) as outlets:
-                sinks = [*outlets, _teller(console)]
+            with (
+                _triggers(visit, run, log, console) as triggers,
+                _outlets(visit, whole, done, run, offer) as outlets,
+            ):
+                sinks = [*triggers, *outlets, _teller(console)]
                 if not visit.fast:
                     sinks.append(OverrunReporter(study.oversight, run.rate_hz, log, console))
+                ahead = None
+                if forward is not None and isinstance(log, BatchLog):
+                    ahead = forward(rig, run, sequencer, log)
                 with _settled():
-                    loop.run(rig, run, sequencer, clock, console, log, sinks)
+                    loop.run(rig, run, sequencer, clock, console, log, sinks, ahead)
         except (PluginError, DeviceError) as error:
             log.note(Event("session.failed", clock.now(), {"why": str(error)}))
             error.add_note(
@@ -364,6 +389,29 @@ def _settled() -> Iterator[None]:
         yield
     finally:
         gc.unfreeze()
+
+
+@contextmanager
+def _triggers(
+    visit: Visit, run: Run, log: FrameLog, console: Console
+) -> Iterator[list[Callable[[Frame], None]]]:
+    study = visit.study
+    chosen = {
+        part.removeprefix(TRIGGERS): choice
+        for part, choice in study.others.items()
+        if part.startswith(TRIGGERS)
+    }
+    if visit.fast or not chosen:  # a simulation is over long before any device has seen a pulse
+        yield []
+        return
+    from labcrane.streams.triggers import Triggers, opened  # noqa: PLC0415
+
+    built = {name: choice.build(study.machine) for name, choice in chosen.items()}
+    lines = {name: each for name, each in built.items() if isinstance(each, Trigger)}
+    with opened(lines, run):
+        triggers = Triggers(lines, log.append, console.report)
+        yield [triggers]
+        triggers.finish()
 
 
 def _teller(console: Console) -> Callable[[Frame], None]:

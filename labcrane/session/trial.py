@@ -45,9 +45,29 @@ class TrialRun:
         self._worst_s = 0.0
         self._began: float | None = None
 
+    @property
+    def ticks(self) -> int:
+        """Ticks so far, pauses left out."""
+        return self._ticks
+
+    @property
+    def task(self) -> Task:
+        """What judges it."""
+        return self._task
+
+    def skip(self, ticks: int) -> None:
+        """Take as many ticks on time that its task has judged, and in which nothing happened."""
+        self._ticks += ticks
+
     def lift_limits(self) -> None:
         """Let the trial go on past its automatic ends."""
         self._task.lift_limits()
+
+    def doubt(self, what: str) -> str | None:
+        """Return why the task does not ask whether ``what`` was seen, or None when it does."""
+        if what in self._task.reports:
+            return None
+        return f"this task asks for reports of {', '.join(self._task.reports) or 'nothing'}"
 
     def evaluate(self, frame: Frame, wish: Phase | None) -> None:
         """Complete ``frame``; ``wish`` ends the trial whatever the task thinks."""

@@ -150,7 +150,8 @@ def _check(population: Population, study: Study, source: YamlFile) -> None:
     for group, factors in population.groups.items():
         if group not in groups:
             known = ", ".join(groups) or "none"
-            source.problem(("groups", group), f"there is no group {group!r}; there is {known}")
+            message = f"there is no group {group!r}; there is {known}"
+            source.problem(("groups", group), message, key=True)
         _check_names(factors, study, source, ("groups", group))
 
 
@@ -165,6 +166,7 @@ def _check_names(
                 (*place, name),
                 f"{name!r} is no number that {study.operator.name!r} is set by; there is "
                 f"{', '.join(numbers)}",
+                key=True,
             )
 
 

@@ -17,6 +17,7 @@ from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan, plan_se
 from labcrane.design.pseudonyms import pseudonyms
 from labcrane.design.slots import group_of
 from labcrane.errors import LabcraneError, ProtocolError
+from labcrane.files.yaml import Place
 from labcrane.protocol.components import ComponentSpec
 from labcrane.protocol.questions import Question
 from labcrane.protocol.rig import Rig
@@ -79,12 +80,13 @@ def rehearse(study: Study) -> Rehearsed:
             whole = plan_session(study, name, number, slot)
             plan = replace(whole, steps=tuple(_shortened(whole.steps)))
             group = f", group {plan.group!r}" if plan.group else ""
-            where = f"{study.path}: rehearsal, session {plan.name!r}{group}"
+            where = f"rehearsal, session {plan.name!r}{group}"
+            seen = _Examiner(study, plan)
             sessions += 1
             try:
-                seen = _run(study, plan)
+                _run(study, plan, seen)
             except LabcraneError as error:
-                wrong.append(f"{where}: {error}")
+                wrong.append(f"{study.where(seen.place)}: {where}: {error}")
                 continue
             trials += seen.ended
             for each in seen.questions:
@@ -139,14 +141,30 @@ def _until_counted(trials: Sequence[Trial]) -> tuple[Trial, ...]:
 class _Examiner:
     """Somebody who skips a trial that nobody ends, and remembers which."""
 
-    def __init__(self, plan: SessionPlan, rate_hz: float) -> None:
+    def __init__(self, study: Study, plan: SessionPlan) -> None:
+        self._steps = study.protocol.sessions[plan.number - 1].steps
+        self._session = plan.number - 1
         self._blocks = {block.number: block for block in plan.blocks}
-        self._rate_hz = rate_hz
+        self._rate_hz = study.protocol.rate_hz
+        self.course: Sequencer | None = None
         self._patience: float | None = None
         self._skipped = False
         self._running: PlannedBlock | None = None
         self.ended = 0
         self.questions: list[Question] = []
+
+    @property
+    def place(self) -> Place:
+        """Where the protocol has the step that runs; the session before the first."""
+        session: Place = ("sessions", self._session)
+        left = self.course.step if self.course else 0
+        if not left:
+            return session
+        for at, step in enumerate(self._steps):
+            left -= step.planned
+            if left <= 0:
+                return (*session, "steps", at)
+        raise AssertionError("a plan has the steps of its session, each as often as it is written")
 
     def commands(self) -> list[Command]:
         if self._patience is None:
@@ -176,18 +194,17 @@ class _Examiner:
         self.questions.append(
             Question(
                 f"rehearsal.{block.name}",
-                (),
+                self.place,
                 f"in a trial of block {block.name!r} the simulated operator {took}; is that meant?",
             )
         )
 
 
-def _run(study: Study, plan: SessionPlan) -> _Examiner:
+def _run(study: Study, plan: SessionPlan, examiner: _Examiner) -> None:
     """Run a plan as a session is run, and throw away what it records."""
     with tempfile.TemporaryDirectory(prefix="labcrane-rehearsal-") as place:
         visit = Visit(study, plan.participant, plan.number, Path(place), simulated=True, fast=True)
         rig = Rig.build(study, simulated=True)
-        examiner = _Examiner(plan, study.protocol.rate_hz)
         with (
             hurried((*rig.components, *rig.tasks.values())),
             rig.opened(study, plan.seed) as run,
@@ -200,13 +217,12 @@ def _run(study: Study, plan: SessionPlan) -> _Examiner:
             log = BatchLog(journal, run)
             try:
                 log.note(opening)
-                course = Sequencer(study, plan, rig, waits=False)
+                examiner.course = course = Sequencer(study, plan, rig, waits=False)
                 told = [drawing.draw, lambda frame: _tell(examiner, frame)]
                 loop.run(rig, run, course, ManualClock(), examiner, log, told)
             finally:
                 log.close()
                 drawing.close()
-    return examiner
 
 
 def _tell(examiner: _Examiner, frame: Frame) -> None:

@@ -8,25 +8,35 @@ import json
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
 from labcrane.analysis.parallel import work
-from labcrane.core.records import Event
+from labcrane.core.records import Event, Run
 from labcrane.design.plan import plan_session
 from labcrane.errors import ProtocolError, RecordingError
 from labcrane.files.atomic import make_folder, write_text
 from labcrane.files.lock import alone_in
+from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study, load
 from labcrane.recording.data_folder import DataFolder
+from labcrane.recording.frame_log import BatchLog
 from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
+from labcrane.session.sequencer import Sequencer
 from labcrane.session.session import run
 from labcrane.session.visit import Visit
+from labcrane.simulation.fast_forward import FastForward, Way
 from labcrane.simulation.population import read_population
 
 ABOUT = "simulation.json"
+WAY = "simulated_by.json"
+"""In a participant's folder: by what each session was simulated, compiled twins or the loop."""
+
+WORTH_LOADING = 200_000
+"""Ticks of a simulation for which the loop takes longer than numba to load, about ten seconds."""
+
 UNFINISHED = ".unfinished"
 """Where participants are until all their sessions are done; what a killed worker leaves there is
 thrown away."""
@@ -42,12 +52,16 @@ class SimulationJob:
         The study's file and the population's; without one all operators are alike.
     data
         Where the participants' folders go.
+    loop
+        Why the loop makes every tick; empty lets compiled twins make those that they can. The bits
+        are the same.
     """
 
     protocol: Path
     cohort: Path | None
     data: Path
     participant: str
+    loop: str = ""
 
     @property
     def folder(self) -> DataFolder:
@@ -62,6 +76,10 @@ class Attendance:
         self._leaves_at = leaves_at
         self._orders: list[Command] = []
         self.left = False
+
+    def waiting(self) -> bool:
+        """Whether an order is still to be taken."""
+        return bool(self._orders)
 
     def commands(self) -> list[Command]:
         given, self._orders = self._orders, []
@@ -88,15 +106,31 @@ def simulate(order: SimulationJob) -> DataFolder:
     make_folder(place)
     with tempfile.TemporaryDirectory(dir=place, prefix=f"{order.participant}-") as scratch:
         there = replace(order, data=Path(scratch)).folder
+        ways: list[Way] = []
         for number in range(1, len(study.protocol.sessions) + 1):
             plan = plan_session(own, order.participant, number)
             attendance = Attendance(population.leaves_at(study, plan))
             visit = Visit(own, order.participant, number, Path(scratch), simulated=True, fast=True)
-            run(visit, attendance)
+            ways.append(_run(visit, attendance, order.loop))
             if attendance.left:
                 break
+        write_text(there.path / WAY, json.dumps([asdict(way) for way in ways], indent=2) + "\n")
         _keep(there.path, order.folder.path)
     return order.folder
+
+
+def _run(visit: Visit, attendance: Attendance, loop: str) -> Way:
+    if loop:
+        run(visit, attendance)
+        return Way(compiled=False, why=loop)
+    made: list[FastForward] = []
+
+    def forward(rig: Rig, run: Run, sequencer: Sequencer, log: BatchLog) -> FastForward:
+        made.append(FastForward(rig, run, sequencer, log, attendance.waiting))
+        return made[-1]
+
+    run(visit, attendance, forward)
+    return made[-1].way
 
 
 def _keep(done: Path, path: Path) -> None:
@@ -128,10 +162,26 @@ def simulate_study(
     with alone_in(first.data, wait=False):
         _check_same(first, study)
         shutil.rmtree(first.data / UNFINISHED, ignore_errors=True)
-        missing = [order for order in orders if not order.folder.path.exists()]
-        yield from (order.folder for order in orders if order not in missing)
+        short = _too_short(study, first.participant)
+        jobs = [replace(order, loop=order.loop or short) for order in orders]
+        missing = [order for order in jobs if not order.folder.path.exists()]
+        yield from (order.folder for order in jobs if order not in missing)
         yield from work(simulate, missing, workers, scheduler)
         shutil.rmtree(first.data / UNFINISHED, ignore_errors=True)
+
+
+def _too_short(study: Study, participant: str) -> str:
+    """Return why the loop is sooner done than twins are loaded; empty when it is not.
+
+    By all who are planned: who is simulated later must not be noted otherwise.
+    """
+    numbers = range(1, len(study.protocol.sessions) + 1)
+    plans = [plan_session(study, participant, number) for number in numbers]
+    seconds = sum(plan.expected_s for plan in plans) * study.protocol.participants.planned
+    expected = round(seconds * study.protocol.rate_hz)
+    if expected >= WORTH_LOADING:
+        return ""
+    return f"twins are loaded for {WORTH_LOADING:,} ticks or more, and {expected:,} are expected"
 
 
 def _check_same(order: SimulationJob, study: Study) -> None:

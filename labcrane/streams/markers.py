@@ -46,6 +46,7 @@ CODES: Mapping[str, int] = {
     "order.override": 66,
     "order.completion": 67,
     "order.hint": 68,
+    "order.report": 69,
     "questionnaire.start": 80,
     "questionnaire.answer": 81,
     "questionnaire.refused": 82,

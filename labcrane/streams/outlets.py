@@ -5,6 +5,7 @@
 | labcrane.state    | MoCap    | double64 | the machine's state, each tick                 |
 | labcrane.input    | Joystick | double64 | axes and buttons, each tick                    |
 | labcrane.markers  | Markers  | string   | an event as JSON (docs/markers.md)             |
+| labcrane.labels   | Markers  | string   | the event's label (docs/markers.md)            |
 | labcrane.codes    | Markers  | int32    | the event's code; the table is in the header   |
 | labcrane.frame    | Frame    | double64 | a whole frame, each tick                       |
 | labcrane.context  | Context  | string   | all there is to know, each change and second   |
@@ -24,6 +25,7 @@ from labcrane.core.records import Frame, Run
 from labcrane.core.signals import Layout
 from labcrane.errors import StreamError
 from labcrane.recording.journal import event_text
+from labcrane.recording.labels import HED_VERSION, KNOWN, LABELS, Labels
 from labcrane.streams.markers import CODES, OTHER
 from labcrane.types import FloatArray
 
@@ -70,11 +72,16 @@ class Outlets:
         numbers = stream_info(CODE_STREAM, "Markers", 1, "int32", rate_hz=0.0, source=source)
         channel(numbers, label="code", unit="none", type="Code")
         _describe_codes(numbers, self._codes)
+        names = stream_info(LABELS, "Markers", 1, "string", rate_hz=0.0, source=source)
+        channel(names, label="label", unit="none", type="Label")
+        _describe_labels(names)
         import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
 
+        self._labels = Labels()
         self._state = Samples(state, run.state.size)
         self._input = Samples(axes, run.axes.size)
         self._markers: pylsl.StreamOutlet | None = pylsl.StreamOutlet(markers)
+        self._names: pylsl.StreamOutlet | None = pylsl.StreamOutlet(names)
         self._numbers: pylsl.StreamOutlet | None = pylsl.StreamOutlet(numbers)
 
     def push(self, frame: Frame) -> None:
@@ -82,18 +89,19 @@ class Outlets:
         due = frame.tick.due
         self._state.push(frame.state, due)
         self._input.push(frame.axes, due)
-        if not frame.events or self._markers is None or self._numbers is None:
+        if not frame.events or not (self._markers and self._names and self._numbers):
             return
         for event in frame.events:
             _check_stamp(event.time)
             self._markers.push_sample([event_text(event, frame.tick.number)], event.time)
+            self._names.push_sample([self._labels.label(event)], event.time)
             self._numbers.push_sample([self._codes.get(event.name, OTHER)], event.time)
 
     def close(self) -> None:
         """End the streams: receivers see them disappear."""
         self._state.close()
         self._input.close()
-        self._markers = self._numbers = None
+        self._markers = self._names = self._numbers = None
 
 
 class Samples:
@@ -223,3 +231,13 @@ def _describe_codes(info: "pylsl.StreamInfo", codes: Mapping[str, int]) -> None:
         entry = table.append_child("code")
         entry.append_child_value("event", name)
         entry.append_child_value("value", str(number))
+
+
+def _describe_labels(info: "pylsl.StreamInfo") -> None:
+    table = info.desc().append_child("labels")
+    table.append_child_value("hed_version", HED_VERSION)
+    for name, meaning in KNOWN.items():
+        entry = table.append_child("label")
+        entry.append_child_value("name", name)
+        entry.append_child_value("description", meaning.words)
+        entry.append_child_value("hed", meaning.hed)

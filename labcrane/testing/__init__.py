@@ -33,6 +33,8 @@ from labcrane.testing.roles import (
     opened,
 )
 from labcrane.testing.tasks import TaskContract
+from labcrane.testing.triggers import TriggerContract
+from labcrane.testing.twins import TwinContract
 
 __all__ = [
     "RATE_HZ",
@@ -50,6 +52,8 @@ __all__ = [
     "QuestionnaireContract",
     "SignalMonitorContract",
     "TaskContract",
+    "TriggerContract",
+    "TwinContract",
     "ch8",
     "check_array",
     "check_closes_after_failed_open",

@@ -10,7 +10,7 @@ from labcrane.session.commands import Order
 from labcrane.web.door.access import SUPERVISOR
 from labcrane.web.form import ConsentCard, Form
 from labcrane.web.page import PRIMARY, PageContext
-from labcrane.web.panels import Cameras, Loads, PerformancePanel
+from labcrane.web.panels import Cameras, Loads, PerformancePanel, Reports
 from labcrane.web.scene import Scene
 
 BUTTONS: Mapping[str, tuple[Order, str, str]] = {
@@ -38,6 +38,7 @@ def supervisor_page(context: PageContext) -> None:
         build_questions(context)
         ConsentCard(context, SUPERVISOR).build()
         _orders(context)
+        Reports(context, SUPERVISOR).build()
         PerformancePanel(context).build()
         with ui.element("div").classes("grid grid-cols-1 lg:grid-cols-2 gap-3 w-full"):
             with ui.card().classes("w-full"):

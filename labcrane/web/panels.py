@@ -5,6 +5,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from labcrane.machines.machine import Joint
+from labcrane.session.commands import Order
 from labcrane.web.page import PageContext
 
 if TYPE_CHECKING:
@@ -44,6 +45,38 @@ class Loads:
             column = f"{LOAD}.{joint.name}"
             load, unit = live.newest.get(column, math.nan), live.units.get(column, SHARE)
             self._values[joint.name].set_text(said(load, unit, joint))
+
+
+class Reports:
+    """A button for each thing that the study's tasks ask about, while a trial runs.
+
+    What is said to have arrived is what came back as an event.
+    """
+
+    def __init__(self, context: PageContext, page: str) -> None:
+        self._context = context
+        self._page = page
+
+    def build(self) -> None:
+        """Build them where the page stands, and keep them up to date."""
+        from nicegui import ui  # noqa: PLC0415 - loads for a second
+
+        tasks, words = self._context.study.tasks.values(), self._context.words(self._page)
+        self._all = ui.row().classes("gap-3 items-center")
+        with self._all:
+            for what in dict.fromkeys(what for task in tasks for what in task.reports):
+                ui.button(
+                    words.seen(what),
+                    on_click=partial(self._context.give, self._page, Order.REPORT, what),
+                ).props(f'size=lg no-caps color=blue-10 id="report-{what}"')
+            self._said = ui.label().classes("text-lg").props('id="reported" role=status')
+        self._update()
+        ui.timer(RATE_S, self._update)
+
+    def _update(self) -> None:
+        session = self._context.session
+        self._all.set_visibility(bool(session.trial))
+        self._said.set_text(", ".join(map(self._context.words(self._page).heard, session.reported)))
 
 
 class PerformancePanel:

@@ -1,8 +1,9 @@
-"""The participant's page: consent, the questionnaire that is asked, and nothing else."""
+"""The participant's page: consent, the questionnaire that is asked, what may be reported."""
 
 from labcrane.web.door.access import PARTICIPANT
 from labcrane.web.form import ConsentCard, Form
 from labcrane.web.page import PRIMARY, PageContext
+from labcrane.web.panels import Reports
 
 
 def participant_page(context: PageContext) -> None:
@@ -14,3 +15,4 @@ def participant_page(context: PageContext) -> None:
     with ui.column().classes("w-full max-w-4xl mx-auto p-4"):
         ConsentCard(context, PARTICIPANT).build()
         Form(context, PARTICIPANT).build()
+        Reports(context, PARTICIPANT).build()

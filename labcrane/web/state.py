@@ -39,6 +39,8 @@ class SessionView:
         What is asked before the session: file, version and text; nothing when none is.
     sync_report
         Lines of the session's sync report, at its end.
+    reported
+        What was reported as seen in the running trial, in the order in which it came.
     assessment
         The performance indicator as it stands.
     """
@@ -60,6 +62,7 @@ class SessionView:
         self.streams: Mapping[str, Any] = {}
         self.sync_report: list[str] = []
         self.last_trial: Mapping[str, Value] = {}
+        self.reported: list[str] = []
         self.alarm = ""
         self.consent: Mapping[str, Value] = {}
         self.assessment = Assessment()
@@ -89,6 +92,8 @@ class SessionView:
                 )
             case _ if self.trial and not event.name.startswith(ROUTINE):
                 self.counts[event.name] += 1
+        if event.name == "order.report" and event.data["refused"] is None:
+            self.reported.append(str(event.data["text"]))
         if event.name == "session.standing":
             self.trials_done = int(str(event.data["done"]))
         self._stage(event)
@@ -119,6 +124,7 @@ class SessionView:
         if what == "start":
             self.trial = data
             self.counts.clear()
+            self.reported.clear()
         elif what == "end":
             self.trial, self.things = {}, ""
             self.last_trial = data

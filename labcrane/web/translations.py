@@ -18,6 +18,9 @@ class Words:
     refused
         Says why an answer, or what was handed in without one, was not taken; given the refusal in
         the record, and the item if it was one.
+    seen, heard
+        What stands on the button with which something is reported, and what is said once it has
+        arrived; given what.
     """
 
     wait: str
@@ -32,6 +35,12 @@ class Words:
     open_file: str
     takes: Callable[[Item], str]
     refused: Callable[[str, Item | None], str]
+    seen: Callable[[str], str]
+    heard: Callable[[str], str]
+
+
+NAMES_GERMAN = {"deformity": "Verformung"}
+"""Of what the bundled tasks ask about."""
 
 
 def _takes_german(item: Item) -> str:
@@ -65,6 +74,8 @@ ENGLISH = Words(
     open_file="Open",
     takes=lambda item: item.takes,
     refused=lambda why, item: why,
+    seen=lambda what: f"I see: {what}",
+    heard=lambda what: f"{what}: reported",
 )
 
 GERMAN = Words(
@@ -80,6 +91,8 @@ GERMAN = Words(
     open_file="Öffnen:",
     takes=_takes_german,
     refused=_refused_german,
+    seen=lambda what: f"Ich sehe: {NAMES_GERMAN.get(what, what)}",
+    heard=lambda what: f"{NAMES_GERMAN.get(what, what)}: gemeldet",
 )
 
 WORDS: Mapping[Language, Words] = {"en": ENGLISH, "de": GERMAN}

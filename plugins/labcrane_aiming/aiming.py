@@ -3,18 +3,24 @@
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
 from labcrane import Frame, Machine, ProtocolError, Run, Signal, Task, Trial
-from labcrane.core import Event, Phase, PlannedTrial, Sphere, TrialStatus
+from labcrane.core import Event, Phase, PlannedTrial, Sphere, TrialStatus, Twin, twin
 from labcrane.machines import reach
 from labcrane_aiming.pairs import Pair, Point, index_of_difficulty, pairs
 from labcrane_aiming.settings import AimingSettings
+
+if TYPE_CHECKING:  # a protocol is checked without loading numpy
+    from labcrane import FloatArray
+    from labcrane.core import Places
 
 # Seconds per movement in a plan: an intercept and seconds per bit, seen with simulated operators.
 PLAN_INTERCEPT_S = 1.0
 PLAN_SLOPE_S = 3.2
 
 PRESSED = 0.5  # a button is 0 or 1
+END_RULES = ("rest_inside", "rest_anywhere", "trigger")  # by their numbers in the compiled twin
 RUNNING = Phase.RUNNING  # Python 3.11 takes long to find it there in every tick; 3.12 does not
 
 
@@ -140,6 +146,39 @@ class Aiming(Task):
         if end is not None:
             events.append(Event("movement.offset", movement.due[end]))
         return TrialStatus(phase, self._values, tuple(events), movement.measures(end))
+
+    def twin(self) -> Twin:
+        import numpy as np  # noqa: PLC0415 - as in open
+
+        from labcrane_aiming.compiled import CHANGING, evaluate  # noqa: PLC0415 - loads numba
+
+        own = np.zeros(16 + 7)
+        return Twin(evaluate, own, CHANGING, self._take_over, self._hand_back)
+
+    def _take_over(self, own: "FloatArray", seen: Frame) -> bool:
+        from labcrane_aiming.movement import ROUNDING_S  # noqa: PLC0415 - loads numpy
+
+        settings, movement, command = self._settings, self._movement, self._command
+        own[:16] = (
+            movement.rest_since, movement.inside, movement.entries, self._pressed,
+            not math.isnan(movement.command_onset), settings.rest_speed,
+            settings.rest_s - ROUNDING_S, self._limit, settings.width / 2,
+            END_RULES.index(settings.end), self._trigger or 0, settings.rest_after,
+            self._tip.start, self._velocity.start, command.start, command.stop,
+        )  # fmt: skip
+        own[16:] = self._values
+        return True
+
+    def _hand_back(self, own: "FloatArray", rows: "FloatArray", places: "Places") -> None:
+        movement, at = self._movement, int(places[twin.STATE])
+        tip, velocity = self._tip, self._velocity
+        movement.go_on(
+            rows[:, twin.ELAPSED], rows[:, twin.TIME], rows[:, at + tip.start : at + tip.stop],
+            rows[:, at + velocity.start : at + velocity.stop],
+        )  # fmt: skip
+        movement.rest_since, inside, entries, pressed = own[:4].tolist()
+        movement.inside, movement.entries = bool(inside), int(entries)
+        self._pressed = bool(pressed)
 
     def _moments(self, frame: Frame) -> list[Event]:
         movement, due = self._movement, frame.tick.due

@@ -65,7 +65,9 @@ class Movement:
         settings = self.settings
         vx, vy, vz = velocity
         speed = math.sqrt(vx * vx + vy * vy + vz * vz)
-        distance = math.dist(tip, self.target)
+        ex, ey, ez = (at - to for at, to in zip(tip, self.target, strict=True))
+        # A root of squares, not dist: that rounds otherwise since Python 3.12.
+        distance = math.sqrt(ex * ex + ey * ey + ez * ez)
         inside = distance <= settings.width / 2
         self.entered = inside and not self.inside
         self.inside = inside
@@ -79,6 +81,26 @@ class Movement:
         self.speed.append(speed)
         self.position.extend(tip)
         self.distance.append(distance)
+
+    def go_on(
+        self, elapsed: FloatArray, due: FloatArray, tip: FloatArray, velocity: FloatArray
+    ) -> None:
+        """Take many ticks, as :meth:`see` takes one; who calls knows entries and rests.
+
+        Parameters
+        ----------
+        elapsed, due
+            In s, shape ``(n,)``.
+        tip, velocity
+            In m and m/s, shape ``(n, 3)``.
+        """
+        away = tip - np.array(self.target)
+        self.ticks += len(elapsed)
+        self.elapsed.frombytes(elapsed.tobytes())
+        self.due.frombytes(due.tobytes())
+        self.speed.frombytes(_length(velocity).tobytes())
+        self.position.frombytes(np.ascontiguousarray(tip).tobytes())
+        self.distance.frombytes(_length(away).tobytes())
 
     @property
     def shown(self) -> FloatArray:
@@ -166,3 +188,10 @@ class Movement:
         miss = np.subtract(tip, self.target)
         along = float(miss @ axis)
         return along, float(np.linalg.norm(miss - along * axis))
+
+
+def _length(vectors: FloatArray) -> FloatArray:
+    """Return the lengths of vectors, shape ``(n, 3)``, to the same bits as in a tick."""
+    x, y, z = vectors.T
+    lengths: FloatArray = np.sqrt(x * x + y * y + z * z)
+    return lengths

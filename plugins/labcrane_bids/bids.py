@@ -1,12 +1,12 @@
 """A whole data set, session by session."""
 
 from collections.abc import Iterable
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 from labcrane import Machine
-from labcrane.analysis import Exporter, Participant
+from labcrane.analysis import Exporter, Participant, eeg_streams
 from labcrane.recording import SessionRecord
 from labcrane_bids.dataset import (
     copy_phenotype,
@@ -14,11 +14,12 @@ from labcrane_bids.dataset import (
     describe_participants,
     people_table,
 )
+from labcrane_bids.eeg import eeg_description, write_eeg
 from labcrane_bids.events import event_description, event_table
-from labcrane_bids.eyes import eye_recordings
 from labcrane_bids.files import label, write_bare_tsv, write_json, write_tsv
 from labcrane_bids.motion import TrackingSystem, tracking_systems
 from labcrane_bids.phenotype import Phenotype
+from labcrane_bids.physio import continuous_recordings, left_out
 from labcrane_bids.settings import BidsSettings
 
 FIRST_DAY = datetime(1925, 1, 1, tzinfo=UTC)
@@ -26,10 +27,11 @@ PERSON = ("age", "sex", "handedness", "group")
 
 
 class Bids(Exporter):
-    """Motion with one tracking system per device, events, eye tracking and phenotype.
+    """Motion with one tracking system per device, EEG, eye tracking, physio, events, phenotype.
 
-    Streams of others that are no gaze, as EEG, are not written: mne-bids does that from the XDF
-    export.
+    EEG is written as BrainVision files, sample by sample as it was recorded; each event is at the
+    sample that was taken when it happened, by the corrected clock. Streams of texts, and of numbers
+    without a rate, have no place in BIDS: the README names them.
     """
 
     shared = ("dataset_description.json", "README", "participants.json", "phenotype/*.json")
@@ -37,6 +39,7 @@ class Bids(Exporter):
     def __init__(self, settings: BidsSettings, machine: Machine) -> None:
         self._settings = settings
         self._machine = machine
+        self._without: set[str] = set()
 
     def export(self, participants: Iterable[Participant], folder: Path) -> None:
         rows, contexts = [], []
@@ -47,9 +50,12 @@ class Bids(Exporter):
             contexts.append(context)
             subject = f"sub-{label(participant.name)}"
             phenotype.add(subject, participant)
+            told = known.get(participant.name, {})
             rows.append(
                 {"participant_id": subject}
-                | {name: known.get(participant.name, {}).get(name) for name in PERSON}
+                | dict.fromkeys(PERSON)
+                | {"group": _group(participant)}
+                | {name: cell for name, cell in told.items() if name in PERSON}
                 | {"status": str(participant.status)}
             )
             shift = None
@@ -61,7 +67,7 @@ class Bids(Exporter):
                 at = folder / subject / f"ses-{number:02}"
                 stem = f"{subject}_ses-{number:02}"
                 self._session(at, stem, session, moved)
-        describe_dataset(folder, self._settings, contexts)
+        describe_dataset(folder, self._settings, contexts, sorted(self._without))
         describe_participants(folder, rows)
         copy_phenotype(self._settings.phenotype, folder, phenotype.write(folder))
 
@@ -72,23 +78,35 @@ class Bids(Exporter):
         context = session.context
         task = label(str(context.get("session_name", "")) or "crane")
         named = f"{stem}_task-{task}"
+        zero = session.streams["state"].time[0]
         scans = []
         for system in tracking_systems(session, self._settings.every):
             path = at / "motion" / f"{named}_tracksys-{system.label}_motion"
             self._motion(path, system, session, task)
-            scans.append(f"motion/{path.name}.tsv")
+            scans.append((f"motion/{path.name}.tsv", 0.0))
         events = event_table(session)
         write_tsv(at / "motion" / f"{named}_events.tsv", events)
         about = event_description(events, context)
         write_json(at / "motion" / f"{named}_events.json", about)
-        for eye, samples, description in eye_recordings(session):
+        streams = eeg_streams(session)
+        for stream in streams:
+            which = f"_acq-{label(stream.name)}" if len(streams) > 1 else ""
+            path = at / "eeg" / f"{named}{which}_eeg"
+            signal = write_eeg(path, stream, session, events, task, self._settings)
+            write_json(path.with_name(f"{named}{which}_events.json"), eeg_description(about))
+            scans.append((f"eeg/{path.name}.vhdr", float(signal.time[0] - zero)))
+        for recording, samples, description in continuous_recordings(session, self._settings):
             (at / "beh").mkdir(exist_ok=True)
-            path = at / "beh" / f"{named}_recording-{eye}_physio"
+            path = at / "beh" / f"{named}_recording-{recording}_physio"
             write_bare_tsv(path.with_name(f"{path.name}.tsv.gz"), samples)
             write_json(path.with_name(f"{path.name}.json"), description)
-            scans.append(f"beh/{path.name}.tsv.gz")
-        when = started.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%S.%fZ")
-        table = pd.DataFrame({"filename": scans, "acq_time": when})
+            scans.append((f"beh/{path.name}.tsv.gz", 0.0))
+        self._without |= set(left_out(session))
+        when = [
+            (started.astimezone(UTC) + timedelta(seconds=later)).strftime("%Y-%m-%dT%H:%M:%S.%fZ")
+            for _, later in scans
+        ]
+        table = pd.DataFrame({"filename": [name for name, _ in scans], "acq_time": when})
         write_tsv(at / f"{stem}_scans.tsv", table)
 
     def _motion(
@@ -122,6 +140,11 @@ class Bids(Exporter):
             "Description": system.description,
         }
         write_json(path.with_name(f"{path.name}.json"), about)
+
+
+def _group(participant: Participant) -> str | None:
+    """Return the group of the design that a participant is in, as recorded."""
+    return str(participant.context.get("group") or "") or None
 
 
 def _counts(system: TrackingSystem) -> dict[str, int]:

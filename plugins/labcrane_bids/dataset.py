@@ -9,7 +9,7 @@ from typing import Any
 
 from labcrane import ProtocolError
 from labcrane.core import read_csv_text
-from labcrane_bids.events import HED_VERSION
+from labcrane.recording import HED_VERSION
 from labcrane_bids.files import MISSING, label, write_json, write_tsv
 from labcrane_bids.settings import BidsSettings
 
@@ -17,9 +17,18 @@ BIDS_VERSION = "1.11.1"
 
 
 def describe_dataset(
-    folder: Path, settings: BidsSettings, contexts: Sequence[Mapping[str, Any]]
+    folder: Path,
+    settings: BidsSettings,
+    contexts: Sequence[Mapping[str, Any]],
+    left_out: Sequence[str] = (),
 ) -> None:
-    """Write ``dataset_description.json`` and the README."""
+    """Write ``dataset_description.json`` and the README.
+
+    Parameters
+    ----------
+    left_out
+        Streams that have no place in BIDS.
+    """
     title = str(contexts[0].get("title", "")) if contexts else ""
     versions = {str(context.get("versions", {}).get("labcrane", "")) for context in contexts}
     description: dict[str, Any] = {
@@ -40,12 +49,18 @@ def describe_dataset(
         description["License"] = settings.license
     write_json(folder / "dataset_description.json", description)
     dates = "moved to 1925 for each participant" if settings.shift_dates else "as recorded"
+    without = (
+        f" Not here, since BIDS has no place for streams of texts or without a rate: "
+        f"{', '.join(left_out)}; they are in the participant files and in labcrane's XDF export."
+        if left_out
+        else ""
+    )
     (folder / "README").write_text(
         f"{title}\n\nWritten by labcrane. Motion holds the simulated machine (tracksys-crane) and "
         "the operator's sticks; times are seconds from the first tick of the session, which is the "
         f"acq_time of the scans file. Dates are {dates}. Participants of the status simulated are "
-        "no people. EEG and other streams are in the participant files and in labcrane's XDF "
-        "export.\n",
+        "no people. Events are named alike everywhere (trial_type), with HED tags in their "
+        f"description; in eeg they are at the sample that was taken when they happened.{without}\n",
         encoding="utf-8",
     )
 

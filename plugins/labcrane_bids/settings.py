@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from pydantic import PositiveInt
+from pydantic import NonNegativeFloat, PositiveInt
 
 from labcrane import Settings
 
@@ -33,3 +33,15 @@ class BidsSettings(Settings):
     phenotype: Path | None = None
     """A folder of CSV files, one per questionnaire, each with a column participant and a JSON file
     of the same name that says what its columns are."""
+
+    gaze_system: str = ""
+    """What gaze is measured in, as ``gaze-on-screen``; by default as the unit of x says."""
+
+    eeg_reference: str = ""
+    """Where the reference electrode of EEG was, as in ``FCz``."""
+
+    eeg_unit: str = ""
+    """Unit of channels of EEG whose source states none, as in ``microvolts``."""
+
+    power_line_hz: NonNegativeFloat = 0.0
+    """Frequency of the mains where EEG was recorded; 0 where it is not known."""

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from labcrane import FloatArray
-from labcrane.core import Crane
+from labcrane.core import Crane, Twin
 
 
 class KinematicCrane(Crane):
@@ -11,6 +11,14 @@ class KinematicCrane(Crane):
 
     Speeds are integrated exactly. A joint that comes to its limit stands there, with speed zero.
     """
+
+    def twin(self) -> Twin:
+        from labcrane_bullet.compiled import step  # noqa: PLC0415 - loads numba
+
+        return self.twin_of(step)
+
+    def _stand(self, angles: Sequence[float], speeds: Sequence[float]) -> None:
+        self._angles = list(angles)
 
     def _place(self, angles: Sequence[float]) -> None:
         self._angles = list(angles)

@@ -11,6 +11,9 @@ from labcrane_bullet.engine import pybullet
 class LoadedBulletCrane(LoadedCrane, BulletCrane):
     """The engine's crane with the load of every joint, and where the grapple is."""
 
+    def twin(self) -> None:
+        return None  # what hangs on it swings by the engine's law
+
     def _place(self, angles: Sequence[float]) -> None:
         super()._place(angles)
         if self._loaded.grapple is None:

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from labcrane import RecordingError
-from labcrane.analysis import Exporter, Participant, answers_of, codebook_of, measures_of, scores_of
+from labcrane.analysis import (
+    Exporter,
+    Participant,
+    answers_of,
+    beside_trials,
+    codebook_of,
+    measures_of,
+    scores_of,
+)
 from labcrane.recording import SessionRecord
 from labcrane_matlab.settings import MatlabSettings
 
@@ -40,7 +48,7 @@ class Matlab(Exporter):
         from scipy.io import savemat
 
         for participant in participants:
-            measures = measures_of(participant)
+            measures = beside_trials(measures_of(participant), participant)
             book = codebook_of(participant, measures)
             trials = book[book["table"] == "trials"]
             content = {

@@ -1,6 +1,7 @@
 """Aiming of an operator: aim, move, look, correct."""
 
 import math
+from collections.abc import Sequence
 from enum import Enum, auto
 
 from labcrane_operator.noise import Noise
@@ -77,7 +78,9 @@ class Aimer:
         if self._doing is MOVING:
             return self._follow(tip)
         self._wait -= self._dt
-        off = math.dist(tip, target)
+        ex, ey, ez = tip[0] - target[0], tip[1] - target[1], tip[2] - target[2]
+        # A root of squares, not dist: that rounds otherwise since Python 3.12.
+        off = math.sqrt(ex * ex + ey * ey + ez * ez)
         inside = off <= self._settings.inside * radius
         if self._doing is HOLDING:
             self._press -= self._dt
@@ -95,6 +98,39 @@ class Aimer:
                 self._doing = HOLDING
                 return STILL
         return self._follow(tip)
+
+    def is_at(self, target: Point) -> bool:
+        """Whether this is the target that was seen last."""
+        return target == self._target
+
+    def numbers(self) -> list[float]:
+        """Return what a compiled twin goes on from; :mod:`.compiled` says what is where."""
+        values, drawn = self._noise.drawn()
+        now = (self._doing.value, self._time, self._wait, self._press, *values, len(drawn))
+        plan = self._plan
+        if plan is None:
+            return [*now, *(0.0,) * 11]
+        return [*now, 1.0, plan.duration, *plan.start, *plan.way, *plan.end]
+
+    @property
+    def drawn(self) -> list[list[float]]:
+        """Motor noise that was drawn for the next ticks, the last first."""
+        return self._noise.drawn()[1]
+
+    def constants(self) -> tuple[float, ...]:
+        """Return what of it does not change in a trial."""
+        settings = self._settings
+        still = settings.still_m_s
+        return (
+            self._dt, settings.gain_per_s, still, still**2, settings.motor_noise,
+            settings.patience_m, settings.look_s, settings.inside, *self._noise.share,
+        )  # fmt: skip
+
+    def go_on(self, numbers: Sequence[float]) -> None:
+        """Go on from where a compiled twin came to."""
+        doing, self._time, self._wait, self._press, x, y, z, left = numbers
+        self._doing = Doing(int(doing))
+        self._noise.go_on((x, y, z), int(left))
 
     def _see(self, target: Point) -> None:
         """Turn to a new target."""

@@ -55,6 +55,20 @@ class Noise:
         x, y, z = (end + share * length * ((draw @ along) * along + SIDE_SHARE * side)).tolist()
         return x, y, z
 
+    @property
+    def share(self) -> tuple[float, float]:
+        """How much of a tick's motor noise is left on the next, and how much is fresh."""
+        return self._share, self._fresh
+
+    def drawn(self) -> tuple[Point, list[list[float]]]:
+        """Return the last tick's motor noise, and what was drawn for the next, the last first."""
+        return self._values, self._drawn
+
+    def go_on(self, values: Point, left: int) -> None:
+        """Go on from a tick's motor noise, with as much as is left of what was drawn."""
+        self._values = values
+        del self._drawn[left:]
+
     def motor(self) -> Point:
         """Return this tick's motor noise along x, y and z, of unit variance."""
         if not self._drawn:

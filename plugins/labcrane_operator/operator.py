@@ -6,9 +6,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from labcrane import FloatArray, Frame, InputDevice, Run, Signal, Tick, Trial
-from labcrane.core import Layout, Phase, Value
+from labcrane.core import Layout, Phase, Places, Twin, Value
 from labcrane_operator.aimer import STILL, Aimer
-from labcrane_operator.noise import Noise
+from labcrane_operator.noise import BLOCK, Noise
 from labcrane_operator.settings import STICK, OperatorSettings
 
 RUNNING = Phase.RUNNING  # Python 3.11 takes long to find it there in every tick; 3.12 does not
@@ -66,7 +66,8 @@ class SimulatedOperator(InputDevice):
         if math.isnan(x):
             aimer.rest()
             return out
-        speed = math.hypot(*state[self._velocity])
+        vx, vy, vz = state[self._velocity]
+        speed = math.sqrt(vx * vx + vy * vy + vz * vz)
         velocity = aimer.move(tuple(state[self._tip]), speed, (x, y, z), task[self._radius])
         if velocity is not STILL:
             asked = self._asked
@@ -79,6 +80,33 @@ class SimulatedOperator(InputDevice):
 
     def metadata(self) -> Mapping[str, Value]:
         return {"simulated": True, "pace": self._pace}
+
+    def twin(self) -> Twin | None:
+        from labcrane_operator.compiled import CHANGING, DRAWN, hands  # noqa: PLC0415 - loads numba
+
+        if not self._shown:
+            return None
+        own = np.zeros(DRAWN + 3 * BLOCK)
+        own[29:36] = (
+            self._left, self._right, self._trigger, self._tip.start, self._velocity.start,
+            self._target.start, self._radius,
+        )  # fmt: skip
+        return Twin(hands, own, CHANGING, self._take_over, self._hand_back)
+
+    def _take_over(self, own: FloatArray, seen: Frame) -> bool:
+        aimer = self._aimer
+        if aimer is None or not self._sees(seen):
+            return False
+        if not aimer.is_at(tuple(seen.task[self._target].tolist())):
+            return False  # it turns to a target, or rests without one
+        own[:19], own[19:29] = aimer.numbers(), aimer.constants()
+        drawn = aimer.drawn
+        own[39 : 39 + 3 * len(drawn)] = np.ravel(drawn)
+        return True
+
+    def _hand_back(self, own: FloatArray, rows: FloatArray, places: Places) -> None:
+        if self._aimer is not None:
+            self._aimer.go_on(own[:8].tolist())
 
     def _sees(self, seen: Frame) -> bool:
         """Say whether the frame shows this trial, going on."""

@@ -14,13 +14,18 @@ class SubMovement:
         Tip positions in the base frame, in m.
     duration
         In seconds.
+
+    Attributes
+    ----------
+    way
+        From start to end, in m.
     """
 
     def __init__(self, start: Point, end: Point, duration: float) -> None:
         self.end = end
         self.duration = duration
-        self._start = start
-        self._way = (end[0] - start[0], end[1] - start[1], end[2] - start[2])
+        self.start = start
+        self.way = (end[0] - start[0], end[1] - start[1], end[2] - start[2])
 
     def at(self, time: float) -> tuple[Point, Point]:
         """Return position in m and velocity in m/s, ``time`` seconds after the start."""
@@ -30,7 +35,7 @@ class SubMovement:
         share = u * u * u * (10.0 + u * (6.0 * u - 15.0))
         rest = 1.0 - u
         pace = 30.0 * u * u * rest * rest / self.duration
-        (x, y, z), (dx, dy, dz) = self._start, self._way
+        (x, y, z), (dx, dy, dz) = self.start, self.way
         return (
             (x + share * dx, y + share * dy, z + share * dz),
             (pace * dx, pace * dy, pace * dz),

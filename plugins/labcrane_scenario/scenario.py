@@ -15,6 +15,7 @@ from labcrane_scenario.observation import Observation
 from labcrane_scenario.settings import ScenarioSettings
 
 PRESSED = 0.5  # a button is 0 or 1
+DEFORMITY = "deformity"
 
 
 class Scenario(Task):
@@ -41,6 +42,8 @@ class Scenario(Task):
         Signal("deformity_found", "s"),  # from the start; NaN when it was not, or there is none
         Signal("k", "1"),  # completion, as far as the run can tell; the supervisor's overrides it
     )
+
+    reports = (DEFORMITY,)
 
     def __init__(self, settings: ScenarioSettings, machine: Machine) -> None:
         self._settings = settings
@@ -118,12 +121,17 @@ class Scenario(Task):
     def _findings(self, frame: Frame) -> Iterator[Event]:
         if self._deformed is None or not math.isnan(self._found):
             return
-        by = None
+        by, pressed = None, False
         for event in frame.events:
             text = str(event.data.get("text", ""))
             if event.name == "order.note" and text.lower().startswith("found"):
                 by = "supervisor"
+            elif event.name == "order.report" and event.data["refused"] is None:
+                pressed = pressed or event.data["by"] == "participant"
+                by = by if event.data["by"] == "participant" else "supervisor"
         if self._button is not None and frame.axes.item(self._button) > PRESSED:
+            pressed = True
+        if pressed:
             away = self._way.nearest(frame.state, self._deformed.name, self._limb)
             if away <= self._settings.find_m:
                 by = "operator"

@@ -34,7 +34,8 @@ class ScenarioSettings(Settings):
 
     find_axis: ButtonName | None = None
     """Button with which the operator reports a deformity, while the tip is near it; none by
-    default. The supervisor reports one with a note that begins with "found"."""
+    default. Both pages have a button too; the participant's counts like this one, and the
+    supervisor's, or a note that begins with "found", wherever the tip is."""
 
     find_m: PositiveFloat = 0.5
     """How near the tip must be then to the middle of the limb, in metres."""

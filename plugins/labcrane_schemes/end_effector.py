@@ -5,8 +5,10 @@ import math
 import numpy as np
 
 from labcrane import Controller, FloatArray, Machine, ProtocolError, Run
+from labcrane.core import Twin
 from labcrane.machines import Arm
 from labcrane_schemes.axis_map import Axis, find_axes
+from labcrane_schemes.law import law, twin_numbers
 from labcrane_schemes.resolved_rate import ResolvedRate
 from labcrane_schemes.settings import DIRECTIONS, EndEffectorSettings
 from labcrane_schemes.shaping import Shaping
@@ -30,11 +32,13 @@ class EndEffector(Controller):
         self._settings = settings
         self._speed = settings.speed_m_s
         self._base = settings.frame == "base"
+        self._machine = machine
         self._arm = Arm(machine)
         self._shaping = Shaping(settings.dead_zone, settings.expo)
+        self._stops = soft_stops(machine, settings.soft_stop_deg)
         self._rate = ResolvedRate(
             machine,
-            soft_stops(machine, settings.soft_stop_deg),
+            self._stops,
             machine.speeds,
             settings.redundancy,
             settings.damping,
@@ -77,3 +81,15 @@ class EndEffector(Controller):
         for (axis, sign), part in zip(self._axes, (x, y, z), strict=True):
             axes[axis] = sign * self._shaping.unshape(part / most)
         return axes
+
+    @property
+    def law(self) -> FloatArray:
+        """What its compiled twin works with."""
+        full = self._machine.speeds
+        tip = (self._speed, self._base)
+        return law(self._machine, self._axes, self._shaping, self._stops, self._rate, full, tip)
+
+    def twin(self) -> Twin:
+        from labcrane_schemes.compiled import command, hands  # noqa: PLC0415 - loads numba
+
+        return Twin(command, twin_numbers(self.law), changing=0, inverse=hands)

@@ -6,7 +6,9 @@ from struct import Struct
 import numpy as np
 
 from labcrane import Controller, FloatArray, Machine, Run
+from labcrane.core import Twin
 from labcrane_schemes.axis_map import Axis, check_joints, find_axes
+from labcrane_schemes.law import law, twin_numbers
 from labcrane_schemes.resolved_rate import NOTHING, ResolvedRate
 from labcrane_schemes.settings import JointVelocitySettings
 from labcrane_schemes.shaping import Shaping
@@ -21,6 +23,7 @@ class JointVelocity(Controller):
         check_joints(machine.names, settings.map)
         self.signals = scheme_signals(machine)
         self._settings = settings
+        self._machine = machine
         self._names = machine.names
         self._full = tuple(settings.speed * speed for speed in machine.speeds)
         self._shaping = Shaping(settings.dead_zone, settings.expo)
@@ -61,3 +64,13 @@ class JointVelocity(Controller):
             moves = abs(speed) > NOTHING and left > 0.0
             hands[axis] = unshape(scale * speed / (full * left)) if moves else 0.0
         return hands
+
+    @property
+    def law(self) -> FloatArray:
+        """What its compiled twin works with."""
+        return law(self._machine, self._sticks, self._shaping, self._stops, self._rate, self._full)
+
+    def twin(self) -> Twin:
+        from labcrane_schemes.compiled import command, hands  # noqa: PLC0415 - loads numba
+
+        return Twin(command, twin_numbers(self.law), changing=0, inverse=hands)

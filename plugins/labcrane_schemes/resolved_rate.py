@@ -63,6 +63,11 @@ class ResolvedRate:
         self._damping2 = damping * damping
         self._threshold2 = threshold * threshold
 
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """What a compiled twin solves with."""
+        return (float(self._hold_pitch), self._damping2, self._threshold2)
+
     def solve_base(self, angles: Sequence[float], x: float, y: float, z: float) -> Motion:
         """Return the joints' motion for a tip velocity in the base frame, in m/s."""
         bearing = self._arm.bearing(angles)
@@ -152,12 +157,18 @@ class ResolvedRate:
 
 def _without_turning(columns: Sequence[Column]) -> list[Column]:
     """Return ``J (I - 1 1ᵀ/n)``: what is left has speeds that add up to zero."""
-    mean_r = sum(r for r, _ in columns) / len(columns)
-    mean_z = sum(z for _, z in columns) / len(columns)
+    # Added one by one: sum() rounds otherwise since Python 3.12.
+    sum_r = sum_z = 0.0
+    for r, z in columns:
+        sum_r += r
+        sum_z += z
+    mean_r, mean_z = sum_r / len(columns), sum_z / len(columns)
     return [(r - mean_r, z - mean_z) for r, z in columns]
 
 
 def _smallest(rr: float, rz: float, zz: float) -> float:
     """Return the smaller eigenvalue of a symmetric matrix that has none below 0."""
-    largest = 0.5 * (rr + zz + math.hypot(rr - zz, 2.0 * rz))
+    # A root of squares, not hypot: that rounds otherwise since Python 3.12.
+    apart, twice = rr - zz, 2.0 * rz
+    largest = 0.5 * (rr + zz + math.sqrt(apart * apart + twice * twice))
     return max(rr * zz - rz * rz, 0.0) / largest if largest > 0.0 else 0.0

@@ -27,6 +27,13 @@ class Shaping:
         self._stretch = 2.0 * math.sqrt(self._linear / (3.0 * expo)) if cubic else 0.0
         self._steepness = 3.0 / (self._linear * self._stretch) if cubic else 0.0
 
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """What a compiled twin shapes with."""
+        straight = float(self._straight)
+        curve = (self._linear, self._expo, self._stretch, self._steepness, straight)
+        return (self._edge, self._rest, *curve)
+
     def shape(self, push: float) -> float:
         """Return the share of full speed, in [-1, 1], that a deflection in [-1, 1] asks for."""
         beyond = abs(push) - self._edge

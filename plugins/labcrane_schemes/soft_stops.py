@@ -18,15 +18,17 @@ class SoftStops:
 
     Attributes
     ----------
+    width
+        The same, no less than rounding.
     nothing_lost
         The factors of joints that are far from their limits.
     """
 
     def __init__(self, machine: Machine, width: float) -> None:
-        self._width = max(width, 1e-9)  # no width is a wall, not a division by zero
+        self.width = max(width, 1e-9)  # no width is a wall, not a division by zero
         self._limits = machine.limits
         self._free = tuple(
-            (joint, low + self._width, high - self._width)
+            (joint, low + self.width, high - self.width)
             for joint, (low, high) in enumerate(machine.limits)
         )
         self.nothing_lost = (1.0,) * len(machine.limits)
@@ -51,9 +53,9 @@ class SoftStops:
             return 1.0
         lowest, highest = self._limits[joint]
         room = highest - angle if speed > 0.0 else angle - lowest
-        if room >= self._width:
+        if room >= self.width:
             return 1.0
-        return room / self._width if room > 0.0 else 0.0
+        return room / self.width if room > 0.0 else 0.0
 
 
 def soft_stops(machine: Machine, width_deg: float) -> SoftStops:

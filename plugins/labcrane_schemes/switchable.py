@@ -2,10 +2,12 @@
 
 import numpy as np
 
-from labcrane import Controller, FloatArray, Machine, Run, Signal, Trial
+from labcrane import Controller, FloatArray, Frame, Machine, Run, Signal, Trial
+from labcrane.core import Places, Twin
 from labcrane_schemes.axis_map import find_axis
 from labcrane_schemes.end_effector import EndEffector
 from labcrane_schemes.joint_velocity import JointVelocity
+from labcrane_schemes.law import twin_numbers
 from labcrane_schemes.settings import SwitchableSettings
 from labcrane_schemes.signals import scheme_signals
 
@@ -18,7 +20,7 @@ class Switchable(Controller):
 
     def __init__(self, settings: SwitchableSettings, machine: Machine) -> None:
         self.signals = (*scheme_signals(machine), Signal("scheme.active", "1"))
-        self._schemes: tuple[Controller, Controller] = (
+        self._schemes: tuple[JointVelocity, EndEffector] = (
             JointVelocity(settings.joint_velocity, machine),
             EndEffector(settings.end_effector, machine),
         )
@@ -54,3 +56,25 @@ class Switchable(Controller):
         self._out[:-1] = command
         self._out[-1] = self._active
         return self._out
+
+    def twin(self) -> Twin:
+        from labcrane_schemes.compiled import (  # noqa: PLC0415 - loads numba
+            BUTTON,
+            BUTTON_SIGN,
+            CHANGING,
+            SWITCHES,
+            command,
+            hands,
+        )
+
+        first, second = self._schemes
+        own = twin_numbers(first.law, second.law)
+        own[SWITCHES], own[BUTTON], own[BUTTON_SIGN] = 1.0, self._index, self._sign
+        return Twin(command, own, CHANGING, self._take_over, self._hand_back, inverse=hands)
+
+    def _take_over(self, own: FloatArray, seen: Frame) -> bool:
+        own[:2] = self._active, self._down
+        return True
+
+    def _hand_back(self, own: FloatArray, rows: FloatArray, places: Places) -> None:
+        self._active, self._down = int(own[0]), bool(own[1])

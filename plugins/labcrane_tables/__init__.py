@@ -1,10 +1,10 @@
-"""Exports recordings as tables: CSV and Parquet for R and pandas, and Psych-DS."""
+"""Exports recordings as tables: CSV and Parquet for R and pandas, Psych-DS, an archive."""
 
 from collections.abc import Sequence
 
 from labcrane import Machine, Offer, hookimpl, offer
 from labcrane.analysis import Exporter
-from labcrane_tables.settings import PsychDsSettings, TableSettings
+from labcrane_tables.settings import ArchiveSettings, PsychDsSettings, TableSettings
 
 labcrane_api = 1
 
@@ -21,7 +21,13 @@ def labcrane_exporters() -> Sequence[Offer[Exporter]]:
 
         return PsychDs(settings)
 
+    def archive(settings: ArchiveSettings, machine: Machine) -> Exporter:
+        from labcrane_tables.archive import Archive
+
+        return Archive(settings)
+
     return (
+        offer("zip", ArchiveSettings, archive),
         offer("tables", TableSettings, tables),
         offer("psychds", PsychDsSettings, psychds),
     )

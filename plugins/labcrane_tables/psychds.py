@@ -4,7 +4,15 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
-from labcrane.analysis import Exporter, Participant, answers_of, codebook_of, measures_of, scores_of
+from labcrane.analysis import (
+    Exporter,
+    Participant,
+    answers_of,
+    beside_trials,
+    codebook_of,
+    measures_of,
+    scores_of,
+)
 from labcrane_tables.frames import snake
 from labcrane_tables.settings import PsychDsSettings
 from labcrane_tables.tables import write_csv
@@ -31,7 +39,7 @@ class PsychDs(Exporter):
         for participant in participants:
             context = participant.context
             title, study = str(context.get("title", "")), str(context.get("study", ""))
-            measures = measures_of(participant)
+            measures = beside_trials(measures_of(participant), participant)
             book = codebook_of(participant, measures)
             table = snake(measures)
             written = dict(zip(map(str, measures), map(str, table), strict=True))

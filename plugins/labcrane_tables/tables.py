@@ -7,7 +7,15 @@ from pathlib import Path
 from shutil import copyfile
 from typing import TYPE_CHECKING, Any
 
-from labcrane.analysis import Exporter, Participant, answers_of, codebook_of, measures_of, scores_of
+from labcrane.analysis import (
+    Exporter,
+    Participant,
+    answers_of,
+    beside_trials,
+    codebook_of,
+    measures_of,
+    scores_of,
+)
 from labcrane.recording import SessionRecord
 from labcrane_tables.frames import snake, stream_tables
 from labcrane_tables.settings import TableSettings
@@ -46,7 +54,7 @@ class Tables(Exporter):
         events = _Growing(folder / "events")
         for participant in participants:
             people.append(_person(participant))
-            measures = measures_of(participant)
+            measures = beside_trials(measures_of(participant), participant)
             trials.append(snake(measures))
             codebooks.append(codebook_of(participant, measures))
             answers.append(answers_of(participant))

@@ -3,19 +3,19 @@
 import random
 import re
 import shutil
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import pytest
 from wrong_protocols import PROTOCOLS, REMOVED, Wrong, everything, faults, texts
 
 from labcrane import ProtocolError
-from labcrane.protocol.questions import questions
+from labcrane.protocol.questions import about, questions
 from labcrane.protocol.study import Study, load
 from labcrane.registry.registry import Registry, discover
 from labcrane.simulation import rehearsal
 
-STUDIES = ("aiming", "retrieval", "everything")
+STUDIES = (*sorted(path.parent.name for path in PROTOCOLS.glob("*/protocol.yaml")), "everything")
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +51,18 @@ LONGEST = 700
 """Characters of a message: all events of a session are named in one."""
 
 
+def assert_in_the_file(at: Iterable[tuple[int, int]], wrong: Wrong) -> None:
+    """Assert that something stands at every place, or ends there."""
+    try:
+        text = wrong.text.decode()
+    except UnicodeDecodeError:
+        return  # its places are counted in characters that are none
+    lines = text.split("\n")
+    for line, column in at:
+        assert 1 <= line <= len(lines), (str(wrong), line, column)
+        assert 1 <= column <= len(lines[line - 1]) + 1, (str(wrong), line, column)
+
+
 def judge(wrong: Wrong, path: Path, registry: Registry) -> Study | None:
     """Judge what a check says of a fault; return the study where it passes."""
     path.write_bytes(wrong.text)
@@ -58,13 +70,18 @@ def judge(wrong: Wrong, path: Path, registry: Registry) -> Study | None:
         study = load(path, registry)
     except ProtocolError as error:
         lines = str(error).replace(f"{path}:", "").splitlines()
-        at = [int(found[0]) for line in lines if (found := re.match(r"\d+", line))]
+        found = [re.match(r"(\d+):(\d+): ", line) for line in lines]
+        at = {(int(each[1]), int(each[2])) for each in found if each}
         assert lines, wrong
-        assert len(at) == len(lines), (str(wrong), lines)
+        assert all(found), (str(wrong), lines)
+        assert_in_the_file(at, wrong)
         # What is missed is told where it is missed, which may be elsewhere.
         missed = wrong.fault == REMOVED or wrong.fault.endswith((" {}", " []", " null"))
         missed = missed or "undefined alias" in lines[0] or wrong.place[-1:] == ("name",)
-        assert wrong.line in at or wrong.line == 0 or missed, (str(wrong), wrong.line, lines)
+        here = {column for line, column in at if line == wrong.line}
+        assert here or wrong.line == 0 or missed, (str(wrong), wrong.line, lines)
+        if wrong.columns and not missed:
+            assert here & wrong.columns, (str(wrong), wrong.columns, lines)
         for line in lines:
             assert REMEDY.search(line), (str(wrong), line)
             assert not JARGON.search(line), (str(wrong), line)
@@ -72,6 +89,8 @@ def judge(wrong: Wrong, path: Path, registry: Registry) -> Study | None:
         return None
     asked = questions(study)
     assert asked or not wrong.must, f"{wrong}: passed"
+    told = [about(study, question) for question in asked]
+    assert_in_the_file({(each["line"], each["column"]) for each in told}, wrong)
     return study
 
 

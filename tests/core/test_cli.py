@@ -80,7 +80,7 @@ def test_a_mistake_ends_with_code_2_and_no_traceback(tmp_path: Path) -> None:
     done = labcrane_command("check", "study.yaml", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr == (
-        "labcrane: study.yaml:4: 'rat_hz' is not a key of the file; did you mean 'rate_hz'?\n"
+        "labcrane: study.yaml:4:1: 'rat_hz' is not a key of the file; did you mean 'rate_hz'?\n"
     )
 
 

@@ -127,6 +127,15 @@ def test_an_order_that_makes_no_sense_is_refused_in_words(study: Study) -> None:
     assert seen.events("order.completion")[0].data["refused"] == "completion is 1 or 0, not ''"
 
 
+def test_what_no_task_asks_about_cannot_be_reported_nor_anything_before_a_trial(
+    study: Study,
+) -> None:
+    orders = {5: give(Order.REPORT, "fire"), 40: give(Order.START), 60: give(Order.REPORT, "fire")}
+    before, within = rehearse(study, orders, waits=True).events("order.report")
+    assert before.data["refused"] == "no trial is running"
+    assert within.data["refused"] == "this task asks for reports of nothing"
+
+
 def test_notes_and_the_completion_flag_are_in_the_record(study: Study) -> None:
     orders = {5: give(Order.NOTE, "coughs"), 6: give(Order.COMPLETION, "0")}
     seen = rehearse(study, orders)

@@ -182,7 +182,7 @@ def test_labcranes_language_server_marks_what_a_check_finds(
             path.write_bytes(each.text)
             marks, found = editor.save(path), told(path, capsys)
             assert [(mark.line, mark.column, mark.message) for mark in marks] == [
-                (one["line"], max(1, one["column"]), one["message"]) for one in found
+                (one["line"], one["column"], one["message"]) for one in found
             ], str(each)
             assert [mark.severity for mark in marks] == [
                 {"problem": 1, "question": 2}[one["kind"]] for one in found
@@ -202,8 +202,8 @@ def test_mistakes_in_another_file_are_marked_where_the_protocol_names_it(
         marks = editor.open(path)
         assert {mark.line for mark in marks} == {place(AIMING, "machine:")[0]}
         assert [mark.message for mark in marks] == [each["message"] for each in told(path, capsys)]
-        for line in (1, 2):
-            assert any(f"digger.yaml:{line}: " in mark.message for mark in marks)
+        for spot in ("1:1", "2:9"):
+            assert any(f"digger.yaml:{spot}: " in mark.message for mark in marks)
         path.write_text(AIMING, encoding="utf-8")
         assert editor.save(path) == []
 

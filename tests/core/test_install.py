@@ -81,7 +81,7 @@ def test_a_part_that_is_missing_is_named_with_its_line_and_the_extra(
     with pytest.raises(labcrane.ProtocolError) as refused:
         chosen.check_installed()
     name = part.split()[1].strip("{},")
-    assert f"{path}:{at}: " in str(refused.value)
+    assert f"{path}:{at}:{lines[at - 1].index(part) + 7}: " in str(refused.value)
     assert f"{name!r} needs {module}, which is not installed: pip install" in str(refused.value)
     assert "'labcrane[lab]'" in str(refused.value)
 

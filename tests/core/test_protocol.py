@@ -2,6 +2,7 @@
 
 # ruff: noqa: E501 - a message is one line, as the researcher sees it
 
+import re
 from pathlib import Path
 
 import pytest
@@ -71,23 +72,23 @@ def test_the_protocol_of_these_tests_is_fine(complaint) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("rate_hz: 240", "rat_hz: 240", "5: 'rat_hz' is not a key of the file; did you mean 'rate_hz'?"),
-        ("rate_hz: 240", "rate_hz: -5", "5: rate_hz is -5; it must be greater than 0"),
-        ("rate_hz: 240", "rate_hz: fast", "5: rate_hz is 'fast'; it must be a number in Hz, or one with its unit, as 1 kHz"),
+        ("rate_hz: 240", "rat_hz: 240", "5:1: 'rat_hz' is not a key of the file; did you mean 'rate_hz'?"),
+        ("rate_hz: 240", "rate_hz: -5", "5:10: rate_hz is -5; it must be greater than 0"),
+        ("rate_hz: 240", "rate_hz: fast", "5:10: rate_hz is 'fast'; it must be a number in Hz, or one with its unit, as 1 kHz"),
         ("machine: ch8", "machine: ch9", "6:10: no machine is called 'ch9'; did you mean 'ch8'? labcrane has ch8, ch8_cranelike, and a file beside the protocol may end in .yaml"),
         ("use: dual_joystick", "use: dual_joistick", "7:14: input 'dual_joistick' is not installed; did you mean 'dual_joystick'? (labcrane plugins lists all)"),
-        ("use: kinematic_crane", "use: kinematic_crane, actuatr: ideal", "11: 'actuatr' is not a key of dynamics; did you mean 'actuator'?"),
-        ("distances: [2, 3]", "distances: [2, -3]", "13: tasks.aiming.distances[2] is -3; it must be greater than 0"),
-        ("distances: [2, 3]", "distances: 2 m", "13: tasks.aiming.distances is '2 m'; it must be a list: [.., ..]"),
-        ("pairs: shuffled", "pairs: randomly", "15: design.order: pairs is 'randomly'; it can be as_written, blocked, latin_square, shuffled, williams"),
+        ("use: kinematic_crane", "use: kinematic_crane, actuatr: ideal", "11:34: 'actuatr' is not a key of dynamics; did you mean 'actuator'?"),
+        ("distances: [2, 3]", "distances: [2, -3]", "13:40: tasks.aiming.distances[2] is -3; it must be greater than 0"),
+        ("distances: [2, 3]", "distances: 2 m", "13:36: tasks.aiming.distances is '2 m'; it must be a list: [.., ..]"),
+        ("pairs: shuffled", "pairs: randomly", "15:18: design.order.pairs.rule: 'randomly' is no rule; it can be as_written, blocked, latin_square, shuffled, williams"),
         ("pairs: shuffled", "paris: shuffled", "15:11: no task varies 'paris'; did you mean 'pairs'? they vary pairs"),
         ("hello.md", "hallo.md", "19:23: instructions is 'hallo.md', and there is no such file; did you mean 'hello.md'?"),
-        ("- break:", "- brake:", "22: 'brake' is not a step; did you mean 'break'?"),
+        ("- break:", "- brake:", "22:9: 'brake' is not a step; did you mean 'break'?"),
         ("task: aiming, pairs: 2", "task: aimin, pairs: 2", "20:26: there is no task 'aimin'; did you mean 'aiming'? there is aiming"),
         ("task: aiming, pairs: 2", "task: aiming, pairs: 9", "20:41: pairs is 9; it must be a whole number, 1 to 4"),
         ("task: aiming, pairs: 2", "task: aiming, circles: 2", "20:34: 'circles' is nothing the task varies; it varies pairs"),
         ("study: aiming", "study: Aiming Study", None),
-        ("labcrane: 1", "labcrane: 2", "1: labcrane is 2; it must be 1"),
+        ("labcrane: 1", "labcrane: 2", "1:11: labcrane is 2; it must be 1"),
     ],
 )  # fmt: skip
 def test_a_mistake_is_told_with_its_line(complaint, old: str, new: str, said: str | None) -> None:
@@ -108,10 +109,35 @@ def test_all_mistakes_are_told_at_once_in_the_order_of_the_file(complaint) -> No
     assert [line.split(":")[0] for line in told] == ["5", "9", "13", "22"]
 
 
+@pytest.mark.parametrize(
+    ("order", "levels", "said"),
+    [
+        ("{rule: shuffled, times: 1000, in_a_row: 2}", "[2, 3]", "4 levels, 1000 times each, are"),
+        ("{rule: shuffled, times: 20, in_a_row: 2}", "[2, 3, 4, 5, 6, 2.5]", "12 levels, 20 times"),
+        ("{rule: blocked, times: 1000, in_a_row: 1}", "[2, 3]", None),
+        ("{rule: shuffled, times: 1000}", "[2, 3]", None),
+        ("{rule: shuffled, times: 8, in_a_row: 2}", "[2, 3]", None),
+    ],
+)
+def test_an_order_that_takes_hours_to_draw_is_told_where_it_is_asked_for(
+    complaint, order: str, levels: str, said: str | None
+) -> None:
+    told = complaint(
+        ("pairs: shuffled", f"pairs: {order}"), ("distances: [2, 3]", f"distances: {levels}")
+    )
+    if said is None:
+        assert told == []
+    else:
+        (line,) = told
+        assert re.match(r"\d+:\d+: pairs of task 'aiming' has ", line)
+        assert said in line
+        assert "use rule: blocked" in line
+
+
 def test_a_target_out_of_reach_is_told_before_anything_runs(complaint) -> None:
     (told,) = complaint(("distances: [2, 3]", "distances: [2, 12]"))
     assert told == (
-        "13: the far circle of pair '12m_far_left' at (9.74, 4.24, 0.80) m is out of reach of the "
+        "13:11: the far circle of pair '12m_far_left' at (9.74, 4.24, 0.80) m is out of reach of the "
         "CH8 knuckle boom of the crane study; move the centre or shorten the distance"
     )
 
@@ -120,7 +146,7 @@ def test_a_mistake_in_the_machines_file_names_that_file(complaint, tmp_path: Pat
     (tmp_path / "mine.yaml").write_text("title: mine\n", encoding="utf-8")
     told = complaint(("machine: ch8", "machine: mine.yaml"))
     assert told[0].startswith("6:10: ")
-    assert "mine.yaml:1: the file needs 'source'" in "\n".join(told)
+    assert "mine.yaml:1:1: the file needs 'source'" in "\n".join(told)
 
 
 def test_an_axis_that_the_device_does_not_have_is_told(complaint) -> None:
@@ -136,8 +162,8 @@ def test_an_axis_that_the_device_does_not_have_is_told(complaint) -> None:
     ("text", "said"),
     [
         ("", "1: it must be a mapping of keys, beginning with 'labcrane: 1'"),
-        ("a: [1, 2", "1: '[' opens here and is not closed"),
-        ("a: 1\na: 2\n", "2: the key 'a' is there twice in what begins in line 1; keep one"),
+        ("a: [1, 2", "1:4: '[' opens here and is not closed"),
+        ("a: 1\na: 2\n", "2:1: the key 'a' is there twice in what begins in line 1; keep one"),
     ],
 )  # fmt: skip
 def test_what_is_no_protocol_is_told(

@@ -89,7 +89,7 @@ def test_people_and_programs_are_asked_the_same_with_the_line(
     path = str(tmp_path / "study.yaml")
     assert main(["check", path]) == 0
     said = capsys.readouterr().err
-    assert said.startswith(f"{path}:4: question: rate_hz is 10 Hz, at which")
+    assert said.startswith(f"{path}:4:10: question: rate_hz is 10 Hz, at which")
     assert "(if it is, write expected: [rate_hz])" in said
     assert main(["check", path, "--json"]) == 0
     (finding,) = json.loads(capsys.readouterr().out)["findings"]
@@ -153,7 +153,9 @@ def test_a_protocol_with_units_is_the_one_with_plain_numbers(
 def test_a_wrong_unit_is_told_with_its_line(tmp_path: Path) -> None:
     with pytest.raises(ProtocolError) as told:
         a_study(tmp_path, ("distances: [2]", "distances: [2], width: 50 kg"))
-    assert "study.yaml:12: tasks.aiming.width: '50 kg' is a mass, where a length" in str(told.value)
+    assert "study.yaml:12:46: tasks.aiming.width: '50 kg' is a mass, where a length" in str(
+        told.value
+    )
 
 
 def test_a_truth_is_no_number_unless_it_was_recorded_as_one(tmp_path: Path) -> None:

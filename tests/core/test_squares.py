@@ -126,3 +126,9 @@ def test_after_many_drop_out_at_once_the_smallest_group_is_filled_first() -> Non
         slot = next_slot("study", groups, taken)
         assert group_of("study", groups, slot) == "b"
         taken.add(slot)
+
+
+def test_long_sequences_are_drawn_without_a_call_for_every_trial() -> None:
+    order = sequence(("a", "b"), 300, 2, 3)
+    assert Counter(order) == {"a": 300, "b": 300}
+    assert runs(order) == 2

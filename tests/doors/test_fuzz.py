@@ -191,6 +191,7 @@ DOORS = {
     "note": (words(Order.NOTE), 400, ()),
     "hint": (words(Order.HINT), 300, ()),
     "order": (words(Order.COMPLETION), 300, ()),
+    "report": (words(Order.REPORT), 300, (b"deformity",)),
     "setting": (settings, 500, (b"ball.far=", b"=", b".", b"&a", b"*a", b"!!int")),
     "message": (messages, 700, (b'"kind"', b'"order"', b"true", b"null")),
     "can": (frames, 1400, ()),

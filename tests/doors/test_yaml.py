@@ -37,27 +37,33 @@ MERGES = "a: &a {x: 1}\n" + "".join(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("title: a\n\x07", ":2: this is no YAML: it holds the character U+0007, which no text may"),
+        (
+            "title: a\n\x07",
+            ":2:1: this is no YAML: it holds the character U+0007, which no text may",
+        ),
         (
             "day: 2001-99-99",
-            ":1: this is no YAML: '2001-99-99' looks like a date or a time, and there is none such",
+            ":1:6: this is no YAML: '2001-99-99' looks like a date or a time, and there is none",
         ),
-        ("[" * 3000, ":1: nested deeper than 50 levels; write it flat"),
-        ("a:\n" + "- " * 2000, ":2: nested deeper than 50 levels; write it flat"),
+        ("[" * 3000, ":1:51: nested deeper than 50 levels; write it flat"),
+        ("a:\n" + "- " * 2000, ":2:100: nested deeper than 50 levels; write it flat"),
         (BOMB, " holds more than 50000 values, or itself, behind its aliases; write fewer of them"),
         ("title: " + "x" * 5_000_000, " cannot be read: it has 5000007 bytes; the most are 256000"),
         ("a: [" + "1, " * 20_001 + "1]", " has more than 20000 commas, colons, brackets, dashes"),
-        ("a: 0b" + "1" * 90_000, ":1: it holds a whole number of 90000 bits; write less"),
-        ('a: "\\ud800"', ":1: it holds the character U+D800 in "),
-        ("a: !!python/object:os.system x", ":1: it holds 'x' with a tag; write plain values"),
+        ("a: 0b" + "1" * 90_000, ":1:4: it holds a whole number of 90000 bits; write less"),
+        ('a: "\\ud800"', ":1:4: it holds the character U+D800 in "),
+        ("a: !!python/object:os.system x", ":1:4: it holds 'x' with a tag; write plain values"),
         (
             "a: !!int x",
-            ":1: this is no YAML: the tag !!int asks for a whole number, which 'x' is not",
+            ":1:4: this is no YAML: the tag !!int asks for a whole number, which 'x' is not",
         ),
-        ("a: [1,\n 2, !!bool maybe]", ":2: this is no YAML: the tag !!bool asks for true or false"),
-        ("a: !!map 5", ":1: this is no YAML: a tag that asks for keys with values, before none"),
-        ("a:\n  b: [1, !x 5]", ":2: it holds '5' with a tag; write plain values"),
-        ("a: &a [*b]", ":1: this is no YAML: found undefined alias 'b'"),
+        (
+            "a: [1,\n 2, !!bool maybe]",
+            ":2:5: this is no YAML: the tag !!bool asks for true or false",
+        ),
+        ("a: !!map 5", ":1:4: this is no YAML: a tag that asks for keys with values, before none"),
+        ("a:\n  b: [1, !x 5]", ":2:10: it holds '5' with a tag; write plain values"),
+        ("a: &a [*b]", ":1:8: this is no YAML: found undefined alias 'b'"),
     ],
 )
 def test_a_hostile_file_is_refused_with_file_and_reason(
@@ -72,7 +78,7 @@ def test_a_hostile_file_is_refused_with_file_and_reason(
 
 def test_bytes_that_are_no_text_and_folders_are_refused(tmp_path: Path) -> None:
     (tmp_path / "wide.yaml").write_bytes("title: ü".encode("utf-16"))
-    with pytest.raises(ProtocolError, match=r"yaml:1: byte 0xFF is no UTF-8; .* save it as"):
+    with pytest.raises(ProtocolError, match=r"yaml:1:1: byte 0xFF is no UTF-8; .* save it as"):
         read_yaml(tmp_path / "wide.yaml")
     with pytest.raises(ProtocolError, match="is no file; give a YAML file"):
         read_yaml(tmp_path)

@@ -13,6 +13,7 @@ from labcrane.streams.network import LOOPBACK
 from labcrane.streams.search import PORTS
 
 NETWORK = ["unshare", "-rn"]
+BEGINS_S = 15.0
 HERE = Path(__file__).parent
 OUTLETS = {"session or page": 7, "feedback.process": 2, "recorder.process": 0}
 """Streams that one process of a kind sends: the session 6, and the gateway's flow."""
@@ -59,3 +60,4 @@ def test_it_begins_each_of_twenty_times(tmp_path, record_property) -> None:
     assert len(runs) == 20
     for run in runs:
         within_the_range(run)
+        assert run["took"] <= BEGINS_S

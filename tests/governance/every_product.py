@@ -32,7 +32,7 @@ PEOPLE = ("P001", "P0011", "VP-001")
 STUDY = GOVERNED.replace(
     "title:", "participants: {pattern: '(P\\d{3,4})|(VP-\\d{3})', planned: 4}\ntitle:"
 )
-EXPORTS = ("tables", "psychds", "matlab", "bids", "xdf")
+EXPORTS = ("tables", "psychds", "matlab", "bids", "xdf", "zip")
 
 
 def command(*words: object) -> None:
@@ -51,7 +51,8 @@ def everything(folder: Path) -> Lab:
     data, elsewhere = lab.places.root, folder / "elsewhere"
     for number, exporter in enumerate(EXPORTS):
         out = (data / "exports" if number % 2 else elsewhere) / exporter
-        command("export", data, "--to", exporter, "--out", out)
+        asked = ("--set", "license=CC0-1.0") if exporter == "zip" else ()
+        command("export", data, "--to", exporter, "--out", out, *asked)
     command("report", data, "--out", elsewhere / "report")
     for name in PEOPLE:
         recording = data / name / f"{name}.h5"

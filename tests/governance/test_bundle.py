@@ -107,10 +107,12 @@ def test_a_file_of_a_bundle_that_was_changed_is_named_before_anything_is_install
     done = run(sys.executable, folder / "install.py", tmp_path / "there")
     assert done.stderr == "a.whl is damaged or was changed; copy the bundle again\n"
     (folder / "bundle.json").write_text(
-        json.dumps({"protocol": "study/a.yaml", "system": "win-amd64", "python": "3.11.9"})
+        json.dumps({"protocol": "study/a.yaml", "system": "another-system", "python": "3.11.9"})
     )
     done = run(sys.executable, folder / "install.py", tmp_path / "there")
-    assert done.stderr.startswith("this bundle is for Python 3.11.9 on win-amd64; here is Python")
+    assert done.stderr.startswith(
+        "this bundle is for Python 3.11.9 on another-system; here is Python"
+    )
     assert not (tmp_path / "there").exists()
 
 

@@ -195,8 +195,8 @@ def test_a_simulated_participants_slot_is_its_number(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("order", "said"),
     [
-        ("{rule: williams, in_a_row: 2}", "pairs is 'williams', where nothing is random; drop in"),
-        ("{rule: random}", "pairs is 'random'; it can be as_written, blocked, latin_square, shuf"),
+        ("{rule: williams, in_a_row: 2}", "the rule is 'williams', where nothing is random; drop"),
+        ("{rule: random}", "'random' is no rule; it can be as_written, blocked, latin_square"),
         ("{rule: shuffled, times: 0}", r"times is 0; it must be greater than 0"),
     ],
 )  # fmt: skip

@@ -1,5 +1,6 @@
 """What was installed when a study was approved is part of the approval."""
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -25,10 +26,16 @@ def package(folder: Path, version: str, content: str = "1") -> str:
     return str(folder)
 
 
+def see(monkeypatch: pytest.MonkeyPatch, folder: str) -> None:
+    """Let what is installed in a folder be seen before all else."""
+    # Not syspath_prepend: it calls what Python 3.11 for Windows cannot.
+    monkeypatch.setattr(sys, "path", [folder, *sys.path])
+
+
 @pytest.fixture
 def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Lab:
     """Return a study that was approved while version 1.0 of a package was installed."""
-    monkeypatch.syspath_prepend(package(tmp_path / "one", "1.0"))
+    see(monkeypatch, package(tmp_path / "one", "1.0"))
     lab = Lab(tmp_path, GOVERNED.replace("rate_hz", "environment: refuse\nrate_hz"))
     lab.approve()
     lab.consent("P001")
@@ -46,7 +53,7 @@ def test_everything_that_is_installed_is_in_the_lock_by_version_and_files(lab: L
 def test_another_version_of_a_package_is_refused_by_its_name(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.syspath_prepend(package(lab.folder / "two", "2.0"))
+    see(monkeypatch, package(lab.folder / "two", "2.0"))
     with pytest.raises(ProtocolError) as refused:
         check_eligibility(lab.visit("P001"))
     first, difference, todo = str(refused.value).splitlines()
@@ -61,7 +68,7 @@ def test_another_version_of_a_package_is_refused_by_its_name(
 def test_the_same_version_with_other_files_is_refused(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.syspath_prepend(package(lab.folder / "again", "1.0", content="2"))
+    see(monkeypatch, package(lab.folder / "again", "1.0", content="2"))
     with pytest.raises(ProtocolError, match=r"winch 1\.0 has other files than the winch of then"):
         check_eligibility(lab.visit("P001"))
 
@@ -71,7 +78,7 @@ def test_a_difference_is_in_the_record_where_the_protocol_does_not_refuse_it(
 ) -> None:
     edit(lab.protocol, "environment: refuse\n", "")
     amend(lab.study, discover(), lab.grant(), "any package will do", TODAY)
-    monkeypatch.syspath_prepend(package(lab.folder / "two", "2.0"))
+    see(monkeypatch, package(lab.folder / "two", "2.0"))
     admission = check_eligibility(lab.visit("P001"))
     assert admission.otherwise_installed == ("winch was 1.0, is 2.0",)
     assert admission.context["otherwise_installed"] == ["winch was 1.0, is 2.0"]
@@ -80,7 +87,7 @@ def test_a_difference_is_in_the_record_where_the_protocol_does_not_refuse_it(
 def test_an_amendment_takes_what_is_installed_now(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.syspath_prepend(package(lab.folder / "two", "2.0"))
+    see(monkeypatch, package(lab.folder / "two", "2.0"))
     lock = amend(lab.study, discover(), lab.grant(), "a mended winch", TODAY)
     assert lock.amendments[-1]["changes"] == ["environment: winch was 1.0, is 2.0"]
     assert check_eligibility(lab.visit("P001")).otherwise_installed == ()
@@ -96,7 +103,7 @@ def test_a_lock_that_says_nothing_of_packages_is_still_good(lab: Lab) -> None:
 def test_on_another_system_versions_are_compared_and_files_are_not() -> None:
     here = environment()
     there = {
-        "system": "win-amd64",
+        "system": "another-system",
         "python": here["python"],
         "packages": {
             name: {"version": each["version"], "sha256": "0"}
@@ -106,7 +113,7 @@ def test_on_another_system_versions_are_compared_and_files_are_not() -> None:
     }
     version = here["packages"]["numpy"]["version"]
     assert changes(here, there) == [
-        f"the system was {here['system']}, is win-amd64",
+        f"the system was {here['system']}, is another-system",
         f"numpy {version} is not installed",
     ]
     assert changes(there, here)[1:] == [f"numpy {version} is new"]

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from governed import Lab, edit
+from needs import need
 
 from labcrane import ProtocolError
 from labcrane.approval.lock import lock_path
@@ -26,6 +27,7 @@ COMFORT = "title: Comfort\nquestions:\n  - {name: heat, text: Too hot?}\n"
 
 @pytest.fixture
 def rescue(tmp_path: Path) -> Lab:
+    need("pybullet")
     """Return the bundled rescue study with questionnaires of the lab's, approved."""
     folder = tmp_path / "rescue"
     shutil.copytree(RESCUE, folder, ignore=shutil.ignore_patterns("hydraulic_arm", "data"))

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from governance.approved_lab import approved_lab, refusal
 from governed import GROUPED, TODAY, Lab, edit
+from needs import needs
 
 from labcrane.approval.decision import Grant, approve, verify
 from labcrane.approval.difference import differences
@@ -79,6 +80,7 @@ def test_lines_that_come_or_go_are_told(lab: Lab) -> None:
     assert refusal(lab) == ["file hello.md: line 2 is gone; it was 'Please hold both sticks.'"]
 
 
+@needs("permissions")
 def test_colleagues_can_read_the_lock(lab: Lab) -> None:
     assert lock_path(lab.protocol).stat().st_mode & 0o777 == 0o644
 

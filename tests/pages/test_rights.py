@@ -93,6 +93,9 @@ def visited(tmp_path_factory: pytest.TempPathFactory):
         )
         answers["participant on supervisor page"] = ask(room, "GET", "/supervisor", participant)
         answers["participant's order"] = ask(room, "POST", "/orders/end", participant)
+        answers["participant's report"] = ask(
+            room, "POST", "/orders/report", participant, "deformity"
+        )
         answers["participant's page"] = ask(room, "GET", "/participant", participant)
         answers["supervisor's note"] = ask(room, "POST", "/orders/note", supervisor, "seen")
         answers["no order"] = ask(room, "POST", "/orders/dance", supervisor)

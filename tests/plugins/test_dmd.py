@@ -13,7 +13,8 @@ from dmd_machine import LEVELS, record, true_speed
 import labcrane_dmd
 from labcrane import ProtocolError, RecordingError
 from labcrane.cli.app import main
-from labcrane_dmd.fit.fitting import fit_model, fit_segment
+from labcrane_dmd.arm.drive import SegmentDrive
+from labcrane_dmd.fit.fitting import LAGS, curve_at, fit_model, fit_segment
 from labcrane_dmd.fit.recordings import read_recordings
 from labcrane_dmd.fit.validation import validate
 from labcrane_dmd.model.interpolation import linear, pchip
@@ -121,6 +122,43 @@ def test_nothing_is_extrapolated_beyond_the_measured_angles(model) -> None:
                 assert far == pytest.approx(segment.speed(signal, end), rel=0.02)
 
 
+def test_the_layers_have_the_run_up_of_the_lag_that_is_found_with_them(model, recordings) -> None:
+    for recording in recordings:
+        segment = model[recording.name]
+        for direction, sign in ((segment.extend, 1), (segment.retract, -1)):
+            run_up = direction.dead_time + LAGS * direction.lag
+            for layer in direction.layers:
+                curve = curve_at(recording, layer.signal, run_up)
+                assert curve is not None
+                # The far end is measured; on the other side are the weaker layers' angles.
+                far, near = (1, 0) if sign > 0 else (0, 1)
+                assert layer.covers[far] == pytest.approx(curve.covers[far], abs=1e-9)
+                assert sign * layer.covers[near] <= sign * curve.covers[near] + 1e-9
+                found = [layer.speed(angle) for angle in curve.angle.tolist()]
+                missed = np.array(found) - curve.speed
+                assert np.sqrt(np.mean(missed**2)) < 0.01 * np.abs(curve.speed).max()
+
+
+def test_every_joint_sets_off_when_its_recording_does(model, recordings) -> None:
+    late = []
+    for recording in recordings:
+        for signal in (-250, -220, -200, -180, 180, 200, 220, 250):
+            (run,) = recording.at(signal)
+            drive, dt = SegmentDrive(model[recording.name], 0.001), 0.001
+            angle = float(np.mean(run.angle[: run.step]))
+            path = [angle := angle + dt * drive.speed(signal, angle) for _ in range(4000)]
+            seen = run.angle[run.step :] - np.mean(run.angle[: run.step])
+            for degrees in (2.0, 4.0, 6.0):
+                came = [
+                    int(np.argmax(np.abs(moved) > np.radians(degrees))) * step
+                    for moved, step in ((np.array(path) - run.angle[0], dt), (seen, run.interval))
+                ]
+                late.append(came[0] - came[1])
+    # The recorded valve's own dead time differs from run to run.
+    assert abs(np.mean(late)) < 0.015
+    assert np.abs(late).max() < 0.05
+
+
 def test_slow_layers_say_that_they_do_not_cover_the_range_and_go_like_the_next(model) -> None:
     (slow, *_) = model["arm"].extend.layers
     assert not slow.whole
@@ -172,7 +210,15 @@ def test_another_machines_law_is_found_in_its_recordings(tmp_path: Path) -> None
         assert abs(model / truth - 1) < 0.01, signal
     for direction in (segment.extend, segment.retract):
         assert direction.dead_band == pytest.approx(22.0, abs=3.0)
-        assert direction.dead_time + direction.lag == pytest.approx(0.08 + 0.12, abs=0.04)
+        assert direction.dead_time == pytest.approx(0.08, abs=0.015)
+        assert direction.lag == pytest.approx(0.12, abs=0.015)
+    # Where it sets off, stronger signals have gone by before the valve was open.
+    for signal in (-250, -200, -160, 160, 200, 250):
+        first = (0.0, 8.0) if signal > 0 else (52.0, 60.0)
+        for angle in np.radians(np.linspace(*first, 9)).tolist():
+            assert segment.speed(signal, angle) == pytest.approx(
+                true_speed(signal, angle), rel=0.03
+            )
 
 
 def spoil(tmp_path: Path, change) -> Path:

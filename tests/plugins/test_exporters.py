@@ -8,7 +8,8 @@ from labcrane.testing import ExporterContract, ch8
 
 
 class TestExporters(ExporterContract):
-    @pytest.fixture(params=["tables", "psychds", "matlab", "bids", "xdf"])
+    @pytest.fixture(params=["tables", "psychds", "matlab", "bids", "xdf", "zip"])
     def exporter(self, request: pytest.FixtureRequest) -> Exporter:
         offer = discover().find(Exporter, request.param)
-        return offer.build(offer.settings(), ch8())
+        needed = {"license": "CC0-1.0"} if offer.name == "zip" else {}
+        return offer.build(offer.settings(**needed), ch8())

@@ -157,9 +157,15 @@ def test_a_goal_of_which_the_state_says_nothing_is_refused_before_the_session(
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (("0.1], mass", "0.02], mass"), r"block.yaml:4: 'block' is 0.080 m deep in the ground"),
-        (("shape: box", "shape: bix"), r"block.yaml:4: things.block.shape is 'bix'; it must be"),
-        (("radius: 0.1}", "radius: 0.1, what: blok}"), r"block.yaml:5: there is no 'blok' in this"),
+        (("0.1], mass", "0.02], mass"), r"block.yaml:4:\d+: 'block' is 0.080 m deep in the ground"),
+        (
+            ("shape: box", "shape: bix"),
+            r"block.yaml:4:\d+: things.block.shape is 'bix'; it must be",
+        ),
+        (
+            ("radius: 0.1}", "radius: 0.1, what: blok}"),
+            r"block.yaml:5:\d+: there is no 'blok' in this",
+        ),
         (("mass_kg: 20", "mass_kg: -1"), r"things.block.mass_kg is -1; it must be greater than 0"),
         (
             ("goals:", "figure: {position: [1, 0, 0.01]}\ngoals:"),
@@ -191,21 +197,26 @@ goals: [{position: [30, 0, 0], radius: 0.1}]
 
 
 @pytest.mark.parametrize(
-    ("ahead", "turn", "button", "notes", "by"),
+    ("ahead", "turn", "button", "orders", "by"),
     [
         (1.2, 0.0, 1.0, {}, "operator"),  # the shank is about so far ahead of the chest
         (1.2, 90.0, 1.0, {}, None),  # and to the left of it once the body has been turned
         (-0.4, 0.0, 1.0, {}, None),  # at the head: nothing is found there
         (6.4, 0.0, 1.0, {}, None),  # pressed far away, without having seen anything
-        (6.4, 0.0, 0.0, {3: "found: the left leg"}, "supervisor"),
-        (1.2, 0.0, 0.0, {3: "the left leg"}, None),
+        (6.4, 0.0, 0.0, {3: ("note", "found: the left leg", "supervisor", None)}, "supervisor"),
+        (1.2, 0.0, 0.0, {3: ("note", "the left leg", "supervisor", None)}, None),
+        (1.2, 0.0, 0.0, {3: ("report", "deformity", "participant", None)}, "operator"),
+        (6.4, 0.0, 0.0, {3: ("report", "deformity", "participant", None)}, None),
+        (6.4, 0.0, 0.0, {3: ("report", "deformity", "supervisor", None)}, "supervisor"),
+        (6.4, 0.0, 0.0, {3: ("report", "deformity", "terminal", None)}, "supervisor"),
+        (1.2, 0.0, 0.0, {3: ("report", "fire", "participant", "asks for deformity")}, None),
     ],
 )
-def test_a_deformity_is_found_by_the_operators_button_or_the_supervisors_note(
+def test_a_deformity_is_found_by_a_button_of_control_or_page_or_the_supervisors_note(
     ahead: float,
     turn: float,
     button: float,
-    notes: dict[int, str],
+    orders: dict[int, tuple[str, str, str, str | None]],
     by: str | None,
     tmp_path: Path,
 ) -> None:
@@ -235,8 +246,10 @@ def test_a_deformity_is_found_by_the_operators_button_or_the_supervisors_note(
         )
         frame = make_frame(run, number, values)
         frame.axes = np.array([button])
-        if number in notes:
-            frame.events = (Event("order.note", frame.tick.due, {"text": notes[number]}),)
+        if number in orders:
+            order, text, page, refused = orders[number]
+            data = {"text": text, "by": page, "refused": refused}
+            frame.events = (Event(f"order.{order}", frame.tick.due, data),)
         judgement = task.evaluate(frame)
         events += [event for event in judgement.events if event.name == "deformity.found"]
         results = judgement.results or results

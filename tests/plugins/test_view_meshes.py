@@ -165,11 +165,11 @@ def a_machine_study(folder: Path, mesh: str) -> Path:
     [
         (
             "no.stl",
-            r"mine\.yaml:\d+: joints\[4\]\.mesh.*there is no mesh '.*no\.stl'; a path",
+            r"mine\.yaml:\d+:\d+: joints\[4\]\.mesh.*there is no mesh '.*no\.stl'; a path",
         ),
         (
             "cut.stl",
-            r"mine\.yaml:\d+: .*cut\.stl' says that it has 4 triangles and has room for 3.96",
+            r"mine\.yaml:\d+:\d+: .*cut\.stl' says that it has 4 triangles and has room for 3.96",
         ),
         ("arm.step", r"'.*arm\.step' is no mesh; \.stl, \.obj, \.gltf, \.glb can be shown"),
         ("{file: a.stl, scale: -1}", r"mesh\.scale is -1; it must be greater than 0"),

@@ -34,3 +34,11 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def cohort(data: Path) -> Cohort:
     """Somebody was erased as well, as the register tells."""
     return find_cohort(data, struck={"P006": (Status.ERASED, "on 2026-05-01: withdrew")})
+
+
+@pytest.fixture(scope="session")
+def electrodes(tmp_path_factory: pytest.TempPathFactory) -> Cohort:
+    """One person with EEG, eyes and a heart, each on a clock of its own."""
+    root = tmp_path_factory.mktemp("electrodes")
+    record(study(root), root / "data", "P001", gaze=True, eeg=True)
+    return find_cohort(root / "data")

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 from rehearsal import ScriptedConsole, a_study
 
 from labcrane.core.clock import ManualClock
@@ -14,9 +15,10 @@ from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.recording.foreign_streams import companion_headers
 from labcrane.recording.frame_log import FrameLog, columns
-from labcrane.recording.journal import SessionJournal
+from labcrane.recording.journal import EVENTS, SessionJournal
 from labcrane.recording.participant_file.writer import consolidate
 from labcrane.recording.xdf.header import Channel, StreamHeader
+from labcrane.recording.xdf.reader import read_xdf
 from labcrane.recording.xdf.writer import XdfWriter
 from labcrane.session import loop
 from labcrane.session.commands import Command
@@ -25,6 +27,7 @@ from labcrane.session.postprocess import conclude
 from labcrane.session.sequencer import Sequencer
 from labcrane.session.session import Visit
 from labcrane.session.visit import claim
+from labcrane.types import FloatArray
 
 STUDY = """\
 labcrane: 1
@@ -64,6 +67,7 @@ def record(
     pilot: bool = False,
     orders: Mapping[int, Sequence[Command]] | None = None,
     gaze: bool = False,
+    eeg: bool = False,
 ) -> Path:
     """Record session 1; a program takes the controls, whatever the stamps say."""
     visit = Visit(the_study, participant, 1, data, simulated=simulated, fast=True, pilot=pilot)
@@ -78,8 +82,15 @@ def record(
             log.note(Event("session.start", clock.now(), context(visit, plan, rig, run)))
             loop.run(rig, run, sequencer, clock, ScriptedConsole(orders), log, [])
     journals = [visit.journal]
-    if gaze:
-        journals.append(_gaze(visit.streams_journal, clock.now()))
+    if gaze or eeg:
+        journals.append(visit.streams_journal)
+        with XdfWriter(visit.streams_journal) as writer:
+            if gaze:
+                _gaze(writer, clock.now())
+            if eeg:
+                events = read_xdf(visit.journal).stream(EVENTS).stamps
+                _eeg(writer, clock.now(), events)
+                _pulse(writer, clock.now())
     consolidate(visit.folder.participant_file, journals, conclude)
     return visit.folder.participant_file
 
@@ -87,23 +98,65 @@ def record(
 OFFSET_S = 5000.0
 
 
-def _gaze(path: Path, until: float) -> Path:
+def _gaze(writer: XdfWriter, until: float) -> None:
     """Write eyes that look at the target for the first half of each second, at 50 Hz."""
     channels = (Channel("x", "m"), Channel("y", "m"), Channel("aoi", ""))
     header = StreamHeader("eyes", "Gaze", channels, "double64", 50.0, source_id="eyes")
     time = np.arange(90.0, until, 0.02)
     data = np.column_stack([np.sin(time), np.cos(time), (time % 1.0 < 0.5) * 1.0])
-    with XdfWriter(path) as writer:
-        number = writer.add_stream(header)
-        beside = companion_headers(header, number)
-        probes = writer.add_stream(beside["probes"])
-        writer.write_samples(number, time - OFFSET_S, data)
-        local = np.arange(90.0, until, 5.0)
-        n = len(local)
-        rows = np.column_stack([local - OFFSET_S, np.full(n, OFFSET_S), np.full(n, 1e-4), local])
-        writer.write_samples(probes, local, rows)
-        arrivals = writer.add_stream(beside["arrivals"])
-        writer.write_samples(arrivals, time[-1:], np.array([[float(len(time)), float(time[-1])]]))
-        notes = writer.add_stream(beside["notes"])
-        writer.write_texts(notes, [90.0], [(json.dumps({"event": "begin"}),)])
-    return path
+    _stream(writer, header, time, OFFSET_S, data)
+
+
+EEG_HZ = 250.0
+LOST = slice(3000, 3050)
+"""Samples of EEG that never came."""
+
+
+def _eeg(writer: XdfWriter, until: float, events: FloatArray) -> None:
+    """Write EEG with a pulse at the sample nearest to each event; its clock is 40 ppm slow."""
+    units = ("microvolts", "microvolts", "microvolts", "")
+    kinds = ("EEG", "EEG", "EOG", "Trigger")
+    named = zip(("Fz", "Cz", "HEOG", "pulse"), units, kinds, strict=True)
+    channels = tuple(Channel(label, unit, kind) for label, unit, kind in named)
+    header = StreamHeader("BrainAmp", "EEG", channels, "float32", EEG_HZ, source_id="amp")
+    time = np.arange(95.0, until, (1.0 + 40e-6) / EEG_HZ)
+    data = np.random.default_rng(5).normal(0.0, 20.0, (len(time), 4)).astype(np.float32)
+    data[:, 3] = 0.0
+    at = np.searchsorted(0.5 * (time[1:] + time[:-1]), events[(events > 95.0)])
+    data[at, 3] = 1.0
+    keep = np.ones(len(time), bool)
+    keep[LOST] = False
+    _stream(writer, header, time[keep], 777.0, data[keep], drift=-40e-6)
+
+
+def _pulse(writer: XdfWriter, until: float) -> None:
+    """Write a heart's signal."""
+    channel = Channel("ecg", "millivolts", "ECG")
+    header = StreamHeader("Heart", "ECG", (channel,), "int16", 100.0, source_id="heart")
+    time = np.arange(96.0, until, 0.01)
+    _stream(writer, header, time, 0.0, (100 * np.sin(time))[:, None].astype(np.int16))
+
+
+def _stream(
+    writer: XdfWriter,
+    header: StreamHeader,
+    time: FloatArray,
+    offset: float,
+    data: npt.NDArray[np.generic],
+    drift: float = 0.0,
+) -> None:
+    """Write samples taken at ``time`` on our clock, stamped with the source's; and its probes."""
+
+    number = writer.add_stream(header)
+    beside = companion_headers(header, number)
+    probes = writer.add_stream(beside["probes"])
+    stamps = time - offset + drift * (time - 90.0)
+    writer.write_samples(number, stamps, data)
+    local = np.arange(90.0, time[-1] + 5.0, 5.0)
+    n, remote = len(local), local - offset + drift * (local - 90.0)
+    rows = np.column_stack([remote, local - remote, np.full(n, 1e-4), local])
+    writer.write_samples(probes, local, rows)
+    arrivals = writer.add_stream(beside["arrivals"])
+    writer.write_samples(arrivals, time[-1:], np.array([[float(len(time)), float(time[-1])]]))
+    notes = writer.add_stream(beside["notes"])
+    writer.write_texts(notes, [90.0], [(json.dumps({"event": "begin"}),)])

@@ -72,8 +72,9 @@ def test_the_validator_does_find_errors(folder: Path, tmp_path: Path) -> None:
     shutil.copytree(folder, broken)
     (broken / f"{MOTION}_tracksys-crane_motion.json").unlink()
     events = broken / f"{MOTION}_events.tsv"
-    events.write_text(
-        events.read_text(encoding="utf-8").replace("Experiment-structure", "No-such-tag"),
+    about = events.with_suffix(".json")
+    about.write_text(
+        about.read_text(encoding="utf-8").replace("Experiment-structure", "No-such-tag"),
         encoding="utf-8",
     )
     found = " ".join(errors(broken))
@@ -117,12 +118,14 @@ def test_what_the_validator_misses(folder: Path, cohort: Cohort, system: str) ->
 def test_events_are_seconds_from_the_first_sample(folder: Path, cohort: Cohort) -> None:
     events = pd.read_csv(folder / f"{MOTION}_events.tsv", sep="\t", na_values="n/a")
     measured = measures_of(cohort.included[0])
-    starts = events[(events["trial_type"] == "trial.start") & events["response_time"].notna()]
+    starts = events[(events["trial_type"] == "trial_start") & events["response_time"].notna()]
     np.testing.assert_allclose(starts["response_time"], measured["reaction_time"])
     np.testing.assert_allclose(starts["onset"], measured["started"] - 100.0, atol=1e-9)
     np.testing.assert_allclose(starts["duration"], measured["ended"] - measured["started"])
-    onsets = events.loc[events["trial_type"] == "movement.onset", "HED"]
-    assert onsets.str.contains("Move, Machine").all()
+    about = json.loads((folder / f"{MOTION}_events.json").read_text(encoding="utf-8"))
+    tags = about["trial_type"]["HED"]
+    assert "(Move, Machine)" in tags["movement_onset"]
+    assert set(tags) == set(about["trial_type"]["Levels"]) == set(events["trial_type"])
 
 
 def test_dates_move_and_intervals_stay(folder: Path, cohort: Cohort, tmp_path: Path) -> None:

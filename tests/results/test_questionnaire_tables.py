@@ -187,6 +187,21 @@ def test_every_question_is_in_the_codebook_and_every_column_in_psych_ds(exports:
         assert set(pd.read_csv(path).columns) <= described
 
 
+def test_what_was_answered_after_a_trial_is_beside_it(exports: Path) -> None:
+    trials = pd.read_csv(exports / "tables" / "trials.csv")
+    answers = pd.read_csv(exports / "tables" / "questionnaires.csv")
+    after = answers[answers["trial"].notna()]
+    assert set(after["questionnaire"]) == {"accuracy"}, "the others are asked between blocks"
+    merged = after.merge(trials, on=["participant", "session", "trial"], suffixes=("", "_of"))
+    assert len(merged) == len(after) == trials["accuracy_rating"].notna().sum()
+    np.testing.assert_array_equal(merged["value"], merged["accuracy_rating"])
+    scores = pd.read_csv(exports / "tables" / "scores.csv").query("trial.notna()")
+    assert scores["value"].tolist() == trials["accuracy_share"].dropna().tolist()
+    book = pd.read_csv(exports / "tables" / "codebook.csv").set_index(["table", "column"])
+    assert len(book.loc[("trials", "accuracy_rating"), "description"]) > 10
+    assert not any(column.startswith("comfort") for column in trials)
+
+
 @needs("Rscript")
 def test_r_reads_the_answers(exports: Path) -> None:
     script = """

@@ -121,7 +121,8 @@ def test_a_simulation_leaves_the_files_of_a_study_all_stamped(
     for name in NAMES:
         folder = tmp_path / "data" / f"{name}-SIMULATED"
         left = sorted(path.name for path in folder.iterdir())
-        assert left == [f"{name}-SIMULATED.h5", "ses-01_run.xdf", "ses-02_run.xdf"]
+        files = [f"{name}-SIMULATED.h5", "ses-01_run.xdf", "ses-02_run.xdf"]
+        assert left == [*files, "simulated_by.json"]
         recording = open_recording(folder / left[0])
         assert list(recording.sessions) == [1, 2]
         for number in (1, 2):

@@ -5,7 +5,8 @@ import pytest
 from streams.synthetic import SourceClock, source
 
 from labcrane.streams.sync.correction import Treatment, correct
-from labcrane.streams.sync.dejitter import Dejitter
+from labcrane.streams.sync.dejitter import Dejitter, even, left_open
+from labcrane.streams.sync.late_chunks import lost_before, lost_between
 from labcrane.streams.sync.raw import RawStream
 
 
@@ -85,3 +86,30 @@ def test_a_counter_bridges_missing_samples(random):
     corrected = correct(raw, Treatment(500.0, dejitter=Dejitter.ENVELOPE, transport_s=0.008))
     assert p95(corrected, times) < 1e-4
     assert corrected.quality.dropped == 10
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_chunks_that_a_busy_computer_holds_up_have_lost_nothing_and_lost_ones_are_counted(seed):
+    random = np.random.default_rng(seed)
+    index = 25.0 * np.arange(600)
+    rest = random.exponential(0.003, 600)
+    for begin in (0, 280, 520):  # at first, in the middle, at last
+        rest[begin : begin + 70] += random.exponential(0.05, 70)
+    assert lost_between(index, rest, 0.004)[0] is False
+    at = np.sort(random.choice(np.arange(40, 500), 12, replace=False))
+    lost = np.searchsorted(at, np.arange(600), side="right") * 3.0
+    assert lost_between(index, rest + 0.004 * lost, 0.004)[0] is True
+    found = lost_before(rest + 0.004 * lost, 0.004)
+    assert abs(found[-1] - 36.0) <= 1.0  # the first ones may go while all chunks are held up
+    assert np.mean(np.abs(found - lost) <= 1.0) > 0.8
+
+
+def test_lines_that_swallowed_lost_samples_are_said_to_be_off(random):
+    index = np.arange(30_000.0)
+    lost = np.repeat([0.0, 5.0, 9.0, 20.0], 7500)
+    true = 100.0 + (index + lost) / 250.0
+    late = np.repeat(0.005 + random.exponential(0.003, 1200), 25)
+    evened = even(true + late, index, Dejitter.ENVELOPE) - 0.005
+    off = np.abs(evened - true)
+    assert off.max() > 0.02
+    assert np.mean(off <= left_open(true + late, evened, Dejitter.ENVELOPE) + 0.005) > 0.99

@@ -235,7 +235,13 @@ def test_a_request_that_two_streams_meet_takes_none_silently(lab):
         assert "so do 2 streams: 'Amplifier' (" in text
         assert "give the name or source_id of the one that is meant, or several: true" in text
     assert stop(recorder) == 0
-    assert set(lab.streams()) == {"Amplifier", "Filtered"}
+    recorded = lab.streams()
+    assert set(recorded) == {"Amplifier", "Filtered"}
+    for stream in recorded.values():  # and noted once beside both
+        noted = [note.data["text"] for note in stream.notes if "text" in note.data]
+        (text,) = [text for text in noted if "so do 2 streams" in text]
+        assert "'Amplifier' (" in text
+        assert "'Filtered' (" in text
 
 
 @pytest.mark.parametrize("any_meant", [False, True])

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from streams.unkind import (
@@ -14,6 +15,7 @@ from streams.unkind import (
 )
 
 from labcrane.streams.sync.correction import Treatment
+from labcrane.streams.sync.dejitter import Dejitter
 from labcrane.streams.sync.raw import RawStream
 from labcrane.streams.sync.report.certificate import Fault
 
@@ -42,6 +44,35 @@ def one_by_one(random):
         random, Clock(random), times, rate, stamped=stamped, sent=stamped,
         treatment=Treatment(rate, latency_s=mean),
         faults=frozenset({Fault.LATE_STAMPS}), clean=False,
+    )  # fmt: skip
+
+
+def chunks_under_load(random, *, drops=False):
+    """Chunks stamped when sent, by a program that waits for its turn for seconds at a time.
+
+    The waits pass and nothing is lost, or something is.
+    """
+    rate, size = 250.0, int(random.integers(10, 60))
+    times = regular(random, rate, 50.0, 250.0)
+    kept = np.ones(len(times), dtype=bool)
+    if drops:
+        for at in random.integers(size, len(times) - size, int(random.integers(5, 30))):
+            kept[at : at + int(random.integers(1, 10))] = False
+    times = times[kept][: int(kept.sum()) // size * size]
+    last = times.reshape(-1, size)[:, -1]
+    least, usual = random.uniform(0.004, 0.010), random.uniform(1e-3, 5e-3)
+    delay = random.exponential(usual, len(last))
+    for _ in range(int(random.integers(1, 5))):
+        begin = random.uniform(last[0] - 5.0, last[-1])
+        busy = (last > begin) & (last < begin + random.uniform(3.0, 20.0))
+        delay[busy] += random.exponential(random.uniform(0.01, 0.08), int(busy.sum()))
+    sent = np.maximum.accumulate(last + least + delay)
+    stamped = (sent[:, None] + (np.arange(size) - (size - 1)) / rate).ravel()
+    faults = {Fault.LATE_STAMPS, Fault.LOST} if drops else {Fault.LATE_STAMPS}
+    return received(
+        random, Clock(random), times, rate, stamped=stamped, sent=np.repeat(sent, size),
+        treatment=Treatment(rate, dejitter=Dejitter.ENVELOPE, transport_s=least),
+        faults=frozenset(faults), clean=False,
     )  # fmt: skip
 
 
@@ -119,11 +150,13 @@ def bad_wireless(random):
     )  # fmt: skip
 
 
-def busy_and_slewed(random):
+def busy_and_slewed(random, *, sampler="own"):
     """NTP turns the clock of a computer that is busy: most exchanges wait for one of two programs.
 
     How often, for how long and for which of them is drawn; at times all of them wait as long
-    as the clock is turned.
+    as the clock is turned. The sampler has a crystal of its "own", or is a program that goes by
+    the "turned" clock and so changes its rate; or there is "none", and markers come when they will:
+    where all probes were held up, a turn and a step are the same to them.
     """
     clock = Clock(random)
     begin, length = START + random.uniform(15, 60), random.uniform(5, 30)
@@ -138,9 +171,22 @@ def busy_and_slewed(random):
             return tuple(random.exponential(1e-5, (2, 8)))
         return tuple(random.exponential(size, (2, 8)) * [[lean], [1.0 - lean]])
 
+    rate, times = 250.0, regular(random, 250.0, 80, 200)
+    if sampler == "turned":
+        fine = np.arange(times[0], times[-1] + 0.1, 0.1)
+        read = clock(fine)
+        times = np.interp(np.linspace(read[0], read[-2], len(times)), read, fine)
+    if sampler == "none":
+        rate, times = 0.0, np.sort(random.uniform(times[0], times[-1], 600))
+    faults = frozenset({Fault.SLEWED} if sampler == "own" else ())
+    perhaps = {
+        "own": {Fault.CONGESTED},
+        "turned": {Fault.CONGESTED, Fault.SLEWED, Fault.CHANGED_RATE},
+        "none": {Fault.CONGESTED, Fault.SLEWED, Fault.STEPPED},
+    }[sampler]
     return received(
-        random, clock, regular(random, 250.0, 80, 200), 250.0, way=random.uniform(1.5e-5, 1e-4),
-        congestion=waits, clean=False, perhaps=frozenset({Fault.CONGESTED, Fault.SLEWED}),
+        random, clock, times, rate, way=random.uniform(1.5e-5, 1e-4), congestion=waits,
+        clean=sampler == "own", faults=faults, perhaps=frozenset(perhaps),
     )  # fmt: skip
 
 
@@ -227,11 +273,15 @@ EITHER = frozenset({Fault.STEPPED, Fault.SLEWED})
 
 MORE: dict[str, Callable] = {
     "samples of bursts stamped one by one": one_by_one,
+    "chunks stamped when sent, under load": chunks_under_load,
+    "the same, and samples lost": partial(chunks_under_load, drops=True),
     "two or three faults at once": together,
     "wireless that comes and goes": bad_wireless,
     "our own clock slewed, logged": lambda r: own_slewed(r, logged=True),
     "our own clock slewed, not logged": lambda r: own_slewed(r, logged=False),
     "slewed, and its computer busy": busy_and_slewed,
+    "slewed with its sampler, and its computer busy": partial(busy_and_slewed, sampler="turned"),
+    "markers, slewed, and their computer busy": partial(busy_and_slewed, sampler="none"),
     "small steps of its clock": lambda r: stepping(r, 5e-3, 5e-2, 1, faults=STEPPED),
     "steps too small to tell": lambda r: stepping(r, 5e-4, 5e-3, 3, clean=False, perhaps=EITHER),
     "steps again and again": lambda r: stepping(r, 0.05, 5.0, 8, faults=STEPPED),

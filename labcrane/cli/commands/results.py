@@ -38,7 +38,7 @@ LEFT_OUT = 3
 def export(
     data: DataFolder,
     to: Annotated[
-        str, typer.Option(help="tables, matlab, bids, psychds, xdf; see labcrane plugins")
+        str, typer.Option(help="tables, matlab, bids, psychds, xdf, zip; see labcrane plugins")
     ],
     folder: Annotated[Path, typer.Option("--out", help="a folder that is empty or new")],
     include: Include = None,
@@ -299,6 +299,7 @@ def progress_bar(what: str, total: int) -> Iterator[Any]:
         Progress,
         TextColumn,
         TimeElapsedColumn,
+        TimeRemainingColumn,
     )
 
     parts = (
@@ -306,6 +307,8 @@ def progress_bar(what: str, total: int) -> Iterator[Any]:
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
     )
     with Progress(*parts, console=out.console) as progress:
         task = progress.add_task(what, total=total)

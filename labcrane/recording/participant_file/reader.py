@@ -17,6 +17,7 @@ from labcrane.recording.participant_file.columns import holds_texts, text_of, te
 from labcrane.recording.participant_file.session_group import SYNC_REPORT
 from labcrane.recording.participant_file.stream_group import BASES
 from labcrane.recording.participant_file.writer import group_name, reading
+from labcrane.recording.xdf.header import StreamHeader
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -103,6 +104,14 @@ class Stream:
         with reading(self._path) as file:
             columns = _columns(file[self._group])
             return {name: str(dataset.attrs.get("unit", "")) for name, dataset in columns}
+
+    @cached_property
+    def header(self) -> StreamHeader | None:
+        """What the source says of itself and its channels; None for the session's own signals."""
+        if "rate_hz" not in self.attrs:
+            return None
+        with reading(self._path) as file:
+            return StreamHeader.from_xml(text_of(file[self._group].parent["header"]))
 
     def _beside(self, name: str) -> FloatArray | None:
         """Return a column beside the corrected time; None where there is none."""

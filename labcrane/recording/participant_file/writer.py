@@ -18,6 +18,7 @@ from labcrane.files.atomic import replacing
 from labcrane.files.lock import alone_in
 from labcrane.recording.foreign_streams import RecordedStream, read_streams
 from labcrane.recording.journal_reader import JournalState, SessionLog, read_journal
+from labcrane.recording.participant_file.about import ABOUT, write_about
 from labcrane.recording.participant_file.columns import node_names, write_attributes
 from labcrane.recording.participant_file.containment import check_containment, check_heaps
 from labcrane.recording.participant_file.session_group import write_session
@@ -184,7 +185,7 @@ def _write(beside: Path, path: Path, session: _Session, conclude: Conclude | Non
             with opened(path) as old:
                 _refuse_less(path, old, session)
                 for name in old:
-                    if name != session.group:
+                    if name != session.group and name not in ABOUT:
                         old.copy(name, new)
                 about = dict(old.attrs)
         else:
@@ -202,6 +203,7 @@ def _write(beside: Path, path: Path, session: _Session, conclude: Conclude | Non
         write_signal_faults(group, session.log, session.streams)
         if conclude is not None:
             conclude(group)
+        write_about(new, context)
 
 
 @contextmanager

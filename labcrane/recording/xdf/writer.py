@@ -88,6 +88,9 @@ class XdfWriter:
     now
         The clock of a simulation, in seconds: its files then depend on nothing but what was
         simulated, and their dates are counted from 1970. The computer's clock by default.
+    checked
+        Whether the checksums are written: of a journal, not of a file for other programs, which
+        would take their stream for a measurement.
 
     Raises
     ------
@@ -96,8 +99,14 @@ class XdfWriter:
     """
 
     def __init__(
-        self, path: Path, sync_s: float = SYNC_S, now: Callable[[], float] | None = None
+        self,
+        path: Path,
+        sync_s: float = SYNC_S,
+        now: Callable[[], float] | None = None,
+        *,
+        checked: bool = True,
     ) -> None:
+        self._checked = checked
         self._file = AppendFile(path, sync_s)
         self._lock = threading.Lock()
         self._streams: dict[int, _Written] = {}
@@ -106,7 +115,8 @@ class XdfWriter:
         self._due = self._now() + CHECK_EVERY_S
         # In one call, so that no check can come before the header of the checks.
         start = MAGIC + pack(Tag.FILE_HEADER, _file_header(part_number(path), now).encode())
-        self._write(start + pack_stream(Tag.STREAM_HEADER, CHECK_ID, CHECK_HEADER.xml), 0.0)
+        head = pack_stream(Tag.STREAM_HEADER, CHECK_ID, CHECK_HEADER.xml) if checked else b""
+        self._write(start + head, 0.0)
 
     @property
     def path(self) -> Path:
@@ -213,7 +223,8 @@ class XdfWriter:
                 for number, written in self._streams.items():
                     footer = pack_stream(Tag.STREAM_FOOTER, number, written.footer())
                     self._write(footer, self._checks.last)
-                self._write_last_checks()
+                if self._checked:
+                    self._write_last_checks()
         finally:
             self._file.close()
 
@@ -238,7 +249,9 @@ class XdfWriter:
 
     def _write(self, chunk: bytes, stamp: float) -> None:
         """Write a chunk and note its check; once a second the checks go with it, in one call."""
-        if (now := self._now()) < self._due:
+        if not self._checked:
+            self._file.write(chunk)
+        elif (now := self._now()) < self._due:
             self._file.write(chunk)
             self._checks.add(chunk, stamp)
         else:

@@ -32,6 +32,11 @@ class Smoothed:
     walk: FloatArray
     evidence: float
 
+    @property
+    def has_knees(self) -> bool:
+        """Whether skew was let change freely anywhere."""
+        return bool(len(self.walk)) and bool(self.walk.max() > 4.0 * np.median(self.walk) + 1e-12)
+
     def at(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return offset and its standard deviation at any times, shape ``(n_times,)`` each.
 

@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.errors import RecordingError
-from labcrane.streams.sync.dejitter import Dejitter, even, follow_sample_clock
+from labcrane.streams.sync.dejitter import Dejitter, even, follow_sample_clock, left_open
 from labcrane.streams.sync.epochs import epochs
 from labcrane.streams.sync.own_clock import OwnClock
 from labcrane.streams.sync.placement import Placement, place
@@ -190,7 +190,7 @@ def _evened(
         elif way in {Dejitter.LEAST_SQUARES, Dejitter.ENVELOPE}:
             index = sampling.index if raw.index is None else raw.index[part]
             time[part] = even(placed.time[part], index, way)
-            error[part] += sampling.noise_s / 4.0  # asked for: how right it is was not tested
+            error[part] += sampling.noise_s / 4.0 + left_open(placed.time[part], time[part], way)
         else:
             error[part] += sampling.noise_s
     return time, error

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from enum import StrEnum
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from labcrane.streams.sync.smoother import smooth
 from labcrane.types import FloatArray
@@ -27,6 +28,10 @@ MOST_BLOCKS = 100
 
 STRETCH_S = 120.0
 BLOCK_S = 0.05
+
+PASSING_S, SOON_S = 5.0, 1.0
+"""Delays pass within the first; what has shifted all samples for longer is a gap. Within the second
+some samples of most seconds are hardly delayed."""
 
 Line = Callable[[FloatArray], FloatArray]
 
@@ -99,9 +104,32 @@ def runs(times: FloatArray, index: FloatArray) -> list[tuple[int, int]]:
     odd = np.abs(steps - period * counts)
     # Eight times what nearly all steps stay below: chunks that travel unevenly are no gaps.
     limit = min(max(1.5 * period, 8.0 * float(np.quantile(odd, 0.995))), 1.0)
-    cuts = np.flatnonzero((odd > limit) | (counts < 1.0)) + 1
-    bounds = [0, *map(int, cuts), len(times)]
+    rest = times - period * index
+    near = max(round(PASSING_S / period), 1)
+    cuts = [
+        int(k) + 1
+        for k in np.flatnonzero((odd > limit) | (counts < 1.0))
+        if counts[k] < 1.0
+        or abs(rest[k + 1 : k + 1 + near].min() - rest[max(k + 1 - near, 0) : k + 1].min()) > limit
+    ]
+    bounds = [0, *cuts, len(times)]
     return list(itertools.pairwise(bounds))
+
+
+def left_open(times: FloatArray, evened: FloatArray, way: Dejitter) -> FloatArray:
+    """Return how far lines that were asked for may be off, in seconds, shape ``(n,)``.
+
+    The soonest of a second's samples, or the middle one, would lie on them if they were right. What
+    lies apart was delayed for so long, or the lines are wrong, as after samples that were lost
+    uncounted: nothing tells which.
+    """
+    apart, span = times - evened, float(np.ptp(times))
+    blocks = np.array_split(np.arange(len(times)), max(int(span / SOON_S), 1))
+    soonest = 0.0 if way is Dejitter.ENVELOPE else 0.5
+    level = np.array([abs(float(np.quantile(apart[block], soonest))) for block in blocks])
+    wide = round(PASSING_S / SOON_S)
+    worst = sliding_window_view(np.pad(level, wide, mode="edge"), 2 * wide + 1).max(axis=1)
+    return np.repeat(worst, [len(block) for block in blocks])
 
 
 def _follow(times: FloatArray, index: FloatArray, way: Dejitter) -> FloatArray:

@@ -10,6 +10,7 @@ from labcrane.streams.sync.offset import SURE, OffsetCurve, fit
 from labcrane.streams.sync.quality import Basis, Segment
 from labcrane.streams.sync.raw import REMOTE, RawStream
 from labcrane.streams.sync.smoother import smooth
+from labcrane.streams.sync.steady_sampler import SteadySampler
 from labcrane.types import FloatArray
 
 WRONG_CLOCK_S = 0.25
@@ -66,7 +67,7 @@ _Piece = tuple[int, int, Epoch, OffsetCurve | None]
 
 def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> Placement:
     """Place every sample, by its own clock's probes, else by arrivals, else not at all (NaN)."""
-    curves = _curves(stretches)
+    curves = _curves(raw.stamps if regular else None, stretches)
     arrival = raw.arrival()
     least = _least_lag(raw.stamps, arrival, stretches, curves, regular=regular)
     whose = ""
@@ -85,8 +86,11 @@ def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> Placement
     return Placement(time, error, segments, probed, least, whose)
 
 
-def _curves(stretches: list[Epoch]) -> list[OffsetCurve | None]:
-    """Return each clock's curve, the longest known first: it lends its slope to brief ones."""
+def _curves(steady: FloatArray | None, stretches: list[Epoch]) -> list[OffsetCurve | None]:
+    """Return each clock's curve, the longest known first: it lends its slope to brief ones.
+
+    ``steady`` are the stamps of a regular stream.
+    """
     curves: list[OffsetCurve | None] = [None] * len(stretches)
     slope = 0.0
     lengths = [
@@ -94,7 +98,9 @@ def _curves(stretches: list[Epoch]) -> list[OffsetCurve | None]:
     ]
     for k in sorted(range(len(stretches)), key=lambda k: -lengths[k]):
         if len(stretches[k].probes):
-            curve = curves[k] = fit(stretches[k].probes, slope)
+            part = slice(stretches[k].start, stretches[k].stop)
+            sampler = None if steady is None else SteadySampler.of(steady[part])
+            curve = curves[k] = fit(stretches[k].probes, slope, sampler)
             slope = slope or curve.slope
     return curves
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from labcrane.streams.sync.late_chunks import lost_before, lost_between, slope, soonest
 from labcrane.types import FloatArray
 
 FEW = 20
@@ -28,8 +29,8 @@ SAME = 0.5
 
 DELAYS = 0.25
 RATE_CHANGE = 1e-3
-STEADY = 1.5e-4
-"""No crystal is further off the rate that stamps are computed by: what is, was lost."""
+PIECES = 8
+"""So many pieces at least tell a changing rate."""
 
 LEAST_NOISE_S = 5e-5
 LATTICES = (1e-2, 1e-3, 1e-4)
@@ -173,11 +174,15 @@ def _steps(time: FloatArray, index: FloatArray, lattice: float, *, counted: bool
     gaps = whole > 1.5 if exact or counted else whole > 1.0  # noqa: PLR2004
     missing = int((whole - 1.0)[gaps].sum())
     position = index if counted else index[0] + np.r_[0.0, np.cumsum(whole)]
-    span = float(position[-1] - position[0])
-    mean, usual = _slope(position, time), float(np.median(local))
-    if computed and not clumped and not counted and mean > usual * (1.0 + STEADY):
-        missing += max(round(span * (mean / usual - 1.0)), 1)
-        mean = usual
+    mean, usual = slope(position, time), float(np.median(local))
+    if computed and not clumped and not counted:
+        first = np.r_[0, np.flatnonzero(~same) + 1]
+        rest = time[first] - usual * position[first]
+        lost, mean = lost_between(position[first], rest, usual)
+        if lost:
+            before = lost_before(rest, usual)
+            position = position + np.repeat(before, np.diff(np.r_[first, len(time)]))
+            missing += max(int(before[-1]), 1)
     longest = float(steps[gaps].max(initial=0.0))
     return _Steps(
         time, mean, local, position, missing, int(gaps.sum()), longest, exact, computed, balance
@@ -190,11 +195,6 @@ def _typical(time: FloatArray, index: FloatArray) -> float:
     return float(
         np.median((time[most:] - time[:-most]) / np.maximum(index[most:] - index[:-most], 1.0))
     )
-
-
-def _slope(x: FloatArray, y: FloatArray) -> float:
-    away = x - x.mean()
-    return float(away @ (y - y.mean())) / float(away @ away)
 
 
 def _local(steps: FloatArray) -> FloatArray:
@@ -219,19 +219,19 @@ def _is_shuffled(steps: FloatArray, in_order: FloatArray) -> bool:
 
 def _rates(found: _Steps) -> tuple[float, ...]:
     """Return the rates at first and at last where they differ by more than stamps scatter."""
-    count = 40
-    edges = np.linspace(0, len(found.time) - 1, count + 1).astype(int)
+    edges = np.linspace(0, len(found.time) - 1, 41).astype(int)
+    blurred = 0.0
+    if found.computed:
+        edges, blurred = soonest(found.time, found.period, found.index)
     span = np.diff(found.index[edges])
-    if (span <= 0).any() or (found.computed and found.balance >= DELAYS):
+    if len(span) < PIECES or (span <= 0).any() or (found.computed and found.balance >= DELAYS):
         return ()
     rate = np.diff(found.time[edges]) / span
     scatter = 1.4826 * float(np.median(np.abs(np.diff(rate)))) / np.sqrt(2.0)
     ends = [float(np.median(part)) for part in (rate[:4], rate[-4:])]
     mean = float(np.median(rate))
     low, high = np.quantile(rate, (0.05, 0.95))
-    # Where bursts are stamped at once, an edge may lie anywhere within one.
-    burst = float(np.quantile(np.diff(found.time), 0.99)) if found.computed else 0.0
-    blurred = 4.0 * burst * mean / float(np.diff(found.time[edges]).min())
+    blurred *= mean / float(np.diff(found.time[edges]).min())
     if high - low < max(RATE_CHANGE * mean, 8.0 * scatter, blurred):
         return ()
     if found.exact or abs(ends[1] - ends[0]) > RATE_CHANGE * mean:
@@ -267,9 +267,9 @@ def _noise(
         late = arrival - time + (rest - level)  # what arrival does on top of a steady clock
         own = rest - level
         near = apart < 4.0 * spread
-        slope = float(own[near] @ (late - late.mean())[near]) / float(own[near] @ own[near])
+        share = float(own[near] @ (late - late.mean())[near]) / float(own[near] @ own[near])
         doubt = float(late.std()) / (float(own[near].std()) * np.sqrt(near.sum()))
-        if slope + 3.0 * doubt < 1.0 - UNLIKE and slope < UNLIKE:
+        if share + 3.0 * doubt < 1.0 - UNLIKE and share < UNLIKE:
             return spread, False
     return 0.0, False
 

@@ -15,7 +15,7 @@ SUPERVISOR, PARTICIPANT = "supervisor", "participant"
 
 RIGHTS: Mapping[str, frozenset[Order]] = {
     SUPERVISOR: frozenset(Order) - {Order.DENIED},
-    PARTICIPANT: frozenset({Order.ANSWER, Order.SUBMIT, Order.CONSENT}),
+    PARTICIPANT: frozenset({Order.ANSWER, Order.SUBMIT, Order.CONSENT, Order.REPORT}),
 }
 """What each page may ask of the session."""
 

@@ -24,9 +24,11 @@ LAGS = 6.0
 WHOLE = 0.8
 """A layer that covers this share of the joint's range, or more, lacks only its run-up."""
 
-WEAKEST = 3
-"""Layers, of those that go all the way, whose first moments give dead time and lag: there the joint
-is still at angles that the layers cover when the valve is open."""
+PASSES = 8
+"""At most: layers need the run-up, which needs the layers. Two or three are enough."""
+
+NEAR = 6
+"""Points of a curve, 3 degrees, whose ratio to a weaker one's holds where it was not measured."""
 
 PARABOLA = 3
 
@@ -78,17 +80,19 @@ def _direction(
     _check(recording, signals)
     found_band = settings.dead_band == "found"
     dead_band = _dead_band(recording, sign, settings) if found_band else 0.0
-    found = Direction(
-        dead_band, 0.0, 0.0, _layers(recording, signals, limits, FIRST_RUN_UP_S, settings)
-    )
-    far = [layer.signal for layer in found.layers if layer.whole] or signals[-1:]
-    first = [run for signal in far[:WEAKEST] for run in recording.at(signal)]
-    dead_time, lag = identify(found, first, settings.between)
-    run_up = dead_time + LAGS * lag
-    layers = _layers(recording, signals, limits, run_up, settings)
-    found = Direction(dead_band, dead_time, lag, layers)
-    dead_time, lag = identify(found, first, settings.between)
-    return Direction(dead_band, dead_time, lag, layers)
+    layers = _layers(recording, signals, limits, FIRST_RUN_UP_S, settings)
+    far = [layer.signal for layer in layers if layer.whole] or signals[-1:]
+    first = [run for signal in far for run in recording.at(signal)]
+    found = Direction(dead_band, 0.0, 0.0, layers)
+    delays = identify(found, first, settings.between)
+    for _ in range(PASSES):
+        before, (dead_time, lag) = delays, delays
+        layers = _layers(recording, signals, limits, dead_time + LAGS * lag, settings)
+        found = Direction(dead_band, dead_time, lag, layers)
+        delays = identify(found, first, settings.between, around=before)
+        if delays == before:
+            break
+    return found
 
 
 def _check(recording: SegmentRecording, signals: Sequence[int]) -> None:
@@ -128,29 +132,49 @@ def _layers(
     run_up_s: float,
     settings: FitSettings,
 ) -> tuple[Layer, ...]:
-    return tuple(
-        _layer(recording, signal, limits, run_up_s, settings.max_degree) for signal in signals
-    )
+    found: list[Layer] = []
+    weaker: SpeedCurve | None = None
+    for signal in signals:
+        curve = _measured(recording, signal, run_up_s)
+        if curve is None:
+            found.append(Layer(signal, limits, whole=False, coefficients=()))
+            continue
+        curve = curve if weaker is None else _set_off(curve, weaker, signal)
+        lowest, highest = curve.covers
+        whole = highest - lowest >= WHOLE * (limits[1] - limits[0])
+        polynomial = fit(curve, settings.max_degree).coefficients
+        found.append(Layer(signal, curve.covers, whole, polynomial))
+        weaker = curve
+    return tuple(found)
 
 
-def _layer(
-    recording: SegmentRecording,
-    signal: int,
-    limits: tuple[float, float],
-    run_up_s: float,
-    max_degree: int,
-) -> Layer:
+def _measured(recording: SegmentRecording, signal: int, run_up_s: float) -> SpeedCurve | None:
     curve = curve_at(recording, signal, run_up_s)
-    if curve is None:
-        if any(moves(run) for run in recording.at(signal)):
-            raise RecordingError(
-                f"{recording.file}: after a run-up of {run_up_s:.2g} s too little of the run at "
-                f"signal {signal} is left to fit a speed; record it from further away"
-            )
-        return Layer(signal, limits, whole=False, coefficients=())
+    if curve is None and any(moves(run) for run in recording.at(signal)):
+        raise RecordingError(
+            f"{recording.file}: after a run-up of {run_up_s:.2g} s too little of the run at "
+            f"signal {signal} is left to fit a speed; record it from further away"
+        )
+    return curve
+
+
+def _set_off(curve: SpeedCurve, weaker: SpeedCurve, signal: int) -> SpeedCurve:
+    """Return a curve that begins where a weaker signal's does, with that one's shape.
+
+    The stronger the signal, the more degrees go by while the valve opens. Held there, the last
+    speed is wrong by as much as the lever geometry changes, and so are dead time and lag.
+    """
     lowest, highest = curve.covers
-    whole = highest - lowest >= WHOLE * (limits[1] - limits[0])
-    return Layer(signal, curve.covers, whole, fit(curve, max_degree).coefficients)
+    before = weaker.angle < lowest if signal > 0 else weaker.angle > highest
+    if not before.any():
+        return curve
+    near = slice(None, NEAR) if signal > 0 else slice(-NEAR, None)
+    theirs = np.interp(curve.angle[near], weaker.angle, weaker.speed)
+    ratio = float(curve.speed[near] @ theirs / (theirs @ theirs))
+    angle = np.concatenate([curve.angle, weaker.angle[before]])
+    speed = np.concatenate([curve.speed, ratio * weaker.speed[before]])
+    order = np.argsort(angle, kind="stable")
+    return SpeedCurve(angle[order], speed[order])
 
 
 def curve_at(recording: SegmentRecording, signal: float, run_up_s: float) -> SpeedCurve | None:

@@ -20,16 +20,20 @@ SIGNALS, ANGLES = 26, 80
 
 
 def identify(
-    direction: Direction, runs: Sequence[JointRun], between: Between
+    direction: Direction,
+    runs: Sequence[JointRun],
+    between: Between,
+    around: tuple[float, float] | None = None,
 ) -> tuple[float, float]:
     """Return dead time and lag in seconds with which the model follows the recordings best.
 
     The valve's opening, which is the signal beyond the dead band, is first order; the joint moves
-    at the speed of the opening reached (docs/decisions/0050).
+    at the speed of the opening reached (docs/decisions/0050). They are looked for within 20 ms of
+    ``around``, if it is given, and up to 0.6 s otherwise.
     """
     tables = [_SetOff(direction, run, between) for run in runs]
     delays = np.arange(0.0, LONGEST_S + COARSE_S / 2, COARSE_S)
-    dead_time, lag = _best(tables, delays, delays)
+    dead_time, lag = around or _best(tables, delays, delays)
     near = np.arange(-COARSE_S, COARSE_S + FINE_S / 2, FINE_S)
     dead_time, lag = _best(tables, np.maximum(dead_time + near, 0.0), np.maximum(lag + near, 0.0))
     return round(dead_time, 4), round(lag, 4)

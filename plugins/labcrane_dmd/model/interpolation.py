@@ -10,18 +10,19 @@ FULL = 250.0
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """A polynomial of speed over angle, good for the angles that were measured.
+    """A polynomial of speed over angle, good for the angles that it covers.
 
     Attributes
     ----------
     signal
         Valve signal, with its sign.
     covers
-        Lowest and highest measured angle, in rad.
+        Lowest and highest angle, in rad: the measured ones, and where the joint set off, those of
+        the next weaker layer.
     whole
         Whether these are, but for the run-up, all angles of the joint.
     coefficients
-        In rad/s, of 1, x, x², ...; x goes from -1 to 1 over the measured angles. None at all for
+        In rad/s, of 1, x, x², ...; x goes from -1 to 1 over the covered angles. None at all for
         a signal at which the joint stands still.
     """
 
@@ -31,7 +32,7 @@ class Layer:
     coefficients: tuple[float, ...]
 
     def speed(self, angle: float) -> float:
-        """Return the speed in rad/s at ``angle`` in rad; beyond the measured ones, the end's."""
+        """Return the speed in rad/s at ``angle`` in rad; beyond the covered ones, the end's."""
         lowest, highest = self.covers
         x = (2.0 * angle - lowest - highest) / (highest - lowest)
         x = 1.0 if x > 1.0 else -1.0 if x < -1.0 else x

@@ -22,6 +22,8 @@ HEADER = """\
 # speed in deg/s = c0 + c1 x + c2 x^2 + ...; x goes from -1 to 1 over the layer's covers_deg.
 # Layers with whole: false did not get over the whole range while they were recorded; beyond
 # covers_deg they go like the next stronger layer. Others keep the speed of their last angle.
+# Where the joint set off, the angles in which the valve was still opening have the next weaker
+# layer's shape.
 """
 
 
@@ -32,7 +34,8 @@ class LayerText(Settings):
     """Valve signal."""
 
     covers_deg: tuple[float, float]
-    """Lowest and highest measured angle, in degrees."""
+    """Lowest and highest angle, in degrees: the measured ones, and where the joint set off, those
+    of the next weaker layer."""
 
     whole: bool
     """Whether these are, but for the run-up, all angles of the joint."""

@@ -1,0 +1,157 @@
+"""MNE object of a stream of EEG, with the session's events at their samples."""
+
+from datetime import datetime, timedelta
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from labcrane.analysis.electrodes.sampled import Sampled, sampled
+from labcrane.errors import PluginError, RecordingError, nearest
+from labcrane.files.units import in_unit
+from labcrane.recording.labels import labelled
+from labcrane.recording.participant_file.reader import SessionRecord, Stream
+
+if TYPE_CHECKING:
+    import mne
+
+EEG = "EEG"
+
+EEG_READERS = "pip install 'labcrane[eeg]'"
+"""How to get what reads and writes EEG."""
+
+KINDS = {
+    "EEG": "eeg", "EOG": "eog", "ECG": "ecg", "EKG": "ecg", "EMG": "emg", "GSR": "gsr",
+    "RESP": "resp", "TEMP": "temperature", "STIM": "stim", "TRIGGER": "stim",
+}  # fmt: skip
+"""MNE's types of channels by those of XDF; all others are ``misc``, as they were recorded."""
+
+ELECTRIC = ("eeg", "eog", "ecg", "emg")
+"""Types that MNE has in volts."""
+
+GAP = "BAD_gap"
+"""Annotation at which samples are missing: MNE leaves out epochs that go over one."""
+
+
+def eeg_streams(session: SessionRecord) -> list[Stream]:
+    """Return a session's streams of the type ``EEG``, in the order of their names."""
+    found = (stream for stream in session.streams.values() if stream.attrs.get("type") == EEG)
+    return sorted(found, key=lambda stream: stream.name)
+
+
+def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") -> "mne.io.RawArray":
+    """Return a stream of EEG as MNE's ``Raw``, with the session's events as annotations.
+
+    Samples are as they were recorded. Each event is at the sample that was taken when it happened,
+    by the corrected clock; those outside of the recording are left out. Annotations are called by
+    labels (docs/markers.md): ``mne.events_from_annotations`` and ``epochs["trial_start"]`` find
+    all that begin so. Where samples are missing is ``BAD_gap``.
+
+    Parameters
+    ----------
+    session
+        Of a participant file: ``open_recording(path).session(1)``.
+    stream
+        Name of the stream; the only one of type ``EEG`` by default.
+    unit
+        In which numbers of channels are whose unit the source does not state: ``microvolts``.
+
+    Raises
+    ------
+    RecordingError
+        There is no such stream, its clock was not corrected, or its unit is neither known nor
+        electric.
+    PluginError
+        MNE is not installed.
+    """
+    try:
+        import mne
+    except ImportError as error:
+        raise PluginError(f"MNE is not installed: {EEG_READERS}") from error
+    chosen = _chosen(session, stream)
+    signal = sampled(chosen)
+    kinds = channel_types(signal, chosen)
+    info = mne.create_info(list(signal.labels), signal.rate_hz, list(kinds))
+    scaled = signal.data.T * volts(signal, chosen, unit)[:, None]
+    raw = mne.io.RawArray(scaled, info, verbose="error")
+    started = datetime.fromisoformat(str(session.attrs["started"]))
+    zero = session.streams["state"].time[0]
+    raw.set_meas_date(started + timedelta(seconds=float(signal.time[0] - zero)))
+    onsets, labels = events_at(session, signal)
+    gaps = signal.gaps.astype(np.float64)
+    raw.set_annotations(
+        mne.Annotations(
+            np.concatenate([onsets, gaps]) / signal.rate_hz,
+            np.concatenate([np.zeros(len(onsets)), np.full(len(gaps), 1.0 / signal.rate_hz)]),
+            [*labels, *[GAP] * len(gaps)],
+            orig_time=raw.info["meas_date"],
+        ),
+        verbose="error",
+    )
+    return raw
+
+
+def events_at(session: SessionRecord, signal: Sampled) -> tuple[Any, list[str]]:
+    """Return at which samples events happened, with fractions, and the events' labels.
+
+    Those outside of the recording are left out.
+    """
+    events = session.events.sort_values("time", kind="stable")
+    told = zip(events["name"].astype(str), events["data"], strict=True)
+    positions = signal.at(events["time"].to_numpy(np.float64))
+    inside = np.isfinite(positions)
+    labels = labelled(told)
+    return positions[inside], [label for label, there in zip(labels, inside, strict=True) if there]
+
+
+def channel_types(signal: Sampled, stream: Stream) -> tuple[str, ...]:
+    """Return MNE's type of each channel; one that states none is what its stream is."""
+    usual = str(stream.attrs.get("type", ""))
+    return tuple(KINDS.get((kind or usual).upper(), "misc") for kind in signal.kinds)
+
+
+def volts(signal: Sampled, stream: Stream, unit: str = "") -> Any:
+    """Return by what each channel is multiplied to be in volts, shape ``(n_channels,)``.
+
+    Channels that are nothing electric stay as they are.
+
+    Raises
+    ------
+    RecordingError
+        An electric channel's unit is neither stated nor given, or it is no voltage.
+    """
+    kinds = channel_types(signal, stream)
+    scale = np.ones(len(kinds))
+    for number, (kind, stated) in enumerate(zip(kinds, signal.units, strict=True)):
+        if kind in ELECTRIC:
+            scale[number] = _volts(stated or unit, f"{stream.name!r}, {signal.labels[number]!r}")
+    return scale
+
+
+def _volts(unit: str, channel: str) -> float:
+    if not unit:
+        raise RecordingError(
+            f"channel {channel} states no unit; give the one of its source: unit='microvolts', or "
+            "labcrane export --set eeg_unit=microvolts"
+        )
+    try:
+        microvolts = in_unit(f"1 {unit}", "uV")
+    except ValueError as error:
+        raise RecordingError(f"channel {channel} is in no voltage: {error}") from error
+    if microvolts is None:
+        raise RecordingError(f"channel {channel} is in {unit!r}, which is no unit of a voltage")
+    return 1e-6 * microvolts
+
+
+def _chosen(session: SessionRecord, name: str | None) -> Stream:
+    if name is not None:
+        if name not in session.streams:
+            there = nearest(name, list(session.streams), "there is")
+            raise RecordingError(f"there is no stream {name!r}; {there}")
+        return session.streams[name]
+    found = eeg_streams(session)
+    if len(found) != 1:
+        names = ", ".join(repr(stream.name) for stream in found) or "none"
+        raise RecordingError(
+            f"the session's streams of type {EEG!r} are {names}; say which one: stream='NAME'"
+        )
+    return found[0]

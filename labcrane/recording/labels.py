@@ -1,0 +1,172 @@
+"""Labels of events: plain, few and the same in every session, for programs that epoch by name.
+
+docs/markers.md says how they are made; :data:`KNOWN` says what each means, also in HED.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+from labcrane.core.records import Event
+
+LABELS = "labcrane.labels"
+"""Name of the stream of labels, live and in exports."""
+
+HED_VERSION = "8.3.0"
+
+LONGEST = 64
+"""Letters of a level; a longer text is no level, but a scene or a remark."""
+
+BLOCK = ("block", "block_name", "task", "practice")
+TRIAL = ("trial", "attempt", *BLOCK, "counted", "group", "reference")
+"""What every trial's event says beside the condition."""
+
+
+class Meaning(NamedTuple):
+    """What an event is.
+
+    Attributes
+    ----------
+    words
+        For people.
+    hed
+        In Hierarchical Event Descriptors, in brackets with a label of its own: tags at the same
+        onset are joined, and HED refuses what is said twice.
+    """
+
+    words: str
+    hed: str
+
+
+def _tagged(words: str, name: str, *tags: str) -> Meaning:
+    return Meaning(words, f"({', '.join((*tags, f'Label/{name_of(name)}'))})")
+
+
+def name_of(event: str) -> str:
+    """Return an event's plain name: ``trial.start`` is ``trial_start``."""
+    return event.replace(".", "_")
+
+
+_STRUCTURE, _CONTROL = "Experiment-structure", "Experiment-control"
+_SHOWN = ("Sensory-event", "Visual-presentation")
+_MOVED = ("Agent-action", "(Move, Machine)")
+
+KNOWN: Mapping[str, Meaning] = {
+    name_of(name): _tagged(words, name, *tags)
+    for name, words, *tags in (
+        ("session.start", "the session, or a part of it after an interruption, begins", _STRUCTURE),
+        ("session.end", "the session has come to its end", _STRUCTURE),
+        ("step.start", "a step of the session begins", _STRUCTURE),
+        ("step.end", "a step of the session ends", _STRUCTURE),
+        ("block.start", "a block of trials begins", _STRUCTURE),
+        ("block.end", "a block of trials ends", _STRUCTURE),
+        ("trial.start", "a trial begins", _STRUCTURE),
+        ("trial.end", "a trial ends", _STRUCTURE),
+        ("break.start", "a break begins", _STRUCTURE),
+        ("break.end", "a break ends", _STRUCTURE),
+        ("pause.start", "the machine is held at rest", _CONTROL),
+        ("pause.end", "the session goes on", _CONTROL),
+        ("instructions.shown", "instructions are shown", "Sensory-event", "Instructional"),
+        ("targets.shown", "the targets are shown", *_SHOWN, "(Target, Circle)"),
+        (
+            "command.onset", "the operator's hand moves", "Agent-action",
+            "Participant-response", "(Move, Hand)",
+        ),
+        ("movement.onset", "the machine moves", *_MOVED),
+        ("movement.offset", "the machine has come to rest", *_MOVED),
+        ("target.entered", "the tip is in the target", "Measurement-event", "(Target, Circle)"),
+        ("scene.placed", "the things of a scene are placed", *_SHOWN),
+        ("goal.reached", "a goal of the scenario is reached", "Measurement-event"),
+        ("contact.object", "the machine touches a thing", "Measurement-event"),
+        ("contact.body", "the machine touches a person", "Measurement-event"),
+        ("overload", "a thing or a person is pressed too hard", "Measurement-event", "Press"),
+        ("drop", "what was held has fallen", "Measurement-event", "Drop"),
+        (
+            "deformity.found", "the operator reports a deformity", "Agent-action",
+            "Participant-response",
+        ),
+        ("questionnaire.start", "a questionnaire is asked", "Sensory-event", "Instructional"),
+        ("questionnaire.end", "a questionnaire is handed in", "Agent-action"),
+        ("input.lost", "the operator's controls are lost", _CONTROL),
+        ("input.back", "the operator's controls are back", _CONTROL),
+    )
+}  # fmt: skip
+"""Labels of labcrane's own events; those of a plugin are made in the same way."""
+
+
+class Labels:
+    """Gives each event its label, in the order in which events happen.
+
+    A label is the event's plain name and, within a block, what the block and the trial are about:
+    ``trial_start/block=learning/direction=inward``. Only texts and truth values of a condition are
+    levels: numbers, as a target's place, would make every label another one.
+    """
+
+    def __init__(self) -> None:
+        self._block: tuple[str, ...] = ()
+        self._trial: tuple[str, ...] = ()
+
+    def label(self, event: Event) -> str:
+        """Return the event's label."""
+        return self.of(event.name, event.data)
+
+    def of(self, name: str, data: Mapping[str, Any]) -> str:
+        """Return the label of the event ``name``, which says ``data``."""
+        if name == "block.start":
+            self._block, self._trial = _block(data), ()
+        elif name == "trial.start":
+            self._trial = (*_block(data), *_levels(data))
+        levels = self._trial or self._block
+        if name == "trial.end":
+            # The rest of its row is results; of one whose process died, it alone says the trial.
+            outcome = plain(str(data.get("outcome", "")))
+            asked = {key: value for key, value in data.items() if key != "outcome"}
+            levels = self._trial or (*_block(asked), *_levels(asked))
+            levels = (*levels, f"outcome={outcome}") if outcome else levels
+            self._trial = ()
+        elif name == "block.end":
+            self._block = self._trial = ()
+        elif name in {"session.start", "session.resumed"}:
+            levels = self._block = self._trial = ()
+        return "/".join((name_of(name), *levels))
+
+
+def labelled(events: Iterable[tuple[str, Mapping[str, Any]]]) -> list[str]:
+    """Return the labels of a whole session's events, by name and data, in order."""
+    labels = Labels()
+    return [labels.of(name, data) for name, data in events]
+
+
+def hed_sidecar(names: Iterable[str]) -> dict[str, Any]:
+    """Return the description of a column of plain names: words, and HED tags.
+
+    As BIDS and the HED tools have it. Of an event that is not labcrane's own only its name is said.
+    """
+    meanings = {
+        name: KNOWN.get(name, _tagged(name.replace("_", " "), name, "Event"))
+        for name in sorted(set(names))
+    }
+    return {
+        "LongName": "Event",
+        "Description": "plain name of the event",
+        "Levels": {name: meaning.words for name, meaning in meanings.items()},
+        "HED": {name: meaning.hed for name, meaning in meanings.items()},
+    }
+
+
+def plain(text: str) -> str:
+    """Return a text in which letters, digits and ``+ - . _`` alone are left; others become _."""
+    return "".join(letter if letter.isalnum() or letter in "+-._" else "_" for letter in text)
+
+
+def _block(data: Mapping[str, Any]) -> tuple[str, ...]:
+    name = data.get("block_name") or data.get("block")
+    block = (f"block={plain(str(name))}",) if name else ()
+    return (*block, *(("practice",) if data.get("practice") else ()))
+
+
+def _levels(data: Mapping[str, Any]) -> list[str]:
+    return [
+        f"{plain(key)}={plain(str(value).lower() if isinstance(value, bool) else value)}"
+        for key, value in data.items()
+        if key not in TRIAL and isinstance(value, str | bool) and len(str(value)) <= LONGEST
+    ]

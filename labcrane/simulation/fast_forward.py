@@ -1,0 +1,150 @@
+"""Fast path of a simulation: compiled twins make the ticks in which nothing happens.
+
+It is the loop's law and the loop's bits. Which of the two ran, and why, is noted of every
+participant.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib.metadata import version
+from importlib.util import find_spec
+
+import numpy as np
+
+from labcrane.core.records import Frame, Phase, Run
+from labcrane.core.roles import Component, Task
+from labcrane.core.twin import Twin
+from labcrane.protocol.rig import Rig
+from labcrane.recording.frame_log import CODES, LOOP, BatchLog, FrameRow, sizes
+from labcrane.session.sequencer import Sequencer
+
+EXTRA = "labcrane[fast]"
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """By what a participant was simulated.
+
+    Attributes
+    ----------
+    compiled
+        Whether by twins; else by the loop.
+    why
+        Why not by twins; with them, what compiled them.
+    deviation
+        The largest difference to the loop that a twin allows itself; 0 for the same bits.
+    """
+
+    compiled: bool
+    why: str
+    deviation: float = 0.0
+
+
+class FastForward:
+    """Makes ticks by twins, from a frame on; built when the rig is open.
+
+    Parameters
+    ----------
+    rig, run
+        The open rig.
+    sequencer
+        Knows which trial is under way.
+    log
+        Where the rows go.
+    waiting
+        Whether somebody at the console wants something.
+
+    Attributes
+    ----------
+    way
+        Whether it can, and why not.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        run: Run,
+        sequencer: Sequencer,
+        log: BatchLog,
+        waiting: Callable[[], bool],
+    ) -> None:
+        self._run, self._log = run, log
+        self._sequencer, self._waiting = sequencer, waiting
+        self._rows = FrameRow(sizes(run))
+        self._places = np.cumsum([len(LOOP), *sizes(run)]).astype(np.int64)
+        self._seen = np.empty(self._rows.size)
+        self._about = np.empty(5)
+        self._twins: tuple[Twin, ...] = ()
+        self._tasks: Mapping[Task, Twin] = {}
+        self.way = self._find(rig)
+
+    def _find(self, rig: Rig) -> Way:
+        if find_spec("numba") is None:
+            return Way(compiled=False, why=f"numba is not installed; {EXTRA} brings it")
+        from labcrane.simulation.kernel import addresses, advance, same_arithmetic  # noqa: PLC0415
+
+        if not same_arithmetic():
+            return Way(compiled=False, why="compiled arithmetic is not Python's on this computer")
+        parts: dict[str, Component] = {
+            "operator": rig.input, "scheme": rig.controller, "dynamics": rig.dynamics,
+            **{f"task {name!r}": task for name, task in rig.tasks.items()},
+        }  # fmt: skip
+        twins = {name: part.twin() for name, part in parts.items()}
+        found = {name: twin for name, twin in twins.items() if twin is not None}
+        if missing := [name for name in twins if name not in found]:
+            return Way(compiled=False, why=f"{', '.join(missing)} has no compiled twin")
+        self._advance = advance
+        operator, scheme, dynamics, *tasks = found.values()
+        self._twins = (operator, scheme, dynamics)
+        self._tasks = dict(zip(rig.tasks.values(), tasks, strict=True))
+        self._functions = {
+            task: addresses(operator.tick, scheme.inverse, scheme.tick, dynamics.tick, twin.tick)
+            for task, twin in self._tasks.items()
+        }
+        most = sum(twin.changing for twin in found.values())
+        self._kept = np.empty(most)
+        compiler = f"numba {version('numba')}"
+        return Way(
+            compiled=True, why=compiler, deviation=max(twin.deviation for twin in found.values())
+        )
+
+    def __call__(self, frame: Frame, start: float) -> Frame:
+        """Make the ticks after ``frame``, in a run that began at ``start`` seconds.
+
+        Returns the frame of the last, or ``frame`` when there is none.
+        """
+        going = self._sequencer.going
+        if going is None or not self._twins or self._waiting():
+            return frame
+        twins = (*self._twins, self._tasks[going.task])
+        if not all(twin.take_over(twin.own, frame) for twin in twins):
+            return frame
+        number = frame.tick.number + 1
+        hands, scheme, machine, task = twins
+        read, inverse, command, step, evaluate = self._functions[going.task]
+        self._rows.fill(self._seen, frame)
+        self._about[:] = (
+            start, self._run.rate_hz, frame.trial, going.ticks, CODES[Phase.RUNNING],
+        )  # fmt: skip
+        changing = np.array([twin.changing for twin in twins], np.int64)
+        last, seen, done = None, self._seen, 0
+        while True:
+            room = self._log.room
+            made = self._advance(
+                room, seen, self._places, self._about, self._kept, number + done,
+                read, hands.own, inverse, command, scheme.own,
+                step, machine.own, evaluate, task.own, changing,
+            )  # fmt: skip
+            if made:
+                for twin in twins:
+                    twin.hand_back(twin.own, room[:made], self._places)
+                seen = last = room[made - 1].copy()
+                done += made
+                self._about[3] += made
+                self._log.made(made)
+            if made < len(room):
+                break
+        if last is None:
+            return frame
+        going.skip(done)
+        return self._rows.frame(last)

@@ -1,0 +1,142 @@
+"""Triggers: pulses by which other devices are told of a session's events, tick by tick."""
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+
+from labcrane.core.records import Echo, Event, Frame, Run, Value
+from labcrane.core.roles import Trigger
+from labcrane.errors import PluginError
+from labcrane.streams.markers import CODES
+
+SENT, ECHO, LOST, BACK = "trigger.sent", "trigger.echo", "trigger.lost", "trigger.back"
+HIGHEST = 255
+"""Eight lines carry no more."""
+
+LAST_S, BETWEEN_S = 0.25, 0.005
+"""How long echoes of the last codes of a session are waited for, and how long between two looks."""
+
+WAITING = 64
+"""Codes that are waited for at most; a line without echoes is waited for in vain."""
+
+
+class _Line:
+    """One trigger, and what was sent on it."""
+
+    def __init__(self, name: str, trigger: Trigger) -> None:
+        self.name = name
+        self.trigger = trigger
+        self.codes = CODES if trigger.codes is None else trigger.codes
+        wrong = {event: code for event, code in self.codes.items() if not 1 <= code <= HIGHEST}
+        if wrong:
+            event, code = next(iter(wrong.items()))
+            raise PluginError(
+                f"trigger {name!r} has the code {code} for {event!r}; a code is 1 to {HIGHEST}"
+            )
+        self.fault: str | None = None
+        self.answers = False
+        self.waiting: deque[tuple[int, float]] = deque(maxlen=WAITING)
+
+
+class Triggers:
+    """Sends what happened in a frame to every trigger, and notes when, and what came back.
+
+    Parameters
+    ----------
+    lines
+        Open triggers, by the protocol's names for them.
+    note
+        Writes an event into the record that was found out after a tick, of that number.
+    tell
+        Tells the examiner of an event.
+    """
+
+    def __init__(
+        self,
+        lines: Mapping[str, Trigger],
+        note: Callable[[Event, int], None],
+        tell: Callable[[Event], None],
+    ) -> None:
+        self._lines = [_Line(name, trigger) for name, trigger in lines.items()]
+        self._note = note
+        self._tell = tell
+        self._tick = 0
+
+    def __call__(self, frame: Frame) -> None:
+        """Send the codes of a frame's events. Does not wait for any device."""
+        self._tick = frame.tick.number
+        for line in self._lines:
+            codes = line.codes
+            wanted = [codes[event.name] for event in frame.events if event.name in codes]
+            began = time.perf_counter()
+            echoes = line.trigger.send(wanted, began)
+            if wanted:
+                sent = time.perf_counter()
+                line.waiting.extend((code, began) for code in wanted)
+                # One event a tick: what was sent together was sent at one time.
+                data: dict[str, Value] = {
+                    "codes": " ".join(map(str, wanted)),
+                    "delay_s": sent - frame.tick.due,
+                }
+                self._write(SENT, frame.tick.due, line, data)
+            self._take(line, echoes)
+            self._look(line, frame)
+
+    def finish(self) -> None:
+        """Wait a moment for what is still under way, after the last tick."""
+        until = time.perf_counter() + LAST_S
+        owing = [line for line in self._lines if line.answers]
+        while any(line.waiting for line in owing) and time.perf_counter() < until:
+            time.sleep(BETWEEN_S)
+            for line in owing:
+                self._take(line, line.trigger.send((), time.perf_counter()))
+
+    def _take(self, line: _Line, echoes: Sequence[Echo]) -> None:
+        for echo in echoes:
+            line.answers = True
+            delay_s = _delay(line.waiting, echo.code, echo.time)
+            self._write(ECHO, echo.time, line, {"code": echo.code, "delay_s": delay_s})
+
+    def _look(self, line: _Line, frame: Frame) -> None:
+        """Say once that a line is lost, and once that it is back."""
+        fault = line.trigger.fault
+        if (fault is None) == (line.fault is None):
+            return
+        line.fault = fault
+        name, data = (BACK, {}) if fault is None else (LOST, {"why": f"{line.name}: {fault}"})
+        self._tell(self._write(name, frame.tick.due, line, data))
+
+    def _write(
+        self,
+        name: str,
+        when: float,
+        line: _Line,
+        data: Mapping[str, Value],
+    ) -> Event:
+        event = Event(name, when, {"trigger": line.name, **data})
+        self._note(event, self._tick)
+        return event
+
+
+def _delay(waiting: deque[tuple[int, float]], code: int, came: float) -> float | None:
+    """Return how long after it was to be sent a code came back, in seconds; None for none of ours.
+
+    Whatever was sent before it and has not come back by now is lost.
+    """
+    for at, (each, sent) in enumerate(waiting):
+        if each == code:
+            for _ in range(at + 1):
+                waiting.popleft()
+            return came - sent
+    return None
+
+
+@contextmanager
+def opened(lines: Mapping[str, Trigger], run: Run) -> Iterator[Mapping[str, Trigger]]:
+    """Open triggers, and close them however that ends."""
+    with ExitStack() as closing:
+        for trigger in lines.values():
+            closing.callback(trigger.close)
+            trigger.open(run)
+        yield lines

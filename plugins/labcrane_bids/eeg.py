@@ -1,0 +1,149 @@
+"""EEG: each stream of that type as BrainVision files, with channels and events beside them."""
+
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from labcrane import PluginError
+from labcrane.analysis import EEG_READERS, Sampled, channel_types, sampled, volts
+from labcrane.recording import SessionRecord, Stream
+from labcrane_bids.files import MISSING, write_json, write_tsv
+from labcrane_bids.settings import BidsSettings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TYPES = {"eeg": "EEG", "eog": "EOG", "ecg": "ECG", "emg": "EMG", "gsr": "GSR", "resp": "RESP",
+         "temperature": "TEMP", "stim": "TRIG", "misc": "MISC"}  # fmt: skip
+"""Types of channels in BIDS, by those of MNE."""
+
+COUNTED = {"EEG": "EEG", "EOG": "EOG", "ECG": "ECG", "EMG": "EMG", "TRIG": "Trigger"}
+"""Types that a description counts, and in which word; all others are miscellaneous."""
+
+GAP = "boundary"
+"""Marker of a sample before which some are missing, as EEGLAB calls it."""
+
+
+def write_eeg(
+    path: Path,
+    stream: Stream,
+    session: SessionRecord,
+    events: "pd.DataFrame",
+    task: str,
+    settings: BidsSettings,
+) -> Sampled:
+    """Write a stream of EEG, and its events; return its samples.
+
+    Parameters
+    ----------
+    path
+        Of the files, without an ending: ``..._eeg``.
+    events
+        The session's, in order, with an onset in seconds from the session's first tick.
+    """
+    try:
+        import pybv
+    except ImportError as error:
+        raise PluginError(
+            f"stream {stream.name!r} is EEG, and pybv, which writes that, is not installed: "
+            f"{EEG_READERS}"
+        ) from error
+    signal = sampled(stream)
+    kinds = [TYPES[kind] for kind in channel_types(signal, stream)]
+    scale = volts(signal, stream, settings.eeg_unit)
+    electric = [kind in {"EEG", "EOG", "ECG", "EMG"} for kind in kinds]
+    units = ["µV" if voltage else unit or MISSING for voltage, unit in zip(
+        electric, signal.units, strict=True
+    )]  # fmt: skip
+    path.parent.mkdir(exist_ok=True)
+    table = _events(events, signal, session)
+    with warnings.catch_warnings():
+        # What is no voltage is not scaled; channels.tsv says what it is.
+        warnings.filterwarnings("ignore", "Encountered unsupported non-voltage units")
+        pybv.write_brainvision(
+            data=signal.data.T * scale[:, None],
+            sfreq=signal.rate_hz,
+            ch_names=list(signal.labels),
+            fname_base=path.name,
+            folder_out=path.parent,
+            events=[
+                {"onset": int(row["sample"]), "description": row["trial_type"], "type": "Comment"}
+                for row in table.to_dict("records")
+            ],
+            resolution=1.0,  # so that float32 in microvolts is what was recorded
+            unit=units,
+        )
+    stem = path.name.removesuffix("_eeg")
+    write_tsv(path.with_name(f"{stem}_events.tsv"), table)
+    write_tsv(path.with_name(f"{stem}_channels.tsv"), _channels(signal, kinds, units))
+    write_json(path.with_name(f"{path.name}.json"), _about(signal, stream, kinds, task, settings))
+    return signal
+
+
+def eeg_description(about: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the description of the events of EEG, by that of the same ones beside motion."""
+    kinds = about["trial_type"]
+    gap = {GAP: "samples are missing before this one"}
+    hed = {GAP: "(Experiment-control, Label/boundary)"}
+    return {
+        **about,
+        "onset": {"Description": "from the first sample of EEG", "Units": "s"},
+        "sample": {"Description": "number of the sample, counted from 0"},
+        "trial_type": {
+            **kinds,
+            "Levels": {**kinds["Levels"], **gap},
+            "HED": {**kinds["HED"], **hed},
+        },
+    }
+
+
+def _events(events: "pd.DataFrame", signal: Sampled, session: SessionRecord) -> "pd.DataFrame":
+    """Return the events within the recording, at its samples; and where samples are missing."""
+    import pandas as pd
+
+    zero = session.streams["state"].time[0]
+    positions = signal.at(events["onset"].to_numpy() + zero)
+    there = events.assign(onset=positions / signal.rate_hz)[pd.notna(positions)]
+    gaps = pd.DataFrame({"onset": signal.gaps / signal.rate_hz, "duration": 0.0})
+    table = pd.concat([there, gaps.assign(trial_type=GAP)] if len(gaps) else [there])
+    table = table.sort_values("onset", kind="stable", ignore_index=True)
+    samples = (table["onset"] * signal.rate_hz).round().astype(int)
+    table.insert(2, "sample", samples)
+    return table
+
+
+def _channels(signal: Sampled, kinds: list[str], units: list[str]) -> "pd.DataFrame":
+    import pandas as pd
+
+    return pd.DataFrame(
+        {
+            "name": signal.labels,
+            "type": kinds,
+            "units": units,
+            "sampling_frequency": signal.rate_hz,
+        }
+    )
+
+
+def _about(
+    signal: Sampled, stream: Stream, kinds: list[str], task: str, settings: BidsSettings
+) -> Mapping[str, Any]:
+    counts = {f"{word}ChannelCount": kinds.count(kind) for kind, word in COUNTED.items()}
+    others = sum(kind not in COUNTED for kind in kinds)
+    error = float(stream.attrs.get("error_p95_s", float("nan")))
+    clock = f"{1000.0 * error:.3f} ms at 95 %" if error == error else "not known"  # noqa: PLR0124
+    return {
+        "TaskName": task,
+        "EEGReference": settings.eeg_reference or MISSING,
+        "SamplingFrequency": signal.rate_hz,
+        "PowerLineFrequency": settings.power_line_hz or MISSING,
+        "SoftwareFilters": MISSING,
+        "HardwareFilters": MISSING,
+        "Manufacturer": str(stream.attrs.get("source_id", "")) or MISSING,
+        "RecordingType": "discontinuous" if len(signal.gaps) else "continuous",
+        "RecordingDuration": len(signal.time) / signal.rate_hz,
+        **counts,
+        "MiscChannelCount": others,
+        "Description": f"LSL stream {stream.name}; clock corrected, off by {clock}",
+    }

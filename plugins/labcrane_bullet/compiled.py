@@ -1,0 +1,163 @@
+"""Compiled cranes: the actuator, the velocity law and the tip, tick by tick.
+
+With an engine, the law holds while every motor has the torque for it and no joint is near a limit;
+all other ticks are the engine's.
+"""
+
+import math
+
+import numpy as np
+
+from labcrane import FloatArray
+from labcrane.core import Places, compiled, twin
+
+JOINTS, DELAY, DT, BASE_X, HEIGHT, DRIVE, CHANGES, IDEAL, SHARE = range(9)
+"""Joints, ticks of dead time, length of a tick, the foot, the first command and where what changes
+begins; then the actuator's constants. Rows of :data:`TABLES` follow."""
+TABLES = 10
+"""Where the largest changes are, then lowest and highest angles, lengths and offsets. What changes
+comes behind them: angles, speeds, the actuator's speeds and commands on their way."""
+
+
+@compiled.part
+def follow(own: FloatArray, at: int, command: FloatArray, speeds: FloatArray) -> None:
+    """Fill the speeds that come of a command."""
+    n, delay = len(speeds), int(own[DELAY])
+    if own[IDEAL] != 0.0:
+        speeds[:] = command
+        return
+    lagging, waiting = at + 2 * n, at + 3 * n
+    for j in range(n):
+        goal = own[waiting + j] if delay > 0 else command[j]
+        change = own[SHARE] * (goal - own[lagging + j])
+        most = own[TABLES + j]
+        own[lagging + j] += most if change > most else (-most if change < -most else change)
+        speeds[j] = own[lagging + j]
+    if delay > 0:
+        for k in range(waiting, waiting + n * (delay - 1)):
+            own[k] = own[k + n]
+        last = waiting + n * (delay - 1)
+        own[last : last + n] = command
+
+
+@compiled.part
+def put_tip(own: FloatArray, angles: FloatArray, speeds: FloatArray, tip: FloatArray) -> None:
+    """Fill the tip's position and velocity."""
+    n = len(angles)
+    length, offset = TABLES + 3 * n, TABLES + 4 * n
+    pitch = turning = outward = upward = 0.0
+    radius = own[length]  # the first pitch axis may be before the slew axis
+    height = own[HEIGHT]
+    for j in range(1, n):
+        pitch += angles[j] + own[offset + j]
+        turning += speeds[j]
+        forward, down = own[length + j] * math.cos(pitch), own[length + j] * math.sin(pitch)
+        radius += forward
+        height -= down
+        outward -= down * turning
+        upward -= forward * turning
+    bearing = angles[0] + own[offset]
+    ahead, left = math.cos(bearing), math.sin(bearing)
+    sideways = radius * speeds[0]
+    tip[0] = own[BASE_X] + radius * ahead
+    tip[1] = radius * left
+    tip[2] = height
+    tip[3] = outward * ahead - sideways * left
+    tip[4] = outward * left + sideways * ahead
+    tip[5] = upward
+
+
+@compiled.tick
+def step(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) -> int:
+    """Move the crane for a tick."""
+    n, at, dt = int(own[JOINTS]), int(own[CHANGES]), own[DT]
+    state, drive = places[twin.STATE], places[twin.COMMAND] + int(own[DRIVE])
+    angles, speeds = row[state : state + n], row[state + n : state + 2 * n]
+    follow(own, at, row[drive : drive + n], speeds)
+    low, high = TABLES + n, TABLES + 2 * n
+    for j in range(n):
+        angle = own[at + j] + speeds[j] * dt
+        if not own[low + j] <= angle <= own[high + j]:
+            angle = own[low + j] if angle < own[low + j] else own[high + j]
+            speeds[j] = 0.0
+        own[at + j] = angles[j] = angle
+    put_tip(own, angles, speeds, row[state + 2 * n : state + 2 * n + 6])
+    return twin.MADE
+
+
+MASS, CENTRE, ALONG, ACROSS, UPRIGHT, EFFORT = range(6)
+"""Of every link, behind the other tables: mass, centre of mass along it, moments of inertia about
+its axes; and its joint's torque."""
+GRAVITY = 9.81
+NEAR = 1e-3
+"""Distance from a limit in rad within which the engine's solver pushes back."""
+ENOUGH = 0.999
+"""Share of a motor's torque up to which rounding cannot tell otherwise."""
+
+
+@compiled.part
+def torques_suffice(
+    own: FloatArray, angles: FloatArray, speeds: FloatArray, asked: FloatArray
+) -> bool:
+    """Whether motors can change the joints' speeds to what is asked for within a tick.
+
+    Newton's and Euler's equations in the vertical plane that turns with the slew.
+    """
+    n, dt = len(angles), own[DT]
+    length, offset, link = TABLES + 3 * n, TABLES + 4 * n, TABLES + 5 * n
+    slew, faster = speeds[0], (asked[0] - speeds[0]) / dt
+    about_slew = own[link + UPRIGHT * n] * faster
+    # Of every link: moment, push and lift, the moment of both about the foot, and its joint.
+    moment, push, lift = np.empty(n), np.empty(n), np.empty(n)
+    joint_r, joint_z = np.empty(n), np.empty(n)
+    pitch = turn = spin = r = dr = ddr = z = ddz = 0.0
+    for k in range(1, n):
+        pitch += angles[k] + own[offset + k]
+        turn += speeds[k]
+        spin += (asked[k] - speeds[k]) / dt
+        joint_r[k], joint_z[k] = r, z
+        c, s = math.cos(pitch), math.sin(pitch)
+        mass, centre = own[link + MASS * n + k], own[link + CENTRE * n + k]
+        ixx, izz = own[link + ALONG * n + k], own[link + UPRIGHT * n + k]
+        at_r, at_z = r + centre * c, z - centre * s
+        at_dr = dr - centre * s * turn
+        push[k] = mass * (ddr - centre * (c * turn * turn + s * spin) - at_r * slew * slew)
+        lift[k] = mass * (ddz + centre * (s * turn * turn - c * spin) + GRAVITY)
+        moment[k] = own[link + ACROSS * n + k] * spin + slew * slew * (izz - ixx) * s * c
+        moment[k] += at_z * push[k] - at_r * lift[k]
+        about_slew += at_r * mass * (at_r * faster + 2.0 * at_dr * slew)
+        about_slew += 2.0 * (ixx - izz) * s * c * turn * slew
+        about_slew += (ixx * s * s + izz * c * c) * faster
+        reach = own[length + k]
+        r, z = r + reach * c, z - reach * s
+        dr -= reach * s * turn
+        ddr -= reach * (c * turn * turn + s * spin)
+        ddz += reach * (s * turn * turn - c * spin)
+    moments = pushes = lifts = 0.0
+    for k in range(n - 1, 0, -1):
+        moments, pushes, lifts = moments + moment[k], pushes + push[k], lifts + lift[k]
+        about_joint = moments - joint_z[k] * pushes + joint_r[k] * lifts
+        if abs(about_joint) > ENOUGH * own[link + EFFORT * n + k]:
+            return False
+    return bool(abs(about_slew) <= ENOUGH * own[link + EFFORT * n])
+
+
+@compiled.tick
+def step_engine(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) -> int:
+    """Move the engine's crane for a tick, if its motors can."""
+    n, at, dt = int(own[JOINTS]), int(own[CHANGES]), own[DT]
+    state, drive = places[twin.STATE], places[twin.COMMAND] + int(own[DRIVE])
+    angles, speeds = row[state : state + n], row[state + n : state + 2 * n]
+    follow(own, at, row[drive : drive + n], speeds)
+    before, was = own[at : at + n], own[at + n : at + 2 * n]
+    if not torques_suffice(own, before, was, speeds):
+        return twin.DECLINED
+    low, high = TABLES + n, TABLES + 2 * n
+    for j in range(n):
+        angle = before[j] + speeds[j] * dt
+        if not own[low + j] + NEAR < angle < own[high + j] - NEAR:
+            return twin.DECLINED
+        angles[j] = angle
+    own[at : at + n], own[at + n : at + 2 * n] = angles, speeds
+    put_tip(own, angles, speeds, row[state + 2 * n : state + 2 * n + 6])
+    return twin.MADE

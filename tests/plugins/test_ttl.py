@@ -1,0 +1,285 @@
+"""Pulses: over a pseudo-terminal that answers, and a parallel port that is a list."""
+
+import errno
+import os
+import select
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+from needs import needs
+from rehearsal import SHORT, ScriptedConsole, a_study
+
+import labcrane
+import labcrane_ttl
+from labcrane import DeviceError, PluginError, ProtocolError, Trigger
+from labcrane.core import Event
+from labcrane.core.clock import Tick
+from labcrane.session.session import Visit, run
+from labcrane.streams.markers import CODES
+from labcrane.streams.triggers import Triggers
+from labcrane.testing import PluginContract, TriggerContract, ch8, make_frame, make_run, opened
+from labcrane_ttl.parallel_port import CLAIM, WRITE, ParallelTrigger
+from labcrane_ttl.serial_port import SerialTrigger, as_byte
+from labcrane_ttl.settings import BoxSettings, ParallelSettings, SerialSettings
+
+pytestmark = needs("terminals")
+
+DELAY_S = 0.02
+
+
+class Device:
+    """A trigger box at the other end of a pseudo-terminal.
+
+    Attributes
+    ----------
+    heard
+        All that was written to it.
+    """
+
+    def __init__(self, delay_s: float | None = None) -> None:
+        self._mine, self._theirs = os.openpty()
+        self.port = os.ttyname(self._theirs)
+        self.heard = b""
+        self._delay_s = delay_s
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._answer)
+        if delay_s is not None:
+            self._thread.start()
+
+    def _answer(self) -> None:
+        while not self._over.is_set():
+            if select.select([self._mine], [], [], 0.05)[0]:
+                came = os.read(self._mine, 100)
+                self.heard += came
+                time.sleep(self._delay_s or 0.0)
+                os.write(self._mine, came)
+
+    def read(self, count: int) -> bytes:
+        """Return the next bytes that were written to it."""
+        found = b""
+        while len(found) < count and select.select([self._mine], [], [], 10.0)[0]:
+            found += os.read(self._mine, count - len(found))
+        return found
+
+    def drain(self) -> None:
+        """Read whatever has come."""
+        while select.select([self._mine], [], [], 0.1)[0]:
+            os.read(self._mine, 10_000)
+
+    def close(self) -> None:
+        self._over.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        os.close(self._mine)
+        os.close(self._theirs)
+
+
+@pytest.fixture
+def device() -> Iterator[Device]:
+    made = Device()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def answering() -> Iterator[Device]:
+    made = Device(DELAY_S)
+    yield made
+    made.close()
+
+
+class TestPlugin(PluginContract):
+    @pytest.fixture
+    def plugin(self) -> ModuleType:
+        return labcrane_ttl
+
+
+class TestSerial(TriggerContract):
+    @pytest.fixture
+    def trigger(self, device: Device) -> Trigger:
+        return SerialTrigger(SerialSettings(port=device.port), as_byte, b"\0")
+
+
+class TestAnswering(TriggerContract):
+    @pytest.fixture
+    def trigger(self, answering: Device) -> Trigger:
+        return SerialTrigger(SerialSettings(port=answering.port, echo=True), as_byte, b"\0")
+
+
+class TestParallel(TriggerContract):
+    @pytest.fixture
+    def trigger(self) -> Trigger:
+        settings = ParallelSettings(port=Path("/dev/null"), codes={"trial.start": 3})
+        return ParallelTrigger(settings, lambda file, request, data: None)
+
+
+def test_codes_go_out_at_once_and_the_line_is_cleared_when_the_pulse_is_over(
+    device: Device,
+) -> None:
+    trigger = SerialTrigger(SerialSettings(port=device.port, pulse_s=0.01), as_byte, b"\0")
+    with opened(trigger, make_run(ch8())):
+        trigger.send([30, 40], 5.0)
+        assert device.read(2) == bytes([30, 40])
+        trigger.send([], 5.009)
+        trigger.send([31], 5.0095)  # a new code makes a new pulse
+        trigger.send([], 5.011)
+        trigger.send([], 5.02)
+        trigger.send([], 5.03)
+        assert device.read(2) == bytes([31, 0])
+        assert not select.select([device._mine], [], [], 0.0)[0]
+
+
+def test_a_box_is_told_in_its_own_words(device: Device) -> None:
+    settings = BoxSettings(port=device.port, command="SET {code};", rest="CLEAR;")
+    trigger = SerialTrigger(settings, settings.written, settings.rest.encode())
+    with opened(trigger, make_run(ch8())):
+        trigger.send([30], 0.0)
+        trigger.send([], 1.0)
+        assert device.read(13) == b"SET 30;CLEAR;"
+
+
+def test_a_device_that_does_not_read_makes_nobody_wait_and_is_told(device: Device) -> None:
+    trigger = SerialTrigger(SerialSettings(port=device.port), as_byte, b"\0")
+    with opened(trigger, make_run(ch8())):
+        for _ in range(5000):
+            trigger.send([7] * 100, 0.0)
+            if trigger.fault:
+                break
+        assert trigger.fault == f"{device.port} takes no more: its device does not read"
+        device.drain()
+        trigger.send([7], 0.0)
+        assert trigger.fault is None
+
+
+def test_a_device_that_is_pulled_out_is_told_and_nothing_raises(answering: Device) -> None:
+    gone = Device()
+    trigger = SerialTrigger(SerialSettings(port=gone.port, echo=True), as_byte, b"\0")
+    with opened(trigger, make_run(ch8())):
+        gone.close()
+        until = time.monotonic() + 10.0
+        while trigger.fault is None and time.monotonic() < until:
+            trigger.send([7], 0.0)
+        assert trigger.fault is not None
+        assert gone.port in trigger.fault
+
+
+def test_a_parallel_port_is_claimed_set_and_cleared() -> None:
+    calls: list[tuple[int, bytes]] = []
+
+    def control(file: int, request: int, data: bytes) -> None:
+        calls.append((request, data))
+        if len(calls) == 5:
+            raise OSError(errno.EIO, "pulled out")
+
+    settings = ParallelSettings(port=Path("/dev/null"))
+    trigger = ParallelTrigger(settings, control)
+    with opened(trigger, make_run(ch8())):
+        trigger.send([30, 255], 0.0)
+        trigger.send([], 0.02)
+        assert calls == [(CLAIM, b""), (WRITE, b"\x1e"), (WRITE, b"\xff"), (WRITE, b"\x00")]
+        trigger.send([1], 1.0)
+        assert trigger.fault == "/dev/null cannot be written: [Errno 5] pulled out"
+        trigger.send([1], 1.0)
+        assert trigger.fault is None
+
+
+def test_ports_that_are_not_there_are_refused_in_words(tmp_path: Path) -> None:
+    gone = str(tmp_path / "ttyS99")
+    serial = SerialTrigger(SerialSettings(port=gone), as_byte, b"\0")
+    with pytest.raises(DeviceError, match=r"serial port '.*ttyS99' cannot be opened: .* plug it"):
+        serial.open(make_run(ch8()))
+    parallel = ParallelTrigger(ParallelSettings(port=Path(gone)))
+    with pytest.raises(DeviceError, match=r"parallel port .*ttyS99 cannot be opened: .* modprobe"):
+        parallel.open(make_run(ch8()))
+
+
+def test_wrong_settings_are_refused_with_their_line(tmp_path: Path) -> None:
+    for written, said in (
+        (
+            "{use: serial_ttl, port: x, codes: {trial.begun: 3}}",
+            r"study\.yaml:\d+:\d+: .*no such event",
+        ),
+        ("{use: serial_ttl, port: x, codes: {trial.start: 256}}", r"study\.yaml:\d+:.*255"),
+        ("{use: box_ttl, port: x, command: 'WRITE'}", r"must have \{code\} in it once"),
+    ):
+        with pytest.raises(ProtocolError, match=said):
+            a_study(tmp_path, SHORT + f"triggers: {{box: {written}}}\n")
+
+
+class Fixed(Trigger):
+    """Sends nothing, and answers what it is told to."""
+
+    def __init__(self, **codes: int) -> None:
+        self.codes = {name.replace("_", "."): code for name, code in codes.items()} or None
+        self.sent: list[list[int]] = []
+        self.answers: list[object] = []
+
+    def send(self, codes, now):
+        self.sent.append(list(codes))
+        answers, self.answers = self.answers, []
+        return answers
+
+
+def test_every_event_that_has_a_code_is_sent_and_noted_in_its_tick() -> None:
+    from labcrane.core import Echo
+
+    made, notes, told = make_run(ch8()), [], []
+    all_codes, own = Fixed(), Fixed(trial_start=5)
+    triggers = Triggers(
+        {"all": all_codes, "own": own}, lambda event, tick: notes.append((event, tick)), told.append
+    )
+    due = time.perf_counter()
+    frame = make_frame(made)
+    frame.tick = Tick(7, due, due)
+    frame.events = (Event("trial.start", due), Event("somebody.else", due), Event("drop", due))
+    triggers(frame)
+    assert all_codes.sent == [[CODES["trial.start"], CODES["drop"]]]
+    assert own.sent == [[5]]
+    (first, tick), (second, _) = notes
+    assert (first.name, tick, first.time) == ("trigger.sent", 7, due)
+    assert (first.data["trigger"], first.data["codes"]) == ("all", "30 48")
+    assert (second.data["trigger"], second.data["codes"]) == ("own", "5")
+    assert 0.0 <= first.data["delay_s"] <= second.data["delay_s"]
+    came = due + 10.0
+    all_codes.answers = [Echo(48, came), Echo(30, came)]  # that of 30 was lost, and comes no more
+    all_codes.fault = "unplugged"
+    frame.events = ()
+    triggers(frame)
+    echo, stray, lost = (event for event, _ in notes[2:])
+    assert echo.data["code"] == 48
+    # From before the code was handed over, which is when the first note says at the latest.
+    assert came - due - first.data["delay_s"] <= echo.data["delay_s"] <= came - due
+    assert stray.data["delay_s"] is None
+    assert (lost.name, lost.data["why"]) == ("trigger.lost", "all: unplugged")
+    triggers(frame)
+    all_codes.fault = None
+    triggers(frame)
+    assert [event.name for event in told] == ["trigger.lost", "trigger.back"]
+    with pytest.raises(PluginError, match=r"trigger 'x' has the code 0 for 'drop'; a code is 1 to"):
+        Triggers({"x": Fixed(drop=0)}, lambda event, tick: None, told.append)
+
+
+@pytest.mark.long
+def test_a_session_sends_its_codes_and_the_record_says_when_and_what_came_back(
+    answering: Device, tmp_path: Path
+) -> None:
+    text = SHORT.replace("study: rehearsal", f"study: t{os.getpid()}")
+    text = text.replace("movements: 2", "movements: 1, limit_s: 2")
+    text += f"triggers: {{box: {{use: serial_ttl, port: {answering.port}, echo: true}}}}\n"
+    visit = Visit(a_study(tmp_path, text), "P001", 1, tmp_path / "data", simulated=True)
+    events = labcrane.open_recording(run(visit, ScriptedConsole())).session(1).events
+    by_name = events.groupby("name")["data"].apply(list)
+    sent = [int(code) for data in by_name["trigger.sent"] for code in data["codes"].split()]
+    known = events[events["name"].isin(list(CODES)) & (events["name"] != "session.start")]
+    assert sent == [CODES[name] for name in known.sort_values("time", kind="stable")["name"]]
+    assert bytes(byte for byte in answering.heard if byte) == bytes(sent)
+    delays = [data["delay_s"] for data in by_name["trigger.echo"]]
+    assert [data["code"] for data in by_name["trigger.echo"]] == sent
+    assert min(delays) >= DELAY_S
+    assert "trigger.lost" not in by_name
+    context = labcrane.open_recording(visit.folder.participant_file).session(1).context
+    assert context["components"]["triggers.box"]["use"] == "serial_ttl"

@@ -1,0 +1,184 @@
+"""EEG on the session's clock: for MNE, and in BIDS."""
+
+import json
+import subprocess
+import sys
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from needs import needs
+
+from labcrane import RecordingError
+from labcrane.analysis import sampled, to_mne
+from labcrane.analysis.cohort import Cohort
+from labcrane.analysis.electrodes.mne import volts
+from labcrane.recording import SessionRecord
+from labcrane.recording.labels import HED_VERSION, KNOWN
+from labcrane.testing import ch8
+from labcrane_bids.bids import Bids
+from labcrane_bids.events import event_description
+from labcrane_bids.settings import BidsSettings
+from results.recorded import EEG_HZ, LOST
+
+NAME = "sub-P001_ses-01_task-acquisition"
+FOLDER = Path("sub-P001") / "ses-01"
+
+
+@pytest.fixture(scope="module")
+def session(electrodes: Cohort) -> SessionRecord:
+    _, session = next(electrodes.included[0].sessions())
+    return session
+
+
+@pytest.fixture(scope="module")
+def bids(electrodes: Cohort, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("bids")
+    asked = tmp_path_factory.mktemp("asked")
+    (asked / "tlx.csv").write_text("participant,mental\nP001,35\n", encoding="utf-8")
+    (asked / "tlx.json").write_text('{"mental": {"Units": "1"}}', encoding="utf-8")
+    settings = BidsSettings(eeg_reference="FCz", power_line_hz=50.0, phenotype=asked)
+    Bids(settings, ch8()).export(iter(electrodes.included), out)
+    return out
+
+
+def test_every_event_is_at_the_sample_that_has_its_pulse(session: SessionRecord) -> None:
+    """The source's clock is 777 s off and 40 ppm slow, and 50 of its samples never came."""
+    signal = sampled(session.streams["BrainAmp"])
+    positions = signal.at(session.events["time"].to_numpy())
+    assert len(positions) > 80
+    at = np.rint(positions).astype(int)
+    assert set(at) == set(np.flatnonzero(signal.data[:, 3]))
+    assert signal.rate_hz == EEG_HZ
+    assert signal.gaps.tolist() == [LOST.start]
+
+
+def test_what_happened_outside_of_the_recording_is_at_no_sample(session: SessionRecord) -> None:
+    signal = sampled(session.streams["BrainAmp"])
+    around = np.array([signal.time[0] - 1.0, signal.time[0], signal.time[-1], signal.time[-1] + 1])
+    np.testing.assert_array_equal(signal.at(around), [np.nan, 0.0, len(signal.time) - 1, np.nan])
+
+
+def test_what_cannot_be_put_at_samples_is_refused_in_words(session: SessionRecord) -> None:
+    with pytest.raises(RecordingError, match=r"'state' is one of the session's own, or its clock"):
+        sampled(session.streams["state"])
+    amp = session.streams["BrainAmp"]
+    signal = sampled(amp)
+    none = replace(signal, units=("", "", "", ""))
+    with pytest.raises(RecordingError, match=r"'Fz' states no unit; give the one of its source"):
+        volts(none, amp)
+    np.testing.assert_allclose(volts(none, amp, "mV"), [1e-3, 1e-3, 1e-3, 1.0])
+    with pytest.raises(RecordingError, match=r"'Fz' is in no voltage: '1 degC' "):
+        volts(none, amp, "degC")
+
+
+@needs("pybv")
+def test_events_of_eeg_and_of_motion_are_the_same_on_two_clocks(
+    bids: Path, session: SessionRecord
+) -> None:
+    motion = pd.read_csv(bids / FOLDER / "motion" / f"{NAME}_events.tsv", sep="\t")
+    eeg = pd.read_csv(bids / FOLDER / "eeg" / f"{NAME}_events.tsv", sep="\t")
+    scans = pd.read_csv(bids / FOLDER / f"{NAME.partition('_task')[0]}_scans.tsv", sep="\t")
+    when = pd.to_datetime(scans.set_index("filename")["acq_time"])
+    later = when[f"eeg/{NAME}_eeg.vhdr"] - when[f"motion/{NAME}_tracksys-crane_motion.tsv"]
+    signal = sampled(session.streams["BrainAmp"])
+    zero = session.streams["state"].time[0]
+    assert later.total_seconds() == pytest.approx(signal.time[0] - zero, abs=2e-6)
+    (gap,) = eeg.index[eeg["trial_type"] == "boundary"]
+    assert eeg["sample"][gap] == LOST.start
+    own = eeg.drop(index=gap).reset_index(drop=True)
+    assert own["trial_type"].tolist() == motion["trial_type"].tolist()
+    # Until samples are missing, both are the same but for where they begin, and for 40 ppm.
+    until = motion["onset"] + zero < signal.time[LOST.start - 1]
+    moved = own["onset"] + signal.time[0] - zero - motion["onset"]
+    assert 3 < until.sum() < len(own)
+    assert np.abs(moved[until]).max() < 40e-6 * 20.0
+    about = json.loads((bids / FOLDER / "eeg" / f"{NAME}_eeg.json").read_text(encoding="utf-8"))
+    assert (about["EEGReference"], about["PowerLineFrequency"]) == ("FCz", 50.0)
+    assert about["RecordingType"] == "discontinuous"
+
+
+def test_a_heart_is_physio_and_gaze_in_metres_is_in_the_world(bids: Path) -> None:
+    stem = bids / FOLDER / "beh" / f"{NAME}_recording"
+    heart = json.loads(Path(f"{stem}-Heart_physio.json").read_text(encoding="utf-8"))
+    assert heart["Columns"] == ["timestamp", "ecg"]
+    assert heart["ecg"]["Units"] == "millivolts"
+    eyes = json.loads(Path(f"{stem}-eye1_physio.json").read_text(encoding="utf-8"))
+    assert eyes["SampleCoordinateSystem"] == "gaze-in-world"
+
+
+def errors(folder: Path) -> list[str]:
+    program = Path(sys.executable).with_name("bids-validator-deno")
+    done = subprocess.run(
+        [program, "--json", folder], capture_output=True, encoding="utf-8", check=False
+    )
+    issues = json.loads(done.stdout)["issues"]["issues"]
+    return [f"{i['code']} {i.get('location')}" for i in issues if i["severity"] == "error"]
+
+
+@needs("bids-validator-deno", "pybv")
+def test_the_validator_finds_no_error_in_eeg_motion_physio_and_phenotype(bids: Path) -> None:
+    assert errors(bids) == []
+
+
+@needs("bids-validator-deno")
+def test_the_validator_knows_the_tags_of_every_event_also_of_two_at_once(tmp_path: Path) -> None:
+    folder = tmp_path / "sub-1" / "beh"
+    folder.mkdir(parents=True)
+    about = {"Name": "tags", "BIDSVersion": "1.11.1", "HEDVersion": HED_VERSION}
+    (tmp_path / "dataset_description.json").write_text(json.dumps(about), encoding="utf-8")
+    (tmp_path / "README").write_text("tags", encoding="utf-8")
+    names = [*KNOWN, "contact_object", "somebody_else"]
+    table = pd.DataFrame(
+        {"onset": 1.0, "duration": 0.0, "trial_type": names, "label": names,
+         "repeat": ["n/a"] * len(KNOWN) + ["2", "n/a"]}
+    )  # fmt: skip
+    columns = {key: value for key, value in event_description(table, {}).items() if key in table}
+    path = folder / "sub-1_task-a_events.json"
+    path.write_text(json.dumps({**columns, "TaskName": "a"}), encoding="utf-8")
+    table.to_csv(path.with_suffix(".tsv"), sep="\t", index=False)
+    assert errors(tmp_path) == []
+    table.assign(repeat="n/a").to_csv(path.with_suffix(".tsv"), sep="\t", index=False)
+    assert [each.split()[0] for each in errors(tmp_path)] == ["HED_ERROR"], "it does look"
+
+
+@pytest.mark.long
+@needs("mne", "mne_bids", "pybv")
+def test_mne_reads_the_participant_file_and_bids_alike_and_epochs_by_label(
+    bids: Path, session: SessionRecord
+) -> None:
+    import mne
+    import mne_bids
+
+    raw = to_mne(session)
+    assert raw.get_channel_types() == ["eeg", "eeg", "eog", "stim"]
+    signal = sampled(session.streams["BrainAmp"])
+    np.testing.assert_allclose(raw.get_data()[:3].T, 1e-6 * signal.data[:, :3], rtol=1e-12)
+    found, ids = mne.events_from_annotations(raw, verbose="error")
+    epochs = mne.Epochs(
+        raw, found, ids, tmin=-0.1, tmax=0.1, baseline=None, picks="stim", preload=True,
+        event_repeated="drop", verbose="error",
+    )  # fmt: skip
+    entered = epochs["target_entered"]
+    inward = epochs["target_entered/direction=inward"]
+    assert len(entered) == 12
+    assert 0 < len(inward) < len(entered)
+    middle = round(0.1 * EEG_HZ)
+    assert (entered.get_data(verbose="error")[:, 0, middle] == 1.0).all()
+    assert "BAD_gap" in set(raw.annotations.description)
+
+    path = mne_bids.BIDSPath(
+        root=bids, subject="P001", session="01", task="acquisition", datatype="eeg"
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # columns and tags that MNE has no use for
+        again = mne_bids.read_raw_bids(path, verbose="error")
+    np.testing.assert_allclose(again.get_data()[:3], raw.get_data()[:3], rtol=1e-6, atol=1e-15)
+    assert again.info["line_freq"] == 50.0
+    theirs = again.annotations.onset[again.annotations.description == "target_entered"]
+    ours = [each["onset"] for each in raw.annotations
+            if each["description"].startswith("target_entered/")]  # fmt: skip
+    np.testing.assert_allclose(theirs, ours, atol=1e-6)

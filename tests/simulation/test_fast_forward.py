@@ -1,0 +1,168 @@
+"""Compiled twins and the loop: the same bits, whatever the study; and which of them ran."""
+
+import json
+import random
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from labcrane.machines.library import find_machine
+from labcrane.simulation import fast_forward
+from labcrane.simulation.simulation import WAY, SimulationJob, simulate
+
+AHEAD = "ahead.yaml"
+
+HEAD = """\
+labcrane: 1
+study: twins
+title: Drawn at random
+participants: {pattern: 'P\\d{3}', planned: 12}
+input: {use: dual_joystick}
+"""
+JOINTS = "map: {slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}"
+BASE = "map: {x: left.y, y: -left.x, z: right.y}, frame: base"
+ARM = "map: {radial: left.y, tangential: -left.x, vertical: right.y}, frame: arm"
+
+
+def drawn_study(seed: int, scheme: str, rule: str) -> str:
+    """Return a protocol with everything that a twin must follow drawn at random."""
+    draw = random.Random(seed)
+
+    def handling() -> str:
+        dead = round(draw.uniform(0.0, 0.2), 3)
+        stop = round(draw.choice([0.0, draw.uniform(1.0, 40.0)]), 2)
+        expo = draw.choice([0.0, 1.0, round(draw.random(), 3)])
+        return f"dead_zone: {dead}, expo: {expo}, soft_stop_deg: {stop}"
+
+    def tip() -> str:
+        where = {"base": BASE, "arm": ARM}.get(scheme) or draw.choice([BASE, ARM])
+        redundancy = draw.choice(["minimum_norm", "hold_pitch"])
+        threshold = round(draw.uniform(0.2, 3.0), 2)
+        speed = round(draw.uniform(0.3, 1.5), 2)
+        return (
+            f"{where}, {handling()}, redundancy: {redundancy}, threshold_m: {threshold}, "
+            f"speed_m_s: {speed}"
+        )
+
+    match scheme:
+        case "joint_velocity":
+            speed = round(draw.uniform(0.5, 1), 2)
+            law = f"use: joint_velocity, {JOINTS}, {handling()}, speed: {speed}"
+        case "switchable":
+            start = draw.choice(["joint_velocity", "end_effector"])
+            law = (
+                f"use: switchable, button: right.trigger, start: {start}, joint_velocity: "
+                f"{{{JOINTS}, {handling()}}}, end_effector: {{{tip()}}}"
+            )
+        case _:
+            law = f"use: end_effector, {tip()}"
+    actuator = draw.choice(["ideal", "electric", "hydraulic", "sluggish"])
+    operator = (
+        f"operator: {{use: simulated_operator, lapse_rate: 0.3, motor_noise: "
+        f"{round(draw.uniform(0, 0.2), 3)}, endpoint_noise: {round(draw.uniform(0, 0.15), 3)}}}"
+    )
+    task = (
+        f"tasks: {{aiming: {{use: aiming, distances: [{draw.choice([2, 3])}], movements: 2, "
+        f"width: {draw.choice([0.3, 0.8])}, end: {rule}, limit_s: {draw.choice([4, 12])}, "
+        f"rest_after: {round(draw.uniform(0.1, 1), 2)}}}}}"
+    )
+    return "\n".join(
+        [
+            HEAD + f"rate_hz: {draw.choice([60, 100, 240])}",
+            f"machine: {draw.choice(['ch8', 'ch8_cranelike', AHEAD])}",
+            f"scheme: {{{law}}}",
+            operator,
+            f"dynamics: {{use: kinematic_crane, actuator: {actuator}}}",
+            task,
+            "sessions: [{name: one, steps: [{block: {task: aiming}}, {block: {task: aiming}}]}]",
+            "",
+        ]
+    )
+
+
+def written(folder: Path, text: str) -> Path:
+    """Write a study, and beside it a machine whose boom stands before its slew axis."""
+    ch8 = find_machine("ch8").read_text(encoding="utf-8")
+    assert "name: slew, d:" in ch8
+    (folder / AHEAD).write_text(ch8.replace("name: slew, d:", "name: slew, a: 0.3, d:"))
+    (folder / "protocol.yaml").write_text(text)
+    return folder / "protocol.yaml"
+
+
+def held(path: Path) -> dict[str, tuple[str, bytes]]:
+    """Return every number of a participant file, to the bit, and everything else as text."""
+    found: dict[str, tuple[str, bytes]] = {}
+
+    def take(name: str, node: h5py.Group | h5py.Dataset) -> None:
+        told = repr(sorted((key, str(value)) for key, value in node.attrs.items()))
+        content = b""
+        if isinstance(node, h5py.Dataset):
+            values = node[()]
+            plain = isinstance(values, np.ndarray) and values.dtype.kind in "fiub"
+            content = values.tobytes() if plain else repr(values).encode()
+        found[name] = (told, content)
+
+    with h5py.File(path) as file:
+        file.visititems(take)
+    return found
+
+
+def simulated(protocol: Path, data: Path, loop: str = "") -> tuple[Path, dict[str, object]]:
+    folder = simulate(SimulationJob(protocol, None, data, "P001", loop))
+    (way,) = json.loads((folder.path / WAY).read_text())
+    return folder.path, way
+
+
+SCHEMES = ("joint_velocity", "base", "arm", "switchable")
+RULES = ("rest_inside", "rest_anywhere", "trigger")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("scheme", "rule"), [(scheme, rule) for scheme in SCHEMES for rule in RULES]
+)
+def test_twins_make_the_bits_of_the_loop_in_journals_and_participant_files(
+    tmp_path: Path, scheme: str, rule: str
+):
+    pytest.importorskip("numba")
+    seed = SCHEMES.index(scheme) * 3 + RULES.index(rule)
+    protocol = written(tmp_path, drawn_study(seed, scheme, rule))
+    fast, way = simulated(protocol, tmp_path / "fast")
+    slow, other = simulated(protocol, tmp_path / "slow", "asked for")
+    assert way["compiled"] is True
+    assert other == {"compiled": False, "why": "asked for", "deviation": 0.0}
+    journals = sorted(path.relative_to(fast) for path in fast.rglob("*.xdf"))
+    assert journals
+    for journal in journals:
+        assert (fast / journal).read_bytes() == (slow / journal).read_bytes()
+    (file,) = fast.glob("*.h5")
+    assert held(file) == held(slow / file.name)
+
+
+@pytest.mark.long
+def test_a_study_with_one_component_without_a_twin_is_simulated_by_the_loop_and_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    pytest.importorskip("numba")
+    from labcrane_schemes.joint_velocity import JointVelocity
+
+    monkeypatch.setattr(JointVelocity, "twin", lambda scheme: None)
+    protocol = tmp_path / "protocol.yaml"
+    written(tmp_path, drawn_study(1, "joint_velocity", "rest_inside"))
+    _, way = simulated(protocol, tmp_path / "data")
+    assert way["compiled"] is False
+    assert way["why"] == "scheme has no compiled twin"
+
+
+def test_without_numba_the_loop_simulates_and_says_what_to_install(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(fast_forward, "find_spec", lambda name: None)
+    protocol = tmp_path / "protocol.yaml"
+    text = drawn_study(1, "joint_velocity", "rest_inside")
+    written(tmp_path, text.replace("limit_s: 12", "limit_s: 4"))
+    _, way = simulated(protocol, tmp_path / "data")
+    assert way["compiled"] is False
+    assert way["why"] == "numba is not installed; labcrane[fast] brings it"

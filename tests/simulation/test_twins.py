@@ -1,0 +1,80 @@
+"""Every bundled twin beside its component, tick by tick."""
+
+import pytest
+
+pytest.importorskip("numba")
+
+from labcrane import Controller
+from labcrane.core import CraneSettings
+from labcrane.core.roles import Component
+from labcrane.testing import TwinContract, ch8
+from labcrane_aiming.aiming import Aiming
+from labcrane_aiming.settings import AimingSettings
+from labcrane_bullet.kinematic_crane import KinematicCrane
+from labcrane_operator.operator import SimulatedOperator
+from labcrane_operator.settings import OperatorSettings
+from labcrane_schemes.end_effector import EndEffector
+from labcrane_schemes.joint_velocity import JointVelocity
+from labcrane_schemes.settings import EndEffectorSettings, JointVelocitySettings, SwitchableSettings
+from labcrane_schemes.switchable import Switchable
+
+pytestmark = pytest.mark.long
+
+JOINTS = JointVelocitySettings(
+    map={"slew": "left.x", "elbow": "left.y", "wrist": "right.x", "shoulder": "-right.y"},
+    soft_stop_deg=40.0,
+    expo=0.3,
+)
+TIP = EndEffectorSettings(map={"x": "left.y", "y": "-left.x", "z": "right.y"}, soft_stop_deg=40.0)
+
+
+class TestSchemes(TwinContract):
+    @pytest.fixture(params=["joint_velocity", "end_effector", "switchable"])
+    def component(self, request: pytest.FixtureRequest) -> Controller:
+        match request.param:
+            case "joint_velocity":
+                return JointVelocity(JOINTS, ch8())
+            case "end_effector":
+                return EndEffector(TIP, ch8())
+        both = SwitchableSettings(button="right.trigger", joint_velocity=JOINTS, end_effector=TIP)
+        return Switchable(both, ch8())
+
+
+class TestCranes(TwinContract):
+    @pytest.fixture(params=["ideal", "electric", "hydraulic", "sluggish"])
+    def component(self, request: pytest.FixtureRequest) -> Component:
+        return KinematicCrane(CraneSettings.model_validate({"actuator": request.param}), ch8())
+
+
+class TestEngines(TwinContract):
+    @pytest.fixture(params=[{"lag_s": 0.5}, "hydraulic"])
+    def component(self, request: pytest.FixtureRequest) -> Component:
+        pytest.importorskip("pybullet")
+        from labcrane_bullet.bullet_crane import BulletCrane
+
+        # Commands of this contract jump; only a drive with a lag has the torque to follow.
+        settings = {"actuator": request.param}
+        return BulletCrane(CraneSettings.model_validate(settings), ch8())
+
+
+class TestTask(TwinContract):
+    @pytest.fixture(params=["rest_inside", "rest_anywhere", "trigger"])
+    def component(self, request: pytest.FixtureRequest) -> Component:
+        return Aiming(AimingSettings(end=request.param), ch8())
+
+
+class TestOperator(TwinContract):
+    @pytest.fixture
+    def component(self) -> Component:
+        return SimulatedOperator(OperatorSettings())
+
+
+def test_a_twin_that_differs_by_a_bit_breaks_the_contract() -> None:
+    class Off(KinematicCrane):
+        def step(self, command, dt):
+            return super().step(command * (1.0 + 2.3e-16), dt)
+
+    with pytest.raises(AssertionError, match=r"in tick \d+ the twin made"):
+        TwinContract().test_twin_makes_its_components_numbers_tick_by_tick(
+            Off(CraneSettings(), ch8())
+        )
