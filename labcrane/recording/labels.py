@@ -12,6 +12,7 @@ LABELS = "labcrane.labels"
 """Name of the stream of labels, live and in exports."""
 
 HED_VERSION = "8.3.0"
+"""Version of the HED schema that the tags of labels are from."""
 
 LONGEST = 64
 """Letters of a level; a longer text is no level, but a scene or a remark."""

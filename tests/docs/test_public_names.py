@@ -111,13 +111,14 @@ def test_arrays_have_shapes_and_numbers_have_units(name: str) -> None:
 
 def hints_of(what: object) -> dict[str, object]:
     """Return the types of a function's parameters and result, or of a record's fields."""
-    import numpy.typing  # as labcrane has them for type checkers only
+    import mne  # as labcrane has them for type checkers only
+    import numpy.typing
     import pandas
+    import pyarrow
 
     public = {name: getattr(module, name) for module in MODULES for name in module.__all__}
-    return typing.get_type_hints(
-        what, localns={"pd": pandas, "np": numpy, "npt": numpy.typing, **public}
-    )
+    others = {"pd": pandas, "np": numpy, "npt": numpy.typing, "pa": pyarrow, "mne": mne}
+    return typing.get_type_hints(what, localns={**others, **public})
 
 
 def has_float(hint: object) -> bool:
