@@ -101,7 +101,7 @@ def test_a_session_without_steps_is_told(told) -> None:
 
 
 def test_all_wrong_names_are_told_at_once(told) -> None:
-    text = AIMING.replace("left.x", "left.q").replace("cab_left", "cab_left, areas: [tipp]")
+    text = AIMING.replace("left.x", "left.q").replace("camera: cab", "camera: cab, areas: [tipp]")
     assert [line.split(":")[0] for line in told("aiming", text)] == ["14", "27"]
 
 
