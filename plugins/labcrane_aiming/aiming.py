@@ -6,14 +6,14 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from labcrane import Frame, Machine, ProtocolError, Run, Signal, Task, Trial
-from labcrane.core import Event, Phase, PlannedTrial, Sphere, TrialStatus, Twin, twin
+from labcrane.core import Event, Phase, PlannedTrial, TrialStatus, Twin, twin
 from labcrane.machines import reach
 from labcrane_aiming.pairs import Pair, Point, index_of_difficulty, pairs
 from labcrane_aiming.settings import AimingSettings
 
 if TYPE_CHECKING:  # a protocol is checked without loading numpy
     from labcrane import FloatArray
-    from labcrane.core import Places
+    from labcrane.core import Places, Sphere
 
 # Seconds per movement in a plan: an intercept and seconds per bit, seen with simulated operators.
 PLAN_INTERCEPT_S = 1.0
@@ -100,7 +100,9 @@ class Aiming(Task):
         expected = PLAN_INTERCEPT_S + PLAN_SLOPE_S * difficulty
         return PlannedTrial(condition, expected_s=expected, counted=number > 0)
 
-    def places(self) -> Sequence[Sphere]:
+    def places(self) -> "Sequence[Sphere]":
+        from labcrane.core import Sphere  # noqa: PLC0415 - nor what is drawn
+
         radius = self._settings.width / 2
         return [
             Sphere(f"{pair.name} {which}", point, radius, (0.9, 0.1, 0.1, 1.0))

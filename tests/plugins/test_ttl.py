@@ -18,6 +18,7 @@ import labcrane_ttl
 from labcrane import DeviceError, PluginError, ProtocolError, Trigger
 from labcrane.core import Event
 from labcrane.core.clock import Tick
+from labcrane.registry.registry import discover
 from labcrane.session.session import Visit, run
 from labcrane.streams.markers import CODES
 from labcrane.streams.triggers import Triggers
@@ -108,6 +109,13 @@ class TestAnswering(TriggerContract):
     @pytest.fixture
     def trigger(self, answering: Device) -> Trigger:
         return SerialTrigger(SerialSettings(port=answering.port, echo=True), as_byte, b"\0")
+
+
+class TestBox(TriggerContract):
+    @pytest.fixture
+    def trigger(self, device: Device) -> Trigger:
+        box = discover().find(Trigger, "box_ttl")
+        return box.build(BoxSettings(port=device.port), ch8())
 
 
 class TestParallel(TriggerContract):
