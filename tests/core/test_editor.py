@@ -6,7 +6,6 @@ import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -193,10 +192,7 @@ def test_mistakes_in_another_file_are_marked_where_the_protocol_names_it(
 def test_the_supervisors_page_asks_what_a_check_asks(
     folder: Path, registry: Registry, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from nicegui import Client, ui
-    from nicegui.page import page
-
-    from labcrane.web.examiner_page import build_questions
+    from labcrane.web.room.snapshot import asked as shown
 
     path, asked = folder / "protocol.yaml", 0
     doubtful = [each for each in faults("aiming", AIMING, 5) if "written as 1e300" in each.fault]
@@ -206,11 +202,7 @@ def test_the_supervisors_page_asks_what_a_check_asks(
         if any(one["kind"] == "problem" for one in found):
             continue
         asked += len(found)
-        client = Client(page(f"/{each.place}"), request=None)
-        with client:
-            build_questions(SimpleNamespace(study=load(path, registry)))
-        labels = [one for one in client.elements.values() if isinstance(one, ui.label)]
-        assert [label.text for label in labels] == [
+        assert [line["text"] for line in shown(load(path, registry))] == [
             f"line {one['line']} of protocol.yaml: {one['message']}" for one in found
         ]
     assert asked >= 2

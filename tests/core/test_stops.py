@@ -3,6 +3,7 @@
 import json
 import math
 import random
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -358,8 +359,9 @@ class Stops(RuleBasedStateMachine):
 def numbers_in(owed: str) -> set[int]:
     found: set[int] = set()
     for part in owed.split("; "):
-        _, _, spans = part.partition(", trials ")
-        for span in spans.split():
+        # "trials 5-8", or of one alone "trial 5".
+        spans = re.search(r", trials? (.+)", part)
+        for span in spans[1].split() if spans else ():
             first, _, last = span.partition("-")
             found |= set(range(int(first), int(last or first) + 1))
     return found

@@ -118,7 +118,7 @@ class TestBox(TriggerContract):
         return box.build(BoxSettings(port=device.port), ch8())
 
 
-class TestParallel(TriggerContract):
+class TestParallel(TriggerContract):  # what offers "parallel_ttl" is given no real port
     @pytest.fixture
     def trigger(self) -> Trigger:
         settings = ParallelSettings(port=Path("/dev/null"), codes={"trial.start": 3})

@@ -1,13 +1,12 @@
 """Columns of numbers that are written a chunk at a time, as long as they come.
 
 A chunk is shuffled and packed here, and given to HDF5 as it goes to the disk: what any HDF5 reads
-as gzip, by a packer that is ten times as fast as zlib's (https://github.com/pycompression/python-isal).
+as gzip, by a packer that is ten times as fast as zlib's (ISA-L).
 """
 
 from typing import TYPE_CHECKING
 
 import numpy as np
-from isal import isal_zlib
 
 from labcrane.recording.participant_file.columns import (
     CHUNK,
@@ -89,5 +88,7 @@ class ColumnWriter:
 def pack(values: FloatArray) -> bytes:
     """Return one chunk as HDF5's filters shuffle and gzip leave it."""
     shuffled = np.ascontiguousarray(values.view(np.uint8).reshape(-1, values.itemsize).T)
+    from isal import isal_zlib  # noqa: PLC0415 - who only reads a recording does without
+
     packed: bytes = isal_zlib.compress(shuffled, GZIP_LEVEL)
     return packed

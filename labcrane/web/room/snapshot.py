@@ -9,6 +9,7 @@ from labcrane.core.records import Event
 from labcrane.core.signals import Signal
 from labcrane.design.counts import TrialCounts
 from labcrane.protocol.questions import about, questions
+from labcrane.protocol.study import Study
 from labcrane.web.page import PageContext
 from labcrane.web.room.bars import groups
 from labcrane.web.room.buttons import buttons
@@ -88,10 +89,7 @@ class Snapshot:
         lines = session.assessment.lines(live.newest, context.study.protocol.indicator)
         streams = self._streams()
         return {
-            "questions": [
-                {"ident": f"question-{question.key}", "text": _asked(context, question)}
-                for question in questions(context.study)
-            ],
+            "questions": asked(context.study),
             "bars": groups(live.newest, live.units, context.study.machine.joints, live.moved),
             "performance": "\n".join(lines),
             "measures": [
@@ -273,6 +271,11 @@ def _stream(stream: Mapping[str, Any], trace: list[float | None]) -> dict[str, A
     }  # fmt: skip
 
 
-def _asked(context: PageContext, question: Any) -> str:
-    said = about(context.study, question)
-    return f"line {said['line']} of {context.study.path.name}: {said['message']}"
+def asked(study: Study) -> list[dict[str, str]]:
+    """Return what ``labcrane check`` asks of a study, by the idents of the page's lines."""
+    found = []
+    for question in questions(study):
+        said = about(study, question)
+        text = f"line {said['line']} of {study.path.name}: {said['message']}"
+        found.append({"ident": f"question-{question.key}", "text": text})
+    return found
