@@ -155,6 +155,8 @@ def beside_trials(measures: "pd.DataFrame", participant: Participant) -> "pd.Dat
     ``QUESTIONNAIRE.score.NAME``. An answer to a questionnaire that follows no trial is in no row.
     Of a trial that was repeated, the last attempt has it; of one asked twice, the last answer.
     """
+    if measures.empty:  # ended before its first trial
+        return measures.copy()
     answers, scores = answers_of(participant), scores_of(participant)
     given: dict[tuple[int, int], dict[str, Any]] = {}
     for row in answers[answers["trial"].notna()].to_dict("records"):

@@ -127,7 +127,7 @@ def in_a_process(plugin: str, **environment: str) -> str:
 
 def test_a_display_is_looked_at_with_what_draws(x_server: str) -> None:
     found = in_a_process("labcrane_view", DISPLAY=x_server)
-    assert "draws a window of 1280 x 720 pixels" in found
+    assert "draws a window of 1000 x 562 pixels" in found  # whole, on a screen of 1000 x 700
     assert "WARN" in found  # nothing but software draws on it
     assert "FAIL there is no display" in in_a_process("labcrane_view", DISPLAY="")
 

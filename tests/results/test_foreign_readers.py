@@ -12,7 +12,7 @@ from results.consumers import needs_octave, needs_r, octave, r, table
 RHDF5 = """
 suppressMessages(library(rhdf5)); file <- commandArgs(TRUE)[1]
 nodes <- h5ls(file); nodes <- nodes[nodes$otype == "H5I_DATASET", ]
-for (path in paste(nodes$group, nodes$name, sep = "/")) {
+for (path in paste(sub("^/$", "", nodes$group), nodes$name, sep = "/")) {
   x <- as.vector(h5read(file, path))
   if (is.character(x)) cat(path, length(x), sum(nchar(x)), 0, sep = "|")
   else cat(path, length(x), sprintf("%.17g", sum(x, na.rm = TRUE)), sum(is.na(x)), sep = "|")

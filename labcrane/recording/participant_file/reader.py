@@ -122,7 +122,7 @@ class Stream:
                 )
         raise RecordingError(
             f"stream {self.name!r} of {self._path} has no column {name!r}; it has "
-            + ", ".join((*self._paths, "time"))
+            + ", ".join(("time", *self._paths))
         )
 
     def batches(
