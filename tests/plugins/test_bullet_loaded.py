@@ -215,6 +215,6 @@ sessions: [{name: only, steps: [{block: {task: aiming}}]}]
 
 def test_a_crane_without_masses_takes_no_load(tmp_path) -> None:
     (tmp_path / "study.yaml").write_text(STUDY, encoding="utf-8")
-    said = r"study.yaml:6:34: 'payload_kg' is not a key of dynamics"
+    said = r"study.yaml:7:34: 'payload_kg' is not a key of dynamics"
     with pytest.raises(ProtocolError, match=said):
         load(tmp_path / "study.yaml", discover())
