@@ -125,7 +125,7 @@ def test_statistics_of_all_episodes_are_those_of_all_rows(lerobot: Path) -> None
         assert stats[name]["count"] == [len(values)]
 
 
-@pytest.mark.long
+@pytest.mark.soak
 @needs("lerobot")
 def test_the_published_lerobot_loads_it_equal_in_float32(
     lerobot: Path, people: list[Participant], tmp_path: Path
@@ -179,7 +179,7 @@ def test_robomimics_file_holds_every_episode_with_its_ends(
         assert {name.decode() for name in file["mask/success"][:]} == succeeded
 
 
-@pytest.mark.long
+@pytest.mark.soak
 @needs("robomimic")
 def test_the_published_robomimic_reads_every_row(people: list[Participant], tmp_path: Path) -> None:
     Robomimic(EpisodeSettings()).export(iter(people), tmp_path)
