@@ -1,5 +1,6 @@
 """Views without a screen and on an X server of the test's own, and where things are in them."""
 
+import gc
 import math
 import os
 import subprocess
@@ -102,5 +103,8 @@ def an_x_server(*more: str) -> Iterator[str]:
     try:
         yield f":{number}"
     finally:
+        # A window's destructor uses its connection, and Xlib ends the process where the server of
+        # one has gone: whatever nobody refers to any more goes first.
+        gc.collect()
         server.terminate()
         server.wait()
