@@ -68,6 +68,7 @@ def command_without(modules: list[str], *arguments: str, cwd: Path) -> str:
     return done.stdout
 
 
+@pytest.mark.long
 def test_the_demo_can_be_run_again_and_overwrites_nothing(tmp_path: Path) -> None:
     for _ in range(2):
         assert labcrane_command("demo", cwd=tmp_path).returncode == 0

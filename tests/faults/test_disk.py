@@ -125,6 +125,7 @@ print("whole")
 )
 
 
+@pytest.mark.long
 @needs_mounts
 def test_a_disk_that_vanishes_is_noticed_by_the_next_write_and_loses_no_frame(
     tmp_path: Path,
@@ -135,6 +136,7 @@ def test_a_disk_that_vanishes_is_noticed_by_the_next_write_and_loses_no_frame(
     assert "whole" in done.stdout
 
 
+@pytest.mark.long
 @needs_mounts
 def test_a_session_on_a_full_disk_is_held_and_loses_no_frame(tmp_path: Path) -> None:
     script = SESSION.replace("FILL", "400").replace("FREE", "1200")

@@ -39,6 +39,7 @@ def addresses(browser) -> set[str]:
     return found
 
 
+@pytest.mark.long
 def test_a_session_is_led_and_answered_from_a_browser(  # noqa: PLR0915 - one visit, in order
     protocol: Path, tmp_path: Path, browser: webdriver.Chrome
 ) -> None:
