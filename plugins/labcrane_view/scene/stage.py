@@ -166,7 +166,7 @@ class Stage:
         state.set_shader(made, 100)
         state.set_shader_input("range", core.LVector2(near, far), 100)
         eye.set_initial_state(state.get_state())
-        eye.set_camera_mask(SHADOWS)
+        eye.set_camera_mask(SHADOWS | STILL)
 
     def _add_machine(self, bodies: Sequence[Body]) -> None:
         last = max((body.frame for body in bodies), default=0)
@@ -254,7 +254,7 @@ class Stage:
     def grid(self) -> None:
         """Draw lines on the ground, a metre apart, as far as it is level."""
         node = self._add(self.root, "grid", grid(), GRID, 0.0)
-        node.hide(SHADOWS)
+        node.hide(SHADOWS | STILL)
 
     def _add_sky(self) -> None:
         node = self.root.attach_new_node(_geometry("sky", self._ball))
