@@ -99,6 +99,10 @@ def open_window(
             "there is no display for a window (DISPLAY is not set); start labcrane in a desktop "
             "session, or write display: hidden to draw without a screen"
         )
+    if not hidden:
+        # Panda3D has its own copy of the environment, made when it was imported: it would open the
+        # window on whatever display there was then.
+        core.ExecutionEnvironment.set_environment_variable("DISPLAY", os.environ["DISPLAY"])
     tried = [("p3headlessgl" if hidden else "pandagl", True)] * (settings.renderer == "auto")
     for module, shaders in [*tried, ("p3tinydisplay", False)]:
         engine = core.GraphicsEngine()

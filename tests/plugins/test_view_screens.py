@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from needs import need
 from pydantic import ValidationError
-from windows import a_view, an_x_server, centre_of, make_frame, projected
+from windows import SIZE, a_view, an_x_server, centre_of, make_frame, projected
 
 from labcrane import DeviceError
 from labcrane.core import SessionState, Sphere
@@ -53,6 +53,21 @@ def window_at(title: str) -> tuple[tuple[int, int], tuple[int, int]]:
 def in_window(x: float) -> float:
     """Return where a column of the wide picture is in the window; NaN behind the frames."""
     return x if x < 480 else x - GAP if x >= 480 + GAP else float("nan")
+
+
+@pytest.mark.parametrize("renderer", ["auto", "software"])
+def test_a_window_opens_on_the_display_that_is_named_now(
+    renderer: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    need("xwininfo")
+    with an_x_server() as first, an_x_server() as second:
+        for display, other in ((first, second), (second, first)):
+            monkeypatch.setenv("DISPLAY", display)
+            with a_view(display="window", renderer=renderer):
+                assert window_at("labcrane")[1] == SIZE
+                monkeypatch.setenv("DISPLAY", other)
+                with pytest.raises(subprocess.CalledProcessError):
+                    window_at("labcrane")
 
 
 @pytest.mark.usefixtures("desktop")
