@@ -2,6 +2,7 @@
 
 import os
 import struct
+import sys
 from collections.abc import Callable, Sequence
 
 from labcrane import DeviceError, Run, Trigger
@@ -70,11 +71,14 @@ class ParallelTrigger(Trigger):
             self.fault = f"{self._path} cannot be written: {error}"
 
 
-def _ioctl() -> Control:
-    try:
+if sys.platform == "linux":
+
+    def _ioctl() -> Control:
         from fcntl import ioctl
-    except ImportError as error:
-        raise DeviceError(
-            "parallel ports are for Linux; elsewhere use serial_ttl or box_ttl"
-        ) from error
-    return ioctl
+
+        return ioctl
+
+else:
+
+    def _ioctl() -> Control:
+        raise DeviceError("parallel ports are for Linux; elsewhere use serial_ttl or box_ttl")
