@@ -77,6 +77,13 @@ def _succeeds(*command: str) -> bool:
         return False
 
 
+def node_module(name: str) -> Path | None:
+    """Return the folder of a module of Node.js, where npm has put it for everybody."""
+    folders = os.environ.get("NODE_PATH", "").split(os.pathsep)
+    folders += ["/usr/local/lib/node_modules", "/usr/lib/node_modules"]
+    return next((Path(each, name) for each in folders if each and Path(each, name).is_dir()), None)
+
+
 def _may_run_in_real_time() -> bool:
     asked = "import os; os.sched_setscheduler(0, os.SCHED_FIFO, "
     asked += f"os.sched_param({REAL_TIME_PRIORITY}))"
@@ -125,6 +132,11 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
         lambda: shutil.which("yaml-language-server") is not None,
         "npm install --global yaml-language-server@1.25.0",  # as .ci/run has it
     ),
+    "axe-core": (
+        lambda: node_module("axe-core") is not None,
+        "npm install --global axe-core@4.14.1",  # as .ci/run has it
+    ),
+    "numba": (lambda: find_spec("numba") is not None, "pip install 'labcrane[fast]'"),
     "lerobot": (
         lambda: _learner_has("lerobot"),
         f"pip install lerobot into an environment of its own, and name its Python in {LEARNERS}",

@@ -7,6 +7,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from needs import need
 
 from labcrane.machines.library import find_machine
 from labcrane.simulation import fast_forward
@@ -126,7 +127,7 @@ RULES = ("rest_inside", "rest_anywhere", "trigger")
 def test_twins_make_the_bits_of_the_loop_in_journals_and_participant_files(
     tmp_path: Path, scheme: str, rule: str
 ):
-    pytest.importorskip("numba")
+    need("numba")
     seed = SCHEMES.index(scheme) * 3 + RULES.index(rule)
     protocol = written(tmp_path, drawn_study(seed, scheme, rule))
     fast, way = simulated(protocol, tmp_path / "fast")
@@ -145,7 +146,7 @@ def test_twins_make_the_bits_of_the_loop_in_journals_and_participant_files(
 def test_a_study_with_one_component_without_a_twin_is_simulated_by_the_loop_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    pytest.importorskip("numba")
+    need("numba")
     from labcrane_schemes.joint_velocity import JointVelocity
 
     monkeypatch.setattr(JointVelocity, "twin", lambda scheme: None)

@@ -1,8 +1,7 @@
 """Every bundled twin beside its component, tick by tick."""
 
 import pytest
-
-pytest.importorskip("numba")
+from needs import need, needs
 
 from labcrane import Controller
 from labcrane.core import CraneSettings
@@ -18,7 +17,7 @@ from labcrane_schemes.joint_velocity import JointVelocity
 from labcrane_schemes.settings import EndEffectorSettings, JointVelocitySettings, SwitchableSettings
 from labcrane_schemes.switchable import Switchable
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, needs("numba")]
 
 JOINTS = JointVelocitySettings(
     map={"slew": "left.x", "elbow": "left.y", "wrist": "right.x", "shoulder": "-right.y"},
@@ -49,7 +48,7 @@ class TestCranes(TwinContract):
 class TestEngines(TwinContract):
     @pytest.fixture(params=[{"lag_s": 0.5}, "hydraulic"])
     def component(self, request: pytest.FixtureRequest) -> Component:
-        pytest.importorskip("pybullet")
+        need("pybullet")
         from labcrane_bullet.bullet_crane import BulletCrane
 
         # Commands of this contract jump; only a drive with a lag has the torque to follow.
