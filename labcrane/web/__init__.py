@@ -1,4 +1,4 @@
-"""The pages of examiner and participant, served by a process of their own.
+"""The pages of examiner and participant, and of a recording, each served by its own process.
 
 In come the session's events and streams; out go pages, and commands that pass through the launcher.
 Nothing here touches the loop.

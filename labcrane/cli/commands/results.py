@@ -246,7 +246,7 @@ def _show(recording: Path, session: int, protocol: Path | None, speed: float, be
     """Show a recorded session in the views and sounds of its study."""
     from tempfile import TemporaryDirectory
 
-    from labcrane.feedback.screening import screen
+    from labcrane.feedback.playback import play
     from labcrane.protocol.study import load
     from labcrane.recording.participant_file.reader import open_recording
     from labcrane.registry.registry import discover
@@ -257,7 +257,7 @@ def _show(recording: Path, session: int, protocol: Path | None, speed: float, be
     with TemporaryDirectory(prefix="labcrane-show-") as folder:
         path = restore(record, Path(folder), protocol, None)
         study = load(path, discover(study=protocol or path), recorded=True)
-        screen(study, record, speed=speed, start_s=begin, say=out.print)
+        play(study, record, speed=speed, start_s=begin, say=out.print)
 
 
 def view(

@@ -1,4 +1,4 @@
-"""Screening of a recorded session: its own frames to views and sounds, at any speed."""
+"""Playback of a recorded session: its own frames to views and sounds, at any speed."""
 
 import os
 import time
@@ -24,7 +24,7 @@ WINDOW = 4096
 """Rows that are read at once: an hour is never held in memory."""
 
 
-class Reel:
+class RecordedFrames:
     """The frames of a recorded session by number, with the events of each."""
 
     def __init__(self, record: SessionRecord) -> None:
@@ -59,8 +59,8 @@ class Reel:
         return [one for tick in self._ticks if first < tick <= last for one in self._events[tick]]
 
 
-def screened(
-    reel: Reel,
+def played(
+    recorded: RecordedFrames,
     start_s: float,
     speed: float,
     now: Callable[[], float],
@@ -80,25 +80,25 @@ def screened(
     RecordingError
         The session has no such second.
     """
-    length = float(reel.time[-1] - reel.time[0]) if len(reel.time) else 0.0
+    length = float(recorded.time[-1] - recorded.time[0]) if len(recorded.time) else 0.0
     if not 0.0 <= start_s <= length:
         raise RecordingError(
             f"the session lasts {length:.1f} s and has no second {start_s:g}; give one from 0 on"
         )
-    begun, origin = now(), reel.time[0] + start_s
-    row, told = int(np.searchsorted(reel.time, origin - 1e-9)), -1
+    begun, origin = now(), recorded.time[0] + start_s
+    row, told = int(np.searchsorted(recorded.time, origin - 1e-9)), -1
     while True:
-        frame = reel.frame(row)
-        yield frame, reel.events(told, frame.tick.number)
+        frame = recorded.frame(row)
+        yield frame, recorded.events(told, frame.tick.number)
         told = frame.tick.number
-        if row + 1 >= len(reel.time):
+        if row + 1 >= len(recorded.time):
             return
-        rest(max(0.0, (reel.time[row + 1] - origin) / speed - (now() - begun)))
+        rest(max(0.0, (recorded.time[row + 1] - origin) / speed - (now() - begun)))
         reached = origin + (now() - begun) * speed
-        row = max(row + 1, int(np.searchsorted(reel.time, reached + 1e-9)) - 1)
+        row = max(row + 1, int(np.searchsorted(recorded.time, reached + 1e-9)) - 1)
 
 
-def screen(
+def play(
     study: Study,
     record: SessionRecord,
     *,
@@ -123,28 +123,28 @@ def screen(
             "the study has neither views nor sounds, so nothing can be shown; labcrane view shows "
             "any session in a browser"
         )
-    reel = Reel(record)
-    run = _run_of(study, reel)
+    recorded = RecordedFrames(record)
+    run = _run_of(study, recorded)
     source = f"{study.protocol.study}/replay-{os.getpid()}"
     orders = [replace(order, recorded=False) for order in host_orders(study, run, source)]
     keepers = [FeedbackHandle(order, "continue") for order in orders]
     try:
         wait_for_all(keepers, say, "labcrane view shows any session in a browser")
-        _send_all(run, source, reel, keepers, speed=speed, start_s=start_s)
+        _send_all(run, source, recorded, keepers, speed=speed, start_s=start_s)
     finally:
         for keeper in keepers:
             keeper.stop()
 
 
-def _run_of(study: Study, reel: Reel) -> Run:
+def _run_of(study: Study, recorded: RecordedFrames) -> Run:
     run = Rig.build(study, simulated=True).describe(study, participant_seed=0)
-    return replace(run, axes=reel.axes)  # what was recorded may have had other controls
+    return replace(run, axes=recorded.axes)  # what was recorded may have had other controls
 
 
 def _send_all(
     run: Run,
     source: str,
-    reel: Reel,
+    recorded: RecordedFrames,
     keepers: list[FeedbackHandle],
     *,
     speed: float,
@@ -163,10 +163,10 @@ def _send_all(
             outlet.push(now)
 
     try:
-        first, events = next(screened(reel, start_s, speed, time.perf_counter, time.sleep))
+        first, events = next(played(recorded, start_s, speed, time.perf_counter, time.sleep))
         send(first, events)
         hold(lambda: send(first, []), keepers)
-        for frame, happened in screened(reel, start_s, speed, time.perf_counter, time.sleep):
+        for frame, happened in played(recorded, start_s, speed, time.perf_counter, time.sleep):
             again = frame.tick.number == first.tick.number
             send(frame, [] if again else happened)
         time.sleep(END_S)

@@ -12,7 +12,7 @@ from labcrane import open_recording
 from labcrane.cli.app import main
 from labcrane.core.records import SessionState
 from labcrane.errors import RecordingError
-from labcrane.feedback.screening import Reel, screened
+from labcrane.feedback.playback import RecordedFrames, played
 from labcrane.streams.context import situation_after
 
 STUDY = (
@@ -50,13 +50,13 @@ class Clock:
 @pytest.mark.parametrize("speed", [0.1, 1.0, 7.0, 50.0])
 def test_each_frame_is_shown_when_it_is_due_and_every_event_once(file: Path, speed: float) -> None:
     record = open_recording(file).session(1)
-    reel = Reel(record)
+    reel = RecordedFrames(record)
     length = reel.time[-1] - reel.time[0]
     start = random.Random(speed).uniform(0.0, length / 2)
     clock = Clock(sending_s=0.001)
     state = record.streams["state"].data.to_numpy()
     happened, late = [], []
-    for frame, events in screened(reel, start, speed, clock.now, clock.rest):
+    for frame, events in played(reel, start, speed, clock.now, clock.rest):
         row = frame.tick.number - int(record.streams["loop"].data["tick"].iloc[0])
         np.testing.assert_array_equal(frame.state, state[row])
         due = (reel.time[row] - reel.time[0] - start) / speed
@@ -73,11 +73,11 @@ def test_each_frame_is_shown_when_it_is_due_and_every_event_once(file: Path, spe
 
 def test_the_first_frame_brings_what_the_session_was_about_then(file: Path) -> None:
     record = open_recording(file).session(1)
-    reel = Reel(record)
+    reel = RecordedFrames(record)
     trials = record.trials
     middle = (trials["started"].iloc[1] + trials["ended"].iloc[1]) / 2 - reel.time[0]
     clock = Clock(0.0)
-    frame, events = next(screened(reel, middle, 1.0, clock.now, clock.rest))
+    frame, events = next(played(reel, middle, 1.0, clock.now, clock.rest))
     situation = SessionState()
     for event in events:
         situation = situation_after(situation, event)
@@ -87,10 +87,10 @@ def test_the_first_frame_brings_what_the_session_was_about_then(file: Path) -> N
 def test_what_cannot_be_shown_is_said_in_words(
     file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    reel = Reel(open_recording(file).session(1))
+    reel = RecordedFrames(open_recording(file).session(1))
     clock = Clock(0.0)
     with pytest.raises(RecordingError, match=r"lasts [\d.]+ s and has no second 1e\+06"):
-        next(screened(reel, 1e6, 1.0, clock.now, clock.rest))
+        next(played(reel, 1e6, 1.0, clock.now, clock.rest))
     for words, said in (
         (["--show"], "neither views nor sounds"),
         (["--show", "--speed", "0"], "a speed of 0 shows nothing"),
