@@ -1,4 +1,4 @@
-"""Find the commands that installed plugins offer."""
+"""Commands that installed plugins offer."""
 
 from collections.abc import Iterable, Mapping
 

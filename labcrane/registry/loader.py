@@ -1,4 +1,4 @@
-"""Import plugins: those that are installed, and the files in a study's own folder."""
+"""Loader of plugins: those that are installed, and the files in a study's own folder."""
 
 import hashlib
 import sys

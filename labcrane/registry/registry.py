@@ -1,4 +1,4 @@
-"""Find installed plugins and look up what they offer."""
+"""Registry of installed plugins and of what they offer."""
 
 from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
