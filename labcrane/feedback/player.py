@@ -1,4 +1,4 @@
-"""Plays a movement to views and sounds as a session does, in real time."""
+"""Player of a movement: to views and sounds as a session does, in real time."""
 
 import os
 import time

@@ -1,4 +1,4 @@
-"""Starts, watches and restarts the processes of a run.
+"""Launcher of a run: starts, watches and restarts its processes.
 
 The session process owns the loop, the recorder process the streams of others. Either may die: the
 recorder is started again at once, and after the session's death everything recorded is put into

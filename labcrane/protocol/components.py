@@ -10,7 +10,6 @@ from labcrane.core.roles import Component, Cue, Feedback, Questionnaire, SignalM
 from labcrane.core.settings import Settings
 from labcrane.errors import PluginError, ProtocolError
 from labcrane.files.yaml import Place, YamlFile
-from labcrane.machines.descriptions.description import MachineDescription
 from labcrane.machines.library import read_machine
 from labcrane.machines.machine import Machine
 from labcrane.protocol.protocol import Protocol, Use
@@ -176,6 +175,11 @@ class ComponentResolver:
         name, folder = self._at(("machine",)), self._source.path.parent
         try:
             if isinstance(name, dict):
+                # Few machines are described so, and every command would read what describes them.
+                from labcrane.machines.descriptions.description import (  # noqa: PLC0415
+                    MachineDescription,
+                )
+
                 described = self._source.check(MachineDescription, ("machine",))
                 return described.read(folder) if described else None
             if not isinstance(name, str):

@@ -1,4 +1,4 @@
-"""Tells of components that take longer than a tick has."""
+"""Overruns: components that take longer than a tick has, and are told of."""
 
 from labcrane.core.records import Event, Frame
 from labcrane.recording.frame_log import FrameLog

@@ -1,4 +1,4 @@
-"""Run one session: open the rig, lead it through its plan, leave a participant file."""
+"""Session: the rig is opened, led through its plan, and leaves a participant file."""
 
 import gc
 from collections.abc import Callable, Iterator, Mapping
