@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 from labcrane.approval.source_tree import hashes
 from labcrane.errors import ProtocolError
@@ -18,6 +19,7 @@ from labcrane.registry.hookspecs import PROJECT
 from labcrane.registry.registry import Registry
 
 DATA = frozenset({".yaml", ".yml", ".json"})
+ROBOTS = frozenset({".urdf", ".xml"})
 OWN = "the study's own"
 """What stands for the version of a file in the study's plugins folder."""
 
@@ -103,19 +105,52 @@ def referred(data: object, folder: Path) -> list[Path]:
             if path in found:
                 continue
             found[path] = None
-            waiting += [(name, path.parent) for name in _strings(_named_in(path))]
+            waiting += [
+                (name, beside)
+                for name in _strings(_named_in(path))
+                for beside in _beside(path, folder)
+            ]
     return list(found)
+
+
+def _beside(path: Path, folder: Path) -> list[Path]:
+    """Return from where a file names others: of a robot's package, any folder above it as well."""
+    if path.suffix not in ROBOTS:
+        return [path.parent]
+    return [above for above in path.parents if above.is_relative_to(folder)]
 
 
 def _named_in(path: Path) -> Any:
     if path.suffix in DATA:
         return _parsed(path.read_text(encoding="utf-8"))
+    if path.suffix in ROBOTS:
+        return list(_named_by_robot(path))
     if path.suffix == ".gltf":  # names its textures and its numbers
         try:
             return json.loads(path.read_text(encoding="utf-8"))
         except (ValueError, RecursionError) as error:
             raise ProtocolError(f"{path} is no glTF file: {str(error)[:100]}; export it") from error
     return None
+
+
+def _named_by_robot(path: Path) -> Iterator[str]:
+    """Yield the files that a URDF or MJCF file names: meshes, textures, and what it includes."""
+    try:
+        elements = list(ElementTree.parse(path).iter())  # noqa: S314 - expat refuses entity bombs
+    except (ElementTree.ParseError, ValueError):
+        return  # no robot: who reads it as one says so
+    folders = {""} | {
+        f"{element.get(key)}/"
+        for element in elements
+        for key in ("meshdir", "texturedir", "assetdir")
+        if element.get(key)
+    }
+    for element in elements:
+        for key in ("filename", "file"):
+            name = (element.get(key) or "").removeprefix("file://")
+            if name.startswith("package://"):
+                name = name.removeprefix("package://").partition("/")[2]
+            yield from (inside + name for inside in sorted(folders) if name)
 
 
 def _paths(text: str, beside: Path, folder: Path) -> list[Path]:
