@@ -30,7 +30,7 @@ from labcrane.approval.environment import (
     source,
 )
 from labcrane.approval.lock import lock_path, read_lock
-from labcrane.approval.materials import referred
+from labcrane.approval.materials import study_files
 from labcrane.errors import ProtocolError
 from labcrane.files.atomic import UNFINISHED, copy, sha256, write_text
 from labcrane.files.yaml import YamlFile
@@ -125,9 +125,9 @@ def _check_installed(study: Study) -> None:
 
 
 def _study_files(study: Study, registry: Registry) -> Iterator[str]:
-    """Yield what of the protocol's folder is the study: never data that lie beside it."""
+    """Yield what of the protocol's folder is the study: neither data beside it, nor keys."""
     folder = study.path.parent
-    found = {study.path, *referred(YamlFile.read(study.path).data, folder)}
+    found = {study.path, *study_files(YamlFile.read(study.path).data, folder)}
     found |= set(registry.local.values())
     if (lock := lock_path(study.path)).exists():
         found |= {lock, read_lock(study.path).consent}

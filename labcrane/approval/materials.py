@@ -20,6 +20,9 @@ from labcrane.registry.registry import Registry
 
 DATA = frozenset({".yaml", ".yml", ".json"})
 ROBOTS = frozenset({".urdf", ".xml"})
+OF_THE_LAB = frozenset({"certificate", "key"})
+"""What of a page is the laboratory's: everybody may read a lock, and a private key is nobody's to
+read; and a certificate that was renewed changes no study."""
 OWN = "the study's own"
 """What stands for the version of a file in the study's plugins folder."""
 
@@ -45,7 +48,7 @@ def materials(
     """
     protocol = YamlFile.read(study.path).data
     folder = study.path.parent
-    named = {path.relative_to(folder).as_posix(): path for path in referred(protocol, folder)}
+    named = {path.relative_to(folder).as_posix(): path for path in study_files(protocol, folder)}
     found: dict[str, Any] = {
         "protocol": protocol,
         "files": {name: content(path) for name, path in sorted(named.items())},
@@ -89,6 +92,15 @@ def _portable(value: object, folder: Path, part: str) -> Any:
             "there, so that it moves with the study and is part of the lock"
         )
     return named.relative_to(inside).as_posix()
+
+
+def study_files(protocol: Mapping[str, Any], folder: Path) -> list[Path]:
+    """Return the files that a protocol names but those of :data:`OF_THE_LAB`."""
+    page = protocol.get("page")
+    if not isinstance(page, Mapping):
+        return referred(protocol, folder)
+    shown = {key: value for key, value in page.items() if key not in OF_THE_LAB}
+    return referred({**protocol, "page": shown}, folder)
 
 
 def referred(data: object, folder: Path) -> list[Path]:
