@@ -13,6 +13,7 @@ from labcrane.errors import RecordingError
 from labcrane.recording.foreign_streams import OWN_CLOCK
 from labcrane.recording.paths import next_part, part_path
 from labcrane.recording.xdf.writer import XdfWriter
+from labcrane.streams.recorder.absence import PATIENCE_S, absent, missed
 from labcrane.streams.recorder.candidates import Candidate, question
 from labcrane.streams.recorder.health import Condition, Health, complaints, condition, rate
 from labcrane.streams.recorder.inlet import Inlet
@@ -84,6 +85,7 @@ class Recorder:
         self.know(known)
         self._own = self._writer.add_stream(OWN_CLOCK) if read_own_clock() is not None else None
         self._search = Search(forget_s=FORGET_S)
+        self._began = time.monotonic()
 
     @property
     def path(self) -> Path:
@@ -127,11 +129,7 @@ class Recorder:
         now = time.perf_counter()
         found = [_health(one, now, self._rivals(one)) for one in self._streams.values()]
         there = {one.request.label for one in self._streams.values()}
-        return found + [
-            _absent(one, self._candidates.get(one.label, ()))
-            for one in self._requests
-            if one.label not in there
-        ]
+        return found + [self._absent(one) for one in self._requests if one.label not in there]
 
     def status(self) -> dict[str, Any]:
         """Return how the recording is, ready for JSON."""
@@ -159,6 +157,19 @@ class Recorder:
         except RecordingError as error:  # the disk is still full: footers are missing, no samples
             self._fault = str(error)
         return all(whole) and self._fault is None
+
+    def _absent(self, request: StreamRequest) -> Health:
+        """Return how a stream is that is not recorded: asked about, left out or not there."""
+        if candidates := self._candidates.get(request.label, ()):
+            kind, required = request.type or "", request.required
+            said = question(request.label, kind, candidates, required=required)
+        elif request.confirmed == NOBODY:
+            said = "was left out: no stream of its type is meant"
+        elif time.monotonic() - self._began < PATIENCE_S:
+            said = absent(request)
+        else:
+            said = missed(request, self._search.results())
+        return _absent(request, candidates, said)
 
     def _log_own_clock(self) -> None:
         reading = None if self._own is None else read_own_clock()
@@ -295,12 +306,7 @@ def _health(recorded: _Recorded, now: float, rivals: list[str]) -> Health:
     return health
 
 
-def _absent(request: StreamRequest, candidates: Sequence[Candidate]) -> Health:
-    said = f"{request} is not on the network: start it, and check that LSL is enabled"
-    if candidates:
-        said = question(request.label, request.type or "", candidates, required=request.required)
-    elif request.confirmed == NOBODY:
-        said = "was left out: no stream of its type is meant"
+def _absent(request: StreamRequest, candidates: Sequence[Candidate], said: str) -> Health:
     return Health(
         label=request.label,
         name=request.name or "",
