@@ -282,8 +282,8 @@ def _of_streams(study: Study) -> Doubts:
             yield (
                 ("streams", label),
                 f"streams: {label} is asked for by its type alone, so that any {need.type} on the "
-                "network is taken, a neighbour's as well; give the source_id or the name that "
-                "labcrane streams shows",
+                "network fits, a neighbour's as well, and each run asks which one is meant; give "
+                "the source_id or the name that labcrane streams shows",
             )
 
 

@@ -344,7 +344,8 @@ class Sequencer:
             case Control(Order.SKIP) if self._stage not in STAGES:
                 return "no trial, break or questionnaire is running"
             case Control(Order.START) if self._stage != "waiting" and not self._paused:
-                return "nothing waits to start"
+                awaited = ", ".join(sorted(self._held.awaited))
+                return f"feedback {awaited} is awaited" if awaited else "nothing waits to start"
             case Control(Order.PAUSE) if EXAMINER in self._held:
                 return "the session is paused already"
             case Answer() | Submission():

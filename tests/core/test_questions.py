@@ -54,7 +54,7 @@ GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
         ([("sessions:", "participants: {planned: 3}\ndesign: {order: {pairs: williams}}\nsessions:")],
          "design.order.pairs", "which has 2 rows; a multiple of 2 does"),
         ([("sessions:", "streams: {eeg: {type: EEG}, gaze: {name: Neon}}\nsessions:")],
-         "streams.eeg", "a neighbour's as well; give the source_id"),
+         "streams.eeg", "each run asks which one is meant; give the source_id"),
     ],
 )  # fmt: skip
 def test_a_number_that_nobody_means_is_asked_about_until_it_is_answered(
