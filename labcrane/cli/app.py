@@ -30,9 +30,11 @@ MODULES = {
     "simulate": ("simulate", "power"),
     "engines": ("compare_engines",),
     "approval": ("approve", "amend", "methods", "bundle"),
-    "participants": ("participants", "consent", "exclude", "note", "waive", "deviations"),
+    "participants": (
+        "participants", "study", "consent", "exclude", "note", "waive", "deviations",
+    ),
     "data": ("where", "erase", "relabel", "transfer"),
-}
+}  # fmt: skip
 """Where commands are: a module, and its functions."""
 
 FEEDBACK, PLUGINS = "feedback", "plugins"
