@@ -4,7 +4,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping
-from importlib.metadata import EntryPoint, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from labcrane.errors import ProtocolError
 from labcrane.files.atomic import sha256
 from labcrane.files.yaml import YamlFile, parse_yaml
 from labcrane.protocol.study import Study
-from labcrane.registry.entry_points import entry_points_of
+from labcrane.registry.entry_points import EntryPoint, entry_points_of
 from labcrane.registry.hookspecs import PROJECT
 from labcrane.registry.registry import Registry
 

@@ -47,7 +47,7 @@ class Study:
         What looks at the signals of streams; None for all that are installed.
     others
         Components of roles that have no place of their own here, by the part they play.
-    oversight
+    call_monitor
         Watches over all components that are built.
     recorded
         Whether it was read as the record of what was run.
@@ -75,7 +75,7 @@ class Study:
     views: dict[str, ComponentSpec] = field(default_factory=dict)
     monitors: dict[str, ComponentSpec] | None = None
     others: Mapping[str, ComponentSpec] = field(default_factory=dict)
-    oversight: CallMonitor = field(default_factory=CallMonitor)
+    call_monitor: CallMonitor = field(default_factory=CallMonitor)
     recorded: bool = False
     outdated: str = ""
     source: YamlFile | None = field(default=None, repr=False, compare=False)
@@ -410,7 +410,7 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
         views=views,
         monitors=monitors,
         others=others,
-        oversight=chooser.oversight,
+        call_monitor=chooser.call_monitor,
         recorded=recorded,
         source=source,
     )

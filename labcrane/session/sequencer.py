@@ -27,9 +27,9 @@ from labcrane.session.commands import (
     Sighting,
     Submission,
     beyond_limits,
-    by_whom,
+    given_by,
+    given_from,
     read_request,
-    whence,
 )
 from labcrane.session.live_settings import FeedbackSettings
 from labcrane.session.pause import DISK, INPUT, Suspenders
@@ -290,7 +290,7 @@ class Sequencer:
 
     def _take(self, command: Command, request: Request) -> None:
         asking = self._asking
-        about: dict[str, Value] = {"by": by_whom(command), **whence(command)}
+        about: dict[str, Value] = {"by": given_by(command), **given_from(command)}
         match request:
             case Denial(why):
                 self._note("page.denied", why=why, **about)

@@ -1,4 +1,4 @@
-"""Run one session: open the rig, lead it through its plan, leave a participant file."""
+"""Session: the rig is opened, led through its plan, and leaves a participant file."""
 
 import gc
 from collections.abc import Callable, Iterator, Mapping
@@ -226,7 +226,7 @@ def _record(
             ):
                 sinks = [*triggers, *outlets, _teller(console)]
                 if not visit.fast:
-                    sinks.append(OverrunReporter(study.oversight, run.rate_hz, log, console))
+                    sinks.append(OverrunReporter(study.call_monitor, run.rate_hz, log, console))
                 ahead = None
                 if forward is not None and isinstance(log, BatchLog):
                     ahead = forward(rig, run, sequencer, log)
@@ -254,7 +254,7 @@ def _watching(visit: Visit, rig: Rig) -> AbstractContextManager[None]:
     if visit.fast:
         visit.whereabouts.unlink(missing_ok=True)  # of a process that died, and was read
         return hurried((*rig.components, *rig.tasks.values()))
-    return visit.study.oversight.published(visit.whereabouts)
+    return visit.study.call_monitor.published(visit.whereabouts)
 
 
 @contextmanager
