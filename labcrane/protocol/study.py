@@ -17,6 +17,7 @@ from labcrane.protocol.components import ComponentResolver, ComponentSpec
 from labcrane.protocol.protocol import DEFAULT_OPERATOR, Protocol, read
 from labcrane.protocol.references import Parts, ReferenceChecker, twice
 from labcrane.protocol.steps import Block
+from labcrane.protocol.tracks import Track
 from labcrane.registry.call_monitor import CallMonitor
 from labcrane.registry.registry import Registry
 
@@ -151,7 +152,11 @@ MOST_TRIALS = 100_000
 def trials_of(block: Block, protocol: Protocol, task: Task) -> tuple[float, float]:
     """Return about how many trials a block has, and how long they take in s, without a plan."""
     share = float(block.repeat * (block.until.rounds if block.until else 1))
+    track = protocol.design.tracks.get(block.track)
     for factor, levels in task.factors().items():
+        if track is not None and factor == track.factor:
+            share *= track.rounds / len(levels)
+            continue
         times = protocol.design.order[factor].times if factor in protocol.design.order else 1
         used = block.limits.get(factor)
         share *= times if not isinstance(used, int) else min(used / len(levels), times)
@@ -200,8 +205,59 @@ class Checker:
                 message = f"there is no task {block.task!r}; {there}"
                 self._source.problem((*place, "task"), message)
             elif task := tasks.get(block.task):
+                if block.track and not self._track(place, block, task):
+                    continue
                 self._limits(place, block.limits, task)
                 self._count(place, block, task)
+
+    def _track(self, place: Place, block: Block, task: Task) -> bool:
+        """Note what is wrong with a block's track, for its task; return whether all is right."""
+        tracks = self._protocol.design.tracks
+        track = tracks.get(block.track)
+        if track is None:
+            there = nearest(block.track, tracks, "there is")
+            self._source.problem((*place, "track"), f"there is no track {block.track!r}; {there}")
+            return False
+        at: Place = ("design", "tracks", block.track)
+        factors = task.factors()
+        if track.factor not in factors:
+            there = nearest(track.factor, factors, "it varies")
+            message = f"task {block.task!r} does not vary {track.factor!r}; {there}"
+            self._source.problem((*at, "factor"), message)
+            return False
+        if track.factor in block.limits:
+            message = f"track {block.track!r} chooses {track.factor}; drop the limit"
+            self._source.problem((*place, track.factor), message, key=True)
+            return False
+        levels = factors[track.factor]
+        if unknown := [name for name in track.levels if name not in levels]:
+            for name in unknown:
+                message = f"{track.factor} has no level {name!r}; {nearest(name, levels, 'it has')}"
+                self._source.problem((*at, "levels", name), message, key=True)
+            return False
+        results = [column for signal in task.results for column in signal.columns]
+        if track.measure and track.measure not in results:
+            there = nearest(track.measure, results, "it has")
+            message = f"task {block.task!r} has no result {track.measure!r}; {there}"
+            self._source.problem((*at, "measure"), message)
+            return False
+        return self._alike(at, track, task)
+
+    def _alike(self, at: Place, track: Track, task: Task) -> bool:
+        """Note levels with other trials than the first: a round would not be a round."""
+        made = {
+            level: [each.counted for each in task.plan({**task.factors(), track.factor: (level,)})]
+            for level in track.levels
+        }
+        first, *others = made
+        odd = [level for level in others if made[level] != made[first]]
+        for level in odd:
+            message = (
+                f"level {level!r} makes {len(made[level])} trials and {first!r} makes "
+                f"{len(made[first])}; a track needs levels that make as many"
+            )
+            self._source.problem((*at, "levels", level), message, key=True)
+        return not odd
 
     def _blocks(self) -> Iterator[tuple[Place, Block]]:
         for number, session in enumerate(self._protocol.sessions):
