@@ -51,6 +51,8 @@ class Study:
         Watches over all components that are built.
     recorded
         Whether it was read as the record of what was run.
+    beyond_operator
+        Where axes and buttons are named that the input has, and the operator has not.
     outdated
         What would be refused of it today, where it is gone on with as it was begun.
     source
@@ -77,6 +79,7 @@ class Study:
     others: Mapping[str, ComponentSpec] = field(default_factory=dict)
     call_monitor: CallMonitor = field(default_factory=CallMonitor)
     recorded: bool = False
+    beyond_operator: tuple[tuple[Place, str], ...] = ()
     outdated: str = ""
     source: YamlFile | None = field(default=None, repr=False, compare=False)
 
@@ -102,6 +105,11 @@ class Study:
             **{f"{kind}.{name}": choice for kind in named for name, choice in named[kind].items()},
             **self.others,
         }
+
+    @property
+    def written(self) -> Mapping[str, object]:
+        """What the protocol's file has at its top level, as it stands there; none of a record's."""
+        return self.source.data if self.source else {}
 
     def where(self, place: Place) -> str:
         """Return file, line and column of what the protocol has at ``place``."""
@@ -375,6 +383,7 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
     if protocol is not None:
         Checker(source, protocol).check(tasks, questionnaires)
     monitors, others = chooser.choose_monitors(), chooser.choose_others()
+    beyond: tuple[tuple[Place, str], ...] = ()
     if machine and not recorded:
         chosen: dict[Place, ComponentSpec | None] = {
             ("input",): device,
@@ -387,7 +396,9 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
             **{tuple(part.split(".", 1)): choice for part, choice in others.items()},
         }
         there = {place: choice for place, choice in chosen.items() if choice}
-        ReferenceChecker(source, Parts(machine[0], there, tasks)).check()
+        references = ReferenceChecker(source, Parts(machine[0], there, tasks))
+        references.check()
+        beyond = tuple(references.beyond_the_operator())
     source.raise_problems()
     if not (protocol and machine and device and operator and scheme and dynamics):
         raise AssertionError("a missing part is a problem, and problems were raised")
@@ -412,5 +423,6 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
         others=others,
         call_monitor=chooser.call_monitor,
         recorded=recorded,
+        beyond_operator=beyond,
         source=source,
     )
