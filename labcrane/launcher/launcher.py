@@ -1,4 +1,4 @@
-"""Starts, watches and restarts the processes of a run.
+"""Launcher of a run: starts, watches and restarts its processes.
 
 The session process owns the loop, the recorder process the streams of others. Either may die: the
 recorder is started again at once, and after the session's death everything recorded is put into
@@ -28,7 +28,7 @@ from labcrane.session.commands import (
     StreamBack,
     StreamConfirmed,
     StreamLost,
-    by_whom,
+    given_by,
 )
 from labcrane.session.eligibility import Admission, check_eligibility
 from labcrane.session.session import finish, outlook, recording, running, still_owed
@@ -84,7 +84,7 @@ class Launcher:
         self._console = console
         self._say = say
         self._recorder: RecorderHandle | None = None
-        self._crew: FeedbackProcesses | None = None
+        self._feedback: FeedbackProcesses | None = None
         self._lost: set[str] = set()
         self._taken: set[str] = set()
         self._signals = SignalReporter(say)
@@ -131,11 +131,11 @@ class Launcher:
         report = None
         try:
             if visit.feedback:
-                self._crew = FeedbackProcesses(visit)
+                self._feedback = FeedbackProcesses(visit)
             died = self._run() if self._gate() else None
         finally:
-            if self._crew:
-                self._crew.stop()
+            if self._feedback:
+                self._feedback.stop()
             if self._recorder:
                 self._recorder.stop()
             if parts(visit.journal):
@@ -152,7 +152,7 @@ class Launcher:
 
     def _gate(self) -> bool:
         """Wait until feedback is ready and all required streams flow; whether to start."""
-        if self._crew and not self._crew.wait(self._say, self._told_to_end):
+        if self._feedback and not self._feedback.wait(self._say, self._told_to_end):
             return False
         recorder = self._recorder
         told: list[str] = []
@@ -196,7 +196,7 @@ class Launcher:
             self._say(str(error))
             return
         self._say(f"stream {what} is {which}")
-        self._kept.append(StreamConfirmed(what, which, by_whom(command)))
+        self._kept.append(StreamConfirmed(what, which, given_by(command)))
 
     def _told_to_end(self) -> bool:
         """Whether the run is to end before it has begun; what is for the record is kept for it."""
@@ -242,8 +242,8 @@ class Launcher:
             if detector.hangs():
                 session.kill()  # its journal is whole; the exit code is passed on as any other
             self._watch_streams(session.send)
-            if self._crew:
-                for news in self._crew.watch(self._say):
+            if self._feedback:
+                for news in self._feedback.watch(self._say):
                     session.send(news)
 
     def _pass_events(self, messages: Iterable[Event | Offered | Ended]) -> Ended | None:
@@ -251,8 +251,8 @@ class Launcher:
             if isinstance(message, Ended):
                 return message
             if isinstance(message, Offered):
-                if self._crew:
-                    self._crew.offer(message.streams)
+                if self._feedback:
+                    self._feedback.offer(message.streams)
                 continue
             if message.name == "session.end":
                 self._owes = bool(message.data["owed"])
@@ -263,8 +263,8 @@ class Launcher:
         recorder = self._recorder
         if recorder is None:
             return
-        if self._crew:
-            recorder.offer(self._crew.sends)
+        if self._feedback:
+            recorder.offer(self._feedback.sends)
         if recorder.watch():
             self._say("a recorder died: the other one has all streams, and a new one was started")
         for news in self._signals.news(recorder):

@@ -306,12 +306,12 @@ def decode(line: bytes) -> Message:
         raise MessageError(f"{len(line)} bytes that are no message to a session") from error
 
 
-def by_whom(command: Command) -> str:
+def given_by(command: Command) -> str:
     """Return who gave an order: a page by its name, or the terminal."""
     return command.by or "terminal"
 
 
-def whence(command: Command) -> dict[str, Value]:
+def given_from(command: Command) -> dict[str, Value]:
     """Return from which address a page ordered, as data of an event; nothing for the terminal."""
     return {"at": command.at} if command.at else {}
 
@@ -353,7 +353,7 @@ class QueueConsole:
         why = beyond_limits(command)
         if why is not None:
             why = f"{command.order.value}: {why}"
-            command = Command(Order.DENIED, why, by_whom(command), command.at)
+            command = Command(Order.DENIED, why, given_by(command), command.at)
         self._orders.put(command)
 
     def commands(self) -> list[Command]:

@@ -152,26 +152,26 @@ def test_a_spare_recorder_that_hangs_keeps_no_recorder_from_closing_its_journal(
     (tmp_path / "hanging_spare.py").write_text(STOPS_BUT_HANGS_AS_A_SPARE, encoding="utf-8")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
     monkeypatch.setattr(recorder_handle, "MODULE", "hanging_spare")
-    keeper = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
-    wait_for(lambda: keeper.ready)
+    handle = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
+    wait_for(lambda: handle.ready)
     for _ in range(recorder_handle.SPARES):
-        assert not keeper.watch()
+        assert not handle.watch()
     monkeypatch.setattr(recorder_handle, "PATIENCE_S", 3.0)
-    keeper.stop()
+    handle.stop()
     assert [(tmp_path / f"heard-{part}").read_text(encoding="utf-8") for part in (1, 2)] == [
         "stop",
         "stop",
     ]
-    assert [one.exit_code for one in keeper._recorders] == [0, 0]
-    assert [one.exit_code for one in keeper._spares] == [-9, -9]
+    assert [one.exit_code for one in handle._recorders] == [0, 0]
+    assert [one.exit_code for one in handle._spares] == [-9, -9]
 
 
 def test_a_recorder_that_dies_as_it_is_given_its_orders_is_replaced(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(recorder_handle, "MODULE", "labcrane.errors")  # ends at once
-    keeper = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
-    wait_for(lambda: all(one.exit_code is not None for one in keeper._recorders))
-    assert keeper.watch()
-    assert keeper.restarts == recorder_handle.RECORDERS
-    keeper.stop()
+    handle = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
+    wait_for(lambda: all(one.exit_code is not None for one in handle._recorders))
+    assert handle.watch()
+    assert handle.restarts == recorder_handle.RECORDERS
+    handle.stop()

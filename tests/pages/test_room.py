@@ -98,6 +98,21 @@ def test_the_lamp_names_what_is_lost_until_it_is_back() -> None:
     assert lamp_of(after(*back), Punctual(), PERIOD_S) == Lamp("ok", "all is well")
 
 
+def test_the_lamp_names_every_trigger_that_is_lost() -> None:
+    lost = [
+        *BEGUN["running"],
+        *(("trigger.lost", {"trigger": name, "why": f"{name}: pulled out"}) for name in ("a", "b")),
+    ]
+    lamp = lamp_of(after(*lost), Punctual(), PERIOD_S)
+    assert (lamp.level, lamp.reason) == ("bad", "trigger failed: a: pulled out")
+    assert "plug the device in" in lamp.remedy
+    lost.append(("trigger.back", {"trigger": "a"}))
+    assert lamp_of(after(*lost), Punctual(), PERIOD_S).reason == "trigger failed: b: pulled out"
+    lost.append(("trigger.back", {"trigger": "b"}))
+    assert lamp_of(after(*lost), Punctual(), PERIOD_S).level == "ok"
+    assert sentence(Event(*lost[1][:1], 0.0, lost[1][1]), str).text == "Trigger a: pulled out"
+
+
 def test_the_lamp_tells_a_late_loop_and_one_that_says_nothing() -> None:
     live = Punctual()
     live.lateness_s = 0.05

@@ -1,4 +1,4 @@
-"""Records the streams of others: whatever was asked for, late or again after a restart."""
+"""Recorder of the streams of others: whatever was asked for, late or again after a restart."""
 
 import time
 from collections.abc import Mapping, Sequence

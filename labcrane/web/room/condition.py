@@ -28,6 +28,7 @@ class Lamp:
 
 
 REMEDIES: Mapping[str, str] = {
+    "trigger": "plug the device in; its codes stay in the record, and the session goes on",
     "input": "check the controls' cable and power; the session goes on when they are back",
     "disk": "free space or connect the disk again; nothing is lost meanwhile",
     "stream": "check the device and its program; the recorder goes on looking for it",

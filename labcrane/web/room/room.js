@@ -258,6 +258,10 @@ export default {
     },
   },
   watch: {
+    words: { deep: true, handler(now) { // outlives that the page is loaded anew, in this tab
+      const texts = Object.fromEntries(now.map((field) => [field.order, field.text]));
+      try { sessionStorage.setItem(this.drafts(), JSON.stringify(texts)); } catch { /* keeps nothing */ }
+    } },
     "s.measures": { immediate: true, handler(now) {
       if (now.length && !now.some((m) => m.name === this.measure)) this.measure = now[0].name;
     } },
@@ -265,6 +269,9 @@ export default {
   mounted() {
     let kept = null;
     try { kept = localStorage.getItem("labcrane-theme"); } catch { /* a browser that keeps nothing */ }
+    let drafts = null;
+    try { drafts = JSON.parse(sessionStorage.getItem(this.drafts())); } catch { /* as above */ }
+    for (const field of this.words) field.text = drafts?.[field.order] ?? "";
     this.dark = kept ? kept === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
     this.paint();
     addEventListener("keydown", this.key);
@@ -275,6 +282,7 @@ export default {
     clearInterval(this.timer);
   },
   methods: {
+    drafts() { return `labcrane-draft ${this.s.who}`; },
     show(part) { Object.assign(this.s, part); },
     taken(ident, why) {
       const field = this.waiting[ident]?.field;
