@@ -44,6 +44,7 @@ def write_report(
     leave_out: Callable[[str, str], None] | None = None,
     workers: int = 1,
     scheduler: str | None = None,
+    unprobed: Sequence[str] = (),
 ) -> Path:
     """Write the report of a cohort into ``folder``; return the page to open.
 
@@ -58,6 +59,8 @@ def write_report(
         Told whose data cannot be used, and why; the report is of the others, and says so.
     workers, scheduler
         Who does it; see :func:`labcrane.analysis.parallel.work`.
+    unprobed
+        Streams whose clock was never probed, which are used all the same, in words.
     """
     import pandas as pd
 
@@ -92,6 +95,10 @@ def write_report(
     page.heading("Loop and clocks")
     page.table("loop_quality", pd.concat(loops, ignore_index=True))
     _syncs(page, pd.concat(syncs, ignore_index=True))
+    if unprobed:
+        page.say(
+            f"Used as told, though nobody knows how right their times are: {'; '.join(unprobed)}."
+        )
     page.heading("Definitions")
     page.say(f"Settings of the measures: {settings.as_dict()}")
     page.table("definitions", _definitions())

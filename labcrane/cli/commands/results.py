@@ -172,7 +172,7 @@ def report(
     from labcrane.analysis.report.report import write_report
 
     cohort = cohort_of(data.resolve() if scheduler else data, include)
-    check_probed(cohort.included, accept=accept_unprobed)
+    unknown = check_probed(cohort.included, accept=accept_unprobed)
 
     def leave_out(name: str, why: str) -> None:
         nonlocal cohort
@@ -189,6 +189,7 @@ def report(
             progress=lambda done, of: advance(),
             workers=workers,
             scheduler=scheduler,
+            unprobed=unknown,
         )
     out.print(f"report: {folder / page.name}", markup=False)
     _tell_left_out(cohort)
