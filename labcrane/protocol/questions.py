@@ -11,7 +11,7 @@ from typing import Any
 
 from labcrane.errors import LabcraneError, suggestion
 from labcrane.files.yaml import Place
-from labcrane.protocol.effective import written_quantities
+from labcrane.protocol.effective import written_numbers
 from labcrane.protocol.steps import Block
 from labcrane.protocol.study import Study, trials_of
 
@@ -39,6 +39,7 @@ PLAUSIBLE: Mapping[str, tuple[float, float]] = {
     "day": (0.0, 3650.0),
     "ppm": (0.0, 1e6),
     "uV": (1e-3, 1e6),
+    "": (1e-12, 1e12),
 }
 """Between which sizes a number of each unit can be meant in a study; 0 always can."""
 
@@ -173,11 +174,11 @@ def _of_components(study: Study) -> Doubts:
 
 
 def _of_sizes(study: Study) -> Doubts:
-    """Question every number that has a unit in which nobody would write it."""
-    for each in written_quantities(study):
+    """Question every number that nobody would write, in its unit or without one."""
+    for each in written_numbers(study):
         least, most = PLAUSIBLE[each.unit]
         if each.value and not least <= abs(each.value) <= most:
-            yield each.place, f"{key_of(each.place)} is {each.value:g} {each.unit}"
+            yield each.place, f"{key_of(each.place)} is {each.value:g} {each.unit}".rstrip()
 
 
 def _of_the_operator(study: Study) -> Iterator[Question]:

@@ -25,6 +25,7 @@ OWNERS: Mapping[str, str] = {
     "button": "the input",
     "joint": "the machine",
     "link": "the machine",
+    "scene": "the dynamics",
     "signal": "the study",
     "event": "the study",
     "object": "the picture",
@@ -69,7 +70,7 @@ class ReferenceChecker:
             written = list(mentioned(settings))
             for mention in written:
                 at = (*place, *mention.place)
-                if isinstance(mention.value, Path):
+                if mention.mark == Reference("file"):
                     self._is_there(at, mention.value)
                 elif isinstance(mention.mark, Reference):
                     self._refers(at, mention, mention.mark, choice)
@@ -86,11 +87,13 @@ class ReferenceChecker:
     def _refers(
         self, at: Place, mention: Mentioned, mark: Reference, choice: ComponentSpec
     ) -> None:
-        name = mark.bare(mention.value)
+        written = mention.value
+        name = written.name.split(".")[0] if isinstance(written, Path) else mark.bare(written)
         known = self._holds(mark, choice, at)
         if known is None or name in known:
             return
-        message = f"{_dotted(at)} is {mention.value!r}, and {_has(mark.kind, name, known)}"
+        said = name if isinstance(written, Path) else written
+        message = f"{_dotted(at)} is {said!r}, and {_has(mark.kind, name, known)}"
         self._source.problem(at, message, key=mention.key)
 
     def beyond_the_operator(self) -> Iterator[tuple[Place, str]]:
@@ -102,7 +105,7 @@ class ReferenceChecker:
             if place in {("input",), ("operator",)}:
                 continue
             named = [
-                ((*place, *each.place), each.mark.kind, each.mark.bare(each.value))
+                ((*place, *each.place), each.mark.kind, each.mark.bare(str(each.value)))
                 for each in mentioned(choice.settings)
                 if isinstance(each.mark, Reference) and not (each.mark.own or each.mark.of)
             ]
@@ -171,6 +174,8 @@ class ReferenceChecker:
             return frozenset(views if isinstance(views, dict) else ())
         if kind == "axis":
             return self._of([(device,)], kind)
+        if kind == "scene":
+            return self._of([("dynamics",)], kind)
         if kind == "button":
             said = self._of([(device,)], kind)
             return self._of([(device,)], "axis") if said is None else said
