@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -46,11 +46,14 @@ class Parts:
         What was chosen, by its place in the protocol.
     tasks
         The tasks that could be built.
+    sections
+        Parts of the protocol that are nobody's components, by their place.
     """
 
     machine: Machine
     components: Mapping[Place, ComponentSpec]
     tasks: Mapping[str, Task]
+    sections: Mapping[Place, Settings] = field(default_factory=dict)
 
 
 class ReferenceChecker:
@@ -61,10 +64,12 @@ class ReferenceChecker:
         self._machine = parts.machine
         self._components = parts.components
         self._tasks = parts.tasks
+        self._sections = parts.sections
         self._known: dict[str, Known] = {}
 
     def check(self) -> None:
         """Look up what every component's settings mention, and what they need unmentioned."""
+        self._check_sections()
         for place, choice in self._components.items():
             settings = choice.settings
             written = list(mentioned(settings))
@@ -83,6 +88,13 @@ class ReferenceChecker:
                     if known is not None and name not in known and name not in said:
                         message = f"{_dotted(place)} needs the {kind} {name!r}, and "
                         self._source.problem(place, message + _has(kind, name, known))
+
+    def _check_sections(self) -> None:
+        """Look up the files that the protocol names beside its components."""
+        for place, section in self._sections.items():
+            for mention in mentioned(section):
+                if mention.mark == Reference("file"):
+                    self._is_there((*place, *mention.place), mention.value)
 
     def _refers(
         self, at: Place, mention: Mentioned, mark: Reference, choice: ComponentSpec

@@ -13,7 +13,7 @@ from wrong_protocols import PROTOCOLS, Entry, entries, everything, misspelt
 
 from labcrane import LabcraneError
 from labcrane.core.records import Event
-from labcrane.design.pseudonyms import pseudonyms
+from labcrane.files.pseudonyms import pseudonyms
 from labcrane.protocol.study import load
 from labcrane.registry.registry import Registry, discover
 from labcrane.session.commands import Command, Order

@@ -36,7 +36,7 @@ def simulate(
 
     Participants who are in the folder already are kept: what was interrupted goes on.
     """
-    from labcrane.design.pseudonyms import pseudonyms
+    from labcrane.files.pseudonyms import pseudonyms
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
 
@@ -104,7 +104,7 @@ def power(
     The test is a t test of the participants' slopes, or differences, against zero; Welch's between
     groups. With labels permuted it says how often something is found where nothing is.
     """
-    from labcrane.design.pseudonyms import pseudonyms
+    from labcrane.files.pseudonyms import pseudonyms
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
     from labcrane.simulation.power import read_effect
