@@ -135,7 +135,7 @@ def _tls(protocol: Path, where: "PageSettings") -> tuple[Path | None, Path | Non
         return None, None
     import ssl
 
-    certificate, key = where.certificate, where.key
+    certificate, key = protocol.parent / where.certificate, protocol.parent / where.key
     try:
         ssl.create_default_context(ssl.Purpose.CLIENT_AUTH).load_cert_chain(certificate, key)
     except (OSError, ValueError) as error:  # ssl's errors are OSErrors

@@ -34,11 +34,11 @@ class PageSettings(Settings):
     port: int = Field(default=0, ge=0, le=65535)
     """Port; 0 takes a free one."""
 
-    certificate: StudyPath | None = None
+    certificate: Path | None = None
     """The lab's certificate in PEM, with which the pages are served over TLS; a path counts from
     the protocol. Without it, whoever listens on the lab's network can read along."""
 
-    key: StudyPath | None = None
+    key: Path | None = None
     """The certificate's private key in PEM, without a passphrase."""
 
     language: Language = "en"

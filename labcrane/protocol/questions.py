@@ -11,6 +11,7 @@ from typing import Any
 
 from labcrane.errors import LabcraneError, ProtocolError, suggestion
 from labcrane.files.pseudonyms import pseudonyms
+from labcrane.files.system import is_there
 from labcrane.files.yaml import Place
 from labcrane.protocol.effective import written_numbers
 from labcrane.protocol.references import twice
@@ -157,6 +158,18 @@ def _doubts(study: Study) -> Doubts:
     yield from _of_streams(study)
     yield from _of_repeats(study)
     yield from _of_pattern(study)
+    yield from _of_the_pages(study)
+
+
+def _of_the_pages(study: Study) -> Doubts:
+    """Question what is the laboratory's, and not here: a check may be made at another desk."""
+    page = study.protocol.page
+    for key, path in (("certificate", page.certificate), ("key", page.key)):
+        if path is not None and not study.recorded and not is_there(study.path.parent / path):
+            yield (
+                ("page", key),
+                f"page.{key} is {str(path)!r}, which is not on this computer",
+            )
 
 
 def _of_pattern(study: Study) -> Doubts:
@@ -360,8 +373,8 @@ def _of_streams(study: Study) -> Doubts:
             yield (
                 ("streams", label),
                 f"streams: {label} is asked for by its type alone, so that any {need.type} on the "
-                "network is taken, a neighbour's as well; give the source_id or the name that "
-                "labcrane streams shows",
+                "network fits, a neighbour's as well, and each run asks which one is meant; give "
+                "the source_id or the name that labcrane streams shows",
             )
 
 

@@ -1,4 +1,4 @@
-"""Opens a window, or a picture without one, with whatever renderer there is."""
+"""Window, or a picture without one, by whatever renderer there is."""
 
 import os
 from collections.abc import Sequence

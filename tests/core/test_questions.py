@@ -64,6 +64,8 @@ GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
           ("sessions:", "views: {front: {use: view, keys: [a, d, s, w, j, l, k, i]}}\nsessions:"),
           ("left.y", "keyboard.elbow"), ("right.x", "keyboard.wrist"), ("right.y", "keyboard.shoulder")],
          "operator", "has no keyboard.slew, keyboard.elbow, keyboard.wrist, keyboard.shoulder"),
+        ([("sessions:", "page: {certificate: lab.pem, key: ../study.yaml}\nsessions:")],
+         "page.certificate", "'lab.pem', which is not on this computer"),
         ([("sessions:", "participants: {pattern: P000, planned: 2}\nsessions:")], "participants.pattern",
          "with room for 2 participants"),
         ([("sessions:", "participants: {planned: 20_000}\nsessions:")], "participants.pattern",
@@ -82,7 +84,7 @@ GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
         ([("sessions:", "participants: {planned: 3}\ndesign: {order: {pairs: williams}}\nsessions:")],
          "design.order.pairs", "which has 2 rows; a multiple of 2 does"),
         ([("sessions:", "streams: {eeg: {type: EEG}, gaze: {name: Neon}}\nsessions:")],
-         "streams.eeg", "a neighbour's as well; give the source_id"),
+         "streams.eeg", "each run asks which one is meant; give the source_id"),
     ],
 )  # fmt: skip
 def test_a_number_that_nobody_means_is_asked_about_until_it_is_answered(
