@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from labcrane.core.records import Event
+from labcrane.errors import StreamError
 from labcrane.feedback.processes import FeedbackProcesses, log_requests
 from labcrane.launcher.hang_detector import HangDetector
 from labcrane.launcher.session_handle import SessionHandle
@@ -153,7 +154,8 @@ class Launcher:
             return False
         recorder = self._recorder
         told: list[str] = []
-        while recorder is not None and not recorder.ready:
+        asked = not self._visit.simulated  # nobody is there to answer, and nothing is required
+        while recorder is not None and not (recorder.ready and not (asked and recorder.asks)):
             recorder.watch()
             self._kept += self._signals.news(recorder)
             if recorder.status and recorder.complaints() != told:
@@ -166,16 +168,37 @@ class Launcher:
         return True
 
     def _say_what_was_taken(self) -> None:
-        """Say, once each, which stream was taken where any of its type would have been."""
+        """Say, once each, which stream was confirmed where any of its type would have fitted."""
         taken = self._recorder.taken() if self._recorder else []
         for line in taken:
             if line not in self._taken:
                 self._taken.add(line)
                 self._say(line)
 
+    def _orders(self) -> list[Command]:
+        """Return what people have ordered, but for what is for the recorder: that is done."""
+        orders = self._console.commands()
+        for command in orders:
+            if command.order is Order.TAKE:
+                self._confirm(command)
+        return [command for command in orders if command.order is not Order.TAKE]
+
+    def _confirm(self, command: Command) -> None:
+        """Let the stream be recorded that somebody says is meant, and put that into the record."""
+        if self._recorder is None:
+            self._say("take: the study records no streams of others")
+            return
+        try:
+            said = self._recorder.confirm(command.text)
+        except StreamError as error:
+            self._say(str(error))
+            return
+        self._say(said)
+        self._kept.append(Command(Order.NOTE, said, command.by, command.at))
+
     def _told_to_end(self) -> bool:
         """Whether the run is to end before it has begun; what is for the record is kept for it."""
-        for command in self._console.commands():
+        for command in self._orders():
             if command.order is Order.END:
                 return True
             if command.order in FOR_THE_RECORD:
@@ -199,8 +222,9 @@ class Launcher:
         while True:
             over = session.ended  # asked first: what it said before is taken below
             try:
-                for command in (*self._kept, *self._console.commands()):
-                    session.send(command)
+                orders = self._orders()
+                for message in (*self._kept, *orders):
+                    session.send(message)
                 self._kept.clear()
                 messages = session.wait(0.0 if over else LOOK_S)
             except KeyboardInterrupt:

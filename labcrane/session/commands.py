@@ -38,6 +38,7 @@ class Order(StrEnum):
     CONSENT = "consent"  # to the text of this version, given before the session begins
     DENIED = "denied"  # said by a page: somebody without the right asked for something
     SETTING = "setting"  # change a setting of a cue or sound: tone.far=3
+    TAKE = "take"  # a stream that only its type asks for: eeg, eeg=amplifier-1 or eeg=none
 
 
 KINDS = {
@@ -174,6 +175,8 @@ def read_request(command: Command) -> Request:
             return Malformed(order, f"a setting is written name.key=value, not {text!r}")
         case Order.SUBMIT:
             return Submission()
+        case Order.TAKE:
+            return Malformed(order, "no stream is asked about")  # a launcher has taken it up
     return OF_WORDS[order](text) if order in OF_WORDS else Control(order)
 
 

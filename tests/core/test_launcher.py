@@ -12,6 +12,7 @@ from labcrane.launcher.launcher import Launcher
 from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.visit import visit_of
 from labcrane.streams.recorder import handle as recorder_handle
+from labcrane.streams.recorder.candidates import answered
 from labcrane.streams.recorder.handle import RecorderHandle
 
 
@@ -42,8 +43,10 @@ class LateRecorder:
     def unwatched(self) -> list[str]:
         return []
 
+    asks = False
+
     def taken(self) -> list[str]:
-        return ["eeg: was taken by type 'EEG' alone"]
+        return ["eeg: is asked for by type 'EEG' alone, and was confirmed"]
 
     def stop(self) -> None:
         pass
@@ -73,7 +76,59 @@ def test_a_note_that_is_given_while_streams_are_waited_for_is_in_the_record(
     assert events["page.denied"]["why"] == "somebody asked for end"
     assert "order.start" not in events
     assert "start: the session has not begun; order it again when it has" in said
-    assert said.count("eeg: was taken by type 'EEG' alone") == 1
+    assert said.count("eeg: is asked for by type 'EEG' alone, and was confirmed") == 1
+
+
+class AskingRecorder(LateRecorder):
+    """A recorder that flows, and asks which stream one of several is."""
+
+    @property
+    def asks(self) -> bool:
+        return self.status["streams"][0]["candidates"] != []
+
+    def __init__(self) -> None:
+        super().__init__()
+        fits = [{"identity": ["amp-1", "ActiChamp", "EEG"], "host": "lab-pc"}]
+        self.status["streams"] = [{"label": "eeg", "required": False, "candidates": fits}]
+
+    def confirm(self, text: str) -> str:
+        label, meant = answered(text, self.status["streams"])
+        self.status["streams"][0]["candidates"] = []
+        return f"stream {label} is {meant[1]}"
+
+
+@pytest.mark.parametrize("simulated", [False, True])
+def test_a_session_begins_when_it_was_said_which_stream_is_meant_and_that_is_in_the_record(
+    tmp_path: Path, *, simulated: bool
+) -> None:
+    protocol = tmp_path / "study.yaml"
+    protocol.write_text(
+        STUDY.format(study=unique("asked")) + "streams: {eeg: {type: EEG}}\n", encoding="utf-8"
+    )
+    console, said = QueueConsole(), []
+    visit = visit_of(protocol, "P001", 1, tmp_path, simulated=simulated, feedback=False)
+    launcher = Launcher(visit, console, said.append)
+    launcher._recorder = recorder = AskingRecorder()
+    if not simulated:  # where nobody can answer, nobody is waited for
+        console.give(Command(Order.TAKE, "oxygen", "supervisor"))
+        console.give(Command(Order.TAKE, "eeg", "supervisor", "10.0.0.7"))
+    assert launcher._gate()
+    assert recorder.asks is simulated
+    if not simulated:
+        assert said[0] == "take: no stream 'oxygen' is asked about; there is eeg"
+        assert said[1] == "stream eeg is ActiChamp"
+        note = Command(Order.NOTE, "stream eeg is ActiChamp", "supervisor", "10.0.0.7")
+        assert launcher._kept == [note]
+
+
+def test_nothing_is_taken_where_no_streams_are_recorded(tmp_path: Path) -> None:
+    protocol = tmp_path / "study.yaml"
+    protocol.write_text(STUDY.format(study=unique("none")), encoding="utf-8")
+    console, said = QueueConsole(), []
+    visit = visit_of(protocol, "P001", 1, tmp_path, simulated=True, feedback=False)
+    console.give(Command(Order.TAKE, "eeg"))
+    assert Launcher(visit, console, said.append)._orders() == []
+    assert said == ["take: the study records no streams of others"]
 
 
 STOPS_BUT_HANGS_AS_A_SPARE = """
