@@ -2,12 +2,15 @@
 
 import random
 import re
+import threading
 from pathlib import Path
 
 import pytest
+from governed import TODAY, Lab
 
 from labcrane.cli.terminal import KEYS as TERMINAL_KEYS
 from labcrane.core.records import Event
+from labcrane.participants.enrolment import exclude
 from labcrane.session.commands import Command, Order, SettingChange, read_request
 from labcrane.session.live_settings import FeedbackSettings
 from labcrane.streams.recorder.candidates import answered
@@ -16,7 +19,7 @@ from labcrane.web.examiner_page import KEYS
 from labcrane.web.room.bars import groups
 from labcrane.web.room.buttons import answers, buttons
 from labcrane.web.room.condition import STATES, Lamp, lamp_of, state_of
-from labcrane.web.room.earlier import FEWEST, Earlier
+from labcrane.web.room.earlier import FEWEST, Earlier, read_behind
 from labcrane.web.room.sentences import KINDS, SAID, sentence
 from labcrane.web.room.sliders import sliders
 from labcrane.web.room.snapshot import clock
@@ -262,6 +265,29 @@ def test_a_cohort_of_few_is_not_shown() -> None:
     earlier.others["error"] = [4.0, 1.0, 3.0, 2.0, 5.0]
     assert earlier.cohort("error") == (2.0, 3.0, 4.0, 5)
     assert earlier.cohort("nothing") is None
+
+
+def test_who_was_excluded_is_no_part_of_the_cohort(tmp_path: Path) -> None:
+    lab = Lab(tmp_path)
+    lab.approve()
+    for name in ("P001", "P002", "P003"):
+        lab.run(name)
+    folder = lab.places.root / "P001"
+
+    def medians(session: int) -> Earlier:
+        found = read_behind(folder, "rehearsal", session, ["movement_time"])
+        for thread in threading.enumerate():
+            if thread.name == "earlier":
+                thread.join()
+        return found
+
+    before = medians(2)
+    assert len(before.others["movement_time"]) == 2
+    assert len(before.mine["movement_time"]) == 1
+    exclude(lab.places, "P003", "did not follow the instructions", TODAY)
+    after = medians(1)
+    assert len(after.others["movement_time"]) == 1
+    assert after.mine == {}, "of this session nothing is from before"
 
 
 def test_times_are_minutes_and_seconds_and_hours_where_there_are_some() -> None:
