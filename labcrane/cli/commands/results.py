@@ -362,6 +362,7 @@ def _settings(model: Any, words: list[str], name: str) -> Any:
     """Return an exporter's settings from NAME=VALUE; values are YAML, as in a protocol."""
     from pydantic import ValidationError
 
+    from labcrane.files.complaints import told
     from labcrane.files.yaml import parse_yaml
 
     given = {}
@@ -374,10 +375,10 @@ def _settings(model: Any, words: list[str], name: str) -> Any:
         return model.model_validate(given)
     except ValidationError as error:
         known = ", ".join(model.model_fields) or "nothing"
-        problems = "; ".join(
-            f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()
-        )
-        raise ProtocolError(f"exporter {name!r} can set {known}; {problems}") from None
+        problems = "; ".join(one.message for one in told(error.errors(), (name,), model))
+        raise ProtocolError(
+            f"{problems}; write --set NAME=VALUE, where {name} has {known}"
+        ) from None
 
 
 def _write_manifest(
