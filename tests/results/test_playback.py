@@ -12,7 +12,8 @@ from labcrane import open_recording
 from labcrane.cli.app import main
 from labcrane.core.records import SessionState
 from labcrane.errors import RecordingError
-from labcrane.feedback.playback import RecordedFrames, played
+from labcrane.feedback.playback import played
+from labcrane.recording.recorded_frames import RecordedFrames
 from labcrane.streams.context import situation_after
 
 STUDY = (
