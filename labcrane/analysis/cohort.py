@@ -165,6 +165,22 @@ def find_cohort(
         There is no such folder, or nobody is left to be used.
     """
     wanted = {Status.COMPLETE, *(_includable(word) for word in include)}
+    people = everyone(folder, struck)
+    included = tuple(person for person in people if person.status in wanted)
+    left_out = tuple(person for person in people if person.status not in wanted)
+    if not included:
+        raise RecordingError(_nobody(folder, left_out))
+    return Cohort(folder, included, left_out)
+
+
+def everyone(folder: Path, struck: Mapping[str, Struck] | None = None) -> list[Participant]:
+    """Return whoever has data below ``folder`` or was struck, in the order of their names.
+
+    Raises
+    ------
+    RecordingError
+        There is no such folder.
+    """
     if not folder.is_dir():
         raise RecordingError(f"there is no data folder {folder}; give the study's data folder")
     folders = [entry for entry in sorted(folder.iterdir()) if _is_participant(entry)]
@@ -172,12 +188,7 @@ def find_cohort(
     gone = [name for name in struck if not any(entry.name == name for entry in folders)]
     people = [_look(entry, struck.get(entry.name)) for entry in folders]
     people += [Participant(name, participant_path(folder / name), *struck[name]) for name in gone]
-    people.sort(key=lambda person: person.name)
-    included = tuple(person for person in people if person.status in wanted)
-    left_out = tuple(person for person in people if person.status not in wanted)
-    if not included:
-        raise RecordingError(_nobody(folder, left_out))
-    return Cohort(folder, included, left_out)
+    return sorted(people, key=lambda person: person.name)
 
 
 def _includable(word: str) -> Status:
@@ -246,7 +257,7 @@ def _judge(recording: Recording) -> tuple[Status, str]:
     for number, session in zip(recording.sessions, sessions, strict=True):
         if (hollow := _hollow(number, session)) is not None:
             return Status.HALF_FINISHED, f"{hollow}; the other sessions can be used"
-        if (why := _unfinished(session)) is not None:
+        if (why := unfinished(session)) is not None:
             return Status.HALF_FINISHED, f"session {number} {why}"
     planned, done = _planned(sessions[-1].protocol), len(sessions)
     if done < planned:
@@ -254,7 +265,7 @@ def _judge(recording: Recording) -> tuple[Status, str]:
     return Status.COMPLETE, f"{done} of {planned} sessions recorded to their end"
 
 
-def _unfinished(session: SessionRecord) -> str | None:
+def unfinished(session: SessionRecord) -> str | None:
     """Return how a session ended before its end, or None when it did not."""
     events = session.events
     ends = events[events["name"] == "session.end"]

@@ -27,12 +27,14 @@ MODULES = {
     "record": ("streams", "record", "recover", "resync"),
     "score": ("score",),
     "results": ("export", "report", "replay", "view"),
-    "simulate": ("simulate", "power"),
+    "simulate": ("simulate", "power", "tracks"),
     "engines": ("compare_engines",),
     "approval": ("approve", "amend", "methods", "bundle"),
-    "participants": ("participants", "consent", "exclude", "note", "waive", "deviations"),
+    "participants": (
+        "participants", "study", "consent", "exclude", "note", "waive", "deviations",
+    ),
     "data": ("where", "erase", "relabel", "transfer"),
-}
+}  # fmt: skip
 """Where commands are: a module, and its functions."""
 
 FEEDBACK, PLUGINS = "feedback", "plugins"

@@ -8,14 +8,14 @@ from typer.core import TyperCommand, TyperGroup
 
 SECTIONS = {
     "Prepare a study": (
-        "check", "plan", "doctor", "feedback", "simulate", "power", "approve", "amend", "methods",
-        "bundle", "plugins", "new-plugin", "schema", "language-server",
+        "check", "plan", "doctor", "feedback", "simulate", "power", "tracks", "approve", "amend",
+        "methods", "bundle", "plugins", "new-plugin", "schema", "language-server",
     ),
     "Run it": ("demo", "run", "resume", "consent", "streams", "record"),
     "Analyse it": ("view", "report", "score", "export", "replay", "compare-engines"),
     "Keep people and data": (
-        "participants", "where", "note", "exclude", "waive", "deviations", "recover", "resync",
-        "erase", "relabel", "transfer",
+        "study", "participants", "where", "note", "exclude", "waive", "deviations", "recover",
+        "resync", "erase", "relabel", "transfer",
     ),
 }  # fmt: skip
 """What commands are for, in the order of a study."""

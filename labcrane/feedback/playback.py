@@ -49,8 +49,8 @@ def played(
     row, told = int(np.searchsorted(recorded.time, origin - 1e-9)), -1
     while True:
         frame = recorded.frame(row)
-        yield frame, recorded.events(told, frame.tick.number)
-        told = frame.tick.number
+        yield frame, recorded.events(told, row)
+        told = row
         if row + 1 >= len(recorded.time):
             return
         rest(max(0.0, (recorded.time[row + 1] - origin) / speed - (now() - begun)))
@@ -87,13 +87,13 @@ def play(
     run = _run_of(study, recorded)
     source = f"{study.protocol.study}/replay-{os.getpid()}"
     orders = [replace(order, recorded=False) for order in host_orders(study, run, source)]
-    keepers = [FeedbackHandle(order, "continue") for order in orders]
+    handles = [FeedbackHandle(order, "continue") for order in orders]
     try:
-        wait_for_all(keepers, say, "labcrane view shows any session in a browser")
-        _send_all(run, source, recorded, keepers, speed=speed, start_s=start_s)
+        wait_for_all(handles, say, "labcrane view shows any session in a browser")
+        _send_all(run, source, recorded, handles, speed=speed, start_s=start_s)
     finally:
-        for keeper in keepers:
-            keeper.stop()
+        for handle in handles:
+            handle.stop()
 
 
 def _run_of(study: Study, recorded: RecordedFrames) -> Run:
@@ -105,7 +105,7 @@ def _send_all(
     run: Run,
     source: str,
     recorded: RecordedFrames,
-    keepers: list[FeedbackHandle],
+    handles: list[FeedbackHandle],
     *,
     speed: float,
     start_s: float,
@@ -125,10 +125,11 @@ def _send_all(
     try:
         first, events = next(played(recorded, start_s, speed, time.perf_counter, time.sleep))
         send(first, events)
-        hold(lambda: send(first, []), keepers)
-        for frame, happened in played(recorded, start_s, speed, time.perf_counter, time.sleep):
-            again = frame.tick.number == first.tick.number
-            send(frame, [] if again else happened)
+        hold(lambda: send(first, []), handles)
+        shown = played(recorded, start_s, speed, time.perf_counter, time.sleep)
+        send(next(shown)[0], [])  # what happened until then was told
+        for frame, happened in shown:
+            send(frame, happened)
         time.sleep(END_S)
     finally:
         for outlet in outlets:

@@ -7,7 +7,7 @@ and a kill leaves it as it was before or after a change.
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -15,6 +15,9 @@ from labcrane.errors import ProtocolError, RecordingError
 from labcrane.files.atomic import write_text
 from labcrane.files.lock import exclusive
 from labcrane.participants.folders import Places
+
+if TYPE_CHECKING:
+    from labcrane.analysis.cohort import Struck
 
 
 class Record(BaseModel):
@@ -230,6 +233,22 @@ def read(places: Places) -> Register:
             both = f"{holders[entry.slot]} and {name} both have slot {entry.slot}"
             raise RecordingError(_damaged(places, both))
     return register
+
+
+def struck(places: Places) -> "dict[str, Struck]":
+    """Return whom the register says not to count, and why; nobody where there is no register."""
+    from labcrane.analysis.cohort import Status  # noqa: PLC0415 - with what reads recordings
+
+    register = read(places)
+    found = {
+        stone.participant: (Status.ERASED, f"on {stone.date}: {stone.reason}")
+        for stone in register.tombstones
+    }
+    for name, entry in register.participants.items():
+        if entry.exclusion is not None:
+            why = f"on {entry.exclusion.date}: {entry.exclusion.reason}"
+            found[name] = (Status.EXCLUDED, why)
+    return found
 
 
 def _damaged(places: Places, why: str) -> str:

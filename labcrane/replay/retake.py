@@ -103,15 +103,15 @@ class Retake:
         RecordingError
             The row is before one that was asked for already.
         """
-        frame = self._frames.frame(row)
-        if frame.tick.number < self._told:
+        if row < self._told:
             raise RecordingError(
-                f"pictures are taken in order, and tick {frame.tick.number} is before tick "
-                f"{self._told}; open the session again"
+                f"pictures are taken in order, and row {row} is before row {self._told}; open the "
+                "session again"
             )
-        for event in self._frames.events(self._told, frame.tick.number):
+        frame = self._frames.frame(row)
+        for event in self._frames.events(self._told, row):
             self._situation = situation_after(self._situation, event)
-        self._told = frame.tick.number
+        self._told = row
         self._view.update(self._situation)
         # Shadows are those of the picture before, which here may be of a second ago.
         self._view.present(frame)

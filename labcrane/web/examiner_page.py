@@ -5,7 +5,7 @@ from typing import Any
 from labcrane.session.commands import Order
 from labcrane.web.door.access import SUPERVISOR
 from labcrane.web.form import ConsentCard, Form
-from labcrane.web.page import PRIMARY, PageContext, speak
+from labcrane.web.page import PRIMARY, PageContext, keep_drafts, speak
 from labcrane.web.panels import Cameras, Reports
 from labcrane.web.participant_page import STYLE as FORM_STYLE
 from labcrane.web.room.snapshot import Snapshot
@@ -25,6 +25,7 @@ KEYS: tuple[tuple[str, str], ...] = (
     ("X", "the trial was not completed"),
     ("H", "write a hint to the operator"),
     ("F", "change a setting of a cue or sound"),
+    ("T", "say which stream is meant, where that is asked"),
     ("Q", "fill in the questionnaire"),
     ("D", "dark or light"),
     ("?", "show these keys"),
@@ -43,6 +44,7 @@ def supervisor_page(context: PageContext) -> None:
     ui.add_css(STYLE)
     ui.add_css(FORM_STYLE)
     speak("en")
+    keep_drafts()
     snapshot = Snapshot(context, context.earlier)
 
     def give(order: str, text: str) -> str:

@@ -31,6 +31,7 @@ class Form:
         self._page = page
         self._words = context.words(page)
         self._refreshers: list[Callable[[], object]] = []
+        self._fields: list[Callable[[], None]] = []
         self._shown: tuple[int, bool] = (-1, False)
         self._at = 0
         one = context.study.protocol.page.one_at_a_time
@@ -52,6 +53,7 @@ class Form:
             self._at = 0
             self._area.clear()
             self._refreshers.clear()
+            self._fields.clear()
             with self._area:
                 self._rebuild(session.form, over=shown[1])
         for refresh in self._refreshers:
@@ -77,11 +79,15 @@ class Form:
         refusal = ui.label().classes("text-red-900 text-lg").props('role=alert id="refusal"')
         self._refreshers.append(lambda: refusal.set_text(self._refusal()))
         with ui.element("div").classes("form-nav"):
-            hand_in = ui.button(
-                self._words.hand_in, on_click=lambda: self._context.give(self._page, Order.SUBMIT)
-            ).props('size=lg no-caps color=primary id="submit"')
+            hand_in = ui.button(self._words.hand_in, on_click=self._hand_in)
+            hand_in.props('size=lg no-caps color=primary id="submit"')
             if self._one_at_a_time and len(cards) > 1:
                 self._one_by_one(cards, hand_in)
+
+    def _hand_in(self) -> None:
+        for save in self._fields:  # also what was put back after a reload, and never left since
+            save()
+        self._context.give(self._page, Order.SUBMIT)
 
     def _progress(self, items: "Sequence[Item]") -> None:
         from nicegui import ui  # noqa: PLC0415
@@ -203,6 +209,27 @@ class Form:
 
         field.on("blur", save)
         field.on("keydown.enter", save)
+        self._fields.append(save)
+        self._refreshers.append(self._drafting(field, name, item))
+
+    def _drafting(self, field: "ui.input", name: str, item: Item) -> Callable[[], None]:
+        """Name the field's draft for ``drafts.js``, and return what says what the record holds."""
+        session, context = self._context.session, self._context
+        visit = f"{context.participant} {context.plan.number}"
+        field.props["data-draft"] = f"{visit} {session.form_version} {name} {item.name}"
+
+        def held() -> str:
+            given = item.name in session.answers
+            return json.dumps(session.answers[item.name], ensure_ascii=False) if given else ""
+
+        field.props["data-held"] = held()
+
+        def refresh() -> None:
+            if field.props["data-held"] != held():
+                field.props["data-held"] = held()
+                field.update()
+
+        return refresh
 
     def _answer(self, name: str, item: Item, value: object) -> None:
         given = {"questionnaire": name, "item": item.name, "value": value}

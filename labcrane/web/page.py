@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from labcrane.design.plan import SessionPlan
 from labcrane.limits import LIMITS
@@ -22,6 +23,8 @@ MOST_ORDERS_S = LIMITS["orders of one page"].most
 def _nothing() -> None:
     """Do nothing."""
 
+
+DRAFTS = Path(__file__).with_name("drafts.js")
 
 PRIMARY = "#0d47a1"
 """The pages' colour for what has the focus, 8.6 to 1 on white; the usual one is too faint."""
@@ -94,6 +97,13 @@ def speak(language: str) -> None:
     from nicegui import ui  # noqa: PLC0415
 
     ui.add_head_html(f"<script>document.documentElement.lang = {language!r}</script>")
+
+
+def keep_drafts() -> None:
+    """Have what is half written on the page that is being built outlive that it is loaded anew."""
+    from nicegui import ui  # noqa: PLC0415
+
+    ui.add_head_html(f"<script>{DRAFTS.read_text(encoding='utf-8')}</script>")
 
 
 def _address() -> str:

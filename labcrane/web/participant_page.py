@@ -4,7 +4,7 @@ from pathlib import Path
 
 from labcrane.web.door.access import PARTICIPANT
 from labcrane.web.form import ConsentCard, Form
-from labcrane.web.page import PageContext, speak
+from labcrane.web.page import PageContext, keep_drafts, speak
 from labcrane.web.panels import Reports
 
 STYLE = Path(__file__).with_name("form.css")
@@ -19,6 +19,7 @@ def participant_page(context: PageContext) -> None:
     ui.colors(primary=page.colour)
     ui.add_css(STYLE)
     speak(page.language)
+    keep_drafts()
     with ui.column().classes("w-full max-w-4xl mx-auto p-4 gap-4").props("role=main"):
         if page.logo is not None:
             logo = ui.element("img").classes("form-logo")

@@ -107,6 +107,8 @@ def test_the_supervisors_page_is_reached_by_keyboard_and_readable(
     shown(browser, "events", "Note: hello")
 
 
+VALUE = "return document.getElementById(arguments[0])?.value ?? ''"
+KEPT = "return JSON.stringify(sessionStorage)"
 AWAY = """
 const [away_ms, done] = arguments;
 window.stays = true;
@@ -129,6 +131,49 @@ def test_what_is_half_written_outlives_a_connection_that_was_lost(
     assert browser.execute_script("return window.stays")
     type_in(browser, "note", Keys.ENTER)
     shown(browser, "events", "Note: half a note")
+
+
+def value(browser: webdriver.Chrome, ident: str) -> str:
+    return str(browser.execute_script(VALUE, ident))
+
+
+def test_what_is_half_written_outlives_that_the_page_is_loaded_anew(
+    room: Room, browser: webdriver.Chrome
+) -> None:
+    links = room.links()
+    browser.get(links["supervisor"])
+    shown(browser, "stage", "questionnaire: Zu Ihrer Person")
+    go_to(browser, "note-field")
+    type_in(browser, "two ")
+    browser.refresh()
+    wait_for(lambda: value(browser, "note-field") == "two ")
+    go_to(browser, "note-field")
+    type_in(browser, Keys.END, "halves", Keys.ENTER)
+    shown(browser, "events", "Note: two halves")
+    wait_for(lambda: not value(browser, "note-field"))
+    browser.refresh()
+    shown(browser, "events", "Note: two halves")
+    assert value(browser, "note-field") == ""
+
+    # An answer, in a process of the pages that has never heard of it.
+    browser.get(links["participant"])
+    wait_for(lambda: "Wie alt sind Sie" in text(browser, "item-age"))
+    go_to(browser, "age-field")
+    type_in(browser, "44")
+    pages = room.process("pages")
+    pages.kill()
+    wait_for(lambda: not pages.is_running())
+    wait_for(lambda: room.process("pages"))
+    browser.get(links["participant"])
+    wait_for(lambda: value(browser, "age-field") == "44")
+    assert text(browser, "status-age") == ""
+    press(browser, "submit")  # what was put back counts, though nobody has been in the field
+    shown(browser, "status-age", "gespeichert")
+
+    # What the record has taken is no draft any more.
+    wait_for(lambda: "person age" not in browser.execute_script(KEPT))
+    browser.refresh()
+    wait_for(lambda: value(browser, "age-field") == "44")
 
 
 def test_a_questionnaire_is_answered_in_german_and_by_keyboard_alone(

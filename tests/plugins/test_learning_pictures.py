@@ -140,7 +140,7 @@ def test_every_so_manieth_row_is_that_of_all_rows(person: Participant) -> None:
 @pytest.mark.parametrize(
     ("camera", "said"),
     [
-        ("fre", r"camera 'fre': there is no camera 'fre'; did you mean 'free'\?"),
+        ("fre", r"camera 'fre': there is no such camera as 'fre'; did you mean 'free'\?"),
         ({"name": "x"}, r"camera \{'name': 'x'\}: Field required"),
         ({**OWN, "on": "tail"}, "camera 'mine' rides on 'tail', which the machine has not"),
     ],
@@ -163,7 +163,7 @@ def test_pictures_are_taken_in_order(person: Participant) -> None:
     record = open_recording(person.path).session(1)
     with Retake(record, "free", SIZE) as retake:
         retake.take(50)
-        with pytest.raises(RecordingError, match="tick 49 is before tick 50"):
+        with pytest.raises(RecordingError, match="row 49 is before row 50"):
             retake.take(49)
 
 

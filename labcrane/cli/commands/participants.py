@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from labcrane.cli.commands.approval import today
-from labcrane.cli.options import DataBeside, ProtocolPath, data_folder
+from labcrane.cli.options import DataBeside, ProtocolPath, data_folder, stay_on_this_computer
 from labcrane.cli.output import out, whole_table
 
 Someone = Annotated[str, typer.Argument(metavar="PARTICIPANT", help="pseudonym: P001")]
@@ -116,3 +116,28 @@ def deviations(data: Data = HERE) -> None:
         where = [str(number) if number else "-" for number in (deviation.session, deviation.trial)]
         table.add_row(name, *where, deviation.what, deviation.detail)
     out.print(table if found else "no deviations")
+
+
+def study(
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="a study's folder, or the data folder in it")
+    ],
+    port: Annotated[int, typer.Option(help="where it is served; 0 takes a free one")] = 0,
+) -> None:
+    """Look at a study in a browser: who is due, groups, quality, deviations, consent, disk."""
+    from labcrane.errors import PluginError
+    from labcrane.registry.offers import LAB, not_installed
+    from labcrane.registry.registry import discover
+
+    if missing := not_installed({"nicegui": LAB}):
+        raise PluginError(f"the study's page {missing}")
+    from labcrane.web.door.serving import HOST
+    from labcrane.web.handle import free_port
+    from labcrane.web.study.overview import Reader, checked_data
+    from labcrane.web.study.service import serve
+
+    stay_on_this_computer()
+    reader = Reader(*checked_data(folder))
+    reader.overview(today())  # what cannot be read is said here, not in a browser
+    out.print("Ctrl-C ends it", markup=False)
+    serve(reader, discover, free_port(HOST, port), lambda line: out.print(line, markup=False))

@@ -13,7 +13,7 @@ from labcrane.cli.output import out
 from labcrane.errors import LabcraneError, PluginError, ProtocolError, RecordingError
 
 if TYPE_CHECKING:
-    from labcrane.analysis.cohort import Cohort, Participant, Struck
+    from labcrane.analysis.cohort import Cohort, Participant
     from labcrane.analysis.movements import Groups
     from labcrane.participants.products import Product
 
@@ -68,16 +68,16 @@ def export(
 
     registry = discover()
     offer = registry.find(Exporter, to)
-    oversight = CallMonitor()
+    call_monitor = CallMonitor()
     plugin = registry.plugin(Exporter, to)
-    place = oversight.place(f"exporter {to!r}", plugin, "export", offer.build)
+    place = call_monitor.place(f"exporter {to!r}", plugin, "export", offer.build)
     chosen = _settings(offer.settings, settings or [], to)
     if folder.exists() and any(folder.iterdir()):
         raise ProtocolError(f"{folder} is not empty, and nothing is overwritten; give a new folder")
     cohort = cohort_of(data.resolve() if scheduler else data, include)
     unknown = check_probed(cohort.included, accept=accept_unprobed)
     _, first = next(cohort.included[0].sessions())
-    exporter = oversight.call(place, offer.build, chosen, machine_of(first))
+    exporter = call_monitor.call(place, offer.build, chosen, machine_of(first))
 
     def attempt(cohort: "Cohort") -> None:
         people = _Read(_measured(cohort, workers, scheduler))
@@ -87,7 +87,7 @@ def export(
         ):
             handed = made.handing_out((person.name, person) for person in people.counted(advance))
             try:
-                oversight.call(place, exporter.export, handed, made.folder)
+                call_monitor.call(place, exporter.export, handed, made.folder)
             except LabcraneError as error:
                 if people.now is None:  # nobody's data were being read
                     raise
@@ -288,9 +288,10 @@ def view(
 
     if missing := not_installed({"nicegui": LAB}):
         raise PluginError(f"the viewer {missing}")
+    from labcrane.web.door.serving import HOST
     from labcrane.web.handle import free_port
     from labcrane.web.viewer.film import Film
-    from labcrane.web.viewer.viewer import HOST, serve
+    from labcrane.web.viewer.viewer import serve
 
     stay_on_this_computer()
     paths = [recording, *([beside] if beside else [])]
@@ -314,31 +315,13 @@ def _write_measures(recording: Path, session: int, frames: "Groups", path: Path)
 def cohort_of(data: Path, include: list[str] | None) -> "Cohort":
     """Return who counts in a study's data folder, and print who does not, and why."""
     from labcrane.analysis.cohort import find_cohort
+    from labcrane.participants.folders import Places
+    from labcrane.participants.register import struck
 
-    cohort = find_cohort(data, include or (), struck=_struck(data))
+    cohort = find_cohort(data, include or (), struck=struck(Places(data)))
     for person in cohort.left_out:
         out.print(f"left out: {person.name}, {person.status}: {person.why}", markup=False)
     return cohort
-
-
-def _struck(data: Path) -> "dict[str, Struck]":
-    """Return whom the study's register says not to count, and why."""
-    from labcrane.analysis.cohort import Status
-    from labcrane.participants.folders import Places
-    from labcrane.participants.register import read
-
-    if not Places(data).register.exists():
-        return {}
-    register = read(Places(data))
-    struck = {
-        stone.participant: (Status.ERASED, f"on {stone.date}: {stone.reason}")
-        for stone in register.tombstones
-    }
-    for name, entry in register.participants.items():
-        if entry.exclusion is not None:
-            why = f"on {entry.exclusion.date}: {entry.exclusion.reason}"
-            struck[name] = (Status.EXCLUDED, why)
-    return struck
 
 
 def _product(

@@ -32,6 +32,9 @@ def _secret() -> str:
 VIEWER = "viewer"
 """The page of a recording; it orders nothing."""
 
+STUDY = "study"
+"""The page of a whole study; it orders nothing either."""
+
 
 @dataclass
 class Keys:
@@ -133,7 +136,7 @@ class Gate:
         if scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
             return
-        text = f"labcrane: {why}; use the link that labcrane run has printed"
+        text = f"labcrane: {why}; use the link that labcrane has printed"
         answer = PlainTextResponse(text, FORBIDDEN, {"cache-control": "no-store"})
         await answer(scope, receive, send)
 

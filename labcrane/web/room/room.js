@@ -154,7 +154,9 @@ export default {
           <svg viewBox="0 0 90 24" role="img" :aria-label="'rate of ' + one.label">
             <path :d="trace(one.trace)"/></svg>
           <span><strong>{{ one.label }}</strong> {{ one.words }}
-            <span v-for="line in one.lines" :key="line" class="room-line">{{ line }}</span></span>
+            <span v-for="line in one.lines" :key="line" class="room-line">{{ line }}</span>
+            <button v-for="a in one.answers" :key="a.ident" type="button" class="room-button"
+              :id="a.ident" @click="press(a)">{{ a.label }}</button></span>
         </div>
       </section>
       <section class="room-card" id="settings" v-show="s.state !== 'ended'">
@@ -256,6 +258,10 @@ export default {
     },
   },
   watch: {
+    words: { deep: true, handler(now) { // outlives that the page is loaded anew, in this tab
+      const texts = Object.fromEntries(now.map((field) => [field.order, field.text]));
+      try { sessionStorage.setItem(this.drafts(), JSON.stringify(texts)); } catch { /* keeps nothing */ }
+    } },
     "s.measures": { immediate: true, handler(now) {
       if (now.length && !now.some((m) => m.name === this.measure)) this.measure = now[0].name;
     } },
@@ -263,6 +269,9 @@ export default {
   mounted() {
     let kept = null;
     try { kept = localStorage.getItem("labcrane-theme"); } catch { /* a browser that keeps nothing */ }
+    let drafts = null;
+    try { drafts = JSON.parse(sessionStorage.getItem(this.drafts())); } catch { /* as above */ }
+    for (const field of this.words) field.text = drafts?.[field.order] ?? "";
     this.dark = kept ? kept === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
     this.paint();
     addEventListener("keydown", this.key);
@@ -273,6 +282,7 @@ export default {
     clearInterval(this.timer);
   },
   methods: {
+    drafts() { return `labcrane-draft ${this.s.who}`; },
     show(part) { Object.assign(this.s, part); },
     taken(ident, why) {
       const field = this.waiting[ident]?.field;
@@ -313,6 +323,7 @@ export default {
       else if (at) document.getElementById(at)?.focus();
       else if (key === "F") document.querySelector("#settings input, #settings select")?.focus();
       else if (key === "Q") document.querySelector(".room-form button, .room-form input")?.focus();
+      else if (key === "T") document.querySelector("#streams button")?.focus();
       else if (key === "D") this.theme();
       else return;
       e.preventDefault();

@@ -1,14 +1,13 @@
 """Viewer's page: the machine as it was recorded, beside its time line and its signals."""
 
 import math
-import secrets
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from labcrane.limits import LIMITS
 from labcrane.registry.registry import Registry
-from labcrane.web.door.access import VIEWER, Gate, Keys
+from labcrane.web.door.access import VIEWER
+from labcrane.web.door.serving import serve_here
 from labcrane.web.page import PRIMARY, speak
 from labcrane.web.room.model import MachineModel, span
 from labcrane.web.room.shown import ShownShapes
@@ -17,8 +16,6 @@ from labcrane.web.surroundings import Surroundings
 from labcrane.web.viewer.film import Film
 
 HERE = Path(__file__).parent
-HOST = "127.0.0.1"
-MOST_HEAD = 16_384
 
 
 class Screen:
@@ -129,11 +126,8 @@ def serve(
     films: Sequence[Film], registry: Registry, port: int, at: float, say: Callable[[str], None]
 ) -> None:
     """Serve the viewer to this computer until it is interrupted; ``say`` is told its link."""
-    import uvicorn  # noqa: PLC0415
     from fastapi import FastAPI  # noqa: PLC0415
     from nicegui import ui  # noqa: PLC0415
-
-    from labcrane.web.door.guard import BoundedProtocol, Guard  # noqa: PLC0415
 
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
 
@@ -142,19 +136,4 @@ def serve(
         viewer_page(films, registry, at)
 
     ui.run_with(app, title="labcrane", show_welcome_message=False)
-    keys = Keys({VIEWER: secrets.token_urlsafe(24)}, {VIEWER: secrets.token_urlsafe(24)})
-    link = f"http://{HOST}:{port}/{VIEWER}?token={keys.tokens[VIEWER]}"
-    gate = Gate(app, keys, lambda _: None, say)
-    config = uvicorn.Config(
-        Guard(gate, HOST, port, say),
-        host=HOST,
-        port=port,
-        log_level="error",
-        server_header=False,
-        http=BoundedProtocol,
-        h11_max_incomplete_event_size=MOST_HEAD,
-        ws_max_size=LIMITS["message of a page"].most,
-        ws_per_message_deflate=False,
-    )
-    say(f"viewer: {link}")
-    uvicorn.Server(config).run()
+    serve_here(app, VIEWER, port, say)

@@ -1,0 +1,35 @@
+"""Serving of a page for this computer only, behind the same door, until it is interrupted."""
+
+import secrets
+from collections.abc import Callable
+from typing import Any
+
+from labcrane.limits import LIMITS
+from labcrane.web.door.access import Gate, Keys
+
+HOST = "127.0.0.1"
+MOST_HEAD = 16_384
+"""Bytes of a request's line and headers."""
+
+
+def serve_here(app: Any, page: str, port: int, say: Callable[[str], None]) -> None:
+    """Serve an application whose first page is ``page``; ``say`` is told its one-time link."""
+    import uvicorn  # noqa: PLC0415 - loads for a second
+
+    from labcrane.web.door.guard import BoundedProtocol, Guard  # noqa: PLC0415
+
+    keys = Keys({page: secrets.token_urlsafe(24)}, {page: secrets.token_urlsafe(24)})
+    link = f"http://{HOST}:{port}/{page}?token={keys.tokens[page]}"
+    config = uvicorn.Config(
+        Guard(Gate(app, keys, lambda _: None, say), HOST, port, say),
+        host=HOST,
+        port=port,
+        log_level="error",
+        server_header=False,
+        http=BoundedProtocol,
+        h11_max_incomplete_event_size=MOST_HEAD,
+        ws_max_size=LIMITS["message of a page"].most,
+        ws_per_message_deflate=False,
+    )
+    say(f"{page}: {link}")
+    uvicorn.Server(config).run()
