@@ -91,8 +91,8 @@ class OperatorSettings(Settings):
     """Share of full signal with which the jaws are moved."""
 
     axes: dict[JointName, AxisName] = Field(default={})
-    """Axes of the input that it stands for, by the joint that each moves: ``{jaws: -right.x}``, with
-    a minus where the scheme has one. A joint left out has an axis of its own, ``valve.jaws``."""
+    """Axes of the input that it stands for, by the joint that each moves (``{jaws: -right.x}``),
+    with a minus where the scheme has one. A joint left out has its own axis: ``valve.jaws``."""
 
     button: ButtonName | None = None
     """A button of the input that it has too, like the device it stands for (``float.base`` of a
