@@ -184,7 +184,7 @@ def report(
     from labcrane.analysis.report.report import write_report
 
     cohort = cohort_of(data.resolve() if scheduler else data, include)
-    check_probed(cohort.included, accept=accept_unprobed)
+    unknown = check_probed(cohort.included, accept=accept_unprobed)
 
     def leave_out(name: str, why: str) -> None:
         nonlocal cohort
@@ -201,6 +201,7 @@ def report(
             progress=lambda done, of: advance(),
             workers=workers or usual_workers(len(cohort.included)),
             scheduler=scheduler,
+            unprobed=unknown,
         )
     out.print(f"report: {folder / page.name}", markup=False)
     _tell_left_out(cohort)
@@ -373,6 +374,7 @@ def _settings(model: Any, words: list[str], name: str) -> Any:
     """Return an exporter's settings from NAME=VALUE; values are YAML, as in a protocol."""
     from pydantic import ValidationError
 
+    from labcrane.files.complaints import told
     from labcrane.files.yaml import parse_yaml
 
     given = {}
@@ -385,10 +387,10 @@ def _settings(model: Any, words: list[str], name: str) -> Any:
         return model.model_validate(given)
     except ValidationError as error:
         known = ", ".join(model.model_fields) or "nothing"
-        problems = "; ".join(
-            f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()
-        )
-        raise ProtocolError(f"exporter {name!r} can set {known}; {problems}") from None
+        problems = "; ".join(one.message for one in told(error.errors(), (name,), model))
+        raise ProtocolError(
+            f"{problems}; write --set NAME=VALUE, where {name} has {known}"
+        ) from None
 
 
 def _write_manifest(
