@@ -4,6 +4,7 @@ import gzip
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from shutil import copyfile
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,7 @@ from labcrane.analysis import (
     measures_of,
     scores_of,
 )
-from labcrane.recording import SessionRecord
+from labcrane.recording import SessionRecord, labelled
 from labcrane_tables.frames import StreamTable, snake, stream_tables
 from labcrane_tables.settings import TableSettings
 
@@ -88,14 +89,15 @@ class Tables(Exporter):
 
 def write_parquet(table: StreamTable, path: Path) -> None:
     """Write a table a row group at a time."""
+    import pyarrow as pa
     from pyarrow import parquet
 
     batches = table.batches()
     first = next(batches)
     with parquet.ParquetWriter(path, first.schema, use_dictionary=False) as out:
-        out.write_batch(first)
-        for batch in batches:
-            out.write_batch(batch)
+        for batch in chain([first], batches):
+            # write_batch would gather a million rows, some hundred megabytes, before it writes any.
+            out.write_table(pa.Table.from_batches([batch]))
 
 
 def _write_packed_csv(table: StreamTable, path: Path) -> None:
@@ -183,6 +185,8 @@ def _events(participant: Participant, number: int, session: SessionRecord) -> "p
         "{}" if name == "session.start" else json.dumps(data, ensure_ascii=False)
         for name, data in zip(events["name"], events["data"], strict=True)
     ]
+    said = zip(session.events["name"], session.events["data"], strict=True)
+    events.insert(list(events).index("name") + 1, "label", labelled(said))
     events.insert(0, "participant", participant.name)
     events.insert(1, "session", number)
     return events

@@ -1,18 +1,18 @@
 """The report's figures, each with the table it shows."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from labcrane.analysis.report.panels import COLOURS, GREY, Panel, Series, figure_of, new_figure
 from labcrane.analysis.statistics.fitts import regress
 from labcrane.analysis.statistics.learning import CURVES
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 WORDS = {
@@ -26,26 +26,37 @@ WORDS = {
 }
 
 
+PLACE_WORDS = "position in the sequence"
+
+
 @dataclass(frozen=True, slots=True)
 class Drawing:
     """A figure, its name for files, what it shows, and its table."""
 
     name: str
     caption: str
-    figure: "Figure"
+    panels: Sequence[Panel]
     table: "pd.DataFrame"
 
+    @property
+    def figure(self) -> "Figure":
+        """The figure as Matplotlib draws it."""
+        return figure_of(self.panels)
 
-def new_figure(columns: int = 1) -> "tuple[Figure, list[Axes]]":
-    """Return an empty figure with some axes beside each other; needs no display."""
-    from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(5.2 * columns, 3.8), layout="constrained")
-    axes = [figure.add_subplot(1, columns, at + 1) for at in range(columns)]
-    for one in axes:
-        one.grid(alpha=0.3)
-        one.spines[["top", "right"]].set_visible(False)
-    return figure, axes
+class Bars(Drawing):
+    """One bar for each participant, and a line at their mean."""
+
+    @property
+    def figure(self) -> "Figure":
+        figure = new_figure()
+        (axes,) = figure.axes
+        who, values = self.table["participant"], self.table["throughput"]
+        axes.bar(who, values, color="C4")
+        axes.tick_params(axis="x", rotation=90, labelsize="x-small")
+        axes.axhline(float(values.mean()), color="k", lw=0.8)
+        axes.set(ylabel="throughput (bit/s)")
+        return figure
 
 
 def over(movements: "pd.DataFrame", measure: str, by: list[str]) -> "pd.DataFrame":
@@ -66,23 +77,22 @@ def over(movements: "pd.DataFrame", measure: str, by: list[str]) -> "pd.DataFram
 
 def by_sequence(movements: "pd.DataFrame", measure: str) -> Drawing:
     """Draw a measure over the sequence: everybody thin, the mean of each group thick."""
-    figure, (axes,) = new_figure()
     each = movements.groupby(["participant", "sequence"])[measure].mean().unstack(level=0)
-    axes.plot(each.index, each, color="0.75", lw=0.8)
+    series = [
+        Series(_numbers(each.index), _numbers(each[name]), "#bfbfbf", "line") for name in each
+    ]
     groups = movements["group"].nunique() > 1 if "group" in movements else False
     by = ["group", "sequence"] if groups else ["sequence"]
     table = over(movements, measure, by)
-    for number, (name, part) in enumerate(table.groupby("group") if groups else [("mean", table)]):
+    for number, (name, part) in enumerate(table.groupby("group") if groups else [("", table)]):
         for at, own in enumerate(_by_phase(movements, part)):
-            label = str(name) if at == 0 else "_"
-            _with_ci(axes, own["sequence"], own, f"C{number}", label)
-    if groups:
-        axes.legend(title="group", fontsize="small")
-    axes.set(xlabel="position in the sequence", ylabel=WORDS.get(measure, measure))
+            label = str(name) if at == 0 else ""
+            series.append(_with_ci(own, COLOURS[number % len(COLOURS)], label))
+    panel = Panel(PLACE_WORDS, WORDS.get(measure, measure), series, legend="group")
     caption = (
         f"{WORDS.get(measure, measure)} over the sequence; mean with 95 % CI, each participant"
     )
-    return Drawing(f"{measure}_by_sequence", caption, figure, table)
+    return Drawing(f"{measure}_by_sequence", caption, [panel], table)
 
 
 def _by_phase(movements: "pd.DataFrame", table: "pd.DataFrame") -> "list[pd.DataFrame]":
@@ -95,47 +105,47 @@ def _by_phase(movements: "pd.DataFrame", table: "pd.DataFrame") -> "list[pd.Data
 
 def by_distance(movements: "pd.DataFrame") -> Drawing:
     """Draw times and accuracy over the sequence for each distance."""
+    import pandas as pd
+
     shown = [
         name
         for name in ("circle_to_circle", "movement_time", "absolute_error")
         if name in movements and movements[name].notna().any()
     ]
-    figure, axes = new_figure(len(shown))
-    tables = []
-    for one, measure in zip(axes, shown, strict=True):
+    panels, tables = [], []
+    for at, measure in enumerate(shown):
         table = over(movements, measure, ["distance", "sequence"])
-        for number, (distance, part) in enumerate(table.groupby("distance")):
-            _with_ci(one, part["sequence"], part, f"C{number}", f"{distance:g} m")
-        one.set(xlabel="position in the sequence", ylabel=WORDS[measure])
+        series = [
+            _with_ci(part, COLOURS[number % len(COLOURS)], "" if at else f"{distance:g} m")
+            for number, (distance, part) in enumerate(table.groupby("distance"))
+        ]
+        panels.append(Panel(PLACE_WORDS, WORDS[measure], series, legend="distance"))
         tables.append(table.assign(measure=measure))
-    axes[0].legend(title="distance", fontsize="small")
-    import pandas as pd
-
     caption = "times and accuracy over the sequence, per distance; means with 95 % CI"
-    return Drawing("sequence_by_distance", caption, figure, pd.concat(tables))
+    return Drawing("sequence_by_distance", caption, panels, pd.concat(tables))
 
 
 def fitts(movements: "pd.DataFrame") -> Drawing:
     """Draw movement time over difficulty, with the regression over participants' means."""
     import pandas as pd
 
-    figure, (axes,) = new_figure()
     cells = movements.groupby(["participant", "difficulty"])["movement_time"].mean().reset_index()
-    axes.plot(cells["difficulty"], cells["movement_time"], ".", color="0.6", ms=4)
+    x, y = _numbers(cells["difficulty"]), _numbers(cells["movement_time"])
+    series, title = [Series(x, y, GREY, "dots")], ""
     rows = []
     for participant, own in movements.groupby("participant"):
         rows.append(_line(str(participant), own["difficulty"], own["movement_time"]))
-    whole = regress(_numbers(cells["difficulty"]), _numbers(cells["movement_time"]))
+    whole = regress(x, y)
     rows.append(_line("all (participants' means)", cells["difficulty"], cells["movement_time"]))
     if whole is not None:
-        x = np.array([cells["difficulty"].min(), cells["difficulty"].max()])
-        axes.plot(x, whole.intercept + whole.slope * x, "C3")
-        axes.set_title(f"{whole.intercept:.2f} s + {whole.slope:.2f} s/bit, R² {whole.r2:.2f}")
-    axes.set(xlabel="index of difficulty (bit)", ylabel=WORDS["movement_time"])
-    return Drawing("fitts", "Fitts' law", figure, pd.DataFrame(rows))
+        ends = np.array([x.min(), x.max()])
+        series.append(Series(ends, whole.intercept + whole.slope * ends, COLOURS[3], "line"))
+        title = f"{whole.intercept:.2f} s + {whole.slope:.2f} s/bit, R² {whole.r2:.2f}"
+    panel = Panel("index of difficulty (bit)", WORDS["movement_time"], series, title)
+    return Drawing("fitts", "Fitts' law", [panel], pd.DataFrame(rows))
 
 
-def _numbers(column: "pd.Series[Any]") -> FloatArray:
+def _numbers(column: "pd.Series[Any] | pd.Index[Any]") -> FloatArray:
     return np.asarray(column, np.float64)
 
 
@@ -161,7 +171,7 @@ def learning(movements: "pd.DataFrame", curves: "pd.DataFrame", measure: str) ->
 
     Curves count from the first position of their session or block.
     """
-    figure, (axes,) = new_figure()
+    series = []
     better = curves[(curves["measure"] == measure) & (curves["better"] == "yes")]
     people = {name: number for number, name in enumerate(better["participant"].unique())}
     for row in better.itertuples(index=False):
@@ -169,56 +179,51 @@ def learning(movements: "pd.DataFrame", curves: "pd.DataFrame", measure: str) ->
         if "phase" in better:
             own = own[own["phase"] == row.phase]
         means = own.groupby("sequence")[measure].mean()
-        color = f"C{people[row.participant] % 10}"
-        axes.plot(means.index, means, ".", color=color, ms=4)
+        colour = COLOURS[people[row.participant] % len(COLOURS)]
+        series.append(Series(_numbers(means.index), _numbers(means), colour, "dots"))
         before = float((own["sequence"] - own["place"]).iloc[0]) if "place" in own else 0.0
         n = np.linspace(1, float(means.index.max()) - before, 100)
         curve: Callable[..., np.ndarray] = CURVES[str(row.curve)]
-        axes.plot(n + before, curve(n, row.asymptote, row.gain, row.rate), color=color, lw=0.8)
-    axes.set(xlabel="position in the sequence", ylabel=WORDS.get(measure, measure))
-    return Drawing(f"learning_{measure}", "learning curves, one per participant", figure, curves)
+        fitted = curve(n, row.asymptote, row.gain, row.rate)
+        series.append(Series(n + before, fitted, colour, "line"))
+    panel = Panel(PLACE_WORDS, WORDS.get(measure, measure), series)
+    return Drawing(f"learning_{measure}", "learning curves, one per participant", [panel], curves)
 
 
 def sticks(movements: "pd.DataFrame") -> Drawing:
     """Draw how the sticks were used over the sequence."""
     import pandas as pd
 
-    measures = ("simultaneous", "bimanual", "reversals")
-    figure, axes = new_figure(len(measures))
-    tables = []
-    for one, measure in zip(axes, measures, strict=True):
+    panels, tables = [], []
+    for measure in ("simultaneous", "bimanual", "reversals"):
         table = over(movements, measure, ["sequence"])
-        _with_ci(one, table["sequence"], table, "C2", "mean")
-        one.set(xlabel="position in the sequence", ylabel=WORDS[measure])
+        panels.append(Panel(PLACE_WORDS, WORDS[measure], [_with_ci(table, COLOURS[2])]))
         tables.append(table.assign(measure=measure))
     caption = "use of the sticks over the sequence; means with 95 % CI"
-    return Drawing("sticks", caption, figure, pd.concat(tables))
+    return Drawing("sticks", caption, panels, pd.concat(tables))
 
 
 def throughputs(table: "pd.DataFrame") -> Drawing:
     """Draw each participant's throughput."""
-    figure, (axes,) = new_figure()
-    axes.bar(table["participant"], table["throughput"], color="C4")
-    axes.tick_params(axis="x", rotation=90, labelsize="x-small")
-    axes.axhline(float(table["throughput"].mean()), color="k", lw=0.8)
-    axes.set(ylabel="throughput (bit/s)")
     caption = f"throughput, mean of means {table['throughput'].mean():.3f} bit/s"
-    return Drawing("throughput", caption, figure, table)
+    return Bars("throughput", caption, (), table)
 
 
-def _with_ci(
-    axes: "Axes", x: "pd.Series[Any]", table: "pd.DataFrame", color: str, label: str
-) -> None:
+def _with_ci(table: "pd.DataFrame", colour: str, label: str = "") -> Series:
     below, above = table["mean"] - table["ci_low"], table["ci_high"] - table["mean"]
-    errors = np.nan_to_num(np.array([below, above], float))
-    axes.errorbar(
-        x.to_numpy(), table["mean"], errors, color=color, marker="o", ms=4, capsize=2, label=label
+    reach = np.nan_to_num(np.array([below, above], float))
+    return Series(
+        _numbers(table["sequence"]), _numbers(table["mean"]), colour, label=label, reach=reach
     )
 
 
-def power_curve(table: "pd.DataFrame") -> "Figure":
-    """Return the power over the size of the cohort, beside the rate of findings in nothing."""
-    figure, (axes,) = new_figure()
+def power_curve(table: "pd.DataFrame", whose: str) -> "Figure":
+    """Return the power over the size of the cohort, beside the rate of findings in nothing.
+
+    ``whose`` says of whom the cohorts are.
+    """
+    figure = new_figure()
+    (axes,) = figure.axes
     for name, words in (("power", "with the effect"), ("null", "labels permuted")):
         low, high = table[name] - table[f"{name}_low"], table[f"{name}_high"] - table[name]
         axes.errorbar(
@@ -227,7 +232,7 @@ def power_curve(table: "pd.DataFrame") -> "Figure":
     axes.axhline(0.8, color="0.6", linestyle="--", linewidth=1)
     axes.axhline(0.05, color="0.6", linestyle=":", linewidth=1)
     axes.set(xlabel="participants", ylabel="share of cohorts with p < 0.05", ylim=(-0.03, 1.03))
-    axes.set_title("simulated operators", fontsize="medium")
+    axes.set_title(whose, fontsize="medium")
     axes.set_xticks(table["participants"])
     axes.legend(loc="center right")
     return figure
@@ -236,8 +241,8 @@ def power_curve(table: "pd.DataFrame") -> "Figure":
 def thresholds(table: "pd.DataFrame") -> "Figure":
     """Return estimates of thresholds over the true ones, a picture for each track."""
     names = list(dict.fromkeys(table["track"]))
-    figure, pictures = new_figure(len(names))
-    for name, axes in zip(names, pictures, strict=True):
+    figure = new_figure(len(names))
+    for name, axes in zip(names, figure.axes, strict=True):
         own = table[table["track"] == name].dropna(subset=["estimate"])
         axes.plot(own["truth"], own["estimate"], ".", markersize=3, alpha=0.4)
         ends = [own["truth"].min(), own["truth"].max()]

@@ -194,12 +194,13 @@ def _study(
     page.table("time_outs", counts)
     _movements(page, running(results, factors))
     said = _statistics(page, everything, results, factors)
+    looked = _gaze(page, results, factors)
     tests = outcomes.score_tests(scores, groups)
     if len(scores):
         page.heading("Questionnaires")
         page.table("scores", outcomes.score_table(scores, groups))
         page.table("score_tests", tests)
-    _in_words(page, Results(about, *said, scores=tests, time_outs=counts, factors=factors))
+    _in_words(page, Results(about, *said, looked, tests, counts, factors))
 
 
 def _in_words(page: Page, results: Results) -> None:
@@ -283,12 +284,26 @@ def _statistics(
     if len(practised := outcomes.practice_table(everything, factors)):
         page.say("Practice against what counts.")
         page.table("practice", practised)
-    if len(looked := outcomes.gaze_table(results, factors)):
-        page.say("How long areas were looked at, before onset and during movements, in seconds.")
-        page.table("gaze", looked)
     for measure in PRIMARY:
         _mixed(page, results.assign(sequence=results[PLACE]), measure)
     return anovas, contrasts, trends, scales
+
+
+def _gaze(page: Page, results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
+    """Add how long areas were looked at; return the tests of it."""
+    looked = outcomes.gaze_table(results, factors)
+    tests = outcomes.gaze_tests(results, factors)
+    if len(looked):
+        page.heading("Gaze")
+        page.say(
+            "How long areas were looked at, before onset and during movements, and how long before "
+            "onset first, in seconds. Tests are of one area each, without a correction for their "
+            "number."
+        )
+        page.table("gaze", looked)
+        if len(tests):
+            page.table("gaze_tests", tests)
+    return tests
 
 
 def _mixed(page: Page, results: "pd.DataFrame", measure: str) -> None:
@@ -337,10 +352,10 @@ def _participant_page(
         results = running(whole[is_result(own)], factors_of(whole))
         curves = learning_curves(results.assign(sequence=results[PLACE]), "movement_time")
         if len(curves):
-            page.draw(figures.learning(results, curves, "movement_time"))
-        page.draw(figures.by_distance(results))
-        page.draw(figures.fitts(results))
-        page.draw(figures.sticks(results))
+            page.sketch(figures.learning(results, curves, "movement_time"))
+        page.sketch(figures.by_distance(results))
+        page.sketch(figures.fitts(results))
+        page.sketch(figures.sticks(results))
         page.table("movements", results[["trial", "sequence", "distance", *SHOWN]])
     page.heading("Exclusions")
     page.table("excluded_movements", exclusions(own))
