@@ -213,7 +213,7 @@ def gaze_tests(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
     """Return the tests of how long each area was looked at, over groups, phases and distances."""
     within = [*factors.over_phases, DISTANCE]
     tests = [
-        replace(test, factor=_words(test.factor, factors))
+        replace(test, factor=named(test, factors))
         for name in _of_gaze(results)
         for test in analyse(results, name, within, factors.between)
     ]
