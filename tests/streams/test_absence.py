@@ -7,8 +7,9 @@ import pylsl
 import pytest
 
 from labcrane.streams.network import VARIABLE, Network
+from labcrane.streams.recorder import absence
 from labcrane.streams.recorder import recorder as recorder_module
-from labcrane.streams.recorder.absence import MOST_NAMED, cause, missed
+from labcrane.streams.recorder.absence import MOST_NAMED, FreePorts, cause, missed
 from labcrane.streams.recorder.recorder import Recorder
 from labcrane.streams.request import StreamRequest
 
@@ -49,9 +50,21 @@ def test_a_crowded_network_is_not_listed_as_a_whole() -> None:
 
 def test_a_configuration_that_cannot_be_read_is_the_cause(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, "gone.cfg")
-    text = missed(StreamRequest("eeg", name="Amplifier"), ())
+    text = missed(StreamRequest("eeg", name="Amplifier"), (), FreePorts())
     assert "eeg (name 'Amplifier') is not on the network after 15 s: " in text
     assert "gone.cfg, which cannot be read" in text
+
+
+def test_ports_are_counted_seldom_for_who_counts_takes_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    counted, now = [], [100.0]
+    monkeypatch.setattr(absence, "free_ports", lambda: len(counted.append(now[0]) or counted))
+    monkeypatch.setattr(absence.time, "monotonic", lambda: now[0])
+    free = FreePorts()
+    assert [free() for _ in range(20)] == [1] * 20
+    now[0] += absence.PATIENCE_S
+    assert free() == 2
 
 
 def test_a_recorder_says_at_first_to_start_it_and_later_what_there_is_instead(

@@ -1,6 +1,7 @@
 """Absence of a stream that is waited for: why it may not be found, in words that say what to do."""
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from labcrane.errors import StreamError
@@ -21,7 +22,24 @@ def absent(request: StreamRequest) -> str:
     return f"{request} is not on the network: start it, and check that LSL is enabled"
 
 
-def missed(request: StreamRequest, seen: "Sequence[pylsl.StreamInfo]") -> str:
+class FreePorts:
+    """Free ports of liblsl's range, counted seldom: who counts has each of them for a moment."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._due = float("-inf")
+
+    def __call__(self) -> int:
+        """Return how many were free when they were last counted."""
+        if (now := time.monotonic()) >= self._due:
+            self._due = now + PATIENCE_S
+            self._count = free_ports()
+        return self._count
+
+
+def missed(
+    request: StreamRequest, seen: "Sequence[pylsl.StreamInfo]", free: Callable[[], int]
+) -> str:
     """Say why a stream is still not there, as far as this computer can tell.
 
     Parameters
@@ -30,9 +48,11 @@ def missed(request: StreamRequest, seen: "Sequence[pylsl.StreamInfo]") -> str:
         What is waited for.
     seen
         All streams that a search finds.
+    free
+        Tells how many ports of liblsl's range are free.
     """
     try:
-        why = cause(seen, describe(), free_ports(), port_range())
+        why = cause(seen, describe(), free(), port_range())
     except StreamError as error:  # of the configuration, which liblsl has read before
         why = str(error)
     return f"{request} is not on the network after {PATIENCE_S:g} s: {why}"

@@ -13,7 +13,7 @@ from labcrane.errors import RecordingError
 from labcrane.recording.foreign_streams import OWN_CLOCK
 from labcrane.recording.paths import next_part, part_path
 from labcrane.recording.xdf.writer import XdfWriter
-from labcrane.streams.recorder.absence import PATIENCE_S, absent, missed
+from labcrane.streams.recorder.absence import PATIENCE_S, FreePorts, absent, missed
 from labcrane.streams.recorder.candidates import Candidate, question
 from labcrane.streams.recorder.health import Condition, Health, complaints, condition, rate
 from labcrane.streams.recorder.inlet import Inlet
@@ -86,6 +86,7 @@ class Recorder:
         self._own = self._writer.add_stream(OWN_CLOCK) if read_own_clock() is not None else None
         self._search = Search(forget_s=FORGET_S)
         self._began = time.monotonic()
+        self._free_ports = FreePorts()
 
     @property
     def path(self) -> Path:
@@ -169,7 +170,7 @@ class Recorder:
         elif time.monotonic() - self._began < PATIENCE_S:
             said = absent(request)
         else:
-            said = missed(request, self._search.results())
+            said = missed(request, self._search.results(), self._free_ports)
         return _absent(request, candidates, said)
 
     def _log_own_clock(self) -> None:
