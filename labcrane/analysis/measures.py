@@ -163,11 +163,31 @@ def measure_session(
             row |= gaze_measures(seen, due[0], due[span.start], due[span.stop - 1])
         rows.append(row)
     measured = pd.DataFrame(rows, index=trials.index)
-    order = pd.DataFrame(
+    return pd.concat([trials, _order(trials), measured], axis=1)
+
+
+OF_TRIALS = ("sequence", "position", "constant_error", "absolute_error")
+"""Measures that follow from the trial table alone."""
+
+
+def measures_of_trials(trials: "pd.DataFrame") -> "pd.DataFrame":
+    """Return a session's trial table with :data:`OF_TRIALS`, for which no frame is needed."""
+    import pandas as pd
+
+    errors = {
+        name: trials[of].astype(float) if of in trials else float("nan")
+        for name, of in (("constant_error", "error_along"), ("absolute_error", "error"))
+    }
+    return pd.concat([trials, _order(trials)], axis=1).assign(**errors)
+
+
+def _order(trials: "pd.DataFrame") -> "pd.DataFrame":
+    import pandas as pd
+
+    return pd.DataFrame(
         {"sequence": _sequence(trials), "position": np.arange(1, len(trials) + 1)},
         index=trials.index,
     )
-    return pd.concat([trials, order, measured], axis=1)
 
 
 def _sequence(trials: "pd.DataFrame") -> "pd.Series[Any]":

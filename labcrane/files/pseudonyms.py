@@ -4,6 +4,7 @@ import itertools
 import re
 
 from labcrane.errors import ProtocolError
+from labcrane.files.names import misfit
 
 MOST = 100_000
 
@@ -21,12 +22,17 @@ def pseudonyms(pattern: str, count: int) -> list[str]:
         for digits in range(1, 7):
             numbers = range(1, min(MOST, 10**digits))
             candidates = (f"{letters}{number:0{digits}}" for number in numbers)
-            names = (name for name in candidates if re.fullmatch(pattern, name))
+            names = (name for name in candidates if _fits(name, pattern))
             if len(found := list(itertools.islice(names, count))) == count:
                 return found
-    if count == 1 and re.fullmatch(pattern, pattern):
+    if count == 1 and _fits(pattern, pattern):
         return [pattern]  # of one person
     raise ProtocolError(
         f"no {count} names of letters and a number match the pattern {pattern!r}; "
         "name participants with --participant"
     )
+
+
+def _fits(name: str, pattern: str) -> bool:
+    """Whether a name matches, and can be that of a participant's folder."""
+    return bool(re.fullmatch(pattern, name)) and misfit(name) is None

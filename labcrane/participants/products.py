@@ -152,27 +152,38 @@ def product(
 
 
 @contextmanager
-def written_about(recording: Path, writer: str, path: Path) -> Iterator[Path]:
-    """Hand out a path for one file about the participant of a participant file.
+def files_about(recording: Path, writer: str, target: Path) -> Iterator[Path]:
+    """Hand out a folder for files about the participant of a participant file.
 
-    It is at ``path`` at the end, and in the register of the study that the participant file is of.
-    For commands of plugins.
+    They are in ``target`` at the end, and in the register of the study that the participant file
+    is of.
 
     Parameters
     ----------
     recording
         The participant file, in its place in the data folder.
     writer
-        What writes: ``operator fit``.
+        What writes: ``feedback preview``.
     """
-    recording, path = recording.resolve(), path.resolve()
+    recording, target = recording.resolve(), target.resolve()
     data, name = recording.parent.parent, recording.parent.name
     today = datetime.now().astimezone().date()
     if recording.stem != name or not recording.is_file():  # a copy that somebody took away
-        yield path
+        yield target
         return
-    with product(data, writer, path.parent, [name], today) as made:
-        yield made.folder / path.name
+    with product(data, writer, target, [name], today) as made:
+        yield made.folder
+
+
+@contextmanager
+def written_about(recording: Path, writer: str, path: Path) -> Iterator[Path]:
+    """Hand out a path for one file about the participant of a participant file.
+
+    As :func:`files_about`. For commands of plugins.
+    """
+    path = path.resolve()
+    with files_about(recording, writer, path.parent) as folder:
+        yield folder / path.name
 
 
 def _put(staging: Path, target: Path) -> None:

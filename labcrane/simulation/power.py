@@ -17,7 +17,11 @@ if TYPE_CHECKING:
 ALPHA = 0.05
 ROUNDING = 1e-12
 """Standard error, as a share of the largest number, that is no spread of people."""
-_EFFECT = re.compile(r"(log\()?([a-z0-9_]+)(\))?~([a-z0-9_]+)(?:\[(.+),(.+)\])?(?:=(.+))?")
+_TERM = r"[a-z0-9_]+(?:\[T\.[^\]]+\])?"  # the second as a mixed model names the level of a factor
+_EFFECT = re.compile(
+    rf"(log\()?([a-z0-9_]+)(\))?~({_TERM}(?::{_TERM})*)(?:\[(.+),(.+)\])?(?:=(.+))?"
+)
+_BLANKS = re.compile(r"\s*([~=,:()\[\]])\s*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +51,7 @@ class Effect:
 
 def read_effect(text: str) -> Effect:
     """Read an effect as it is written on the command line."""
-    found = _EFFECT.fullmatch(text.replace(" ", ""))
+    found = _EFFECT.fullmatch(_BLANKS.sub(r"\1", text.strip()))
     try:
         size = float(found[7]) if found and found[7] else None
     except ValueError:
@@ -267,11 +271,32 @@ def power(
         else:
             tested, true = _tested(permuted + effect.size * added, shuffled, pool), effect.size
         found = claim.shown(tested)
-        seen = tested.estimate[found]
-        wrong = np.nan, np.nan
-        if claim.kind == "difference" and true != 0.0 and found.any():
-            wrong = float(np.abs(seen).mean() / abs(true)), float((seen * true < 0.0).mean())
-        yield Power(size, len(found), *_share(found), *_share(null), *wrong)
+        if claim.kind != "difference":
+            true = 0.0
+        yield summarise(size, found, null, tested.estimate, true)
+
+
+def summarise(
+    size: int,
+    found: npt.NDArray[np.bool_],
+    null: npt.NDArray[np.bool_],
+    estimates: FloatArray,
+    true: float,
+) -> Power:
+    """Return the power from what was shown in each cohort, and in each where nothing is.
+
+    Parameters
+    ----------
+    found, null, estimates
+        Shape ``(cohorts,)``.
+    true
+        The effect that there is; 0 or NaN where nothing is to be said of exaggeration.
+    """
+    seen = estimates[found]
+    wrong = np.nan, np.nan
+    if true and true == true and found.any():  # noqa: PLR0124 - NaN is not itself
+        wrong = float(np.abs(seen).mean() / abs(true)), float((seen * true < 0.0).mean())
+    return Power(size, len(found), *_share(found), *_share(null), *wrong)
 
 
 def _effect_of(pool: Pool) -> float:

@@ -1,6 +1,6 @@
 """Sample size of a planned test: the smallest cohort that has a wanted power."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from labcrane.errors import ProtocolError
@@ -38,7 +38,29 @@ class SampleSize:
 def sample_size(
     pool: Pool, effect: Effect, goal: float, cohorts: int, seed: int, claim: Claim = DIFFERENCE
 ) -> SampleSize:
+    """Return the smallest cohort with a power of ``goal``, of participants drawn from a pool.
+
+    Raises
+    ------
+    ProtocolError
+        Not even :data:`MOST` participants have it, or it is no power.
+    """
+
+    def at(size: int) -> Power:
+        # Seeded by the size, so that a size has one power whoever asks.
+        (found,) = power(pool, effect, [size], cohorts, seed + size, claim=claim)
+        return found
+
+    return smallest_cohort(at, goal)
+
+
+def smallest_cohort(power_of: Callable[[int], Power], goal: float) -> SampleSize:
     """Return the smallest cohort with a power of ``goal``, by halving; power grows with its size.
+
+    Parameters
+    ----------
+    power_of
+        The power of a cohort of a size.
 
     Raises
     ------
@@ -51,8 +73,7 @@ def sample_size(
 
     def at(size: int) -> Power:
         if size not in known:
-            # Seeded by the size, so that a size has one power whoever asks.
-            (known[size],) = power(pool, effect, [size], cohorts, seed + size, claim=claim)
+            known[size] = power_of(size)
         return known[size]
 
     def smallest(end: str) -> int:
@@ -77,8 +98,24 @@ def sample_size(
     return SampleSize(goal, found, ends[0], ends[-1], at(found))
 
 
-def paragraph(effect: str, claim: Claim, pool: int, sizes: Iterable[SampleSize]) -> str:
-    """Return what an application to an ethics board says of the number of participants."""
+def paragraph(
+    effect: str,
+    claim: Claim,
+    pool: int,
+    sizes: Iterable[SampleSize],
+    *,
+    test: str = "",
+    recorded: bool = False,
+) -> str:
+    """Return what an application to an ethics board says of the number of participants.
+
+    Parameters
+    ----------
+    test
+        What the test is called; nothing for a t test of participants' means.
+    recorded
+        Whether the participants who are drawn were recorded, and not simulated.
+    """
     shown = {
         "difference": f"an effect (two-sided test at {100 * ALPHA:g} %)",
         "equivalence": f"equivalence within a margin of {claim.margin:g} (two one-sided tests at "
@@ -86,11 +123,14 @@ def paragraph(effect: str, claim: Claim, pool: int, sizes: Iterable[SampleSize])
         "non_inferiority": f"non-inferiority with a margin of {claim.margin:g} (one-sided test at "
         f"{100 * ALPHA:g} %)",
     }[claim.kind]
-    sentences = [
-        f"The number of participants was planned by simulation. {pool} participants were simulated "
-        f"with the study's own protocol, and cohorts of each size were drawn from them; in each, "
-        f"{effect} was tested as it is planned, to show {shown}."
-    ]
+    who = (
+        f"From {pool} participants of a pilot cohorts of each size were drawn with replacement"
+        if recorded
+        else f"The number of participants was planned by simulation. {pool} participants were "
+        "simulated with the study's own protocol, and cohorts of each size were drawn from them"
+    )
+    by = f" by the report's {test}" if test else ""
+    sentences = [f"{who}; in each, {effect} was tested as it is planned{by}, to show {shown}."]
     for each in sizes:
         found = each.found
         sentences.append(
@@ -105,6 +145,8 @@ def paragraph(effect: str, claim: Claim, pool: int, sizes: Iterable[SampleSize])
                 f"average, and has the wrong sign in {100 * found.type_s:.1f} % of cases."
             )
     sentences.append(
-        "The simulated operators are a model; the numbers hold for people as far as they do."
+        "A pilot is small: its own chance is in these numbers."
+        if recorded
+        else "The simulated operators are a model; the numbers hold for people as far as they do."
     )
     return " ".join(sentences)

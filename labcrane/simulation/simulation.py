@@ -7,13 +7,18 @@ simulated again is the same to the last bit.
 import json
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+import numpy as np
+
+from labcrane.analysis.measures import measures_of_trials
 from labcrane.analysis.parallel import work
-from labcrane.core.records import Event, Run
+from labcrane.core.records import Event, Run, Value
 from labcrane.design.plan import plan_session
 from labcrane.errors import ProtocolError, RecordingError
 from labcrane.files.atomic import make_folder, write_text
@@ -25,12 +30,21 @@ from labcrane.recording.frame_log import BatchLog
 from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
 from labcrane.session.sequencer import Sequencer
-from labcrane.session.session import run
+from labcrane.session.session import ForwardMaker, record, run
 from labcrane.session.visit import Visit
 from labcrane.simulation.fast_forward import FastForward, Way
 from labcrane.simulation.population import read_population
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 ABOUT = "simulation.json"
+TRIALS = "_trials.parquet"
+"""Behind a participant's name: a file of the trial table alone."""
+
+COUNTED = "counted"
+"""Column of what is said of a trial that the trial table, which has no other, leaves out."""
+
 WAY = "simulated_by.json"
 """In a participant's folder: by what each session was simulated, compiled twins or the loop."""
 
@@ -70,12 +84,21 @@ class SimulationJob:
 
 
 class Attendance:
-    """A console at which nobody sits; the participant may leave in a trial."""
+    """A console at which nobody sits; the participant may leave in a trial.
+
+    Attributes
+    ----------
+    left
+        Whether they have left.
+    rows
+        The trial table so far.
+    """
 
     def __init__(self, leaves_at: int | None) -> None:
         self._leaves_at = leaves_at
         self._orders: list[Command] = []
         self.left = False
+        self.rows: list[Mapping[str, Value]] = []
 
     def waiting(self) -> bool:
         """Whether an order is still to be taken."""
@@ -89,6 +112,8 @@ class Attendance:
         if event.name == "trial.start" and event.data["trial"] == self._leaves_at:
             self.left = True
             self._orders = [Command(Order.END, "the simulated participant leaves")]
+        elif event.name == "trial.end" and event.data[COUNTED]:
+            self.rows.append(event.data)
 
 
 def simulate(order: SimulationJob) -> DataFolder:
@@ -98,30 +123,89 @@ def simulate(order: SimulationJob) -> DataFolder:
     """
     if order.folder.path.exists():
         return order.folder
-    study = load(order.protocol, discover(study=order.protocol))
-    population = read_population(order.cohort, study)
-    plan = plan_session(study, order.participant, 1)
-    own = population.study_of(study, order.participant, plan.group)
     place = order.data / UNFINISHED
     make_folder(place)
     with tempfile.TemporaryDirectory(dir=place, prefix=f"{order.participant}-") as scratch:
         there = replace(order, data=Path(scratch)).folder
-        ways: list[Way] = []
-        for number in range(1, len(study.protocol.sessions) + 1):
-            plan = plan_session(own, order.participant, number)
-            attendance = Attendance(population.leaves_at(study, plan))
-            visit = Visit(own, order.participant, number, Path(scratch), simulated=True, fast=True)
-            ways.append(_run(visit, attendance, order.loop))
-            if attendance.left:
-                break
+        ways = [_run(run, *each, order.loop) for each in visits(order, Path(scratch))]
         write_text(there.path / WAY, json.dumps([asdict(way) for way in ways], indent=2) + "\n")
         _keep(there.path, order.folder.path)
     return order.folder
 
 
-def _run(visit: Visit, attendance: Attendance, loop: str) -> Way:
+def simulate_trials(order: SimulationJob) -> "pd.DataFrame":
+    """Simulate every session of one participant, and return the trial table; a worker's function.
+
+    Nothing is left but the table, in one small file that a later call returns: no participant file
+    is made, and nothing is measured in frames. Its columns are those of the participant file, and
+    :data:`~labcrane.analysis.measures.OF_TRIALS`.
+    """
+    import pandas as pd
+
+    path = order.data / f"{order.folder.name}{TRIALS}"
+    if path.exists():
+        return pd.read_parquet(path)
+    tables = []
+    with tempfile.TemporaryDirectory(prefix=f"labcrane-{order.participant}-") as scratch:
+        for visit, attendance in visits(order, Path(scratch)):
+            _run(_record, visit, attendance, order.loop)
+            tables.append(_table(visit, attendance.rows))
+    table = pd.concat(tables, ignore_index=True)
+    make_folder(order.data)
+    with tempfile.TemporaryDirectory(dir=order.data, prefix=UNFINISHED) as scratch:
+        table.to_parquet(Path(scratch) / path.name)
+        (Path(scratch) / path.name).replace(path)
+    return table
+
+
+def _table(visit: Visit, rows: "Sequence[Mapping[str, Value]]") -> "pd.DataFrame":
+    """Return rows as a participant file has them: numbers as they are, truth values as 0 and 1."""
+    import pandas as pd
+
+    columns = list(dict.fromkeys(name for row in rows for name in row if name != COUNTED))
+    table = pd.DataFrame(index=range(len(rows)))
+    for name in columns:
+        values = [row.get(name) for row in rows]
+        if any(isinstance(value, str) for value in values):
+            table[name] = ["" if value is None else str(value) for value in values]
+        else:
+            table[name] = np.array([np.nan if v is None else v for v in values], np.float64)
+    table = measures_of_trials(table) if rows else table
+    table.insert(0, "participant", visit.folder.name)
+    table.insert(1, "status", "simulated")
+    table.insert(2, "session", visit.session)
+    table.insert(3, "session_name", visit.study.protocol.sessions[visit.session - 1].name)
+    return table
+
+
+def visits(order: SimulationJob, data: Path) -> Iterator[tuple[Visit, Attendance]]:
+    """Yield a participant's sessions, until they leave, each to be run before the next is asked."""
+    study = load(order.protocol, discover(study=order.protocol))
+    population = read_population(order.cohort, study)
+    plan = plan_session(study, order.participant, 1)
+    own = population.study_of(study, order.participant, plan.group)
+    for number in range(1, len(study.protocol.sessions) + 1):
+        plan = plan_session(own, order.participant, number)
+        attendance = Attendance(population.leaves_at(study, plan))
+        yield (
+            Visit(own, order.participant, number, data, simulated=True, fast=True),
+            attendance,
+        )
+        if attendance.left:
+            break
+
+
+Runner = Callable[[Visit, Attendance, ForwardMaker | None], object]
+"""Runs a session, to its participant file or not."""
+
+
+def _record(visit: Visit, attendance: Attendance, forward: ForwardMaker | None) -> None:
+    record(visit, attendance, forward=forward)
+
+
+def _run(runner: Runner, visit: Visit, attendance: Attendance, loop: str) -> Way:
     if loop:
-        run(visit, attendance)
+        runner(visit, attendance, None)
         return Way(compiled=False, why=loop)
     made: list[FastForward] = []
 
@@ -129,7 +213,7 @@ def _run(visit: Visit, attendance: Attendance, loop: str) -> Way:
         made.append(FastForward(rig, run, sequencer, log, attendance.waiting))
         return made[-1]
 
-    run(visit, attendance, forward)
+    runner(visit, attendance, forward)
     return made[-1].way
 
 
@@ -155,19 +239,41 @@ def simulate_study(
     ProtocolError
         The folder holds another study, or another population's participants.
     """
+    with _ready(orders) as jobs:
+        missing = [order for order in jobs if not order.folder.path.exists()]
+        yield from (order.folder for order in jobs if order not in missing)
+        yield from work(simulate, missing, workers, scheduler)
+
+
+def simulate_tables(
+    orders: Sequence[SimulationJob], workers: int = 1, scheduler: str | None = None
+) -> "Iterator[pd.DataFrame]":
+    """Simulate the participants and yield their trial tables, in the order in which they are done.
+
+    As :func:`simulate_study`, by :func:`simulate_trials`.
+    """
+    with _ready(orders) as jobs:
+        yield from work(simulate_trials, jobs, workers, scheduler)
+
+
+@contextmanager
+def _ready(orders: Sequence[SimulationJob]) -> Iterator[list[SimulationJob]]:
+    """Hold a data folder for one study's simulation; give the orders, with by what they are run."""
     first = orders[0]
     study = load(first.protocol, discover(study=first.protocol))
     read_population(first.cohort, study)
     make_folder(first.data)
     with alone_in(first.data, wait=False):
         _check_same(first, study)
-        shutil.rmtree(first.data / UNFINISHED, ignore_errors=True)
+        _sweep(first.data)
         short = _too_short(study, first.participant)
-        jobs = [replace(order, loop=order.loop or short) for order in orders]
-        missing = [order for order in jobs if not order.folder.path.exists()]
-        yield from (order.folder for order in jobs if order not in missing)
-        yield from work(simulate, missing, workers, scheduler)
-        shutil.rmtree(first.data / UNFINISHED, ignore_errors=True)
+        yield [replace(order, loop=order.loop or short) for order in orders]
+        _sweep(first.data)
+
+
+def _sweep(data: Path) -> None:
+    for left in data.glob(f"{UNFINISHED}*"):
+        shutil.rmtree(left, ignore_errors=True)
 
 
 def _too_short(study: Study, participant: str) -> str:

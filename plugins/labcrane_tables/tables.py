@@ -4,6 +4,7 @@ import gzip
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from shutil import copyfile
 from typing import TYPE_CHECKING, Any
@@ -88,14 +89,15 @@ class Tables(Exporter):
 
 def write_parquet(table: StreamTable, path: Path) -> None:
     """Write a table a row group at a time."""
+    import pyarrow as pa
     from pyarrow import parquet
 
     batches = table.batches()
     first = next(batches)
     with parquet.ParquetWriter(path, first.schema, use_dictionary=False) as out:
-        out.write_batch(first)
-        for batch in batches:
-            out.write_batch(batch)
+        for batch in chain([first], batches):
+            # write_batch would gather a million rows, some hundred megabytes, before it writes any.
+            out.write_table(pa.Table.from_batches([batch]))
 
 
 def _write_packed_csv(table: StreamTable, path: Path) -> None:

@@ -185,7 +185,7 @@ def font(path: Path | None) -> Any:
         return _plain_font()
     if not path.is_file():
         raise DeviceError(f"there is no font file {str(path)!r}; correct font: or leave it out")
-    loaded = core.FontPool.load_font(core.Filename.from_os_specific(path).get_fullpath())
+    loaded = core.FontPool.load_font(core.Filename.from_os_specific(str(path)).get_fullpath())
     if loaded is None or not loaded.is_valid():
         raise DeviceError(f"{str(path)!r} cannot be read as a font; TrueType and OpenType can")
     return loaded

@@ -84,30 +84,33 @@ def write_session(writer: XdfWriter, session: SessionRecord) -> set[str]:
 
 
 def _write_stream(writer: XdfWriter, name: str, stream: Stream, rate_hz: float) -> None:
-    data = stream.data
+    """Write a stream, a stretch of it in memory at a time."""
+    names = list(stream.units)
+    count = len(stream) if names else 0
     own = "corrected" not in stream.attrs
     kind = "Frames" if own else str(stream.attrs.get("type", ""))
-    texts = any(column.dtype.kind == "O" for _, column in data.items())
+    texts = any(each.dtype.kind == "O" for each in stream.columns(names, 0, 1).values())
     corrected = "yes" if own or stream.attrs["corrected"] else "no"
     # As they were sent: a participant file holds every number as a double.
     form = "double64" if own else str(stream.attrs.get("format", "double64"))
     header = StreamHeader(
         f"labcrane.{name}" if own else name,
         kind,
-        tuple(Channel(str(column), stream.units[str(column)]) for column in data),
+        tuple(Channel(column, stream.units[column]) for column in names),
         "string" if texts else form,
         rate_hz if own else float(stream.attrs.get("rate_hz", 0.0)),
         source_id=f"labcrane/{name}",
         desc={"labcrane": {"corrected": corrected}},
     )
     number = writer.add_stream(header)
-    if len(data):
-        writer.write_offset(number, float(stream.time[0]), 0.0)
-    for start in range(0, len(data), CHUNK):
-        part = data.iloc[start : start + CHUNK]
-        time = stream.time[start : start + CHUNK]
+    if count:
+        writer.write_offset(number, float(stream.column("time", 0, 1)[0]), 0.0)
+    for start in range(0, count, CHUNK):
+        part = stream.columns(("time", *names), start, start + CHUNK)
+        time = part.pop("time")
         if header.dtype is None:
-            rows = [tuple(map(str, row)) for row in part.itertuples(index=False)]
+            rows = [tuple(map(str, row)) for row in zip(*part.values(), strict=True)]
             writer.write_texts(number, time.tolist(), rows)
         else:
-            writer.write_samples(number, time, np.ascontiguousarray(part, header.dtype))
+            rows_of_numbers = np.column_stack(list(part.values()))
+            writer.write_samples(number, time, np.ascontiguousarray(rows_of_numbers, header.dtype))

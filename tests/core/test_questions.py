@@ -64,6 +64,8 @@ GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
           ("sessions:", "views: {front: {use: view, keys: [a, d, s, w, j, l, k, i]}}\nsessions:"),
           ("left.y", "keyboard.elbow"), ("right.x", "keyboard.wrist"), ("right.y", "keyboard.shoulder")],
          "operator", "has no keyboard.slew, keyboard.elbow, keyboard.wrist, keyboard.shoulder"),
+        ([("sessions:", "participants: {pattern: left.x}\nsessions:")], "participants.pattern",
+         "with room for 1 participant,"),
         ([("sessions:", "page: {certificate: lab.pem, key: ../study.yaml}\nsessions:")],
          "page.certificate", "'lab.pem', which is not on this computer"),
         ([("sessions:", "participants: {pattern: P000, planned: 2}\nsessions:")], "participants.pattern",

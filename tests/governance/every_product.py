@@ -14,6 +14,7 @@ from pathlib import Path
 import h5py
 from governance.kept_people import killed_at
 from governed import GOVERNED, TODAY, Lab
+from needs import GRAPHICS, missing
 from pyarrow import parquet
 
 from labcrane.analysis.indicator import Performance, indicate
@@ -32,6 +33,7 @@ PEOPLE = ("P001", "P0011", "VP-001")
 STUDY = GOVERNED.replace(
     "title:", "participants: {pattern: '(P\\d{3,4})|(VP-\\d{3})', planned: 4}\ntitle:"
 )
+VIEW = "views: {operator: {use: view, renderer: software, size: [160, 90]}}\n"
 EXPORTS = ("tables", "psychds", "matlab", "bids", "xdf", "zip", "lerobot", "robomimic")
 
 
@@ -62,6 +64,12 @@ def everything(folder: Path) -> Lab:
                 f"# Fitted to session 1 of {name}.h5\noperator: {{}}\n", encoding="utf-8"
             )
         command("replay", recording, "--measures", elsewhere / f"replay_{name}.csv")
+    if not any(map(missing, GRAPHICS)):
+        shown = lab.folder / "shown.yaml"
+        shown.write_text(f"{STUDY}{VIEW}", encoding="utf-8")
+        for number, name in enumerate(PEOPLE):
+            seen = ("--recording", data / name / f"{name}.h5", "--to", elsewhere / f"seen{number}")
+            command("feedback", "preview", shown, *seen)
     _workbook(lab, data / "evaluation.xlsx")
     command("transfer", folder / "store", "--data", data)
     return lab

@@ -16,7 +16,7 @@ from governance.every_product import (
 )
 from governance.kept_people import REASON
 from governed import TODAY, Lab
-from needs import needs
+from needs import GRAPHICS, missing, needs
 
 from labcrane.cli.app import main
 from labcrane.participants import recovery
@@ -50,6 +50,9 @@ def erased(lab: Lab, name: str, before: dict[str, dict[str, str]]) -> None:
     assert (lab.places.exports / "psychds" / "dataset_description.json").is_file()
     assert list((elsewhere / "report").rglob("*")) == []
     assert not (lab.places.root / "evaluation.xlsx").exists()
+    if not any(map(missing, GRAPHICS)):  # nothing in a picture says whose movement it shows
+        seen = [root_of(lab) / "elsewhere" / f"seen{number}" for number in range(len(PEOPLE))]
+        assert [bool(list(each.glob("*.png"))) for each in seen] == [n != name for n in PEOPLE]
     rest = sorted(set(PEOPLE) - {name})
     for table in ("trials", "events", "participants"):
         found = pd.read_csv(elsewhere / "tables" / f"{table}.csv")

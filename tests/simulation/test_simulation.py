@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -268,3 +269,62 @@ def test_two_cores_report_and_export_the_same(
     assert one == two
     assert len(one) > 2
     assert set(digests(tmp_path / "1")) == set(digests(tmp_path / "2"))
+
+
+@contextmanager
+def killed_at_work(address: str, worker: "subprocess.Popen[bytes]") -> Iterator[list[str]]:
+    """Kill a worker as soon as it has something to do; say what that was."""
+    from distributed import Client
+
+    done: list[str] = []
+    over = threading.Event()
+
+    def watch() -> None:
+        with Client(address, set_as_default=False) as client:
+            whose = {pid: where for where, pid in client.run(os.getpid).items()}
+            while not over.is_set():
+                if at_work := client.processing().get(whose[worker.pid]):
+                    done.extend(map(str, at_work))
+                    worker.kill()
+                    return
+
+    watching = threading.Thread(target=watch)
+    watching.start()
+    try:
+        yield done
+    finally:
+        over.set()
+        watching.join()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("command", ["power", "report", "export"])
+def test_a_cluster_does_what_one_process_does_even_when_a_worker_is_killed(
+    study: Path, cohort: Path, tmp_path: Path, command: str
+) -> None:
+    """Real processes: the worker dies while it has work, and its work is done by the other one."""
+    data = tmp_path / "data"
+    if command != "power":
+        list(simulate_study(orders(study, cohort, data)))
+    words = {
+        "power": ["power", str(study), "--participants", "4", "--pool", "6", "--cohorts", "60",
+                  "--test", "contrast", "--effect", "movement_time~group[none,slow]=1"],
+        "report": ["report", str(data), "--include", "simulated"],
+        "export": ["export", str(data), "--include", "simulated", "--to", "tables"],
+    }[command]  # fmt: skip
+    assert main([*words, "--out", str(tmp_path / "one")]) == 0
+    for kept in data.rglob("*.parquet"):
+        kept.unlink()  # of measures: they are to be worked out again
+    with (
+        cluster(tmp_path) as (address, workers),
+        killed_at_work(address, workers[0]) as killed,
+    ):
+        assert main([*words, "--out", str(tmp_path / "two"), "--scheduler", address]) == 0
+        assert workers[0].wait(240) == -signal.SIGKILL
+    assert killed
+    one, two = (
+        {name: each for name, each in digests(tmp_path / where).items() if name.endswith(".csv")}
+        for where in ("one", "two")
+    )
+    assert one == two
+    assert one

@@ -217,8 +217,11 @@ def _with_ci(table: "pd.DataFrame", colour: str, label: str = "") -> Series:
     )
 
 
-def power_curve(table: "pd.DataFrame") -> "Figure":
-    """Return the power over the size of the cohort, beside the rate of findings in nothing."""
+def power_curve(table: "pd.DataFrame", whose: str) -> "Figure":
+    """Return the power over the size of the cohort, beside the rate of findings in nothing.
+
+    ``whose`` says of whom the cohorts are.
+    """
     figure = new_figure()
     (axes,) = figure.axes
     for name, words in (("power", "with the effect"), ("null", "labels permuted")):
@@ -229,7 +232,7 @@ def power_curve(table: "pd.DataFrame") -> "Figure":
     axes.axhline(0.8, color="0.6", linestyle="--", linewidth=1)
     axes.axhline(0.05, color="0.6", linestyle=":", linewidth=1)
     axes.set(xlabel="participants", ylabel="share of cohorts with p < 0.05", ylim=(-0.03, 1.03))
-    axes.set_title("simulated operators", fontsize="medium")
+    axes.set_title(whose, fontsize="medium")
     axes.set_xticks(table["participants"])
     axes.legend(loc="center right")
     return figure

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.report.factors import GROUP, PHASE, PLACE, Factors
 from labcrane.analysis.statistics.anova import Anova, Contrast, analyse, compare
+from labcrane.analysis.statistics.anova import word as word  # noqa: PLC0414 - of levels, here too
 from labcrane.analysis.statistics.time_scales import quantities, summary, taken_away
 from labcrane.analysis.statistics.trends import holm, linear_trend
 
@@ -31,32 +32,39 @@ def measures_in(results: "pd.DataFrame") -> list[str]:
 
 def anova_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
     """Return every test of every outcome over positions, distances, sides, phases and groups."""
-    tests: list[Anova] = []
+    found: list[Anova] = []
     for measure in measures_in(results):
-        named: dict[str, Anova] = {}
-        for test in _tests(results, measure, factors):
-            name = _words(test.factor, factors)
-            named.setdefault(name, replace(test, factor=name))  # groups come with every design
-        tests += named.values()
-    return _frame(tests)
+        own: dict[str, Anova] = {}
+        for test in tests(results, measure, factors):
+            name = named(test, factors)
+            own.setdefault(name, replace(test, factor=name))  # groups come with every design
+        found += own.values()
+    return _frame(found)
 
 
-def _words(name: str, factors: Factors) -> str:
+def named(test: Anova, factors: Factors) -> str:
+    """Return an effect's name as the tables have it."""
+    return named_factor(test.factor, factors)
+
+
+def named_factor(name: str, factors: Factors) -> str:
+    """Return the name of a factor, or of several with colons, as the tables have it."""
     words = {PHASE: factors.kind, PLACE: SEQUENCE}
     effect, separator, rest = name.partition(" ")
     return ":".join(words.get(part, part) for part in effect.split(":")) + separator + rest
 
 
-def _tests(results: "pd.DataFrame", measure: str, factors: Factors) -> Iterator[Anova]:
+def tests(results: "pd.DataFrame", measure: str, factors: Factors) -> Iterator[Anova]:
     """Yield the tests; what stands behind an effect's name says where and of what it is."""
     between, phases = factors.between, factors.over_phases
-    adjusted = results.assign(**{measure: taken_away(results, measure)})
     # First, because most participants are whole there.
     yield from analyse(results, measure, phases, between)
     if factors.alike:
         yield from _of_places(analyse(results, measure, [*phases, PLACE], between), "")
+        adjusted = results.assign(**{measure: taken_away(results, measure)})
         yield from _of_places(analyse(adjusted, measure, [*phases, PLACE], between), ADJUSTED)
     else:  # positions of phases of unequal length have nothing to do with each other
+        adjusted = results.assign(**{measure: taken_away(results, measure)})
         for phase in factors.phases:
             here = results[PHASE] == phase
             where = f" in {phase}"
@@ -103,7 +111,7 @@ def contrast_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
         if phases:
             found += compare(results, measure, GROUP, phases, between, at=PHASE)
         found += compare(results, measure, DISTANCE, [*phases, DISTANCE], between)
-    rows = [asdict(one) | {"factor": _words(one.factor, factors)} for one in found]
+    rows = [asdict(one) | {"factor": named_factor(one.factor, factors)} for one in found]
     return pd.DataFrame(rows)
 
 
@@ -205,7 +213,7 @@ def gaze_tests(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
     """Return the tests of how long each area was looked at, over groups, phases and distances."""
     within = [*factors.over_phases, DISTANCE]
     tests = [
-        replace(test, factor=_words(test.factor, factors))
+        replace(test, factor=named(test, factors))
         for name in _of_gaze(results)
         for test in analyse(results, name, within, factors.between)
     ]

@@ -309,13 +309,14 @@ def compare(
             rows.append((first, second, _difference(cells, seen, asked)))
         corrected = holm([one[-1] for _, _, one in rows])
         found += [
-            Contrast(measure, factor, _word(place), _word(first), _word(second), *one, p_holm)
+            Contrast(measure, factor, word(place), word(first), word(second), *one, p_holm)
             for (first, second, one), p_holm in zip(rows, corrected, strict=True)
         ]
     return found
 
 
-def _word(level: Any) -> str:
+def word(level: Any) -> str:
+    """Return a level as contrasts name it."""
     return "" if level is None else f"{level:g}" if isinstance(level, float) else str(level)
 
 

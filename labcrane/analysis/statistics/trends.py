@@ -83,14 +83,18 @@ def linear_trend(movements: "pd.DataFrame", measure: str) -> Trend | None:
 
 
 def holm(p: Sequence[float]) -> list[float]:
-    """Return p-values corrected after Holm; a NaN is no test and does not count as one."""
-    from statsmodels.stats.multitest import multipletests
+    """Return p-values corrected after Holm (1979); a NaN is no test and does not count as one.
 
-    tested = [value for value in p if not math.isnan(value)]
-    if not tested:
-        return list(p)
-    corrected = iter(multipletests(tested, method="holm")[1].tolist())
-    return [value if math.isnan(value) else next(corrected) for value in p]
+    The smallest is taken as often as there are tests, the next as often as are left, and none is
+    below the one before it.
+    """
+    # statsmodels' multipletests collects all garbage in every call, a fifth of a second.
+    corrected, largest = list(p), 0.0
+    tested = sorted((value, at) for at, value in enumerate(p) if not math.isnan(value))
+    for number, (value, at) in enumerate(tested):
+        largest = max(largest, min(1.0, value * (len(tested) - number)))
+        corrected[at] = largest
+    return corrected
 
 
 @dataclass(frozen=True, slots=True)

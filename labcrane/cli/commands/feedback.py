@@ -2,6 +2,7 @@
 
 import os
 import sys
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Annotated
 
@@ -41,5 +42,17 @@ def preview(
         return
     if folder is None:
         out.print(f"there is no display (DISPLAY is not set); files go to {FILES}/", markup=False)
-    for path in write_preview(study, folder or FILES, recording, session, trial):
-        out.print(str(path), markup=False)
+    target = folder or FILES
+    with _place(target, recording) as place:
+        written = write_preview(study, place, recording, session, trial)
+    for path in written:
+        out.print(str(target / path.relative_to(place)), markup=False)
+
+
+def _place(target: Path, recording: Path | None) -> AbstractContextManager[Path]:
+    """Return where to write: what shows somebody's movement is known to the study's register."""
+    if recording is None:
+        return nullcontext(target)
+    from labcrane.participants.products import files_about
+
+    return files_about(recording, "feedback preview", target)

@@ -1,11 +1,18 @@
 """Commands that rehearse a study without people: simulate, power and tracks."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from labcrane.cli.commands.results import Scheduler, Workers, progress_bar
+from labcrane.cli.commands.results import (
+    Include,
+    Scheduler,
+    Workers,
+    cohort_of,
+    progress_bar,
+)
 from labcrane.cli.options import ProtocolPath, stay_on_this_computer
 from labcrane.cli.output import out
 
@@ -14,9 +21,13 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
+    from labcrane.analysis.cohort import Participant
     from labcrane.design.tracks import PlannedTrack
     from labcrane.protocol.study import Study
-    from labcrane.simulation.power import Claim, Effect
+    from labcrane.simulation.power import Claim, Effect, Power
+    from labcrane.simulation.reported import Kind
+    from labcrane.simulation.sample_size import SampleSize
+    from labcrane.simulation.simulation import SimulationJob
 
 CohortPath = Annotated[
     Path | None,
@@ -58,8 +69,20 @@ def simulate_all(
     scheduler: str | None,
 ) -> None:
     """Simulate whoever is not in ``folder`` yet, and say how far it is."""
+    from labcrane.simulation.simulation import simulate_study
+
+    orders = _orders(protocol, folder, names, cohort)
+    with progress_bar("simulate", len(orders)) as advance:
+        for _ in simulate_study(orders, workers, scheduler):
+            advance()
+
+
+def _orders(
+    protocol: Path, folder: Path, names: "Sequence[str]", cohort: Path | None
+) -> "list[SimulationJob]":
+    """Return whom to simulate, and say by which operators."""
     from labcrane.simulation.population import BESIDE
-    from labcrane.simulation.simulation import SimulationJob, simulate_study
+    from labcrane.simulation.simulation import SimulationJob
 
     stay_on_this_computer()
     beside = protocol.resolve().with_name(BESIDE)
@@ -68,10 +91,7 @@ def simulate_all(
     # Workers may be in another folder than we are.
     place = folder.resolve()
     of = cohort.resolve() if cohort else None
-    orders = [SimulationJob(protocol.resolve(), of, place, name) for name in names]
-    with progress_bar("simulate", len(orders)) as advance:
-        for _ in simulate_study(orders, workers, scheduler):
-            advance()
+    return [SimulationJob(protocol.resolve(), of, place, name) for name in names]
 
 
 def power(
@@ -81,9 +101,18 @@ def power(
     effect: Annotated[
         str, typer.Option(help="what is tested: MEASURE~FACTOR; =SIZE puts an effect in")
     ] = "movement_time~sequence",
+    test: Annotated[
+        str,
+        typer.Option(help="t, or one of the report's tests: anova, contrast, trend or mixed"),
+    ] = "t",
     pool: Annotated[
         int | None, typer.Option(help="participants to draw cohorts from; twice the largest", min=3)
     ] = None,
+    recordings: Annotated[
+        Path | None,
+        typer.Option(help="draw from the participants of this data folder, and simulate nobody"),
+    ] = None,
+    include: Include = None,
     cohorts: Annotated[int, typer.Option(help="cohorts drawn for each size", min=20)] = 1000,
     resimulate: Annotated[
         int | None, typer.Option(help="simulate so many cohorts afresh and draw none", min=2)
@@ -101,11 +130,14 @@ def power(
     workers: Workers = 1,
     scheduler: Scheduler = None,
 ) -> None:
-    """Find out how many participants the planned test needs, from simulated ones.
+    """Find out how many participants the planned test needs, from simulated or recorded ones.
 
-    The test is a t test of the participants' slopes, or differences, against zero; Welch's between
-    groups. With labels permuted it says how often something is found where nothing is.
+    Without --test it is a t test of the participants' slopes, or differences, against zero; Welch's
+    between groups. With labels permuted it says how often something is found where nothing is.
     """
+    from labcrane.analysis.quality import is_result
+    from labcrane.errors import ProtocolError
+    from labcrane.files.atomic import make_folder
     from labcrane.files.pseudonyms import pseudonyms
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
@@ -113,19 +145,138 @@ def power(
 
     tested, to_show, goals = read_effect(effect), _claim(claim, margin), _goals(goal)
     sizes = _sizes(participants)
-    study = load(protocol, discover())
-    count = pool or 2 * max(sizes)
-    if resimulate is not None:
-        count, cohorts = resimulate * max(sizes), resimulate
-    names = pseudonyms(study.protocol.participants.pattern, count)
-    simulate_all(protocol, folder / "pool", names, cohort, workers, scheduler)
-    movements = _movements(folder / "pool", names, workers, scheduler)
+    study = load(protocol, discover(study=protocol))
+    if resimulate is not None and (recordings is not None or test != "t"):
+        raise ProtocolError(
+            "--resimulate makes fresh participants for the t test; leave it out with --recordings, "
+            "and with --test"
+        )
+    kind = _kind(test)
+    if recordings is not None:
+        everything = _recorded(recordings, include, workers, scheduler)
+    else:
+        count = pool or 2 * max(sizes)
+        if resimulate is not None:
+            count, cohorts = resimulate * max(sizes), resimulate
+        names = pseudonyms(study.protocol.participants.pattern, count)
+        everything = _simulated(
+            protocol, folder / "pool", names, cohort, study, tested, workers, scheduler
+        )
+    make_folder(folder)
+    by = _Drawn(study.protocol.study, sizes, cohorts, to_show, recordings is not None)
+    if kind is not None:
+        everything.to_csv(folder / "movements.csv", index=False)
+        _power_of_report(folder, everything, tested, effect, kind, goals, by, workers, scheduler)
+        return
+    movements = everything[is_result(everything)]
     movements.to_csv(folder / "movements.csv", index=False)
-    _print_power(
-        folder, study.protocol.study, movements, tested, sizes, cohorts, resimulate, to_show
-    )
+    _print_power(folder, by, movements, tested, fresh=resimulate is not None)
     if goals:
-        _search(folder, study.protocol.study, movements, effect, goals, cohorts, to_show)
+        _search(folder, by, movements, effect, goals)
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """How cohorts are drawn, and what is to be shown of them."""
+
+    study: str
+    sizes: "Sequence[int]"
+    cohorts: int
+    claim: "Claim"
+    recorded: bool
+
+
+def _kind(test: str) -> "Kind | None":
+    """Return which of the report's tests is meant; None for the t test."""
+    from typing import cast, get_args
+
+    from labcrane.errors import ProtocolError, suggestion
+    from labcrane.simulation.reported import Kind
+
+    kinds = ("t", *get_args(Kind))
+    if test not in kinds:
+        raise ProtocolError(f"--test {test!r} is no test; {suggestion(test, kinds)}")
+    return None if test == "t" else cast("Kind", test)
+
+
+def _simulated(
+    protocol: Path,
+    folder: Path,
+    names: "Sequence[str]",
+    cohort: Path | None,
+    study: "Study",
+    effect: "Effect",
+    workers: int,
+    scheduler: str | None,
+) -> "pd.DataFrame":
+    """Return the movements of a pool; files are made only where frames are asked for."""
+    import pandas as pd
+
+    from labcrane.analysis.measures import OF_TRIALS
+    from labcrane.approval.codebook import codebook
+    from labcrane.simulation.simulation import simulate_tables
+
+    there = {each.name for each in codebook(study) if each.table == "trials"} | {*OF_TRIALS}
+    if effect.measure not in there:
+        simulate_all(protocol, folder, names, cohort, workers, scheduler)
+        return _movements(folder, names, workers, scheduler)
+    orders = _orders(protocol, folder, names, cohort)
+    with progress_bar("simulate", len(orders)) as advance:
+        tables = []
+        for table in simulate_tables(orders, workers, scheduler):
+            tables.append(table)
+            advance()
+    everything = pd.concat(tables, ignore_index=True)
+    return everything.sort_values("participant", kind="stable", ignore_index=True)
+
+
+def _recorded(
+    folder: Path, include: "list[str] | None", workers: int, scheduler: str | None
+) -> "pd.DataFrame":
+    """Return the movements of everybody who counts in a data folder."""
+    cohort = cohort_of(folder.resolve() if scheduler else folder, include)
+    return _measured(cohort.included, workers, scheduler)
+
+
+def _power_of_report(
+    folder: Path,
+    movements: "pd.DataFrame",
+    effect: "Effect",
+    written: str,
+    kind: "Kind",
+    goals: "Sequence[float]",
+    by: _Drawn,
+    workers: int,
+    scheduler: str | None,
+) -> None:
+    from labcrane.design.seeds import derive
+    from labcrane.files.atomic import write_text
+    from labcrane.simulation.power import Power
+    from labcrane.simulation.reported import NAMES, plan_test, power_of_report
+    from labcrane.simulation.sample_size import paragraph, smallest_cohort
+
+    planned = plan_test(kind, effect, movements, by.claim)
+    seed = derive(by.study, "power")
+
+    def power_at(size: int) -> Power:
+        (one,) = power_of_report(planned, [size], by.cohorts, seed, by.claim, workers, scheduler)
+        return one
+
+    with progress_bar("test", len(by.sizes)) as advance:
+        found = []
+        for size in by.sizes:
+            found.append(power_at(size))
+            advance()
+    _write_power(folder, found, by)
+    if goals:
+        searched = [smallest_cohort(power_at, goal) for goal in goals]
+        people = movements["participant"].nunique()
+        text = paragraph(
+            written, by.claim, people, searched, test=NAMES[kind], recorded=by.recorded
+        )
+        _print_sizes(searched)
+        write_text(folder / "sample_size.md", text + "\n")
+        out.print(f"for the ethics application: {folder / 'sample_size.md'}", markup=False)
 
 
 def _claim(kind: str, margin: float) -> "Claim":
@@ -150,13 +301,7 @@ def _goals(text: str) -> list[float]:
 
 
 def _search(
-    folder: Path,
-    study: str,
-    movements: "pd.DataFrame",
-    effect: str,
-    goals: "Sequence[float]",
-    cohorts: int,
-    claim: "Claim",
+    folder: Path, by: _Drawn, movements: "pd.DataFrame", effect: str, goals: "Sequence[float]"
 ) -> None:
     from labcrane.design.seeds import derive
     from labcrane.files.atomic import write_text
@@ -164,15 +309,20 @@ def _search(
     from labcrane.simulation.sample_size import paragraph, sample_size
 
     tested = read_effect(effect)
-    pool, seed = make_pool(movements, tested), derive(study, "sample size")
-    found = [sample_size(pool, tested, goal, cohorts, seed, claim) for goal in goals]
+    pool, seed = make_pool(movements, tested), derive(by.study, "sample size")
+    found = [sample_size(pool, tested, goal, by.cohorts, seed, by.claim) for goal in goals]
+    _print_sizes(found)
+    text = paragraph(effect, by.claim, len(pool.means), found, recorded=by.recorded)
+    write_text(folder / "sample_size.md", text + "\n")
+    out.print(f"for the ethics application: {folder / 'sample_size.md'}", markup=False)
+
+
+def _print_sizes(found: "Sequence[SampleSize]") -> None:
     for each in found:
         out.print(
             f"power {each.goal:g}: {each.participants} participants ({each.low} to {each.high})",
             markup=False,
         )
-    write_text(folder / "sample_size.md", paragraph(effect, claim, len(pool.means), found) + "\n")
-    out.print(f"for the ethics application: {folder / 'sample_size.md'}", markup=False)
 
 
 def _sizes(text: str) -> list[int]:
@@ -192,43 +342,35 @@ def _sizes(text: str) -> list[int]:
 def _movements(
     folder: Path, names: "Sequence[str]", workers: int, scheduler: str | None
 ) -> "pd.DataFrame":
-    """Return the results of the participants of a pool, who may be more in its folder."""
-    import pandas as pd
-
+    """Return the movements of the participants of a pool, who may be more in its folder."""
     from labcrane.analysis.cohort import find_cohort
-    from labcrane.analysis.measures import measures_of
-    from labcrane.analysis.parallel import work
-    from labcrane.analysis.quality import is_result
     from labcrane.recording.data_folder import DataFolder
 
     people = find_cohort(folder.resolve(), ["simulated"]).included
     wanted = [person for person in people if DataFolder.pseudonym(person.name) in names]
-    with progress_bar("measure", len(wanted)) as advance:
+    return _measured(wanted, workers, scheduler)
+
+
+def _measured(
+    people: "Sequence[Participant]", workers: int, scheduler: str | None
+) -> "pd.DataFrame":
+    import pandas as pd
+
+    from labcrane.analysis.measures import measures_of
+    from labcrane.analysis.parallel import work
+
+    with progress_bar("measure", len(people)) as advance:
         tables = []
-        for table in work(measures_of, wanted, workers, scheduler):
+        for table in work(measures_of, people, workers, scheduler):
             tables.append(table)
             advance()
     everything = pd.concat(tables, ignore_index=True)
-    everything = everything.sort_values("participant", kind="stable", ignore_index=True)
-    return everything[is_result(everything)]
+    return everything.sort_values("participant", kind="stable", ignore_index=True)
 
 
 def _print_power(
-    folder: Path,
-    study: str,
-    movements: "pd.DataFrame",
-    tested: "Effect",
-    sizes: "Sequence[int]",
-    cohorts: int,
-    resimulate: int | None,
-    claim: "Claim",
+    folder: Path, by: _Drawn, movements: "pd.DataFrame", tested: "Effect", *, fresh: bool
 ) -> None:
-    from dataclasses import asdict
-
-    import pandas as pd
-
-    from labcrane.analysis.report.figures import power_curve
-    from labcrane.cli.output import whole_table
     from labcrane.design.seeds import derive
     from labcrane.simulation.power import make_pool
     from labcrane.simulation.power import power as power_of
@@ -236,14 +378,23 @@ def _print_power(
     pool = make_pool(movements, tested)
     if pool.left_out:
         out.print(f"left out, without a value at some level: {', '.join(pool.left_out)}")
+    seed = derive(by.study, "power")
+    found = power_of(pool, tested, by.sizes, by.cohorts, seed, fresh=fresh, claim=by.claim)
+    _write_power(folder, list(found), by)
+
+
+def _write_power(folder: Path, found: "Sequence[Power]", by: _Drawn) -> None:
+    from dataclasses import asdict
+
+    import pandas as pd
+
+    from labcrane.analysis.report.figures import power_curve
+    from labcrane.cli.output import whole_table
+
     table = whole_table(
         "participants", "cohorts", "power", "95 %", "in nothing", "type M", "type S"
     )
-    found = []
-    seed = derive(study, "power")
-    fresh = resimulate is not None
-    for one in power_of(pool, tested, sizes, cohorts, seed, fresh=fresh, claim=claim):
-        found.append(asdict(one))
+    for one in found:
         table.add_row(
             str(one.participants),
             str(one.cohorts),
@@ -254,10 +405,12 @@ def _print_power(
             f"{one.type_s:.3f}",
         )
     out.print(table)
-    curve = pd.DataFrame(found)
+    curve = pd.DataFrame([asdict(one) for one in found])
     curve.to_csv(folder / "power.csv", index=False)
-    power_curve(curve).savefig(folder / "power.png", dpi=150)
-    out.print(f"SIMULATED: {folder / 'power.csv'}, power.png, movements.csv", markup=False)
+    whose = "drawn from recordings" if by.recorded else "simulated operators"
+    power_curve(curve, whose).savefig(folder / "power.png", dpi=150)
+    stamp = "DRAWN FROM RECORDINGS" if by.recorded else "SIMULATED"
+    out.print(f"{stamp}: {folder / 'power.csv'}, power.png, movements.csv", markup=False)
 
 
 def tracks(

@@ -167,7 +167,8 @@ class Stream:
                 + ", ".join(self._paths)
             )
         first, last, _ = slice(start, stop).indices(len(self))
-        with reading(self._path) as file:
+        # Whoever reads whole chunks needs none twice, and what keeps them grows with the length.
+        with reading(self._path, cached=rows < CHUNK) as file:
             chosen = {"time": file[self._time]}
             chosen |= {name: file[self._paths[name]] for name in wanted}
             for at in range(first, max(last, first + 1), rows):

@@ -208,8 +208,13 @@ def _write(beside: Path, path: Path, session: _Session, conclude: Conclude | Non
 
 
 @contextmanager
-def opened(path: Path) -> Iterator["h5py.File"]:
+def opened(path: Path, *, cached: bool = True) -> Iterator["h5py.File"]:
     """Open a participant file for reading.
+
+    Parameters
+    ----------
+    cached
+        Whether chunks are kept, a megabyte for each column: for whoever reads parts of them.
 
     Raises
     ------
@@ -219,7 +224,7 @@ def opened(path: Path) -> Iterator["h5py.File"]:
     import h5py  # noqa: PLC0415
 
     try:
-        file = h5py.File(path, "r")
+        file = h5py.File(path, "r") if cached else h5py.File(path, "r", rdcc_nbytes=0)
     except (OSError, RuntimeError, ValueError) as error:  # ValueError: no name of a file
         raise RecordingError(f"cannot read {path}: {error}") from error
     with file:
@@ -239,8 +244,10 @@ def opened(path: Path) -> Iterator["h5py.File"]:
 
 
 @contextmanager
-def reading(path: Path) -> Iterator["h5py.File"]:
+def reading(path: Path, *, cached: bool = True) -> Iterator["h5py.File"]:
     """Open a participant file for reading alone: whatever is wrong with it is told in words.
+
+    ``cached`` is as for :func:`opened`.
 
     Raises
     ------
@@ -248,7 +255,7 @@ def reading(path: Path) -> Iterator["h5py.File"]:
         It cannot be read, is none, or is damaged where it was read.
     """
     try:
-        with opened(path) as file:
+        with opened(path, cached=cached) as file:
             yield file
     # h5py, numpy, pandas and json raise what they like of damaged files.
     except (*DAMAGED, MemoryError) as error:

@@ -1,0 +1,343 @@
+"""Power of the report's own tests: cohorts of participants, each tested as the report does."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from labcrane.analysis.parallel import work
+from labcrane.analysis.quality import is_result
+from labcrane.analysis.report import outcomes
+from labcrane.analysis.report.factors import (
+    GROUP,
+    PHASE,
+    PLACE,
+    Factors,
+    factors_of,
+    with_factors,
+)
+from labcrane.analysis.report.outcomes import DISTANCE, SEQUENCE
+from labcrane.analysis.statistics.anova import compare
+from labcrane.analysis.statistics.trends import linear_trend, mixed_model
+from labcrane.errors import ProtocolError
+from labcrane.simulation.power import ALPHA, DIFFERENCE, Claim, Effect, Power, Tested, summarise
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Kind = Literal["anova", "contrast", "trend", "mixed"]
+
+NAMES: Mapping[Kind, str] = {
+    "anova": "analysis of variance", "contrast": "contrast, corrected after Holm",
+    "trend": "linear trend", "mixed": "mixed model",
+}  # fmt: skip
+"""What the tests are called."""
+
+CHUNK = 25
+"""Cohorts that a worker is given at a time."""
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A planned test of the report, and the movements of the participants who are drawn.
+
+    Attributes
+    ----------
+    kind
+        ``anova``: the F test of an effect, corrected after Greenhouse and Geisser. ``contrast``: a
+        difference of two levels, corrected after Holm. ``trend``: participants' slopes over the
+        sequence. ``mixed``: a term of the mixed model of the logarithm.
+    effect
+        Its factor is an effect as the report's table names it: ``group:sequence``.
+    results
+        Movements that are results, with the report's factors.
+    factors
+        What varies in the study.
+    """
+
+    kind: Kind
+    effect: Effect
+    results: "pd.DataFrame"
+    factors: Factors
+
+    @property
+    def of_groups(self) -> bool:
+        """Whether the effect is between participants alone."""
+        return self.effect.factor == GROUP and bool(self.factors.groups)
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a test says of one cohort.
+
+    Attributes
+    ----------
+    p
+        As the report corrects it; NaN where there was no test.
+    estimate, error, freedom
+        The effect, its standard error and degrees of freedom; NaN of an F test.
+    """
+
+    p: float
+    estimate: float = np.nan
+    error: float = np.nan
+    freedom: float = np.nan
+
+
+NOTHING = Answer(np.nan)
+
+
+def plan_test(kind: Kind, effect: Effect, movements: "pd.DataFrame", claim: Claim) -> Planned:
+    """Return a planned test, tried once on everybody.
+
+    Parameters
+    ----------
+    movements
+        Of all participants, those that are no results included.
+
+    Raises
+    ------
+    ProtocolError
+        The report has no such test, or nothing of the kind can be claimed of it.
+    """
+    if effect.log:
+        raise ProtocolError(
+            f"log({effect.measure}): the report tests measures as they are, and the mixed model "
+            "always their logarithm; write the measure alone"
+        )
+    if kind == "anova" and (claim.kind != "difference" or effect.size is not None):
+        raise ProtocolError(
+            "an F test has no direction: no equivalence or non-inferiority is shown by it, and no "
+            "size put in; take --test contrast, trend or mixed"
+        )
+    if effect.measure not in movements:
+        raise ProtocolError(
+            f"movements have no {effect.measure!r}; they have {', '.join(map(str, movements))}"
+        )
+    table = with_factors(movements)
+    factors = factors_of(table)
+    results = table[is_result(table)]
+    wanted = ["participant", "pair", "distance", "difficulty", "far_side", SEQUENCE, GROUP, PHASE]
+    kept = [name for name in (*wanted, PLACE, effect.measure) if name in results]
+    planned = Planned(kind, effect, results[kept].reset_index(drop=True), factors)
+    _check(planned)
+    if np.isnan(ask(planned, planned.results).p):
+        raise ProtocolError(
+            f"everybody together is no test of {effect.measure} over {effect.factor}; it needs "
+            "three or more participants with a value at every level, and not all alike"
+        )
+    return planned
+
+
+def _check(planned: Planned) -> None:
+    kind, effect, results = planned.kind, planned.effect, planned.results
+    if kind == "contrast" and not effect.between:
+        raise ProtocolError(
+            f"a contrast is of two levels; write {effect.measure}~{effect.factor}[ONE,OTHER]"
+        )
+    if kind == "trend" and (effect.factor != SEQUENCE or len(planned.factors.phases) > 1):
+        raise ProtocolError(
+            "the report's trend is over the sequence of one session or block; write "
+            f"{effect.measure}~sequence, or take --test anova or mixed for several"
+        )
+    there = names(planned)
+    if effect.factor not in there:
+        raise ProtocolError(
+            f"the report has no {kind} test of {effect.measure} over {effect.factor!r}; it has "
+            f"{', '.join(there) or 'none here'}"
+        )
+    if kind == "contrast":
+        levels = [outcomes.word(each) for each in sorted(results[column(effect.factor)].unique())]
+        if unknown := [each for each in effect.between if each not in levels]:
+            raise ProtocolError(
+                f"{effect.factor} has no level {unknown[0]!r}; it has {', '.join(levels)}"
+            )
+
+
+def names(planned: Planned) -> list[str]:
+    """Return the effects of which the report has such a test, for this measure."""
+    factors, results, measure = planned.factors, planned.results, planned.effect.measure
+    match planned.kind:
+        case "anova":
+            found = [
+                outcomes.named(test, factors) for test in outcomes.tests(results, measure, factors)
+            ]
+            return list(dict.fromkeys(found))
+        case "contrast":
+            there = [*factors.between, *factors.over_phases, DISTANCE]
+            return [outcomes.named_factor(each, factors) for each in there if each in results]
+        case "trend":
+            return [SEQUENCE]
+    model = mixed_model(results.assign(sequence=results[PLACE]), measure)
+    return [] if model is None else [str(each) for each in model.terms["term"][1:]]
+
+
+def column(factor: str) -> str:
+    """Return the column of a factor that the report calls ``factor``."""
+    return PHASE if factor in {"session", "block", "phase"} else factor
+
+
+def ask(planned: Planned, results: "pd.DataFrame") -> Answer:
+    """Return what the report's test says of some participants' movements."""
+    return ASKED[planned.kind](planned, results)
+
+
+def _anova(planned: Planned, results: "pd.DataFrame") -> Answer:
+    for test in outcomes.tests(results, planned.effect.measure, planned.factors):
+        if outcomes.named(test, planned.factors) == planned.effect.factor:
+            return Answer(test.p_gg)
+    return NOTHING
+
+
+def _contrast(planned: Planned, results: "pd.DataFrame") -> Answer:
+    effect, factors = planned.effect, planned.factors
+    within = [*factors.over_phases, *[name for name in (effect.factor,) if name == DISTANCE]]
+    asked = column(effect.factor)
+    for row in compare(results, effect.measure, asked, within, factors.between):
+        if {row.first, row.second} == set(effect.between):
+            # Other minus one, as the effect is written; the report's is first minus second.
+            sign = -1.0 if row.second == effect.between[1] else 1.0
+            return Answer(row.p_holm, sign * row.difference, row.se, row.df)
+    return NOTHING
+
+
+def _trend(planned: Planned, results: "pd.DataFrame") -> Answer:
+    trend = linear_trend(results.assign(sequence=results[PLACE]), planned.effect.measure)
+    if trend is None:
+        return NOTHING
+    return Answer(trend.p, trend.slope, trend.slope / trend.t, trend.df)
+
+
+def _mixed(planned: Planned, results: "pd.DataFrame") -> Answer:
+    model = mixed_model(results.assign(sequence=results[PLACE]), planned.effect.measure)
+    if model is None or not model.converged:
+        return NOTHING
+    own = model.terms[model.terms["term"] == planned.effect.factor]
+    if own.empty:
+        return NOTHING
+    p, estimate, error = own[["p", "estimate", "se"]].to_numpy(float)[0].tolist()
+    return Answer(p, estimate, error, np.inf)
+
+
+ASKED: Mapping[Kind, Callable[[Planned, "pd.DataFrame"], Answer]] = {
+    "anova": _anova, "contrast": _contrast, "trend": _trend, "mixed": _mixed,
+}  # fmt: skip
+"""What each kind of test is asked by."""
+
+
+class Drawer:
+    """Draws cohorts of participants with replacement, from each group as many."""
+
+    def __init__(self, planned: Planned) -> None:
+        self._planned = planned
+        results = planned.results
+        self._rows = list(results.groupby("participant", sort=True).indices.values())
+        group = results[GROUP].to_numpy()
+        groups = planned.factors.groups or ("",)
+        self._members = [
+            [
+                at
+                for at, rows in enumerate(self._rows)
+                if group[rows[0]] == each or not planned.factors.groups
+            ]
+            for each in groups
+        ]
+
+    def cohort(self, size: int, random: np.random.Generator) -> "pd.DataFrame":
+        """Return a cohort's movements; somebody who is drawn twice is two people."""
+        drawn = [
+            self._rows[members[at]]
+            for number, members in enumerate(self._members)
+            for at in random.integers(
+                len(members), size=(size + number) // len(self._members)
+            ).tolist()
+        ]
+        cohort = self._planned.results.take(np.concatenate(drawn)).reset_index(drop=True)
+        numbers = np.repeat(np.arange(len(drawn)), [len(rows) for rows in drawn])
+        return cohort.assign(participant=numbers)
+
+    def permuted(self, cohort: "pd.DataFrame", random: np.random.Generator) -> "pd.DataFrame":
+        """Return a cohort in which the effect is nothing.
+
+        Groups are permuted over participants; of any other effect the measure within each of them.
+        """
+        if self._planned.of_groups:
+            labels = cohort.groupby("participant")[GROUP].first()
+            mixed = dict(zip(labels.index, random.permutation(labels.to_numpy()), strict=True))
+            return cohort.assign(**{GROUP: cohort["participant"].map(mixed)})
+        measure = self._planned.effect.measure
+        values = cohort[measure].to_numpy(float).copy()
+        ends = np.flatnonzero(np.diff(cohort["participant"])) + 1
+        for own in np.split(values, ends):
+            random.shuffle(own)  # a view
+        return cohort.assign(**{measure: values})
+
+
+def power_of_report(
+    planned: Planned,
+    sizes: Sequence[int],
+    cohorts: int,
+    seed: int,
+    claim: Claim = DIFFERENCE,
+    workers: int = 1,
+    scheduler: str | None = None,
+) -> Iterator[Power]:
+    """Yield the power of the test for each size of the cohort.
+
+    A cohort follows from the seed, its size and its number, whoever makes it.
+    """
+    whole = ask(planned, planned.results).estimate
+    true = whole if planned.effect.size is None else planned.effect.size
+    for size in sizes:
+        chunks = [
+            (size, seed, first, min(first + CHUNK, cohorts)) for first in range(0, cohorts, CHUNK)
+        ]
+        made = dict(work(partial(_chunk, planned), chunks, workers, scheduler))
+        answers = [each for first in sorted(made) for each in made[first]]
+        plain, null = ([pair[at] for pair in answers] for at in (0, 1))
+        found = plain if planned.effect.size is None else _shifted(null, planned.effect.size)
+        yield summarise(
+            size,
+            _shown(found, claim),
+            _shown(_shifted(null, claim.margin) if claim.margin else null, claim),
+            np.array([each.estimate for each in found]),
+            true if claim.kind == "difference" else 0.0,
+        )
+
+
+def _chunk(
+    planned: Planned, order: tuple[int, int, int, int]
+) -> tuple[int, list[tuple[Answer, Answer]]]:
+    """Test some cohorts, as they are and with nothing to be found; a worker's function."""
+    size, seed, first, last = order
+    drawer = Drawer(planned)
+    answers = []
+    for number in range(first, last):
+        random = np.random.default_rng([seed, size, number])
+        cohort = drawer.cohort(size, random)
+        mixed = drawer.permuted(cohort, random)
+        answers.append((ask(planned, cohort), ask(planned, mixed)))
+    return first, answers
+
+
+def _shifted(answers: Sequence[Answer], size: float) -> list[Answer]:
+    """Return the answers with an effect put in: estimates are linear, their errors stay."""
+    from scipy.stats import t
+
+    moved = []
+    for each in answers:
+        estimate = each.estimate + size
+        p = float(2.0 * t.sf(abs(estimate) / each.error, each.freedom))
+        moved.append(Answer(p, estimate, each.error, each.freedom))
+    return moved
+
+
+def _shown(answers: Sequence[Answer], claim: Claim) -> npt.NDArray[np.bool_]:
+    if claim.kind == "difference":
+        return np.array([each.p < ALPHA for each in answers])
+    columns = ("estimate", "error", "freedom")
+    tested = Tested(*(np.array([getattr(each, name) for each in answers]) for name in columns))
+    return claim.shown(tested)

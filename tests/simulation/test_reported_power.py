@@ -1,0 +1,350 @@
+"""Power of the report's own tests, against theory and against the tests themselves."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import ttest_1samp, ttest_ind
+from simple_crane import CRANE
+
+from labcrane.analysis.cohort import find_cohort
+from labcrane.analysis.measures import measures_of
+from labcrane.cli.app import main
+from labcrane.errors import ProtocolError
+from labcrane.simulation.power import Claim, read_effect
+from labcrane.simulation.reported import (
+    Drawer,
+    Planned,
+    ask,
+    names,
+    plan_test,
+    power_of_report,
+)
+from labcrane.simulation.simulation import (
+    SimulationJob,
+    simulate_study,
+    simulate_tables,
+    simulate_trials,
+)
+
+COHORTS = 40
+
+
+def movements(
+    people: int = 60,
+    groups: tuple[str, ...] = ("none", "visual"),
+    difference: float = 0.0,
+    slope: float = 0.0,
+    sessions: int = 1,
+    seed: int = 1,
+) -> pd.DataFrame:
+    """Return movements of 8 pairs: standard deviations of 1 over people, and of 1 within them."""
+    random = np.random.default_rng(seed)
+    rows = []
+    for person in range(people):
+        group = groups[person % len(groups)]
+        own = random.normal() + difference * (group == groups[-1])
+        for session in range(1, sessions + 1):
+            for at, pair in enumerate(random.permutation(8).tolist()):
+                distance = float(2 + pair % 4)
+                value = 10.0 + own + slope * (at - 3.5) + random.normal()
+                rows.append(
+                    (f"P{person:03}", session, group, float(at + 1), f"{pair}", distance,
+                     distance, "left" if pair < 4 else "right", value)
+                )  # fmt: skip
+    columns = ["participant", "session", "group", "sequence", "pair", "distance", "difficulty",
+               "far_side", "movement_time"]  # fmt: skip
+    table = pd.DataFrame(rows, columns=columns)
+    return table.assign(
+        session_name=table["session"].map("session {}".format),
+        block=1.0, block_name="aiming", practice=0.0, outcome="success",
+    )  # fmt: skip
+
+
+NOTHING = Claim()
+PLAIN = read_effect("movement_time~group")
+OF_GROUPS = read_effect("movement_time~group[none,visual]")
+
+
+def drawn(planned: Planned, size: int, seed: int) -> Iterator[tuple[pd.DataFrame, pd.DataFrame]]:
+    """Yield each cohort that is tested, and the same with nothing in it."""
+    drawer = Drawer(planned)
+    for number in range(COHORTS):
+        random = np.random.default_rng([seed, size, number])
+        cohort = drawer.cohort(size, random)
+        yield cohort, drawer.permuted(cohort, random)
+
+
+def in_groups(cohort: pd.DataFrame) -> tuple[np.ndarray, np.ndarray]:
+    """Return participants' means of either group."""
+    means = cohort.groupby(["group", "participant"])["movement_time"].mean()
+    return means["none"].to_numpy(), means["visual"].to_numpy()
+
+
+def test_a_contrast_of_groups_finds_what_scipys_t_test_finds_in_each_cohort() -> None:
+    planned = plan_test("contrast", OF_GROUPS, movements(difference=0.9), NOTHING)
+    (found,) = power_of_report(planned, [24], COHORTS, seed=3)
+    cohorts = list(drawn(planned, 24, seed=3))
+    assert all(len(one) == len(two) == 12 for one, two in (in_groups(each) for each, _ in cohorts))
+    tests = [ttest_ind(*in_groups(plain)) for plain, _ in cohorts]
+    assert found.power == np.mean([test.pvalue < 0.05 for test in tests])
+    assert found.null == np.mean(
+        [ttest_ind(*in_groups(empty)).pvalue < 0.05 for _, empty in cohorts]
+    )
+    assert 0.2 < found.power < 1.0
+    assert found.null < 0.2
+    one, other = in_groups(planned.results)
+    seen = [np.diff([each.mean() for each in in_groups(plain)])[0] for plain, _ in cohorts]
+    shown = np.abs([each for each, test in zip(seen, tests, strict=True) if test.pvalue < 0.05])
+    assert found.type_m == pytest.approx(shown.mean() / (other.mean() - one.mean()))
+
+
+def test_what_is_put_in_is_added_to_the_second_group() -> None:
+    put = read_effect("movement_time~group[none,visual]=0.9")
+    planned = plan_test("contrast", put, movements(), NOTHING)
+    (found,) = power_of_report(planned, [24], COHORTS, seed=6)
+    groups = [in_groups(empty) for _, empty in drawn(planned, 24, seed=6)]
+    expected = np.mean([ttest_ind(one, other + 0.9).pvalue < 0.05 for one, other in groups])
+    assert found.power == expected
+    assert 0.2 < expected < 1.0
+
+
+def test_the_f_test_of_two_groups_finds_what_their_contrast_finds() -> None:
+    table = movements(difference=0.8)
+    found = [
+        next(power_of_report(plan_test(kind, effect, table, NOTHING), [16], COHORTS, seed=4))
+        for kind, effect in (("anova", PLAIN), ("contrast", OF_GROUPS))
+    ]
+    assert found[0].power == found[1].power
+    assert found[0].null == found[1].null
+    assert found[0].type_m != found[0].type_m  # an F test has no sign
+
+
+def test_the_reports_trend_finds_what_a_t_test_of_slopes_finds_in_each_cohort() -> None:
+    table = movements(groups=("",), slope=-0.08)
+    planned = plan_test("trend", read_effect("movement_time~sequence"), table, NOTHING)
+    (found,) = power_of_report(planned, [16], COHORTS, seed=5)
+    shown = []
+    for cohort, _ in drawn(planned, 16, seed=5):
+        values = cohort["movement_time"].to_numpy().reshape(16, 8)
+        slopes = np.polyfit(np.arange(8.0), values.T, 1)[0]
+        shown.append(ttest_1samp(slopes, 0.0).pvalue < 0.05)
+    assert found.power == np.mean(shown)
+    assert 0.2 < found.power < 1.0
+
+
+def test_equivalence_is_shown_as_often_as_two_one_sided_tests_show_it() -> None:
+    from statsmodels.stats.weightstats import CompareMeans, DescrStatsW
+
+    claim = Claim("equivalence", 1.0)
+    planned = plan_test("contrast", OF_GROUPS, movements(), claim)
+    (found,) = power_of_report(planned, [30], COHORTS, seed=7, claim=claim)
+    shown = []
+    for cohort, _ in drawn(planned, 30, seed=7):
+        one, other = in_groups(cohort)
+        both = CompareMeans(DescrStatsW(other), DescrStatsW(one))
+        shown.append(both.ttost_ind(-1.0, 1.0)[0] < 0.05)
+    assert found.power == np.mean(shown)
+    assert 0.2 < found.power < 1.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "text"),
+    [
+        ("anova", "movement_time~group:sequence"),
+        ("anova", "movement_time~session"),
+        ("anova", "movement_time~distance"),
+        ("contrast", "movement_time~distance[2,5]"),
+        ("contrast", "movement_time~session[1 session 1,2 session 2]"),
+        ("mixed", "movement_time~sequence"),
+        ("mixed", "movement_time~group[T.visual]"),
+    ],
+)
+def test_the_planned_test_is_the_one_that_the_report_prints(kind: str, text: str) -> None:
+    """Of everybody: the p of the report's own table."""
+    from labcrane.analysis.report import outcomes
+    from labcrane.analysis.report.factors import factors_of, with_factors
+    from labcrane.analysis.statistics.trends import mixed_model
+
+    table = movements(24, sessions=2, difference=0.5, slope=-0.1)
+    effect = read_effect(text)
+    planned = plan_test(kind, effect, table, NOTHING)
+    answer = ask(planned, planned.results)
+    whole = with_factors(table)
+    factors = factors_of(whole)
+    if kind == "anova":
+        rows = outcomes.anova_table(whole, factors)
+        expected = rows.loc[rows["factor"] == effect.factor, "p_gg"].item()
+    elif kind == "contrast":
+        rows = outcomes.contrast_table(whole, factors)
+        own = rows[(rows["factor"] == effect.factor) & (rows["at"] == "")]
+        pair = own[(own["first"] == effect.between[0]) & (own["second"] == effect.between[1])]
+        expected = pair["p_holm"].item()
+        assert answer.estimate == pytest.approx(-pair["difference"].item())
+    else:
+        terms = mixed_model(whole.assign(sequence=whole["place"]), "movement_time").terms
+        expected = terms.loc[terms["term"] == effect.factor, "p"].item()
+    assert answer.p == pytest.approx(expected, rel=1e-9)
+
+
+def test_who_drops_out_is_left_out_by_the_f_test_and_kept_by_the_mixed_model() -> None:
+    table = movements(30, sessions=2, slope=-0.3)
+    gone = table["participant"].isin([f"P{n:03}" for n in range(12)]) & (table["session"] == 2)
+    left = table[~gone].reset_index(drop=True)
+    sequence = read_effect("movement_time~sequence")
+    anova = plan_test("anova", sequence, left, NOTHING)
+    whole = plan_test("anova", sequence, table, NOTHING)
+    assert ask(anova, anova.results).p != ask(whole, whole.results).p
+    assert anova.results["participant"].nunique() == 30
+    (found,) = power_of_report(plan_test("mixed", sequence, left, NOTHING), [10], 20, seed=2)
+    assert found.power > 0.5
+
+
+def test_time_outs_are_no_results_and_their_places_still_are_places() -> None:
+    table = movements(20, slope=-0.3)
+    table.loc[table["sequence"] == 1.0, "outcome"] = "timeout"
+    planned = plan_test("trend", read_effect("movement_time~sequence"), table, NOTHING)
+    assert planned.results["place"].min() == 2.0
+    assert len(planned.results) == 20 * 7
+
+
+def test_cohorts_are_the_same_whoever_makes_them() -> None:
+    planned = plan_test("contrast", OF_GROUPS, movements(40, difference=0.5), NOTHING)
+    one = next(power_of_report(planned, [12], 30, seed=9))
+    two = next(power_of_report(planned, [12], 30, seed=9, workers=2))
+    assert one == two
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "claim", "message"),
+    [
+        (
+            "anova",
+            "movement_time~nothing",
+            NOTHING,
+            "no anova test of movement_time over 'nothing'",
+        ),
+        ("anova", "movement_time~group=0.2", NOTHING, "an F test has no direction"),
+        ("anova", "movement_time~group", Claim("equivalence", 0.1), "an F test has no direction"),
+        ("contrast", "movement_time~group", NOTHING, "write movement_time~group[ONE,OTHER]"),
+        ("contrast", "movement_time~group[none,loud]", NOTHING, "no level 'loud'; it has none, v"),
+        ("trend", "movement_time~distance", NOTHING, "trend is over the sequence of one session"),
+        ("mixed", "log(movement_time)~group", NOTHING, "the mixed model always their logarithm"),
+        ("mixed", "speed~group", NOTHING, "movements have no 'speed'"),
+    ],
+)
+def test_what_the_report_does_not_test_is_refused(
+    kind: str, text: str, claim: Claim, message: str
+) -> None:
+    with pytest.raises(ProtocolError) as caught:
+        plan_test(kind, read_effect(text), movements(12), claim)
+    assert message in str(caught.value)
+
+
+def test_the_names_of_effects_are_those_of_the_reports_table() -> None:
+    planned = plan_test("anova", PLAIN, movements(12), NOTHING)
+    assert {"group", "sequence", "group:sequence", "distance", "far_side"} <= set(names(planned))
+
+
+STUDY = (
+    """\
+labcrane: 1
+study: planned
+title: Few movements
+participants: {pattern: 'P\\d{3}', planned: 6}
+rate_hz: 60
+"""
+    + CRANE
+    + """\
+tasks:
+  aiming: {use: aiming, distances: [2, 4], movements: 2, limit_s: 14}
+design:
+  groups: {none: [], slow: []}
+  order: {pairs: shuffled}
+sessions:
+  - {name: one, steps: [{block: {task: aiming, pairs: 3}}]}
+  - {name: two, steps: [{block: {task: aiming, pairs: 2}}]}
+"""
+)
+COHORT = """\
+labcrane_cohort: 1
+operator: {reaction_s: {lowest: 0.3, highest: 0.5}}
+groups: {slow: {fitts_b_s: 1.2}}
+dropout: 0.2
+"""
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    path = tmp_path / "study" / "protocol.yaml"
+    path.parent.mkdir()
+    path.write_text(STUDY)
+    path.with_name("cohort.yaml").write_text(COHORT)
+    return path
+
+
+def test_trial_tables_without_files_are_those_of_the_participant_files(
+    study: Path, tmp_path: Path
+) -> None:
+    cohort = study.with_name("cohort.yaml")
+    names = [f"P{number:03}" for number in range(1, 7)]
+    files = [SimulationJob(study, cohort, tmp_path / "files", name) for name in names]
+    tables = [SimulationJob(study, cohort, tmp_path / "tables", name) for name in names]
+    list(simulate_study(files))
+    made = dict(zip(names, simulate_tables(tables), strict=True))
+    people = find_cohort(tmp_path / "files", ["simulated"]).included
+    assert len(people) == len(names)
+    for person in people:
+        whole = measures_of(person)
+        own = made[person.name.removesuffix("-SIMULATED")]
+        assert len(own) == len(whole)
+        pd.testing.assert_frame_equal(
+            own[sorted(own)], whole[sorted(own)], check_dtype=False, check_exact=True
+        )
+    assert not list((tmp_path / "tables").rglob("*.h5"))
+    assert not list((tmp_path / "tables").rglob("*.xdf"))
+    again = simulate_trials(tables[0])  # as it was read back
+    pd.testing.assert_frame_equal(again, made["P001"])
+
+
+def test_power_makes_files_only_for_what_is_measured_in_frames(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["power", str(study), "--participants", "4", "--pool", "6", "--cohorts", "20"]
+    where = tmp_path / "by_trials"
+    assert main([*words, "--out", str(where), "--effect", "movement_time~group"]) == 0
+    assert not list(where.rglob("*.h5"))
+    assert len(list((where / "pool").glob("*_trials.parquet"))) == 6
+    again = [*words, "--out", str(where), "--effect", "movement_time~group[none,slow]"]
+    before = {path: path.stat().st_mtime_ns for path in (where / "pool").glob("*.parquet")}
+    assert main([*again, "--test", "contrast", "--goal", "0.6"]) in {0, 2}
+    assert {path: path.stat().st_mtime_ns for path in before} == before  # nobody made again
+    where = tmp_path / "by_frames"
+    assert main([*words, "--out", str(where), "--effect", "path_ratio~group"]) == 0
+    assert len(list(where.rglob("*.h5"))) == 6
+    recorded = ["--recordings", str(where / "pool"), "--include", "simulated"]
+    where = tmp_path / "drawn"
+    found = ["--test", "contrast", "--effect", "movement_time~group[none,slow]=2"]
+    capsys.readouterr()
+    assert main([*words, "--out", str(where), *recorded, *found]) == 0
+    assert "DRAWN FROM RECORDINGS" in capsys.readouterr().out
+    assert not (where / "pool").exists()
+    assert len(pd.read_csv(where / "power.csv")) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--test", "anvoa"], "--test 'anvoa' is no test; did you mean 'anova'?"),
+        (["--test", "anova", "--resimulate", "3"], "--resimulate makes fresh participants"),
+        (["--recordings", "nowhere"], "there is no data folder nowhere"),
+    ],
+)
+def test_what_cannot_be_tested_is_refused_before_anybody_is_simulated(
+    study: Path, tmp_path: Path, words: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["power", str(study), "--out", str(tmp_path / "out"), *words]) != 0
+    assert message in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "out").exists()
