@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from labcrane.analysis.report.style import COLOURS, HIGH, MARKERS, new_figure, styled
 from labcrane.analysis.statistics.fitts import regress
 from labcrane.analysis.statistics.learning import CURVES
 from labcrane.types import FloatArray
@@ -26,6 +27,18 @@ WORDS = {
 }
 
 
+POSITION = "position in the sequence"
+MEANS = "Points: means over participants' means, bars: 95 % confidence intervals (t),"
+MOST_NAMED = 60
+"""Participants that have their names in a figure; more of them would fill a page."""
+
+LINE = 0.13
+"""Inches from one name to the next."""
+
+WORDS_A_LINE = 30
+"""Letters of an axis' name beside a figure of one column: longer ones go into two lines."""
+
+
 @dataclass(frozen=True, slots=True)
 class Drawing:
     """A figure, its name for files, what it shows, and its table."""
@@ -34,18 +47,6 @@ class Drawing:
     caption: str
     figure: "Figure"
     table: "pd.DataFrame"
-
-
-def new_figure(columns: int = 1) -> "tuple[Figure, list[Axes]]":
-    """Return an empty figure with some axes beside each other; needs no display."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(5.2 * columns, 3.8), layout="constrained")
-    axes = [figure.add_subplot(1, columns, at + 1) for at in range(columns)]
-    for one in axes:
-        one.grid(alpha=0.3)
-        one.spines[["top", "right"]].set_visible(False)
-    return figure, axes
 
 
 def over(movements: "pd.DataFrame", measure: str, by: list[str]) -> "pd.DataFrame":
@@ -64,23 +65,25 @@ def over(movements: "pd.DataFrame", measure: str, by: list[str]) -> "pd.DataFram
     return pd.DataFrame(rows, columns=columns)
 
 
+@styled()
 def by_sequence(movements: "pd.DataFrame", measure: str) -> Drawing:
     """Draw a measure over the sequence: everybody thin, the mean of each group thick."""
     figure, (axes,) = new_figure()
     each = movements.groupby(["participant", "sequence"])[measure].mean().unstack(level=0)
-    axes.plot(each.index, each, color="0.75", lw=0.8)
+    axes.plot(each.index, each, color="0.78", lw=0.5)
     groups = movements["group"].nunique() > 1 if "group" in movements else False
     by = ["group", "sequence"] if groups else ["sequence"]
     table = over(movements, measure, by)
     for number, (name, part) in enumerate(table.groupby("group") if groups else [("mean", table)]):
         for at, own in enumerate(_by_phase(movements, part)):
             label = str(name) if at == 0 else "_"
-            _with_ci(axes, own["sequence"], own, f"C{number}", label)
+            _with_ci(axes, own["sequence"], own, number, label)
     if groups:
-        axes.legend(title="group", fontsize="small")
-    axes.set(xlabel="position in the sequence", ylabel=WORDS.get(measure, measure))
+        _legend(figure, axes, "group")
+    _set(axes, xlabel=POSITION, ylabel=WORDS.get(measure, measure))
     caption = (
-        f"{WORDS.get(measure, measure)} over the sequence; mean with 95 % CI, each participant"
+        f"{_begun(WORDS.get(measure, measure))}, over the sequence. {MEANS} of "
+        f"{_of(movements, 'group' if groups else '')}; thin lines: each participant."
     )
     return Drawing(f"{measure}_by_sequence", caption, figure, table)
 
@@ -93,6 +96,7 @@ def _by_phase(movements: "pd.DataFrame", table: "pd.DataFrame") -> "list[pd.Data
     return [part for _, part in table.groupby(table["sequence"].map(phases))]
 
 
+@styled()
 def by_distance(movements: "pd.DataFrame") -> Drawing:
     """Draw times and accuracy over the sequence for each distance."""
     shown = [
@@ -100,28 +104,41 @@ def by_distance(movements: "pd.DataFrame") -> Drawing:
         for name in ("circle_to_circle", "movement_time", "absolute_error")
         if name in movements and movements[name].notna().any()
     ]
+    import pandas as pd
+
     figure, axes = new_figure(len(shown))
     tables = []
     for one, measure in zip(axes, shown, strict=True):
         table = over(movements, measure, ["distance", "sequence"])
+        own = movements.groupby(["distance", "participant", "sequence"])[measure].mean()
         for number, (distance, part) in enumerate(table.groupby("distance")):
-            _with_ci(one, part["sequence"], part, f"C{number}", f"{distance:g} m")
-        one.set(xlabel="position in the sequence", ylabel=WORDS[measure])
+            each = own.loc[distance].unstack(level=0)
+            aside = _aside(number, table["distance"].nunique())
+            one.plot(
+                each.index + aside, each, ".", color=COLOURS[number % len(COLOURS)], alpha=0.25,
+                ms=2, mew=0,
+            )  # fmt: skip
+            _with_ci(one, part["sequence"] + aside, part, number, f"{distance:g} m")
+        _set(one, xlabel=POSITION, ylabel=WORDS[measure])
+        _keep_to(one, own)
         tables.append(table.assign(measure=measure))
-    axes[0].legend(title="distance", fontsize="small")
-    import pandas as pd
-
-    caption = "times and accuracy over the sequence, per distance; means with 95 % CI"
+    _legend(figure, axes[0], "distance")
+    caption = (
+        f"Times and accuracy over the sequence, for each distance. {MEANS} of {_of(movements)}, "
+        "beside each other so that they can be told apart; dots: each participant. An interval of "
+        "few participants may be wider than what is shown."
+    )
     return Drawing("sequence_by_distance", caption, figure, pd.concat(tables))
 
 
+@styled()
 def fitts(movements: "pd.DataFrame") -> Drawing:
     """Draw movement time over difficulty, with the regression over participants' means."""
     import pandas as pd
 
     figure, (axes,) = new_figure()
     cells = movements.groupby(["participant", "difficulty"])["movement_time"].mean().reset_index()
-    axes.plot(cells["difficulty"], cells["movement_time"], ".", color="0.6", ms=4)
+    axes.plot(cells["difficulty"], cells["movement_time"], ".", color="0.6", ms=3)
     rows = []
     for participant, own in movements.groupby("participant"):
         rows.append(_line(str(participant), own["difficulty"], own["movement_time"]))
@@ -129,10 +146,18 @@ def fitts(movements: "pd.DataFrame") -> Drawing:
     rows.append(_line("all (participants' means)", cells["difficulty"], cells["movement_time"]))
     if whole is not None:
         x = np.array([cells["difficulty"].min(), cells["difficulty"].max()])
-        axes.plot(x, whole.intercept + whole.slope * x, "C3")
-        axes.set_title(f"{whole.intercept:.2f} s + {whole.slope:.2f} s/bit, R² {whole.r2:.2f}")
-    axes.set(xlabel="index of difficulty (bit)", ylabel=WORDS["movement_time"])
-    return Drawing("fitts", "Fitts' law", figure, pd.DataFrame(rows))
+        axes.plot(x, whole.intercept + whole.slope * x, color=COLOURS[0])
+    _set(axes, xlabel="index of difficulty (bit)", ylabel=WORDS["movement_time"])
+    law = (
+        f" Line: {whole.intercept:.2f} s + {whole.slope:.2f} s/bit, R² = {whole.r2:.2f}."
+        if whole is not None
+        else ""
+    )
+    caption = (
+        f"Fitts' law: movement time over the index of difficulty. Dots: each participant's mean at "
+        f"each difficulty, {_of(movements)}.{law}"
+    )
+    return Drawing("fitts", caption, figure, pd.DataFrame(rows))
 
 
 def _numbers(column: "pd.Series[Any]") -> FloatArray:
@@ -156,6 +181,7 @@ def _line(who: str, x: "pd.Series[float]", y: "pd.Series[float]") -> dict[str, o
     }
 
 
+@styled()
 def learning(movements: "pd.DataFrame", curves: "pd.DataFrame", measure: str) -> Drawing:
     """Draw participants' means and the better of both learning curves for each.
 
@@ -169,16 +195,22 @@ def learning(movements: "pd.DataFrame", curves: "pd.DataFrame", measure: str) ->
         if "phase" in better:
             own = own[own["phase"] == row.phase]
         means = own.groupby("sequence")[measure].mean()
-        color = f"C{people[row.participant] % 10}"
-        axes.plot(means.index, means, ".", color=color, ms=4)
+        color = COLOURS[people[row.participant] % len(COLOURS)]
+        axes.plot(means.index, means, ".", color=color, ms=3, alpha=0.6)
         before = float((own["sequence"] - own["place"]).iloc[0]) if "place" in own else 0.0
         n = np.linspace(1, float(means.index.max()) - before, 100)
         curve: Callable[..., np.ndarray] = CURVES[str(row.curve)]
         axes.plot(n + before, curve(n, row.asymptote, row.gain, row.rate), color=color, lw=0.8)
-    axes.set(xlabel="position in the sequence", ylabel=WORDS.get(measure, measure))
-    return Drawing(f"learning_{measure}", "learning curves, one per participant", figure, curves)
+    _set(axes, xlabel=POSITION, ylabel=WORDS.get(measure, measure))
+    caption = (
+        f"Learning curves of {_begun(WORDS.get(measure, measure)).lower()}. Dots: each "
+        f"participant's means; lines: the better of an exponential and a power curve, n = "
+        f"{len(people)} {_people(len(people))}."
+    )
+    return Drawing(f"learning_{measure}", caption, figure, curves)
 
 
+@styled()
 def sticks(movements: "pd.DataFrame") -> Drawing:
     """Draw how the sticks were used over the sequence."""
     import pandas as pd
@@ -188,34 +220,93 @@ def sticks(movements: "pd.DataFrame") -> Drawing:
     tables = []
     for one, measure in zip(axes, measures, strict=True):
         table = over(movements, measure, ["sequence"])
-        _with_ci(one, table["sequence"], table, "C2", "mean")
-        one.set(xlabel="position in the sequence", ylabel=WORDS[measure])
+        each = movements.groupby(["participant", "sequence"])[measure].mean().unstack(level=0)
+        one.plot(each.index, each, color="0.78", lw=0.5)
+        _with_ci(one, table["sequence"], table, 0, "mean")
+        _set(one, xlabel=POSITION, ylabel=WORDS[measure])
         tables.append(table.assign(measure=measure))
-    caption = "use of the sticks over the sequence; means with 95 % CI"
+    caption = (
+        f"Use of the sticks over the sequence. {MEANS} of {_of(movements)}; thin lines: each "
+        "participant."
+    )
     return Drawing("sticks", caption, figure, pd.concat(tables))
 
 
+@styled()
 def throughputs(table: "pd.DataFrame") -> Drawing:
-    """Draw each participant's throughput."""
-    figure, (axes,) = new_figure()
-    axes.bar(table["participant"], table["throughput"], color="C4")
-    axes.tick_params(axis="x", rotation=90, labelsize="x-small")
-    axes.axhline(float(table["throughput"].mean()), color="k", lw=0.8)
-    axes.set(ylabel="throughput (bit/s)")
-    caption = f"throughput, mean of means {table['throughput'].mean():.3f} bit/s"
+    """Draw each participant's throughput, the least at the bottom, each on a line of its own."""
+    own = table.sort_values("throughput")
+    named = len(own) <= MOST_NAMED
+    figure, (axes,) = new_figure(high=max(HIGH, LINE * len(own) + 0.6) if named else HIGH)
+    axes.plot(own["throughput"], np.arange(len(own)), "o", color=COLOURS[0])
+    if named:
+        axes.set_yticks(np.arange(len(own)), own["participant"])
+    else:
+        axes.set_yticks([])
+    mean = float(table["throughput"].mean())
+    axes.axvline(mean, color="k", lw=0.8)
+    _set(axes, xlabel="throughput (bit/s)", ylabel="participant")
+    caption = (
+        f"Throughput: mean of means. Dots: each participant, n = {len(own)} {_people(len(own))}; "
+        f"line: their mean, {mean:.3f} bit/s."
+    )
     return Drawing("throughput", caption, figure, table)
 
 
+def _set(axes: "Axes", xlabel: str, ylabel: str) -> None:
+    from textwrap import fill
+
+    axes.set(xlabel=xlabel, ylabel=fill(ylabel, WORDS_A_LINE))
+
+
+def _legend(figure: "Figure", axes: "Axes", title: str) -> None:
+    """Put a legend above the axes, where it covers nothing."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, title=title, loc="outside upper center", ncols=4)
+
+
+def _keep_to(axes: "Axes", values: "pd.Series[float]") -> None:
+    """Show the range of what was measured: an interval of two people would press it flat."""
+    low, high = float(values.min()), float(values.max())
+    aside = 0.08 * (high - low) or 0.1 * abs(high) or 1.0
+    axes.set_ylim(low - aside, high + aside)
+
+
+def _begun(words: str) -> str:
+    return words[:1].upper() + words[1:].partition(" (")[0]
+
+
+def _people(count: int) -> str:
+    return "participant" if count == 1 else "participants"
+
+
+def _of(movements: "pd.DataFrame", by: str = "") -> str:
+    """Return how many there are, and in which group."""
+    count = int(movements["participant"].nunique())
+    said = f"n = {count} {_people(count)}"
+    if not by:
+        return said
+    sizes = movements.groupby(by)["participant"].nunique()
+    return f"{said} ({', '.join(f'{size} {name}' for name, size in sizes.items())})"
+
+
+def _aside(number: int, count: int) -> float:
+    """Return how far a level stands beside its position, so that bars do not cover each other."""
+    return 0.12 * (number - (count - 1) / 2.0)
+
+
 def _with_ci(
-    axes: "Axes", x: "pd.Series[Any]", table: "pd.DataFrame", color: str, label: str
+    axes: "Axes", x: "pd.Series[Any]", table: "pd.DataFrame", number: int, label: str
 ) -> None:
     below, above = table["mean"] - table["ci_low"], table["ci_high"] - table["mean"]
     errors = np.nan_to_num(np.array([below, above], float))
+    colour, marker = COLOURS[number % len(COLOURS)], MARKERS[number % len(MARKERS)]
     axes.errorbar(
-        x.to_numpy(), table["mean"], errors, color=color, marker="o", ms=4, capsize=2, label=label
+        x.to_numpy(), table["mean"], errors, color=colour, marker=marker, capsize=1.5, label=label
     )
 
 
+@styled()
 def power_curve(table: "pd.DataFrame") -> "Figure":
     """Return the power over the size of the cohort, beside the rate of findings in nothing."""
     figure, (axes,) = new_figure()
