@@ -1,6 +1,7 @@
 """The viewer: poses, curves and events are those of the record; its page shows them."""
 
 import random
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -21,6 +22,7 @@ from labcrane.machines.kinematics import link_frames
 from labcrane.registry.registry import discover
 from labcrane.web.room.shown import ShownShapes
 from labcrane.web.viewer.film import POINTS, Film
+from labcrane.web.viewer.opened import opened
 
 STUDY = (
     "labcrane: 1\nstudy: {study}\ntitle: Viewed\nrate_hz: 240\n"
@@ -125,6 +127,76 @@ def test_a_session_without_frames_says_that_there_is_nothing_to_see(file: Path) 
         RecordingError, match=r"has no column 'joint'; it has time, joint.angle.slew"
     ):
         open_recording(file).session(1).streams["state"].column("joint")
+
+
+def copied(file: Path, folder: Path) -> Path:
+    """Return a participant's folder with the journals only."""
+    there = folder / file.parent.name
+    there.mkdir()
+    for journal in file.parent.glob("ses-01_*"):
+        shutil.copy(journal, there)
+    return there
+
+
+def same_as_far_as(film: Film, cut: Film) -> None:
+    for at in moments(cut.length, 30):
+        whole, part = film.frame(at), cut.frame(at)
+        assert part == pytest.approx(whole, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize("share", [0.6, 0.9])
+def test_a_killed_session_is_shown_as_far_as_its_journal_goes_and_nothing_is_written(
+    share: float, file: Path, film: Film, tmp_path: Path
+) -> None:
+    folder = copied(file, tmp_path)
+    journal = folder / "ses-01_run.xdf"
+    journal.write_bytes(journal.read_bytes()[: int(share * journal.stat().st_size)])
+    before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
+    said: list[str] = []
+    cut = Film(opened(folder, 1, tmp_path / "scratch", said.append), "cut")
+    assert 0.3 * film.length < cut.length < film.length
+    same_as_far_as(film, cut)
+    assert "shown is what its journals hold" in said[0]
+    assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
+
+
+def test_a_damaged_participant_file_is_shown_from_its_journals(
+    file: Path, film: Film, tmp_path: Path
+) -> None:
+    folder = copied(file, tmp_path)
+    damaged = folder / file.name
+    damaged.write_bytes(file.read_bytes()[:4000])
+    said: list[str] = []
+    whole = Film(opened(damaged, 1, tmp_path / "scratch", said.append), "whole")
+    assert (len(whole.time), len(said)) == (len(film.time), 1)
+    same_as_far_as(film, whole)
+    for journal in folder.glob("*.xdf"):
+        journal.unlink()
+    with pytest.raises(RecordingError, match=r"P001-SIMULATED\.h5"):
+        opened(damaged, 1, tmp_path / "other", said.append)
+
+
+def test_two_trials_are_shown_from_their_starts_side_by_side(file: Path, film: Film) -> None:
+    table = open_recording(file).session(1).trials.set_index("trial")
+    one, other = table.index[:2]
+    apart_s = table.loc[other, "started"] - table.loc[one, "started"]
+    assert film.start_of(other) - film.start_of(one) == pytest.approx(apart_s, abs=1e-3)
+    with pytest.raises(RecordingError, match=r"has no trial 9; there are 2 to 3"):
+        film.start_of(9)
+    with pytest.raises(RecordingError, match="no trial 7"):
+        check_view(file, "--trial", f"{one:g}", "--beside-trial", "7")
+    assert main(["view", str(file), "--beside-trial", "2"]) == 2
+
+
+def check_view(file: Path, *words: str) -> None:
+    """Have the command look at a file, and let what it raises through."""
+    import typer
+
+    from labcrane.cli.commands.results import view
+
+    app = typer.Typer()
+    app.command()(view)
+    app([str(file), *words], standalone_mode=False)
 
 
 POSES = """

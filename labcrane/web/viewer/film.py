@@ -69,10 +69,13 @@ class Film:
     ----------
     run
         What was run, as far as drawing it goes; nobody can steer it.
+    shift
+        How many seconds later than another film beside it this one is shown.
     """
 
     def __init__(self, record: SessionRecord, called: str) -> None:
         self.called = called
+        self.shift = 0.0
         self._record = record
         try:
             self._own: Mapping[str, Stream] = {name: record.streams[name] for name in GROUPS}
@@ -181,6 +184,21 @@ class Film:
             elif event.name == "trial.end" and found:
                 found[-1] |= {"to": at, "outcome": event.data["outcome"]}
         return found
+
+    def start_of(self, trial: int) -> float:
+        """Return when the newest attempt at a trial began.
+
+        Raises
+        ------
+        RecordingError
+            There was none.
+        """
+        begun = [one["from"] for one in self.trials if one["counted"] and one["trial"] == trial]
+        if not begun:
+            there = sorted({one["trial"] for one in self.trials if one["counted"]})
+            known = f"{there[0]} to {there[-1]}" if there else "none"
+            raise RecordingError(f"{self.called} has no trial {trial}; there are {known}")
+        return float(begun[-1])
 
     @cached_property
     def gaps(self) -> list[tuple[float, float]]:

@@ -49,6 +49,7 @@ class Screen:
 
     def show(self, at: float) -> None:
         """Show a time, in seconds from the film's start."""
+        at += self._film.shift
         frame, situation = self._film.frame(at), self._film.situation(at)
         names = self._film.machine.names
         angles = [frame.get(f"state.joint.angle.{name}", math.nan) for name in names]
