@@ -12,7 +12,7 @@ from labcrane.recording.participant_file.writer import DAMAGED
 from labcrane.recording.paths import participant_path
 from labcrane.registry.registry import Registry
 from labcrane.web.door.access import STUDY
-from labcrane.web.door.serving import serve_here
+from labcrane.web.door.serving import build_pages, serve_here
 from labcrane.web.study.overview import Reader
 from labcrane.web.study.study_page import page_of
 from labcrane.web.viewer.film import Film
@@ -30,13 +30,12 @@ def serve(
 
     ``registry`` gives what draws recorded cues, when the first recording is looked at.
     """
-    from fastapi import FastAPI  # noqa: PLC0415
-    from nicegui import ui  # noqa: PLC0415 - loads for a second
+    from fastapi import FastAPI  # noqa: PLC0415 - loads for a second
 
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     with TemporaryDirectory(prefix="labcrane-study-") as scratch:
         _routes(app, reader, registry, Path(scratch))
-        ui.run_with(app, title="labcrane", show_welcome_message=False)
+        build_pages(app)
         serve_here(app, STUDY, port, say)
 
 

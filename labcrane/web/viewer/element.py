@@ -1,5 +1,6 @@
 """Element of a NiceGUI page that draws a recording's time line; importing it loads NiceGUI."""
 
+import asyncio
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -29,11 +30,11 @@ class Timeline(Element, component="viewer.js"):
         super().__init__()
         self._props["about"] = dict(about)
 
-        def asked(event: events.GenericEventArguments) -> None:
+        async def asked(event: events.GenericEventArguments) -> None:
             told = event.args
-            found = curve(
-                str(told["stream"]), str(told["column"]), float(told["begin"]), float(told["end"])
-            )
+            where = str(told["stream"]), str(told["column"])
+            # Beside everything else: an hour of a signal is read, and a jump waits for nobody.
+            found = await asyncio.to_thread(curve, *where, float(told["begin"]), float(told["end"]))
             self.run_method("curve", int(told["at"]), dict(found))
 
         self.on("at", lambda event: at(float(event.args)))

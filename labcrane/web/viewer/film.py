@@ -8,6 +8,7 @@ from collections import OrderedDict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -104,6 +105,7 @@ class Film:
         )
         self._window = (0, 0)
         self._rows: dict[str, FloatArray] = {}
+        self._reading = Lock()  # each curve is asked for by a thread of its own
         self._curves: OrderedDict[tuple[str, str], tuple[FloatArray, FloatArray]] = OrderedDict()
 
     def _layout(self, group: str) -> Layout:
@@ -238,6 +240,10 @@ class Film:
         return {"low": low, "high": high}
 
     def _signal(self, stream: str, column: str) -> tuple[FloatArray, FloatArray]:
+        with self._reading:
+            return self._signal_kept(stream, column)
+
+    def _signal_kept(self, stream: str, column: str) -> tuple[FloatArray, FloatArray]:
         key = stream, column
         if key not in self._curves:
             if len(self._curves) >= KEPT:

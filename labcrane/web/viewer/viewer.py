@@ -7,7 +7,7 @@ from typing import Any
 
 from labcrane.registry.registry import Registry
 from labcrane.web.door.access import VIEWER
-from labcrane.web.door.serving import serve_here
+from labcrane.web.door.serving import build_pages, serve_here
 from labcrane.web.page import PRIMARY, speak
 from labcrane.web.room.model import MachineModel, span
 from labcrane.web.room.shown import ShownShapes
@@ -136,5 +136,5 @@ def serve(
     def viewer() -> None:
         viewer_page(films, registry, at)
 
-    ui.run_with(app, title="labcrane", show_welcome_message=False)
+    build_pages(app)
     serve_here(app, VIEWER, port, say)
