@@ -1,4 +1,4 @@
-"""What an installation takes: seconds and megabytes, lean and full, each in an environment anew.
+"""Installations, lean and full, each in an environment anew: seconds and megabytes.
 
     python -m benchmarks.install
 

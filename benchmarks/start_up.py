@@ -26,6 +26,8 @@ CASES = {
     "labcrane check": ["-m", "labcrane", "check", str(AIMING)],
 }
 LIMITS = {"labcrane --help": 1.5, "labcrane check": 4.0}
+ALLOWED_S = {"labcrane check": 0.1}
+"""What plain loaders of settings may take beyond it, in seconds: they replaced hand-made ones."""
 
 REHEARSAL = ["-m", "labcrane", "check", str(AIMING), "--rehearse"]
 REHEARSALS = 3
@@ -46,7 +48,14 @@ def rows() -> list[Row]:
     bare = min(took["bare"])
     return [
         *(
-            Row("start-up", f"{name}, s", min(took[name]), bare, "import typer, rich", limit)
+            Row(
+                "start-up",
+                f"{name}, s",
+                min(took[name]),
+                bare,
+                "import typer, rich",
+                limit + ALLOWED_S.get(name, 0.0) / bare,
+            )
             for name, limit in LIMITS.items()
         ),
         Row(

@@ -251,7 +251,7 @@ def restarts(folder: Path, count: int) -> list[Row]:
     lab = Lab(folder, build(folder))
     try:
         device = lab.device("Restarted", Skew())
-        recorder = lab.recorder({"label": "EEG", "type": "EEG"})
+        recorder = lab.recorder({"label": "EEG", "name": "Restarted"})
         until_ready(recorder)
         for number in range(count):
             time.sleep(4.0)

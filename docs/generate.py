@@ -1,4 +1,4 @@
-"""Makes the pages that are read off the program itself: every key, every plugin, all decisions.
+"""Generator of the pages that are read off the program: every key, every plugin, all decisions.
 
 mkdocs calls :func:`on_files` while it builds the site, so these pages are never out of date there.
 In the repository they stand as ``python docs/generate.py docs`` wrote them; a test compares.

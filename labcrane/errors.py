@@ -37,6 +37,10 @@ class RecordingError(LabcraneError):
     """A recording cannot be written, found or read."""
 
 
+MOST_LISTED = 40
+"""Names that a message lists beside the one that is meant."""
+
+
 def suggestion(word: str, known: Iterable[str], otherwise: str = "there is") -> str:
     """Return the known word that is closest, as a question; all of them when none is close."""
     possible = list(known)
@@ -46,7 +50,11 @@ def suggestion(word: str, known: Iterable[str], otherwise: str = "there is") -> 
 def nearest(word: str, known: Iterable[str], there: str) -> str:
     """Return the known word that is closest, as a question where one is close, and all of them."""
     names = list(known)
-    return f"{meant(word, names)} {there} {', '.join(names) or 'none'}".lstrip()
+    listed = ", ".join(names) or "none"
+    close = meant(word, names)
+    if close and len(names) > MOST_LISTED:
+        listed = f"{', '.join(names[:MOST_LISTED])} and {len(names) - MOST_LISTED} more"
+    return f"{close} {there} {listed}".lstrip()
 
 
 def meant(word: str, known: Sequence[str]) -> str:

@@ -136,6 +136,7 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
         lambda: node_module("axe-core") is not None,
         "npm install --global axe-core@4.14.1",  # as .ci/run has it
     ),
+    "questplus": (lambda: find_spec("questplus") is not None, "pip install questplus"),
     "numba": (lambda: find_spec("numba") is not None, "pip install 'labcrane[fast]'"),
     "lerobot": (
         lambda: _learner_has("lerobot"),

@@ -11,7 +11,7 @@ import sys
 import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from importlib.metadata import Distribution, distributions
+from importlib.metadata import Distribution
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -24,12 +24,13 @@ from labcrane.approval.environment import (
     environment,
     fingerprint,
     fingerprint_of,
+    installed,
     is_working_copy,
     one_name,
     source,
 )
 from labcrane.approval.lock import lock_path, read_lock
-from labcrane.approval.materials import referred
+from labcrane.approval.materials import study_files
 from labcrane.errors import ProtocolError
 from labcrane.files.atomic import UNFINISHED, copy, sha256, write_text
 from labcrane.files.yaml import YamlFile
@@ -91,9 +92,9 @@ def _fill(folder: Path, study: Study, files: Sequence[str]) -> int:
     """Write everything into a folder; return how many packages that are."""
     for name in files:
         copy(study.path.parent / name, folder / STUDY / name)
-    installed = list(_installed())
-    _fetch(installed, folder / WHEELS)
-    wheels = _checked_wheels(installed, folder / WHEELS)
+    packages = list(installed(sys.path))
+    _fetch(packages, folder / WHEELS)
+    wheels = _checked_wheels(packages, folder / WHEELS)
     here = environment()
     pins = [
         f"{name}=={package['version']} --hash=sha256:{sha256(wheels[name])}"
@@ -124,9 +125,9 @@ def _check_installed(study: Study) -> None:
 
 
 def _study_files(study: Study, registry: Registry) -> Iterator[str]:
-    """Yield what of the protocol's folder is the study: never data that lie beside it."""
+    """Yield what of the protocol's folder is the study: neither data beside it, nor keys."""
     folder = study.path.parent
-    found = {study.path, *referred(YamlFile.read(study.path).data, folder)}
+    found = {study.path, *study_files(YamlFile.read(study.path).data, folder)}
     found |= set(registry.local.values())
     if (lock := lock_path(study.path)).exists():
         found |= {lock, read_lock(study.path).consent}
@@ -135,17 +136,7 @@ def _study_files(study: Study, registry: Registry) -> Iterator[str]:
         yield path.resolve().relative_to(folder.resolve()).as_posix()
 
 
-def _installed() -> Iterator[Distribution]:
-    """Yield each package that is installed once: the one that is imported."""
-    seen: set[str] = set()
-    for each in distributions():
-        name = one_name(each.name)
-        if name not in seen:
-            seen.add(name)
-            yield each
-
-
-def _fetch(installed: list[Distribution], wheels: Path) -> None:
+def _fetch(packages: list[Distribution], wheels: Path) -> None:
     """Have pip fetch or build a wheel of each package, of just the version that is here.
 
     Raises
@@ -157,7 +148,7 @@ def _fetch(installed: list[Distribution], wheels: Path) -> None:
         raise ProtocolError("a bundle is made by pip, which is not installed; python -m ensurepip")
     with TemporaryDirectory() as scratch:
         wanted = Path(scratch) / REQUIREMENTS
-        wanted.write_text("\n".join(map(_wanted, installed)) + "\n", encoding="utf-8")
+        wanted.write_text("\n".join(map(_wanted, packages)) + "\n", encoding="utf-8")
         command = ["-m", "pip", "wheel", "--no-deps", "--disable-pip-version-check", "-q"]
         done = subprocess.run(
             [sys.executable, *command, "--wheel-dir", str(wheels), "-r", str(wanted)],
@@ -177,10 +168,10 @@ def _wanted(package: Distribution) -> str:
     return f"{package.name} @ {url}" if url else f"{package.name}=={package.version}"
 
 
-def _checked_wheels(installed: list[Distribution], folder: Path) -> dict[str, Path]:
+def _checked_wheels(packages: list[Distribution], folder: Path) -> dict[str, Path]:
     """Return the wheel of each package by its name, if it holds what is installed here."""
     wheels = {one_name(path.name.partition("-")[0]): path for path in folder.glob("*.whl")}
-    for package in installed:
+    for package in packages:
         name = one_name(package.name)
         if name not in wheels:
             raise ProtocolError(f"pip made no wheel of {name} {package.version}; install it anew")

@@ -17,11 +17,11 @@ from labcrane.recording.trial_columns import UNITS, trial_units
 CORE = "labcrane"
 ABOUT = (
     "trial", "attempt", "block", "block_name", "practice", "reference", "group", "feedback",
-    "outcome", "completion",
+    "outcome", "completion", "track_success",
 )  # fmt: skip
 """Columns of the trial table that are labcrane's own, besides those with units."""
 
-FLAGS = ("practice", "reference")
+FLAGS = ("practice", "reference", "track_success")
 """Truth values, recorded as 1 or 0."""
 
 EVENTS = (("time", "s"), ("tick", "1"), ("part", "1"), ("trial", "1"), ("name", ""), ("data", ""))
@@ -93,6 +93,7 @@ def _has(study: Study, name: str) -> bool:
     given = {
         "group": bool(protocol.design.groups),
         "feedback": bool(protocol.feedback),
+        "track_success": any(step.block is not None and step.block.track for step in steps),
         "reference": any(step.kind == "reference" for step in steps),
     }
     return given.get(name, True)

@@ -1,4 +1,4 @@
-"""Approve a study, amend it, and see whether it still is what was approved."""
+"""Approval and amendment of a study, and whether it still is what was approved."""
 
 import os
 from dataclasses import dataclass

@@ -7,7 +7,7 @@ import platform
 import re
 import sys
 import sysconfig
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from importlib.metadata import Distribution, distributions
 from typing import Any
@@ -16,6 +16,8 @@ OF_THE_INSTALLER = frozenset(
     {"INSTALLER", "RECORD", "REQUESTED", "direct_url.json", "uv_cache.json", "uv_build.json"}
 )
 """Files that say how a package came here, and not what it is."""
+
+_NAME = re.compile(r"^Name: *\S", re.MULTILINE | re.IGNORECASE)
 
 Environment = Mapping[str, Any]
 
@@ -35,18 +37,31 @@ def environment() -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def _environment(path: tuple[str, ...]) -> dict[str, Any]:
-    packages: dict[str, Any] = {}
-    for each in distributions(path=list(path)):
-        # Of two on the path the first is the one that is imported.
-        packages.setdefault(
-            one_name(each.name),
-            {"version": each.version, "sha256": fingerprint(each)},
-        )
+    packages = {
+        one_name(each.name): {"version": each.version, "sha256": fingerprint(each)}
+        for each in installed(path)
+    }
     return {
         "system": sysconfig.get_platform(),
         "python": platform.python_version(),
         "packages": dict(sorted(packages.items())),
     }
+
+
+def installed(path: Sequence[str]) -> Iterator[Distribution]:
+    """Yield each package on a path once: of two the first, which is the one that is imported.
+
+    What an installer that was interrupted left behind has no name and is none: on Windows, where
+    files in use cannot be removed, such folders are common.
+    """
+    seen: set[str] = set()
+    for each in distributions(path=list(path)):
+        about = each.read_text("METADATA") or each.read_text("PKG-INFO") or each.read_text("")
+        if not _NAME.search(about or ""):
+            continue
+        if (name := one_name(each.name)) not in seen:
+            seen.add(name)
+            yield each
 
 
 def one_name(project: str) -> str:

@@ -4,20 +4,25 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping
-from importlib.metadata import EntryPoint, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 from labcrane.approval.source_tree import hashes
 from labcrane.errors import ProtocolError
 from labcrane.files.atomic import sha256
 from labcrane.files.yaml import YamlFile, parse_yaml
 from labcrane.protocol.study import Study
-from labcrane.registry.entry_points import entry_points_of
+from labcrane.registry.entry_points import EntryPoint, entry_points_of
 from labcrane.registry.hookspecs import PROJECT
 from labcrane.registry.registry import Registry
 
 DATA = frozenset({".yaml", ".yml", ".json"})
+ROBOTS = frozenset({".urdf", ".xml"})
+OF_THE_LAB = frozenset({"certificate", "key"})
+"""What of a page is the laboratory's: everybody may read a lock, and a private key is nobody's to
+read; and a certificate that was renewed changes no study."""
 OWN = "the study's own"
 """What stands for the version of a file in the study's plugins folder."""
 
@@ -43,7 +48,7 @@ def materials(
     """
     protocol = YamlFile.read(study.path).data
     folder = study.path.parent
-    named = {path.relative_to(folder).as_posix(): path for path in referred(protocol, folder)}
+    named = {path.relative_to(folder).as_posix(): path for path in study_files(protocol, folder)}
     found: dict[str, Any] = {
         "protocol": protocol,
         "files": {name: content(path) for name, path in sorted(named.items())},
@@ -89,6 +94,15 @@ def _portable(value: object, folder: Path, part: str) -> Any:
     return named.relative_to(inside).as_posix()
 
 
+def study_files(protocol: Mapping[str, Any], folder: Path) -> list[Path]:
+    """Return the files that a protocol names but those of :data:`OF_THE_LAB`."""
+    page = protocol.get("page")
+    if not isinstance(page, Mapping):
+        return referred(protocol, folder)
+    shown = {key: value for key, value in page.items() if key not in OF_THE_LAB}
+    return referred({**protocol, "page": shown}, folder)
+
+
 def referred(data: object, folder: Path) -> list[Path]:
     """Return the files that ``data`` names, and those that these name, below ``folder``.
 
@@ -103,19 +117,52 @@ def referred(data: object, folder: Path) -> list[Path]:
             if path in found:
                 continue
             found[path] = None
-            waiting += [(name, path.parent) for name in _strings(_named_in(path))]
+            waiting += [
+                (name, beside)
+                for name in _strings(_named_in(path))
+                for beside in _beside(path, folder)
+            ]
     return list(found)
+
+
+def _beside(path: Path, folder: Path) -> list[Path]:
+    """Return from where a file names others: of a robot's package, any folder above it as well."""
+    if path.suffix not in ROBOTS:
+        return [path.parent]
+    return [above for above in path.parents if above.is_relative_to(folder)]
 
 
 def _named_in(path: Path) -> Any:
     if path.suffix in DATA:
         return _parsed(path.read_text(encoding="utf-8"))
+    if path.suffix in ROBOTS:
+        return list(_named_by_robot(path))
     if path.suffix == ".gltf":  # names its textures and its numbers
         try:
             return json.loads(path.read_text(encoding="utf-8"))
         except (ValueError, RecursionError) as error:
             raise ProtocolError(f"{path} is no glTF file: {str(error)[:100]}; export it") from error
     return None
+
+
+def _named_by_robot(path: Path) -> Iterator[str]:
+    """Yield the files that a URDF or MJCF file names: meshes, textures, and what it includes."""
+    try:
+        elements = list(ElementTree.parse(path).iter())  # noqa: S314 - expat refuses entity bombs
+    except (ElementTree.ParseError, ValueError):
+        return  # no robot: who reads it as one says so
+    folders = {""} | {
+        f"{element.get(key)}/"
+        for element in elements
+        for key in ("meshdir", "texturedir", "assetdir")
+        if element.get(key)
+    }
+    for element in elements:
+        for key in ("filename", "file"):
+            name = (element.get(key) or "").removeprefix("file://")
+            if name.startswith("package://"):
+                name = name.removeprefix("package://").partition("/")[2]
+            yield from (inside + name for inside in sorted(folders) if name)
 
 
 def _paths(text: str, beside: Path, folder: Path) -> list[Path]:

@@ -27,7 +27,7 @@ MODULES = {
     "record": ("streams", "record", "recover", "resync"),
     "score": ("score",),
     "results": ("export", "report", "replay", "view"),
-    "simulate": ("simulate", "power"),
+    "simulate": ("simulate", "power", "tracks"),
     "engines": ("compare_engines",),
     "approval": ("approve", "amend", "methods", "bundle"),
     "participants": (

@@ -82,7 +82,7 @@ def description(module: str) -> str:
 def _offered(group: str) -> dict[str, Callable[..., None]]:
     from labcrane.registry.commands import plugin_commands
 
-    points = entry_points_of(GROUP).select(name=group)
+    points = [point for point in entry_points_of(GROUP) if point.name == group]
     return {
         name: offer.run
         for (its_group, name), offer in plugin_commands(points).items()

@@ -1,4 +1,4 @@
-"""Prints how right time stamps are."""
+"""Sync report in the terminal: how right time stamps are."""
 
 from typing import TYPE_CHECKING
 

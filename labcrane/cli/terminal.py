@@ -31,6 +31,7 @@ KEYS: Mapping[str, Order] = {
     "c": Order.COMPLETION,
     "h": Order.HINT,
     "f": Order.SETTING,
+    "t": Order.TAKE,
 }
 PEOPLES = (*KEYS.values(), Order.ANSWER, Order.SUBMIT)
 """The orders that people give."""
@@ -40,12 +41,13 @@ PROMPTS: Mapping[Order, str] = {
     Order.HINT: "hint: ",
     Order.COMPLETION: "completed? 1 or 0: ",
     Order.SETTING: "setting, such as tone.far=3: ",
+    Order.TAKE: "take which stream, such as eeg or eeg=amplifier-1: ",
 }
 """What is asked for orders that need words."""
 
 HELP = (
     "space start/go on · p pause · r repeat · s skip · e end · n note · o override · "
-    "c completion · h hint · f feedback setting · q fill in the questionnaire"
+    "c completion · h hint · f feedback setting · t take a stream · q fill in the questionnaire"
 )
 
 

@@ -14,7 +14,11 @@ from dataclasses import dataclass
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, core_schema
+
+from labcrane.errors import nearest
 
 Place = tuple[str | int, ...]
 
@@ -31,11 +35,14 @@ class Reference:
         Whether a leading minus is allowed, and means the same thing turned round.
     own
         Whether it must be among what the component itself provides.
+    of
+        The key beside it that names a view, which must provide it.
     """
 
     kind: str
     signed: bool = False
     own: bool = False
+    of: str = ""
 
     def bare(self, name: str) -> str:
         """Return a written name without its sign."""
@@ -59,8 +66,9 @@ Mark = Reference | Covers | Once
 AxisName = Annotated[str, Field(pattern=r"^-?[a-z][a-z0-9_.]*$"), Reference("axis", signed=True)]
 """An axis of the input, ``right.y``; a leading minus turns it round."""
 
-ButtonName = Annotated[str, Reference("axis")]
-"""A button, which is an axis of the input without a sign: ``right.trigger``."""
+ButtonName = Annotated[str, Reference("button")]
+"""A button: an axis of the input that is pressed or not, and has no sign: ``right.trigger``. Of an
+input that does not say which of its axes are buttons, any axis."""
 
 JointName = Annotated[str, Reference("joint")]
 """A joint of the machine."""
@@ -82,6 +90,47 @@ ViewName = Annotated[str, Reference("view")]
 
 CameraName = Annotated[str, Reference("camera", own=True)]
 """A camera of the view itself."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)  # types are looked up by hash, and it holds a mapping
+class Preset:
+    """A mark on a settings type: a name stands for settings that the plugin comes with.
+
+    Attributes
+    ----------
+    kind
+        What is named, for the message: ``camera``.
+    named
+        What each name stands for.
+
+    Examples
+    --------
+    >>> Camera = Annotated[CameraSettings, Preset("camera", {"cab": CameraSettings(...)})]
+    """
+
+    kind: str
+    named: Mapping[str, BaseModel]
+
+    def __get_pydantic_core_schema__(
+        self, source: type, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Put settings in the place of their name."""
+        return core_schema.no_info_before_validator_function(self._found, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, core: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Say the names in the schema."""
+        return {"anyOf": [{"enum": list(self.named), "type": "string"}, handler(core)]}
+
+    def _found(self, value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        if value not in self.named:
+            there = nearest(value, list(self.named), "there is")
+            raise ValueError(f"there is no such {self.kind} as {value!r}; {there}")
+        return self.named[value]
+
 
 EVENTS = (
     "block.end", "block.start", "break.end", "break.start", "consent.asked", "consent.given",

@@ -236,7 +236,8 @@ class Trigger(Component):
     fault: str | None = None
     """Why nothing can be sent now, in words; None while all is well.
 
-    Looked at after every ``send``. The session goes on, and says so.
+    Looked at after every ``send``: what was to be sent then is recorded as not sent. The session
+    goes on, and says so.
     """
 
     @abstractmethod

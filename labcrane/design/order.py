@@ -1,4 +1,4 @@
-"""In which order the levels of a factor come."""
+"""Order in which the levels of a factor come."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

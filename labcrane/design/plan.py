@@ -5,9 +5,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from labcrane.core.records import PlannedTrial, Trial, Value
+from labcrane.core.roles import Task
 from labcrane.design.order import RULES, SQUARES, Turn, faded
 from labcrane.design.seeds import derive
 from labcrane.design.slots import group_of, place_of
+from labcrane.design.tracks import PlannedTrack, plan_rounds, standing
 from labcrane.protocol.design import AS_WRITTEN, Criterion
 from labcrane.protocol.steps import Block, Step
 from labcrane.protocol.study import Study
@@ -48,9 +50,9 @@ class PlannedBlock:
     practice
         Whether its trials are practice.
     levels
-        The levels of each factor, in the order in which they come.
+        The levels of each factor, in the order in which they come; not of one that a track chooses.
     trials
-        First attempts, in order.
+        First attempts, in order; with a track the most that there can be, all at its first level.
     group
         The participant's between-subject group; "" when the study has none.
     until, last
@@ -65,6 +67,8 @@ class PlannedBlock:
         What a session that stopped was still to ask after trials that are over.
     streak
         How many counted trials in a row had succeeded before it stopped.
+    track
+        What chooses the levels of a factor while it runs.
     """
 
     name: str
@@ -81,10 +85,13 @@ class PlannedBlock:
     feedback: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
     owed: tuple[Owed, ...] = ()
     streak: int = 0
+    track: PlannedTrack | None = None
 
     @property
     def expected_s(self) -> float:
-        """How long it is likely to take, in seconds."""
+        """How long it is likely to take, in seconds; with a track at most."""
+        if self.track is not None:
+            return self.track.longest_s * len(self.trials) / self.track.size
         return sum(trial.planned.expected_s for trial in self.trials)
 
 
@@ -198,13 +205,18 @@ class Planner:
         self._blocks += 1
         task = self._study.tasks[block.task]
         levels = {}
+        adaptive = self._study.protocol.design.tracks.get(block.track)
         for factor, written in task.factors().items():
+            if adaptive is not None and factor == adaptive.factor:
+                continue
             order = self._study.protocol.design.order.get(factor, AS_WRITTEN)
             seed = derive(*self._words, "order", factor, self._blocks)
             turn = Turn(seed, self._place + self._shift(factor))
             ordered = RULES[order.rule](written, turn, order.times, order.in_a_row)
             levels[factor] = ordered[: block.limits.get(factor)]
-        trials = tuple(self._trial(planned) for planned in task.plan(levels))
+        track = self._track(block, task, levels) if adaptive is not None else None
+        planned = task.plan(levels) if track is None else self._rounds(track)
+        trials = tuple(map(self._trial, planned))
         name = block.name or block.task
         return PlannedBlock(
             name,
@@ -219,7 +231,26 @@ class Planner:
             reference=kind == "reference",
             ask=block.ask,
             feedback=self._feedback(block, trials),
+            track=track,
         )
+
+    def _track(
+        self, block: Block, task: Task, levels: Mapping[str, tuple[str, ...]]
+    ) -> PlannedTrack:
+        track = self._study.protocol.design.tracks[block.track]
+        rounds = {
+            level: plan_rounds(block.track, level, task.plan({**levels, track.factor: (level,)}))
+            for level in track.levels
+        }
+        size = len(next(iter(rounds.values())))
+        return PlannedTrack(block.track, track, self._trials + 1, size * track.rounds, rounds)
+
+    def _rounds(self, track: PlannedTrack) -> list[PlannedTrial]:
+        """Return as many rounds as there can be, at the level that the track begins with."""
+        first = standing(track.settings).level
+        if first is None:
+            raise AssertionError("a track does not end before it begins")
+        return list(track.rounds[first]) * track.settings.rounds
 
     def _shift(self, factor: str) -> int:
         """Return by how many rows a further square is shifted, so that two squares get crossed.

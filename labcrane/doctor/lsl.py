@@ -115,14 +115,15 @@ def _whose(request: StreamRequest, fitting: Sequence[FoundStream]) -> Iterator[F
     which = "; ".join(
         f"{one.name!r} (source_id {one.source_id!r}) of {one.host}" for one in fitting
     )
-    if len(fitting) > 1:
+    if request.asks:
+        text = f"stream {request} is asked for by its type alone, and a run asks which is meant: "
+        fix = "write the source_id of the one that is meant in the protocol"
+        meant = request.any_meant and len(fitting) == 1
+        yield Finding(Verdict.PASS if meant else Verdict.WARN, f"{text}{which}", fix)
+    elif len(fitting) > 1:
         fix = "write the source_id of the one that is meant in the protocol, or several: true"
         text = f"stream {request} could be any of {len(fitting)}, and no run begins: {which}"
         yield Finding(Verdict.FAIL if request.required else Verdict.WARN, text, fix)
-    elif taken := request.taken(fitting[0].name, fitting[0].source_id, fitting[0].host):
-        text, _, fix = f"stream {request} {taken}".partition("; ")
-        text = text.replace("was taken", "would be taken")
-        yield Finding(Verdict.PASS if request.any_meant else Verdict.WARN, text, fix)
 
 
 def _info(one: FoundStream) -> "pylsl.StreamInfo":

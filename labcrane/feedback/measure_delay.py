@@ -1,4 +1,4 @@
-"""Measures the delay of a view or a sound with a sensor that is an LSL stream."""
+"""Measurement of the delay of a view or a sound, with a sensor that is an LSL stream."""
 
 import random
 import time

@@ -2,8 +2,10 @@
 
 import os
 import time
+from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +21,9 @@ from labcrane.protocol.study import Study
 from labcrane.recording.frame_log import LOOP, FrameRow
 from labcrane.recording.participant_file.reader import SessionRecord
 
+if TYPE_CHECKING:
+    import numpy.typing as npt
+
 GROUPS = ("input", "command", "state", "task")
 WINDOW = 4096
 """Rows that are read at once: an hour is never held in memory."""
@@ -33,15 +38,28 @@ class RecordedFrames:
         units = self._streams["input"].units
         self.axes = Layout("the input", signals_of(list(units), units))
         self._frame = FrameRow(len(self._streams[name].units) for name in GROUPS).frame
-        self._events: dict[int, list[Event]] = {}
-        table = record.events
-        ticks = table["tick"].to_numpy()
-        for tick, name, at, data in zip(
-            ticks, table["name"], table["time"], table["data"], strict=True
-        ):
-            self._events.setdefault(int(tick), []).append(Event(str(name), float(at), data))
-        self._ticks = sorted(self._events)
+        events = record.events.assign(row=self._rows_of(record))
+        events = events.sort_values("row", kind="stable")
+        self._told = events["row"].tolist()
+        self._events = [
+            Event(str(name), float(at), data)
+            for name, at, data in zip(events["name"], events["time"], events["data"], strict=True)
+        ]
         self._first, self._rows = 0, np.empty((0, 0))
+
+    def _rows_of(self, record: SessionRecord) -> "npt.NDArray[np.intp]":
+        """Return the row of the frame of each event; in each part of a session ticks begin anew."""
+        events = record.events
+        begins = events.groupby("part")["time"].first()
+        first = dict(zip(begins.index, np.searchsorted(self.time, begins), strict=True))
+        last = dict(zip(begins.index, [*list(first.values())[1:], len(self.time)], strict=True))
+        ticks = self._streams["loop"].column("tick")
+        rows = [
+            first[part] + np.searchsorted(ticks[first[part] : last[part]], tick)
+            for part, tick in zip(events["part"], events["tick"], strict=True)
+        ]
+        ends = events["part"].map(last).to_numpy()
+        return np.asarray(np.maximum(np.minimum(rows, ends - 1), 0))
 
     def frame(self, row: int) -> Frame:
         """Return the frame in a row."""
@@ -55,8 +73,8 @@ class RecordedFrames:
         return frame
 
     def events(self, first: int, last: int) -> list[Event]:
-        """Return what happened after tick ``first``, up to tick ``last``."""
-        return [one for tick in self._ticks if first < tick <= last for one in self._events[tick]]
+        """Return what happened after the frame in row ``first``, up to that in row ``last``."""
+        return self._events[bisect_right(self._told, first) : bisect_right(self._told, last)]
 
 
 def played(
@@ -89,8 +107,8 @@ def played(
     row, told = int(np.searchsorted(recorded.time, origin - 1e-9)), -1
     while True:
         frame = recorded.frame(row)
-        yield frame, recorded.events(told, frame.tick.number)
-        told = frame.tick.number
+        yield frame, recorded.events(told, row)
+        told = row
         if row + 1 >= len(recorded.time):
             return
         rest(max(0.0, (recorded.time[row + 1] - origin) / speed - (now() - begun)))
@@ -127,13 +145,13 @@ def play(
     run = _run_of(study, recorded)
     source = f"{study.protocol.study}/replay-{os.getpid()}"
     orders = [replace(order, recorded=False) for order in host_orders(study, run, source)]
-    keepers = [FeedbackHandle(order, "continue") for order in orders]
+    handles = [FeedbackHandle(order, "continue") for order in orders]
     try:
-        wait_for_all(keepers, say, "labcrane view shows any session in a browser")
-        _send_all(run, source, recorded, keepers, speed=speed, start_s=start_s)
+        wait_for_all(handles, say, "labcrane view shows any session in a browser")
+        _send_all(run, source, recorded, handles, speed=speed, start_s=start_s)
     finally:
-        for keeper in keepers:
-            keeper.stop()
+        for handle in handles:
+            handle.stop()
 
 
 def _run_of(study: Study, recorded: RecordedFrames) -> Run:
@@ -145,7 +163,7 @@ def _send_all(
     run: Run,
     source: str,
     recorded: RecordedFrames,
-    keepers: list[FeedbackHandle],
+    handles: list[FeedbackHandle],
     *,
     speed: float,
     start_s: float,
@@ -165,10 +183,11 @@ def _send_all(
     try:
         first, events = next(played(recorded, start_s, speed, time.perf_counter, time.sleep))
         send(first, events)
-        hold(lambda: send(first, []), keepers)
-        for frame, happened in played(recorded, start_s, speed, time.perf_counter, time.sleep):
-            again = frame.tick.number == first.tick.number
-            send(frame, [] if again else happened)
+        hold(lambda: send(first, []), handles)
+        shown = played(recorded, start_s, speed, time.perf_counter, time.sleep)
+        send(next(shown)[0], [])  # what happened until then was told
+        for frame, happened in shown:
+            send(frame, happened)
         time.sleep(END_S)
     finally:
         for outlet in outlets:

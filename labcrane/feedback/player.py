@@ -1,4 +1,4 @@
-"""Plays a movement to views and sounds as a session does, in real time."""
+"""Player of a movement: to views and sounds as a session does, in real time."""
 
 import os
 import time
@@ -44,17 +44,17 @@ def play(study: Study, frames: Sequence[Frame], scene: str, say: Callable[[str],
     run = Rig.build(study, simulated=True).describe(study, participant_seed=0)
     source = f"{study.protocol.study}/preview-{os.getpid()}"
     orders = [replace(order, recorded=False) for order in host_orders(study, run, source)]
-    keepers = [FeedbackHandle(order, "continue") for order in orders]
+    handles = [FeedbackHandle(order, "continue") for order in orders]
     try:
-        wait_for_all(keepers, say, "--to FOLDER writes files instead")
-        _present(run, source, frames, scene, [*study.cues, *study.sounds], keepers)
+        wait_for_all(handles, say, "--to FOLDER writes files instead")
+        _present(run, source, frames, scene, [*study.cues, *study.sounds], handles)
     finally:
-        for keeper in keepers:
-            keeper.stop()
+        for handle in handles:
+            handle.stop()
 
 
 def wait_for_all(
-    keepers: Sequence[FeedbackHandle], say: Callable[[str], None], instead: str
+    handles: Sequence[FeedbackHandle], say: Callable[[str], None], instead: str
 ) -> None:
     """Wait until each is ready or left out.
 
@@ -63,12 +63,12 @@ def wait_for_all(
     DeviceError
         All are left out; its words end with what to do ``instead``.
     """
-    while not all(keeper.ready or keeper.given_up for keeper in keepers):
-        for keeper in keepers:
-            for news in keeper.watch():
+    while not all(handle.ready or handle.given_up for handle in handles):
+        for handle in handles:
+            for news in handle.watch():
                 say(f"feedback {news}")
         time.sleep(LOOK_S)
-    if all(keeper.given_up for keeper in keepers):
+    if all(handle.given_up for handle in handles):
         raise DeviceError(f"nothing can be shown or sounded here; {instead}")
 
 
@@ -78,7 +78,7 @@ def _present(
     frames: Sequence[Frame],
     scene: str,
     active: Sequence[str],
-    keepers: Sequence[FeedbackHandle],
+    handles: Sequence[FeedbackHandle],
 ) -> None:
     from labcrane.streams.context import ContextOutlet  # noqa: PLC0415 - loads liblsl
     from labcrane.streams.frames import FrameOutlet  # noqa: PLC0415
@@ -90,7 +90,7 @@ def _present(
         about: dict[str, Value] = {"trial": first.trial, "feedback": "+".join(active) or "none"}
         placed = Event(SCENE_PLACED, now, {"things": scene})
         show(first, placed, Event("trial.start", now, about))
-        hold(lambda: show(first), keepers)
+        hold(lambda: show(first), handles)
         began = time.perf_counter()
         for frame in frames:
             due = began + frame.tick.due - first.tick.due
@@ -110,14 +110,14 @@ def _send(pushes: Sequence[Callable[[Frame], None]], frame: Frame, *events: Even
         push(sent)
 
 
-def hold(show: Callable[[], None], keepers: Sequence[FeedbackHandle]) -> None:
+def hold(show: Callable[[], None], handles: Sequence[FeedbackHandle]) -> None:
     """Show the first frame until all present it, and for a while.
 
     Whoever finds the streams now is told what is switched on within the second.
     """
     began = time.perf_counter()
     while (now := time.perf_counter()) < began + HOLD_S or not (
-        all(keeper.presented or keeper.given_up for keeper in keepers) or now > began + PATIENCE_S
+        all(handle.presented or handle.given_up for handle in handles) or now > began + PATIENCE_S
     ):
         show()
         time.sleep(LOOK_S)

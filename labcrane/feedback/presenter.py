@@ -1,4 +1,4 @@
-"""Presents frames with one feedback component and the cues it draws."""
+"""Presenter of frames: one feedback component, and the cues it draws."""
 
 from dataclasses import replace
 from typing import Any, TypeVar

@@ -88,18 +88,14 @@ class FeedbackProcess:
     def _join(self, context: "ContextInlet", log: "FeedbackLog") -> None:
         """Wait for what belongs to the first frame: what it is about, and who records it."""
         recorded = self._order.recorded
-        since = time.monotonic()
+        since, heard = time.monotonic(), False
         while not (self._stop.is_set() or (context.text and (log.taken or not recorded))):
             context.changed(WAIT_S)
             self._beat()
-            if not context.text:
-                since = time.monotonic()
-            elif time.monotonic() - since > TAKEN_S:
-                raise StreamError(
-                    f"no recorder has taken what {self._order.name!r} presents for {TAKEN_S:g} s; "
-                    "labcrane doctor counts LSL's free ports: if none are left, end other programs "
-                    "that search or set PortRange = 128 in lsl_api.cfg (docs/lab.md)"
-                )
+            if heard != bool(context.text):
+                since, heard = time.monotonic(), bool(context.text)
+            if time.monotonic() - since > TAKEN_S:
+                raise StreamError(unheard(self._order.name, heard=heard))
 
     def _follow(
         self,
@@ -158,6 +154,24 @@ class FeedbackProcess:
         if now - self._beaten >= BEAT_S:
             self._beaten = now
             self._say({"beat": self._presented})
+
+
+def unheard(name: str, *, heard: bool) -> str:
+    """Say what a view or sound has waited for in vain, and what the likely cause is.
+
+    ``heard`` is whether the session's context came.
+    """
+    if not heard:
+        return (
+            f"{name!r} found the session's streams and heard nothing of them for {TAKEN_S:g} s; "
+            "a firewall of this computer stops TCP to itself: allow the ports that labcrane doctor "
+            "names"
+        )
+    return (
+        f"no recorder has taken what {name!r} presents for {TAKEN_S:g} s; "
+        "labcrane doctor counts LSL's free ports: if none are left, end other programs "
+        "that search or set PortRange = 128 in lsl_api.cfg (docs/lab.md)"
+    )
 
 
 def main() -> int:

@@ -27,7 +27,7 @@ class FeedbackProcesses:
     def __init__(self, visit: Visit) -> None:
         policy = visit.study.protocol.on_fault.feedback_lost
         self._required = policy != "continue"
-        self.keepers = [FeedbackHandle(order, policy) for order in _orders_of(visit)]
+        self.handles = [FeedbackHandle(order, policy) for order in _orders_of(visit)]
         self._news: list[FeedbackLost | FeedbackReady] = []
 
     def wait(self, say: Callable[[str], None], ended: Callable[[], bool]) -> bool:
@@ -38,16 +38,16 @@ class FeedbackProcesses:
         DeviceError
             One cannot be started, and the protocol does not say to go on without it.
         """
-        while not all(keeper.ready or keeper.given_up for keeper in self.keepers):
-            for keeper in self.keepers:
-                if not (why := keeper.failure):
+        while not all(handle.ready or handle.given_up for handle in self.handles):
+            for handle in self.handles:
+                if not (why := handle.failure):
                     continue
                 if self._required:
                     raise DeviceError(
-                        f"feedback {keeper.name!r} cannot be started: {why} (on_fault: "
+                        f"feedback {handle.name!r} cannot be started: {why} (on_fault: "
                         "{feedback_lost: continue} would go on without it)"
                     )
-                self._news += (news := keeper.watch())
+                self._news += (news := handle.watch())
                 for report in news:
                     say(f"feedback {report}")
             if ended():
@@ -57,7 +57,7 @@ class FeedbackProcesses:
 
     def watch(self, say: Callable[[str], None]) -> list[FeedbackLost | FeedbackReady]:
         """Look after all processes; return what the session is to be told, also of its start."""
-        news = [report for keeper in self.keepers for report in keeper.watch()]
+        news = [report for handle in self.handles for report in handle.watch()]
         for report in news:
             say(f"feedback {report}")
         before, self._news = self._news, []
@@ -66,17 +66,17 @@ class FeedbackProcesses:
     @property
     def sends(self) -> tuple[str, ...]:
         """The descriptions of all streams in which feedback says what it did."""
-        return tuple(text for keeper in self.keepers for text in keeper.sends)
+        return tuple(text for handle in self.handles for text in handle.sends)
 
     def offer(self, streams: Mapping[str, str]) -> None:
         """Tell all processes the session's streams, by name and description."""
-        for keeper in self.keepers:
-            keeper.offer(streams)
+        for handle in self.handles:
+            handle.offer(streams)
 
     def stop(self) -> None:
         """Stop all processes."""
-        for keeper in self.keepers:
-            keeper.stop()
+        for handle in self.handles:
+            handle.stop()
 
 
 def host_orders(study: Study, run: Run, source: str) -> list[FeedbackConfig]:

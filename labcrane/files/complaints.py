@@ -48,6 +48,7 @@ def told(
     Pydantic complains once for every member, each as if it were the only one.
     """
     unions: dict[Place, list[ErrorDetails]] = {}
+    inside: set[Place] = set()
     for each in errors:
         loc = each["loc"]
         if _follows(each, errors):
@@ -62,10 +63,13 @@ def told(
         at = next((n for n, step in enumerate(loc) if is_member(step)), None)
         if at is None or at + 1 < len(loc):
             of_key = of_key or each["type"] == "extra_forbidden"
+            inside |= {loc[:at]} if at is not None else set()
             yield Complaint(loc, explain(each, place, model), of_key)
         else:
             unions.setdefault(loc[:at], []).append(each)
     for loc, several in unions.items():
+        if loc in inside:  # it is one of the members, with something wrong in it
+            continue
         texts = [explain(each, place, model) for each in several]
         head = texts[0].partition("; it must be ")[0]
         wanted = [text.partition("; it must be ")[2] or text for text in texts]

@@ -1,4 +1,4 @@
-"""Why a text is no YAML, in the words of those who write one, and the place where it went wrong.
+"""Reasons why a text is no YAML, in the words of those who write one, and where it went wrong.
 
 A parser notices a mistake where it can go on no more, which is often a line later.
 """

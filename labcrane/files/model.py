@@ -99,6 +99,8 @@ def _no_truth(annotation: Any, value: Any) -> Any:
 
     It becomes what is no number, so that it is refused at its own place, in a list as well.
     """
+    while hasattr(annotation, "__metadata__"):
+        annotation = get_args(annotation)[0]
     origin, arguments = get_origin(annotation), get_args(annotation)
     if isinstance(value, bool):
         kinds = set(_plain_types(annotation))
@@ -106,6 +108,9 @@ def _no_truth(annotation: Any, value: Any) -> Any:
             if str not in kinds:
                 return Truth(str(value).lower())
             raise ValueError(f"{str(value).lower()} is no number; write one")
+    elif isinstance(value, list | dict) and origin in {Union, UnionType}:
+        for one in arguments:  # one of them, at most, is of this kind
+            value = _no_truth(one, value)
     elif isinstance(value, list) and origin in {tuple, list}:
         of: Any = Union[arguments]  # noqa: UP007 - of what is only known now
         return [_no_truth(of, each) for each in value]

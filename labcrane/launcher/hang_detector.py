@@ -1,4 +1,4 @@
-"""Finds out that a session hangs in a component, from outside its process."""
+"""Detector of a session that hangs in a component, from outside its process."""
 
 import time
 from collections.abc import Callable

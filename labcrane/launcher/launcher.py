@@ -1,4 +1,4 @@
-"""Starts, watches and restarts the processes of a run.
+"""Launcher of a run: starts, watches and restarts its processes.
 
 The session process owns the loop, the recorder process the streams of others. Either may die: the
 recorder is started again at once, and after the session's death everything recorded is put into
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from labcrane.core.records import Event
+from labcrane.errors import StreamError
 from labcrane.feedback.processes import FeedbackProcesses, log_requests
 from labcrane.launcher.hang_detector import HangDetector
 from labcrane.launcher.session_handle import SessionHandle
@@ -81,7 +82,7 @@ class Launcher:
         self._console = console
         self._say = say
         self._recorder: RecorderHandle | None = None
-        self._crew: FeedbackProcesses | None = None
+        self._feedback: FeedbackProcesses | None = None
         self._lost: set[str] = set()
         self._taken: set[str] = set()
         self._signals = SignalReporter(say)
@@ -128,11 +129,11 @@ class Launcher:
         report = None
         try:
             if visit.feedback:
-                self._crew = FeedbackProcesses(visit)
+                self._feedback = FeedbackProcesses(visit)
             died = self._run() if self._gate() else None
         finally:
-            if self._crew:
-                self._crew.stop()
+            if self._feedback:
+                self._feedback.stop()
             if self._recorder:
                 self._recorder.stop()
             if parts(visit.journal):
@@ -149,11 +150,12 @@ class Launcher:
 
     def _gate(self) -> bool:
         """Wait until feedback is ready and all required streams flow; whether to start."""
-        if self._crew and not self._crew.wait(self._say, self._told_to_end):
+        if self._feedback and not self._feedback.wait(self._say, self._told_to_end):
             return False
         recorder = self._recorder
         told: list[str] = []
-        while recorder is not None and not recorder.ready:
+        asked = not self._visit.simulated  # nobody is there to answer, and nothing is required
+        while recorder is not None and not (recorder.ready and not (asked and recorder.asks)):
             recorder.watch()
             self._kept += self._signals.news(recorder)
             if recorder.status and recorder.complaints() != told:
@@ -166,16 +168,37 @@ class Launcher:
         return True
 
     def _say_what_was_taken(self) -> None:
-        """Say, once each, which stream was taken where any of its type would have been."""
+        """Say, once each, which stream was confirmed where any of its type would have fitted."""
         taken = self._recorder.taken() if self._recorder else []
         for line in taken:
             if line not in self._taken:
                 self._taken.add(line)
                 self._say(line)
 
+    def _orders(self) -> list[Command]:
+        """Return what people have ordered, but for what is for the recorder: that is done."""
+        orders = self._console.commands()
+        for command in orders:
+            if command.order is Order.TAKE:
+                self._confirm(command)
+        return [command for command in orders if command.order is not Order.TAKE]
+
+    def _confirm(self, command: Command) -> None:
+        """Let the stream be recorded that somebody says is meant, and put that into the record."""
+        if self._recorder is None:
+            self._say("take: the study records no streams of others")
+            return
+        try:
+            said = self._recorder.confirm(command.text)
+        except StreamError as error:
+            self._say(str(error))
+            return
+        self._say(said)
+        self._kept.append(Command(Order.NOTE, said, command.by, command.at))
+
     def _told_to_end(self) -> bool:
         """Whether the run is to end before it has begun; what is for the record is kept for it."""
-        for command in self._console.commands():
+        for command in self._orders():
             if command.order is Order.END:
                 return True
             if command.order in FOR_THE_RECORD:
@@ -199,8 +222,9 @@ class Launcher:
         while True:
             over = session.ended  # asked first: what it said before is taken below
             try:
-                for command in (*self._kept, *self._console.commands()):
-                    session.send(command)
+                orders = self._orders()
+                for message in (*self._kept, *orders):
+                    session.send(message)
                 self._kept.clear()
                 messages = session.wait(0.0 if over else LOOK_S)
             except KeyboardInterrupt:
@@ -216,8 +240,8 @@ class Launcher:
             if detector.hangs():
                 session.kill()  # its journal is whole; the exit code is passed on as any other
             self._watch_streams(session.send)
-            if self._crew:
-                for news in self._crew.watch(self._say):
+            if self._feedback:
+                for news in self._feedback.watch(self._say):
                     session.send(news)
 
     def _pass_events(self, messages: Iterable[Event | Offered | Ended]) -> Ended | None:
@@ -225,8 +249,8 @@ class Launcher:
             if isinstance(message, Ended):
                 return message
             if isinstance(message, Offered):
-                if self._crew:
-                    self._crew.offer(message.streams)
+                if self._feedback:
+                    self._feedback.offer(message.streams)
                 continue
             if message.name == "session.end":
                 self._owes = bool(message.data["owed"])
@@ -237,8 +261,8 @@ class Launcher:
         recorder = self._recorder
         if recorder is None:
             return
-        if self._crew:
-            recorder.offer(self._crew.sends)
+        if self._feedback:
+            recorder.offer(self._feedback.sends)
         if recorder.watch():
             self._say("a recorder died: the other one has all streams, and a new one was started")
         for news in self._signals.news(recorder):

@@ -1,4 +1,4 @@
-"""Read a machine: one that comes with labcrane, or a YAML file of the study."""
+"""Library of machines: those that come with labcrane, and YAML files of a study."""
 
 from collections.abc import Mapping
 from importlib.resources import files

@@ -1,4 +1,4 @@
-"""Which monitors look at the streams of a session."""
+"""Configuration of monitors: which of them look at the streams of a session."""
 
 import threading
 from collections.abc import Mapping, Sequence

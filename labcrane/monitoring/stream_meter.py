@@ -1,4 +1,4 @@
-"""How a stream comes: its clock, chunks, jitter and gaps, from what has come of late."""
+"""Meter of how a stream comes: its clock, chunks, jitter and gaps, from what has come of late."""
 
 from collections import deque
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Finds what could lead to a person, in a text and in files that are given away."""
+"""Personal data: what could lead to a person, in a text and in files that are given away."""
 
 import csv
 import io

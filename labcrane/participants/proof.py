@@ -1,4 +1,4 @@
-"""What a file says, packed as it may be: a search of bytes finds nothing in a zipped workbook."""
+"""Proof by what a file says, packed as it may be: a zipped workbook shows no name to a search."""
 
 import gzip
 import io

@@ -1,4 +1,4 @@
-"""Where a participant's data are: everything that labcrane has written, and what is due."""
+"""Places where a participant's data are: everything that labcrane has written, and what is due."""
 
 from dataclasses import dataclass
 from pathlib import Path

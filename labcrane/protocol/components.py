@@ -10,7 +10,6 @@ from labcrane.core.roles import Component, Cue, Feedback, Questionnaire, SignalM
 from labcrane.core.settings import Settings
 from labcrane.errors import PluginError, ProtocolError
 from labcrane.files.yaml import Place, YamlFile
-from labcrane.machines.descriptions.description import MachineDescription
 from labcrane.machines.library import read_machine
 from labcrane.machines.machine import Machine
 from labcrane.protocol.protocol import Protocol, Use
@@ -32,7 +31,7 @@ class ComponentSpec:
     plugin: str
     offer: Offer[Component]
     settings: Settings
-    oversight: CallMonitor = field(default_factory=CallMonitor, compare=False)
+    call_monitor: CallMonitor = field(default_factory=CallMonitor, compare=False)
     called: str = field(default="", compare=False)
     """Where it is used, and what it is: ``study.yaml:7:14: input 'dual_joystick'``."""
 
@@ -42,7 +41,7 @@ class ComponentSpec:
         return {"use": self.name, "plugin": self.plugin, "settings": settings}
 
     def build(self, machine: Machine) -> Component:
-        """Build, but do not open, the component, under oversight.
+        """Build, but do not open, the component, under a call monitor.
 
         Raises
         ------
@@ -51,9 +50,9 @@ class ComponentSpec:
         """
         if missing := self.offer.missing:
             raise PluginError(f"{self.called or repr(self.name)} {missing}")
-        build = self.oversight.place(repr(self.name), self.plugin, "build", self.offer.build)
-        component = self.oversight.call(build, self.offer.build, self.settings, machine)
-        return watched(component, self.name, self.plugin, self.oversight)
+        build = self.call_monitor.place(repr(self.name), self.plugin, "build", self.offer.build)
+        component = self.call_monitor.call(build, self.offer.build, self.settings, machine)
+        return watched(component, self.name, self.plugin, self.call_monitor)
 
 
 class ComponentResolver:
@@ -62,7 +61,7 @@ class ComponentResolver:
     def __init__(self, source: YamlFile, registry: Registry) -> None:
         self._source = source
         self._registry = registry
-        self.oversight = CallMonitor()
+        self.call_monitor = CallMonitor()
 
     def choose(
         self, role: type[RoleT], place: Place, default: Use | None = None
@@ -142,7 +141,7 @@ class ComponentResolver:
             return None
         plugin = self._registry.plugin(role, use.use)
         called = f"{self._source.where(named)}: {ROLES[role].word} {use.use!r}"
-        return ComponentSpec(use.use, plugin, offer, settings, self.oversight, called)
+        return ComponentSpec(use.use, plugin, offer, settings, self.call_monitor, called)
 
     def choose_feedback(
         self,
@@ -176,6 +175,11 @@ class ComponentResolver:
         name, folder = self._at(("machine",)), self._source.path.parent
         try:
             if isinstance(name, dict):
+                # Few machines are described so, and every command would read what describes them.
+                from labcrane.machines.descriptions.description import (  # noqa: PLC0415
+                    MachineDescription,
+                )
+
                 described = self._source.check(MachineDescription, ("machine",))
                 return described.read(folder) if described else None
             if not isinstance(name, str):

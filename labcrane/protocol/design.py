@@ -7,6 +7,7 @@ from pydantic import Field, PositiveInt, ValidationInfo, field_validator
 
 from labcrane.core.settings import Settings
 from labcrane.files.model import AtMost
+from labcrane.protocol.tracks import Track
 
 RULES = ("as_written", "blocked", "latin_square", "shuffled", "williams")
 """What a protocol may say under ``design: order:``; :mod:`labcrane.design.order` follows it."""
@@ -83,6 +84,10 @@ class Design(Settings):
     """For each factor of the tasks, in which order its levels come: ``{pairs: shuffled}``, or
     ``{pairs: {rule: shuffled, times: 3, in_a_row: 2}}``. Factors that are not named come as
     written."""
+
+    tracks: dict[str, Track] = Field(default_factory=dict)
+    """Levels that are chosen while the session runs, by what the participant does: staircases and
+    QUEST+. Blocks name them as ``track``."""
 
     @field_validator("order", mode="before", json_schema_input_type=dict[str, RuleName | Order])
     @classmethod

@@ -133,6 +133,7 @@ def key_of(place: Sequence[str | int]) -> str:
 def _asked(study: Study) -> Iterator[Question]:
     for place, text in _doubts(study):
         yield Question(key_of(place), place, f"{text}; is that meant?")
+    yield from _of_the_operator(study)
 
 
 Doubts = Iterator[tuple[Place, str]]
@@ -177,6 +178,19 @@ def _of_sizes(study: Study) -> Doubts:
         least, most = PLAUSIBLE[each.unit]
         if each.value and not least <= abs(each.value) <= most:
             yield each.place, f"{key_of(each.place)} is {each.value:g} {each.unit}"
+
+
+def _of_the_operator(study: Study) -> Iterator[Question]:
+    """Question an operator who cannot stand in for the input: nothing can be simulated."""
+    if lacks := dict.fromkeys(name for _, name in study.beyond_operator):
+        place = ("operator",) if "operator" in study.written else study.beyond_operator[0][0]
+        yield Question(
+            "operator",
+            place,
+            f"the operator, {study.operator.name!r}, who stands in for the input when nobody is "
+            f"there, has no {', '.join(lacks)}, so that the study can be neither simulated nor "
+            "rehearsed; is that meant?",
+        )
 
 
 def _of_the_loop(study: Study) -> Doubts:
@@ -282,8 +296,8 @@ def _of_streams(study: Study) -> Doubts:
             yield (
                 ("streams", label),
                 f"streams: {label} is asked for by its type alone, so that any {need.type} on the "
-                "network is taken, a neighbour's as well; give the source_id or the name that "
-                "labcrane streams shows",
+                "network fits, a neighbour's as well, and each run asks which one is meant; give "
+                "the source_id or the name that labcrane streams shows",
             )
 
 

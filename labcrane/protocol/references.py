@@ -22,6 +22,7 @@ Known = frozenset[str] | None
 
 OWNERS: Mapping[str, str] = {
     "axis": "the input",
+    "button": "the input",
     "joint": "the machine",
     "link": "the machine",
     "signal": "the study",
@@ -86,11 +87,38 @@ class ReferenceChecker:
         self, at: Place, mention: Mentioned, mark: Reference, choice: ComponentSpec
     ) -> None:
         name = mark.bare(mention.value)
-        known = self._own(choice, mark.kind) if mark.own else self._names(mark.kind, at)
+        known = self._holds(mark, choice, at)
         if known is None or name in known:
             return
         message = f"{_dotted(at)} is {mention.value!r}, and {_has(mark.kind, name, known)}"
         self._source.problem(at, message, key=mention.key)
+
+    def beyond_the_operator(self) -> Iterator[tuple[Place, str]]:
+        """Yield axes and buttons of the input that the operator who stands in for it has not.
+
+        That is where each is named, and its name.
+        """
+        for place, choice in self._components.items():
+            if place in {("input",), ("operator",)}:
+                continue
+            named = [
+                ((*place, *each.place), each.mark.kind, each.mark.bare(each.value))
+                for each in mentioned(choice.settings)
+                if isinstance(each.mark, Reference) and not (each.mark.own or each.mark.of)
+            ]
+            needed = self._needed(place, choice.settings)
+            named += [(place, kind, name) for kind, names in needed for name in names]
+            for at, kind, name in named:
+                if kind in {"axis", "button"} and name in (self._names(kind, at) or ()):
+                    has = self._found(kind, "operator")
+                    if has is not None and name not in has:
+                        yield at, name
+
+    def _holds(self, mark: Reference, choice: ComponentSpec, at: Place) -> Known:
+        if mark.of:
+            view = self._components.get(("views", str(getattr(choice.settings, mark.of, ""))))
+            return self._own(view, mark.kind) if view else None  # that there is none is told there
+        return self._own(choice, mark.kind) if mark.own else self._names(mark.kind, at)
 
     def _is_there(self, at: Place, path: Path) -> None:
         if not is_there(path):
@@ -143,6 +171,9 @@ class ReferenceChecker:
             return frozenset(views if isinstance(views, dict) else ())
         if kind == "axis":
             return self._of([(device,)], kind)
+        if kind == "button":
+            said = self._of([(device,)], kind)
+            return self._of([(device,)], "axis") if said is None else said
         if kind == "signal":
             given = self._of([("scheme",), ("dynamics",)], kind)
             shown = {c for each in self._tasks.values() for s in each.signals for c in s.columns}

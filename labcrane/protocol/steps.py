@@ -56,6 +56,9 @@ class Block(Section):
     repeat: Annotated[PositiveInt, AtMost(1000)] = 1
     """How many times the block is run, each time in a new order."""
 
+    track: str = ""
+    """Which of the design's tracks chooses the levels of its factor, round by round."""
+
     until: Criterion | None = None
     """For practice: it ends as soon as this is met."""
 
@@ -168,7 +171,20 @@ def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
             (*place, kind, "until"), "only practice has a criterion; drop until", key=True
         )
         return None
+    if block and block.track and (wrong := _beside_track(block)):
+        key, why = wrong
+        source.problem((*place, kind, key), f"{why}; drop {key}, or the track", key=True)
+        return None
     return {"kind": kind, "block": block} if block else None
+
+
+def _beside_track(block: Block) -> tuple[str, str] | None:
+    """Return what a block cannot have whose trials are not known beforehand, and why."""
+    if block.until:
+        return "until", "a block with a track ends by the track's own rule"
+    if block.fading != (1.0,):
+        return "fading", "parts of a block are not known beforehand when a track chooses its end"
+    return None
 
 
 def _questionnaire(source: YamlFile, place: Place, value: Any) -> dict[str, Any] | None:

@@ -19,7 +19,7 @@ class StreamNeed(Settings):
 
     type: str | None = None
     """LSL type: ``EEG``, ``Gaze``, ``Markers``. By its type alone any stream on the network fits, a
-    neighbour's as well: a check asks whether that is meant."""
+    neighbour's as well: a check asks whether that is meant, and a run which one is."""
 
     name: str | None = None
     """LSL name."""
@@ -28,8 +28,9 @@ class StreamNeed(Settings):
     """LSL source id."""
 
     several: bool = False
-    """Whether all streams that fit are meant. Otherwise one is, and a session does not begin while
-    two fit: another program's stream derived from yours is of its type as well."""
+    """Whether all streams that fit are meant, and none is asked about. Otherwise one is, and a
+    session does not begin while two fit: another program's stream derived from yours is of its type
+    as well."""
 
     required: bool = True
     """Whether a session starts only when it flows."""

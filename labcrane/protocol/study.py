@@ -17,6 +17,7 @@ from labcrane.protocol.components import ComponentResolver, ComponentSpec
 from labcrane.protocol.protocol import DEFAULT_OPERATOR, Protocol, read
 from labcrane.protocol.references import Parts, ReferenceChecker, twice
 from labcrane.protocol.steps import Block
+from labcrane.protocol.tracks import Track
 from labcrane.registry.call_monitor import CallMonitor
 from labcrane.registry.registry import Registry
 
@@ -46,10 +47,12 @@ class Study:
         What looks at the signals of streams; None for all that are installed.
     others
         Components of roles that have no place of their own here, by the part they play.
-    oversight
+    call_monitor
         Watches over all components that are built.
     recorded
         Whether it was read as the record of what was run.
+    beyond_operator
+        Where axes and buttons are named that the input has, and the operator has not.
     outdated
         What would be refused of it today, where it is gone on with as it was begun.
     source
@@ -74,8 +77,9 @@ class Study:
     views: dict[str, ComponentSpec] = field(default_factory=dict)
     monitors: dict[str, ComponentSpec] | None = None
     others: Mapping[str, ComponentSpec] = field(default_factory=dict)
-    oversight: CallMonitor = field(default_factory=CallMonitor)
+    call_monitor: CallMonitor = field(default_factory=CallMonitor)
     recorded: bool = False
+    beyond_operator: tuple[tuple[Place, str], ...] = ()
     outdated: str = ""
     source: YamlFile | None = field(default=None, repr=False, compare=False)
 
@@ -101,6 +105,11 @@ class Study:
             **{f"{kind}.{name}": choice for kind in named for name, choice in named[kind].items()},
             **self.others,
         }
+
+    @property
+    def written(self) -> Mapping[str, object]:
+        """What the protocol's file has at its top level, as it stands there; none of a record's."""
+        return self.source.data if self.source else {}
 
     def where(self, place: Place) -> str:
         """Return file, line and column of what the protocol has at ``place``."""
@@ -151,7 +160,11 @@ MOST_TRIALS = 100_000
 def trials_of(block: Block, protocol: Protocol, task: Task) -> tuple[float, float]:
     """Return about how many trials a block has, and how long they take in s, without a plan."""
     share = float(block.repeat * (block.until.rounds if block.until else 1))
+    track = protocol.design.tracks.get(block.track)
     for factor, levels in task.factors().items():
+        if track is not None and factor == track.factor:
+            share *= track.rounds / len(levels)
+            continue
         times = protocol.design.order[factor].times if factor in protocol.design.order else 1
         used = block.limits.get(factor)
         share *= times if not isinstance(used, int) else min(used / len(levels), times)
@@ -200,8 +213,59 @@ class Checker:
                 message = f"there is no task {block.task!r}; {there}"
                 self._source.problem((*place, "task"), message)
             elif task := tasks.get(block.task):
+                if block.track and not self._track(place, block, task):
+                    continue
                 self._limits(place, block.limits, task)
                 self._count(place, block, task)
+
+    def _track(self, place: Place, block: Block, task: Task) -> bool:
+        """Note what is wrong with a block's track, for its task; return whether all is right."""
+        tracks = self._protocol.design.tracks
+        track = tracks.get(block.track)
+        if track is None:
+            there = nearest(block.track, tracks, "there is")
+            self._source.problem((*place, "track"), f"there is no track {block.track!r}; {there}")
+            return False
+        at: Place = ("design", "tracks", block.track)
+        factors = task.factors()
+        if track.factor not in factors:
+            there = nearest(track.factor, factors, "it varies")
+            message = f"task {block.task!r} does not vary {track.factor!r}; {there}"
+            self._source.problem((*at, "factor"), message)
+            return False
+        if track.factor in block.limits:
+            message = f"track {block.track!r} chooses {track.factor}; drop the limit"
+            self._source.problem((*place, track.factor), message, key=True)
+            return False
+        levels = factors[track.factor]
+        if unknown := [name for name in track.levels if name not in levels]:
+            for name in unknown:
+                message = f"{track.factor} has no level {name!r}; {nearest(name, levels, 'it has')}"
+                self._source.problem((*at, "levels", name), message, key=True)
+            return False
+        results = [column for signal in task.results for column in signal.columns]
+        if track.measure and track.measure not in results:
+            there = nearest(track.measure, results, "it has")
+            message = f"task {block.task!r} has no result {track.measure!r}; {there}"
+            self._source.problem((*at, "measure"), message)
+            return False
+        return self._alike(at, track, task)
+
+    def _alike(self, at: Place, track: Track, task: Task) -> bool:
+        """Note levels with other trials than the first: a round would not be a round."""
+        made = {
+            level: [each.counted for each in task.plan({**task.factors(), track.factor: (level,)})]
+            for level in track.levels
+        }
+        first, *others = made
+        odd = [level for level in others if made[level] != made[first]]
+        for level in odd:
+            message = (
+                f"level {level!r} makes {len(made[level])} trials and {first!r} makes "
+                f"{len(made[first])}; a track needs levels that make as many"
+            )
+            self._source.problem((*at, "levels", level), message, key=True)
+        return not odd
 
     def _blocks(self) -> Iterator[tuple[Place, Block]]:
         for number, session in enumerate(self._protocol.sessions):
@@ -319,6 +383,7 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
     if protocol is not None:
         Checker(source, protocol).check(tasks, questionnaires)
     monitors, others = chooser.choose_monitors(), chooser.choose_others()
+    beyond: tuple[tuple[Place, str], ...] = ()
     if machine and not recorded:
         chosen: dict[Place, ComponentSpec | None] = {
             ("input",): device,
@@ -331,7 +396,9 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
             **{tuple(part.split(".", 1)): choice for part, choice in others.items()},
         }
         there = {place: choice for place, choice in chosen.items() if choice}
-        ReferenceChecker(source, Parts(machine[0], there, tasks)).check()
+        references = ReferenceChecker(source, Parts(machine[0], there, tasks))
+        references.check()
+        beyond = tuple(references.beyond_the_operator())
     source.raise_problems()
     if not (protocol and machine and device and operator and scheme and dynamics):
         raise AssertionError("a missing part is a problem, and problems were raised")
@@ -354,7 +421,8 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
         views=views,
         monitors=monitors,
         others=others,
-        oversight=chooser.oversight,
+        call_monitor=chooser.call_monitor,
         recorded=recorded,
+        beyond_operator=beyond,
         source=source,
     )

@@ -1,4 +1,4 @@
-"""Reads back the streams of others, with what the recorder noted about them.
+"""Streams of others, read back with what the recorder noted about them.
 
 Beside a stream ``EEG``, its journal holds ``EEG|probes``, ``EEG|arrivals`` and ``EEG|notes``, each
 with the number of the stream it belongs to in ``desc/of``.

@@ -1,4 +1,4 @@
-"""Reads back what a session's journals hold."""
+"""Reader of what a session's journals hold."""
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence

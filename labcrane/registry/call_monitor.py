@@ -1,4 +1,4 @@
-"""Watches over components: which one is running, how long it takes, whether it keeps its word.
+"""Monitor of calls to components: which is running, how long it takes, whether it keeps its word.
 
 Every call of a component that fails becomes a :class:`PluginError` that names component, plugin,
 tick and line. Errors of labcrane's own kind pass as they are: they are the plugin's own words.

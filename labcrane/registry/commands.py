@@ -1,9 +1,9 @@
-"""Find the commands that installed plugins offer."""
+"""Commands that installed plugins offer."""
 
 from collections.abc import Iterable, Mapping
-from importlib.metadata import EntryPoint
 
 from labcrane.errors import PluginError
+from labcrane.registry.entry_points import EntryPoint
 from labcrane.registry.loader import PluginModules, offered
 from labcrane.registry.offers import CommandOffer
 

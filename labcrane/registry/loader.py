@@ -1,10 +1,9 @@
-"""Import plugins: those that are installed, and the files in a study's own folder."""
+"""Loader of plugins: those that are installed, and the files in a study's own folder."""
 
 import hashlib
 import sys
 from collections.abc import Callable, Collection, Iterable, Set
 from importlib.machinery import SourceFileLoader
-from importlib.metadata import EntryPoint
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import CodeType, ModuleType
@@ -13,7 +12,7 @@ from typing import Any, NamedTuple, TypeVar
 import pluggy
 
 from labcrane.errors import PluginError, suggestion
-from labcrane.registry.entry_points import entry_points_of
+from labcrane.registry.entry_points import EntryPoint, entry_points_of
 from labcrane.registry.hookspecs import PROJECT, ROLES, labcrane_commands
 from labcrane.registry.offers import API
 from labcrane.registry.traceback import told

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from labcrane.types import FloatArray
 
 
-def watched(component: Component, name: str, plugin: str, oversight: CallMonitor) -> Component:
-    """Return ``component`` under oversight; what runs in a process of its own as it is."""
+def watched(component: Component, name: str, plugin: str, call_monitor: CallMonitor) -> Component:
+    """Return ``component`` under a call monitor; what runs in a process of its own as it is."""
     for role, entry in ROLES.items():
         if entry.returns is not None and isinstance(component, role):
-            return _proxy_of(role)(component, f"{entry.word} {name!r}", plugin, oversight, entry)
+            return _proxy_of(role)(component, f"{entry.word} {name!r}", plugin, call_monitor, entry)
     return component
 
 
@@ -47,22 +47,22 @@ def hurried(components: Iterable[Component]) -> Iterator[None]:
 
 
 class _Proxy(Component):
-    """A component under oversight; its methods are set by :meth:`watch`, its attributes asked."""
+    """A component whose calls are watched: methods by :meth:`watch`, attributes asked."""
 
     def __init__(
         self,
         component: Component,
         called: str,
         plugin: str,
-        oversight: CallMonitor,
+        call_monitor: CallMonitor,
         entry: RoleEntry,
     ) -> None:
         self._inner = component
-        self._oversight = oversight
+        self._call_monitor = call_monitor
         self._layout = Layout(called, component.signals)
         self._returns = entry.returns or {}
         self._number = {
-            method: oversight.place(called, plugin, method, getattr(component, method))
+            method: call_monitor.place(called, plugin, method, getattr(component, method))
             for method in dir(type(self))
             if not method.startswith("_") and method != "watch"
             if callable(getattr(type(self), method))
@@ -76,10 +76,12 @@ class _Proxy(Component):
         """Set every method anew."""
         for method, number in self._number.items():
             function = getattr(self._inner, method)
-            call = self._oversight.watched(number, function, self._check(method), closely=closely)
+            call = self._call_monitor.watched(
+                number, function, self._check(method), closely=closely
+            )
             vars(self)[method] = call
         if isinstance(self, InputDevice):  # the first that a tick enters
-            vars(self)["read"] = _beginning(self._oversight, vars(self)["read"])
+            vars(self)["read"] = _beginning(self._call_monitor, vars(self)["read"])
 
     def _check(self, method: str) -> Callable[[Any], None] | None:
         """Return what looks at what a method returned."""
@@ -103,7 +105,7 @@ class _Proxy(Component):
         def check(values: FloatArray) -> None:
             nonlocal known
             if not (values is known and isfinite(values.dot(values))):
-                self._oversight.check(number, values, self._layout, finite=True)
+                self._call_monitor.check(number, values, self._layout, finite=True)
                 known = values
 
         return check
@@ -117,17 +119,17 @@ class _Proxy(Component):
             if judgement is last:
                 return
             if not isinstance(judgement, TrialStatus):
-                raise PluginError(self._oversight.complaint(number, f"returned {judgement!r}"))
-            self._oversight.check(number, judgement.values, self._layout, finite=False)
+                raise PluginError(self._call_monitor.complaint(number, f"returned {judgement!r}"))
+            self._call_monitor.check(number, judgement.values, self._layout, finite=False)
             last = judgement
 
         return check
 
 
 def _beginning(
-    oversight: CallMonitor, read: Callable[[Tick, Frame], FloatArray]
+    call_monitor: CallMonitor, read: Callable[[Tick, Frame], FloatArray]
 ) -> Callable[[Tick, Frame], FloatArray]:
-    begin_tick = oversight.begin_tick
+    begin_tick = call_monitor.begin_tick
 
     def begin(tick: Tick, seen: Frame) -> FloatArray:
         begin_tick(tick.number)

@@ -1,4 +1,4 @@
-"""Imports modules that greet from C, without what they print."""
+"""Import of modules that greet from C, without what they print."""
 
 import os
 import sys

@@ -1,7 +1,6 @@
-"""Find installed plugins and look up what they offer."""
+"""Registry of installed plugins and of what they offer."""
 
 from collections.abc import Collection, Iterable, Mapping
-from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import TypeVar, cast
 
@@ -9,6 +8,7 @@ import pluggy
 
 from labcrane.core.roles import Component
 from labcrane.errors import PluginError, suggestion
+from labcrane.registry.entry_points import EntryPoint
 from labcrane.registry.hookspecs import ROLES
 from labcrane.registry.loader import PluginModules, offered
 from labcrane.registry.offers import Offer

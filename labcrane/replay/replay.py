@@ -28,6 +28,7 @@ from labcrane.registry.registry import discover
 from labcrane.replay.restore import differing_parts, restore
 from labcrane.replay.script import RecordOver, Script
 from labcrane.session import loop
+from labcrane.session.resume import Ledger, Progress, carried_in
 from labcrane.session.sequencer import Sequencer
 
 if TYPE_CHECKING:
@@ -147,7 +148,8 @@ def _run(
         run = closing.enter_context(rig.opened(study, plan.seed))
         log = _Log(run, script)
         waits = not bool(record.context["simulated"])
-        sequencer = Sequencer(study, plan, rig, waits=waits, awaits=script.awaited)
+        ledger = Ledger(study, plan, Progress(carried=carried_in(record.context)))
+        sequencer = Sequencer(study, plan, rig, waits=waits, awaits=script.awaited, ledger=ledger)
         shown: list[Callable[[Frame], None]] = []
         if speed is not None:
             show = _Show(run, f"replay/{participant}/ses-{session:02}", speed)

@@ -38,6 +38,7 @@ class Order(StrEnum):
     CONSENT = "consent"  # to the text of this version, given before the session begins
     DENIED = "denied"  # said by a page: somebody without the right asked for something
     SETTING = "setting"  # change a setting of a cue or sound: tone.far=3
+    TAKE = "take"  # a stream that only its type asks for: eeg, eeg=amplifier-1 or eeg=none
 
 
 KINDS = {
@@ -174,6 +175,8 @@ def read_request(command: Command) -> Request:
             return Malformed(order, f"a setting is written name.key=value, not {text!r}")
         case Order.SUBMIT:
             return Submission()
+        case Order.TAKE:
+            return Malformed(order, "no stream is asked about")  # a launcher has taken it up
     return OF_WORDS[order](text) if order in OF_WORDS else Control(order)
 
 
@@ -285,12 +288,12 @@ def decode(line: bytes) -> Message:
         raise MessageError(f"{len(line)} bytes that are no message to a session") from error
 
 
-def by_whom(command: Command) -> str:
+def given_by(command: Command) -> str:
     """Return who gave an order: a page by its name, or the terminal."""
     return command.by or "terminal"
 
 
-def whence(command: Command) -> dict[str, Value]:
+def given_from(command: Command) -> dict[str, Value]:
     """Return from which address a page ordered, as data of an event; nothing for the terminal."""
     return {"at": command.at} if command.at else {}
 
@@ -332,7 +335,7 @@ class QueueConsole:
         why = beyond_limits(command)
         if why is not None:
             why = f"{command.order.value}: {why}"
-            command = Command(Order.DENIED, why, by_whom(command), command.at)
+            command = Command(Order.DENIED, why, given_by(command), command.at)
         self._orders.put(command)
 
     def commands(self) -> list[Command]:

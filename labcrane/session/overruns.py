@@ -1,4 +1,4 @@
-"""Tells of components that take longer than a tick has."""
+"""Overruns: components that take longer than a tick has, and are told of."""
 
 from labcrane.core.records import Event, Frame
 from labcrane.recording.frame_log import FrameLog
@@ -16,12 +16,12 @@ class OverrunReporter:
     """Looks once a second which components were slow, and notes it as an event."""
 
     def __init__(
-        self, oversight: CallMonitor, rate_hz: float, log: FrameLog, console: Console
+        self, call_monitor: CallMonitor, rate_hz: float, log: FrameLog, console: Console
     ) -> None:
-        self._oversight = oversight
+        self._call_monitor = call_monitor
         self._log = log
         self._console = console
-        self._period = oversight.patience_s = 1.0 / rate_hz
+        self._period = call_monitor.patience_s = 1.0 / rate_hz
         self._look_at = 0.0
         self._told: dict[object, float] = {}
 
@@ -30,7 +30,7 @@ class OverrunReporter:
         if now < self._look_at:
             return
         self._look_at = now + 1.0
-        for place, overrun in self._oversight.overruns.items():
+        for place, overrun in self._call_monitor.overruns.items():
             if overrun.calls <= FEW or now < self._told.get(place, 0.0):
                 continue
             self._told[place] = now + AGAIN_S
@@ -47,4 +47,4 @@ class OverrunReporter:
             )
             self._log.append(event, frame.tick.number)
             self._console.report(event)
-        self._oversight.overruns.clear()
+        self._call_monitor.overruns.clear()

@@ -15,6 +15,7 @@ import numpy as np
 from labcrane.core.records import Phase, Trial, Value
 from labcrane.design.counts import TableNumbers, TrialCounts, numbers, spans
 from labcrane.design.plan import Owed, PlannedBlock, PlannedStep, SessionPlan, next_attempt
+from labcrane.design.tracks import LEVEL, PlannedTrack, Response, Standing, check_carried
 from labcrane.errors import ProtocolError
 from labcrane.protocol.study import Study
 from labcrane.recording.journal_reader import LoggedEvent, SessionLog, read_journal
@@ -69,6 +70,10 @@ class Progress:
         The same of what is asked after trials, by trial and questionnaire.
     held
         Who of the people in the room held it: the examiner, a stop rule.
+    responses
+        What every trial told its track, by trial number, in the order in which they ended.
+    carried
+        What trials of earlier sessions told their tracks.
     """
 
     stop: str = KILLED
@@ -86,6 +91,8 @@ class Progress:
     ratings: dict[tuple[int, str], dict[str, Value]] = field(default_factory=dict)
     rated: set[tuple[int, str]] = field(default_factory=set)
     held: set[str] = field(default_factory=set)
+    responses: dict[int, Response] = field(default_factory=dict)
+    carried: tuple[Response, ...] = ()
 
     def take(self, name: str, data: Mapping[str, Any], *, closes: bool = True) -> None:
         """Take up an event.
@@ -99,6 +106,7 @@ class Progress:
         match name:
             case "session.start":
                 self.stop, self.called_complete = KILLED, False
+                self.carried = carried_in(data)
             case "session.end":
                 self.stop = str(data["reason"])
                 self.called_complete = self.stop == COMPLETE
@@ -107,6 +115,7 @@ class Progress:
             case "session.resumed":
                 for number in numbers(data["void"]):
                     self.done.pop(number, None)
+                    self.responses.pop(number, None)
             case "step.end" if data.get("done", closes):
                 self.steps.add(data["step"])
             case "trial.start" | "trial.end":
@@ -122,6 +131,7 @@ class Progress:
             self.attempts[number] = data["attempt"]
             self.begun[number] = self.interrupted = data
             self.done.pop(number, None)  # of two attempts the later one counts
+            self.responses.pop(number, None)
             self.broken.discard(number)
             for asked in [key for key in self.rated | set(self.ratings) if key[0] == number]:
                 self.rated.discard(asked)
@@ -133,6 +143,8 @@ class Progress:
             self.broken.add(number)
         elif outcome is not Phase.REPEATED:
             self.done[number] = outcome
+            if (response := Response.of(data)) is not None:
+                self.responses[number] = response
 
     def _take_questionnaire(self, name: str, data: Mapping[str, Any], *, closes: bool) -> None:
         rating = "trial" in data
@@ -154,6 +166,38 @@ class Progress:
 
 EXAMINER, STOP = "examiner", "stop rule"
 """The people who can hold a session: it goes on when they say so, also after a resumption."""
+
+
+def carried_in(context: Mapping[str, Any]) -> tuple[Response, ...]:
+    """Return what a session's context says that its tracks go on from."""
+    return tuple(Response(**each) for each in context.get("carried", ()))
+
+
+def carry(study: Study, journals: Sequence[Path]) -> tuple[Response, ...]:
+    """Return what earlier sessions told the tracks that go on from session to session.
+
+    Parameters
+    ----------
+    journals
+        The first parts of those sessions' journals, in their order; one that was not held has none.
+
+    Raises
+    ------
+    ProtocolError
+        A track has lost a level since.
+    """
+    tracks = {name: each for name, each in study.protocol.design.tracks.items() if each.carry}
+    if not tracks:
+        return ()
+    told = [
+        each
+        for journal in journals
+        if parts(journal)
+        for each in progress(journal, study.machine.names).responses.values()
+        if each.track in tracks and each.success is not None
+    ]
+    check_carried(tracks, told)
+    return tuple(told)
 
 
 def progress(journal: Path, joints: Sequence[str]) -> Progress:
@@ -213,19 +257,9 @@ def check_recorded(plan: SessionPlan, so_far: Progress) -> None:
     ProtocolError
         A trial was recorded that the plan does not have, or has otherwise.
     """
-    planned = {
-        trial.number: {
-            "block": block.number,
-            "block_name": block.name,
-            "practice": block.practice,
-            "counted": trial.planned.counted,
-            **trial.planned.condition,
-        }
-        for block in plan.blocks
-        for trial in block.trials
-    }
+    planned = {trial.number: (block, trial) for block in plan.blocks for trial in block.trials}
     for number, said in sorted(so_far.begun.items()):
-        about = planned.get(number, {})
+        about = _about(*planned[number], said) if number in planned else {}
         wrong = [name for name, value in about.items() if said.get(name) != value]
         if wrong or not about:
             was = ", ".join(f"{name} {said.get(name)!r}" for name in wrong) or "recorded"
@@ -235,6 +269,20 @@ def check_recorded(plan: SessionPlan, so_far: Progress) -> None:
                 f"has {has}; go on with the protocol, and the place in the design, with which it "
                 "was begun"
             )
+
+
+def _about(block: PlannedBlock, trial: Trial, said: Mapping[str, Any]) -> dict[str, Value]:
+    """Return what is said at a trial's start, at the level that its track chose if it has one."""
+    level = str(said.get(LEVEL))
+    chosen = block.track.at(trial.number, level) if block.track is not None else None
+    planned = chosen or trial.planned
+    return {
+        "block": block.number,
+        "block_name": block.name,
+        "practice": block.practice,
+        "counted": planned.counted,
+        **planned.condition,
+    }
 
 
 class Ledger:
@@ -257,6 +305,16 @@ class Ledger:
     def owed(self) -> SessionPlan:
         """Return what is still owed, given up or not."""
         return remaining(self._study, self._whole, self._so_far, "redo_trial")
+
+    def chosen(self, block: PlannedBlock, trial: Trial) -> Trial | None:
+        """Return a trial as the block's track wants it now; None when it has come to its end."""
+        if block.track is None:
+            return trial
+        return block.track.choose(trial, self._so_far.responses, self._so_far.carried)
+
+    def stands(self, track: PlannedTrack) -> Standing:
+        """Return where a track stands."""
+        return track.stands(self._so_far.responses, self._so_far.carried)
 
 
 def remaining(study: Study, plan: SessionPlan, so_far: Progress, policy: Policy) -> SessionPlan:
@@ -300,6 +358,9 @@ def _rest(
     left: list[Trial] = []
     if not warm_up.over:
         left = [trial for trial in block.trials if trial.number not in so_far.done]
+    if left and block.track is not None:
+        chosen = block.track.choose(left[0], so_far.responses, so_far.carried)
+        left = left if chosen is not None else []
     begun = [trial.number for trial in block.trials if trial.number in so_far.attempts]
     if policy == "redo_block" and left and begun:
         attempt = 1 + max(so_far.attempts[number] for number in begun)

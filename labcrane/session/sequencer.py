@@ -27,9 +27,9 @@ from labcrane.session.commands import (
     Sighting,
     Submission,
     beyond_limits,
-    by_whom,
+    given_by,
+    given_from,
     read_request,
-    whence,
 )
 from labcrane.session.live_settings import FeedbackSettings
 from labcrane.session.pause import DISK, INPUT, Suspenders
@@ -207,9 +207,15 @@ class Sequencer:
         for trial in block.trials:
             if self._held.ending or (block.until and self._warm_up.over):
                 break  # also at once: it may have been begun for what was still to be asked
-            yield from self._trial(block, trial)
+            chosen = self._ledger.chosen(block, trial)
+            if chosen is None:
+                break  # its track has come to its end
+            yield from self._trial(block, chosen)
             for name in block.ask if trial.planned.counted else ():
                 yield from self._ask(name, {}, trial)
+        if block.track is not None:
+            where = self._ledger.stands(block.track)
+            self._note("track.end", **about, track=block.track.name, **where.row)
         self._note("block.end", **about)
         if not self._held.ending and (verdict := self._warm_up.verdict(block)) is not None:
             self._note("practice.end", **about, **verdict)
@@ -284,7 +290,7 @@ class Sequencer:
 
     def _take(self, command: Command, request: Request) -> None:
         asking = self._asking
-        about: dict[str, Value] = {"by": by_whom(command), **whence(command)}
+        about: dict[str, Value] = {"by": given_by(command), **given_from(command)}
         match request:
             case Denial(why):
                 self._note("page.denied", why=why, **about)
@@ -344,7 +350,8 @@ class Sequencer:
             case Control(Order.SKIP) if self._stage not in STAGES:
                 return "no trial, break or questionnaire is running"
             case Control(Order.START) if self._stage != "waiting" and not self._paused:
-                return "nothing waits to start"
+                awaited = ", ".join(sorted(self._held.awaited))
+                return f"feedback {awaited} is awaited" if awaited else "nothing waits to start"
             case Control(Order.PAUSE) if EXAMINER in self._held:
                 return "the session is paused already"
             case Answer() | Submission():

@@ -1,4 +1,4 @@
-"""Run one session: open the rig, lead it through its plan, leave a participant file."""
+"""Session: the rig is opened, led through its plan, and leaves a participant file."""
 
 import gc
 from collections.abc import Callable, Iterator, Mapping
@@ -14,6 +14,7 @@ from labcrane.core.records import Event, Frame, Phase, Run
 from labcrane.core.roles import Trigger
 from labcrane.design.counts import TrialCounts
 from labcrane.design.plan import SessionPlan, plan_session
+from labcrane.design.tracks import Response
 from labcrane.doctor.scheduling import lateness
 from labcrane.errors import DeviceError, PluginError, ProtocolError
 from labcrane.files.lock import held
@@ -23,7 +24,7 @@ from labcrane.recording.crash_marker import CrashMarker, read_whereabouts
 from labcrane.recording.frame_log import BatchLog, FrameLog, columns, frame_bytes
 from labcrane.recording.journal import SessionJournal
 from labcrane.recording.participant_file.writer import consolidate
-from labcrane.recording.paths import next_part, parts
+from labcrane.recording.paths import journal_path, next_part, parts
 from labcrane.registry.proxies import hurried
 from labcrane.session import loop
 from labcrane.session.commands import Console
@@ -36,6 +37,7 @@ from labcrane.session.resume import (
     Ledger,
     Policy,
     Progress,
+    carry,
     check_recorded,
     done_before,
     owed_text,
@@ -187,6 +189,7 @@ def _record(
     so_far, plan = go_on(visit, whole) if visit.resumed else (None, whole)
     if so_far is None:
         claim(visit)
+    carried = _carried(visit) if so_far is None else so_far.carried
     rig = Rig.build(study, simulated=visit.simulated)
     clock = _clock(visit, so_far)
     died = read_whereabouts(visit.whereabouts) if visit.resumed else None
@@ -200,6 +203,8 @@ def _record(
         second = frame_bytes(run) * run.rate_hz
         visit.folder.check_space(plan.expected_s, second, RESERVE_S)
         about = context(visit, plan, rig, run) | admission.context | scheduling
+        if study.protocol.design.tracks:
+            about["carried"] = [asdict(each) for each in carried]
         awaits = (*study.views, *study.sounds) if visit.feedback else ()
         opening = list(_opening(about, so_far, died, clock.now()))
         if so_far is not None:
@@ -221,7 +226,7 @@ def _record(
             ):
                 sinks = [*triggers, *outlets, _teller(console)]
                 if not visit.fast:
-                    sinks.append(OverrunReporter(study.oversight, run.rate_hz, log, console))
+                    sinks.append(OverrunReporter(study.call_monitor, run.rate_hz, log, console))
                 ahead = None
                 if forward is not None and isinstance(log, BatchLog):
                     ahead = forward(rig, run, sequencer, log)
@@ -238,11 +243,18 @@ def _record(
             log.close()
 
 
+def _carried(visit: Visit) -> tuple[Response, ...]:
+    """Return what the tracks of a new session go on from."""
+    folder = visit.folder.path
+    journals = [journal_path(folder, number, "run") for number in range(1, visit.session)]
+    return carry(visit.study, journals)
+
+
 def _watching(visit: Visit, rig: Rig) -> AbstractContextManager[None]:
     if visit.fast:
         visit.whereabouts.unlink(missing_ok=True)  # of a process that died, and was read
         return hurried((*rig.components, *rig.tasks.values()))
-    return visit.study.oversight.published(visit.whereabouts)
+    return visit.study.call_monitor.published(visit.whereabouts)
 
 
 @contextmanager

@@ -1,8 +1,11 @@
 """One attempt at a trial, from its start to its row in the trial table."""
 
+from collections.abc import Mapping
+
 from labcrane.core.records import Event, Frame, Phase, Trial, TrialStatus, Value
 from labcrane.core.roles import Task
 from labcrane.design.plan import PlannedBlock
+from labcrane.design.tracks import SUCCESS
 
 
 class TrialRun:
@@ -37,6 +40,8 @@ class TrialRun:
         self.completion: bool | None = None
         self._trial = trial
         self._task = task
+        self._track = block.track.settings if block.track and trial.planned.counted else None
+        self._tracked = block.track is not None
         self._rate_hz = rate_hz
         self._period = 1.0 / rate_hz
         self._ticks = 0
@@ -108,6 +113,7 @@ class TrialRun:
             **self.about,
             "outcome": str(self.phase),
             **results,
+            **self._told(results),
             "completion": None if self.completion is None else int(self.completion),
             "started": self._began,
             "ended": frame.tick.due,
@@ -116,3 +122,10 @@ class TrialRun:
             "late_ticks": self._late_ticks,
             "worst_lateness": self._worst_s,
         }
+
+    def _told(self, results: Mapping[str, Value]) -> dict[str, Value]:
+        """Return what the trial tells its track; nothing without one."""
+        if not self._tracked:
+            return {}
+        success = None if self._track is None else self._track.judge(self.phase, results)
+        return {SUCCESS: None if success is None else int(success)}

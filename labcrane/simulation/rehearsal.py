@@ -235,7 +235,7 @@ class _Drawing:
 
     def __init__(self, study: Study, run: Run) -> None:
         self._left = DRAWN
-        self._oversight = study.oversight
+        self._call_monitor = study.call_monitor
         self._cues: list[tuple[str, Cue, tuple[int, int]]] = []
         for name, choice in study.cues.items():
             cue = choice.build(study.machine)
@@ -250,8 +250,8 @@ class _Drawing:
             return
         self._left -= 1
         for called, cue, (draw, values) in self._cues:
-            self._oversight.call(draw, cue.draw, frame)
-            self._oversight.call(values, promised, called, cue.signals, cue.values, frame)
+            self._call_monitor.call(draw, cue.draw, frame)
+            self._call_monitor.call(values, promised, called, cue.signals, cue.values, frame)
 
     def close(self) -> None:
         """Close them all."""
@@ -259,9 +259,9 @@ class _Drawing:
             cue.close()
 
     def _number(self, name: str, choice: ComponentSpec, method: Callable[..., object]) -> int:
-        return self._oversight.place(f"cue {name!r}", choice.plugin, method.__name__, method)
+        return self._call_monitor.place(f"cue {name!r}", choice.plugin, method.__name__, method)
 
     def _call(
         self, name: str, choice: ComponentSpec, method: Callable[[Run], object], run: Run
     ) -> None:
-        self._oversight.call(self._number(name, choice, method), method, run)
+        self._call_monitor.call(self._number(name, choice, method), method, run)

@@ -41,6 +41,8 @@ def situation_after(
     counts = {**situation.counts, event.name: situation.counts.get(event.name, 0) + 1}
     now = replace(situation, counts=counts)
     match event.name:
+        case "session.start":  # of a part: another process, which knows of nothing before
+            return SessionState(trials=situation.trials, done=situation.done)
         case "step.start":
             return replace(now, step=data["step"], kind=data["kind"])
         case "block.start":

@@ -16,6 +16,13 @@ MARKER_TYPES = frozenset({"marker", "markers", "event", "events"})
 OURS = "labcrane."
 """Streams of labcrane itself are recorded when asked for by name or source id only."""
 
+Identity = tuple[str, str, str]
+"""What a stream is known again by when its program is started again: its source id, where it has
+one that lasts, its name and its type."""
+
+NOBODY: Identity = ("", "", "")
+"""No stream: one that is asked for by its type has a type."""
+
 RANDOM_ID = re.compile(r"-?[0-9]{15,20}")
 """What pylsl makes up when a program gives no source id: another one in every process."""
 
@@ -39,7 +46,11 @@ class StreamRequest:
     several
         Whether all streams that fit are meant, and not one.
     any_meant
-        Whether somebody said that any stream of the type is meant.
+        Whether a protocol is written for any stream of the type, each laboratory's own: a run asks
+        all the same which one it is.
+    confirmed
+        The one stream of the type that somebody said is meant, :data:`NOBODY` where none is; None
+        as long as nobody was asked.
     """
 
     label: str
@@ -52,6 +63,7 @@ class StreamRequest:
     counter: str | None = None
     several: bool = False
     any_meant: bool = False
+    confirmed: Identity | None = None
 
     def __post_init__(self) -> None:
         if self.type is None and self.name is None and self.source_id is None:
@@ -67,10 +79,13 @@ class StreamRequest:
             raise StreamError(
                 f"a stream request has no {', '.join(unknown)}; it has {', '.join(known)}"
             )
-        return cls(**fields)
+        confirmed = fields.get("confirmed")
+        return cls(**{**fields, "confirmed": None if confirmed is None else tuple(confirmed)})
 
     def matches(self, info: "pylsl.StreamInfo") -> bool:
-        """Whether a stream is one of those asked for."""
+        """Whether a stream is one of those asked for, or may be."""
+        if self.confirmed is not None:
+            return identity(info) == self.confirmed
         if self.name is not None and info.name() != self.name:
             return False
         if self.source_id is not None and info.source_id() != self.source_id:
@@ -86,13 +101,18 @@ class StreamRequest:
         """Whether any stream of a type fits, a neighbour's as well."""
         return self.name is None and self.source_id is None
 
+    @property
+    def asks(self) -> bool:
+        """Whether somebody must say first which stream of a type is meant."""
+        return self.by_type_alone and not self.several and self.confirmed is None
+
     def taken(self, name: str, source_id: str, host: str) -> str | None:
-        """Say which stream was taken where any of its type would have been; else None."""
+        """Say which stream was taken where any of its type would have fitted; else None."""
         if not self.by_type_alone or self.several:
             return None
         return (
-            f"was taken by type {self.type!r} alone: it is {name!r} (source_id {source_id!r}) of "
-            f"{host}; write that source_id in the protocol if it is meant"
+            f"is asked for by type {self.type!r} alone, and was confirmed: it is {name!r} "
+            f"(source_id {source_id!r}) of {host}"
         )
 
     def misfits(self, channels: int, rate_hz: float) -> list[str]:
@@ -107,6 +127,12 @@ class StreamRequest:
     def __str__(self) -> str:
         wanted = {"type": self.type, "name": self.name, "source_id": self.source_id}
         return f"{self.label} ({', '.join(f'{k} {v!r}' for k, v in wanted.items() if v)})"
+
+
+def identity(info: "pylsl.StreamInfo") -> Identity:
+    """Return what a stream is known again by."""
+    lasts = unstable_id(info.source_id()) is None
+    return info.source_id() if lasts else "", info.name(), info.type()
 
 
 def same_type(wanted: str, actual: str) -> bool:

@@ -10,7 +10,8 @@ from labcrane.core.roles import Trigger
 from labcrane.errors import PluginError
 from labcrane.streams.markers import CODES
 
-SENT, ECHO, LOST, BACK = "trigger.sent", "trigger.echo", "trigger.lost", "trigger.back"
+SENT, UNSENT, ECHO = "trigger.sent", "trigger.unsent", "trigger.echo"
+LOST, BACK = "trigger.lost", "trigger.back"
 HIGHEST = 255
 """Eight lines carry no more."""
 
@@ -71,15 +72,14 @@ class Triggers:
             wanted = [codes[event.name] for event in frame.events if event.name in codes]
             began = time.perf_counter()
             echoes = line.trigger.send(wanted, began)
-            if wanted:
-                sent = time.perf_counter()
+            sent, fault = time.perf_counter(), line.trigger.fault
+            # One event a tick: what was sent together was sent at one time.
+            data: dict[str, Value] = {"codes": " ".join(map(str, wanted))}
+            if wanted and fault is None:
                 line.waiting.extend((code, began) for code in wanted)
-                # One event a tick: what was sent together was sent at one time.
-                data: dict[str, Value] = {
-                    "codes": " ".join(map(str, wanted)),
-                    "delay_s": sent - frame.tick.due,
-                }
-                self._write(SENT, frame.tick.due, line, data)
+                self._write(SENT, frame.tick.due, line, {**data, "delay_s": sent - frame.tick.due})
+            elif wanted:
+                self._write(UNSENT, frame.tick.due, line, {**data, "why": fault})
             self._take(line, echoes)
             self._look(line, frame)
 

@@ -25,6 +25,7 @@ KEYS: tuple[tuple[str, str], ...] = (
     ("X", "the trial was not completed"),
     ("H", "write a hint to the operator"),
     ("F", "change a setting of a cue or sound"),
+    ("T", "say which stream is meant, where that is asked"),
     ("Q", "fill in the questionnaire"),
     ("D", "dark or light"),
     ("?", "show these keys"),

@@ -23,7 +23,10 @@ STAGES = {
 }
 """Where the session stands after an event that says nothing more of it."""
 
-LOST = {"input": "the controls", "disk": "the disk", "stream": "stream", "feedback": ""}
+LOST = {
+    "input": "the controls", "disk": "the disk", "stream": "stream", "feedback": "",
+    "trigger": "trigger",
+}  # fmt: skip
 """What can be lost, and what it is called."""
 
 
@@ -160,7 +163,7 @@ class SessionView:
     def _fault(self, kind: str, what: str, data: Mapping[str, Value]) -> None:
         """Note what was lost, is back, or stands at another value."""
         name = str(data.get("what", ""))
-        key = f"{kind} {name}".strip()
+        key = f"{kind} {name or data.get('trigger', '')}".strip()
         if (kind, what) == ("feedback", "setting"):
             mine = self.settings.setdefault(str(data["feedback"]), {})
             mine[str(data["key"])] = data["value"]

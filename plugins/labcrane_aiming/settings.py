@@ -79,7 +79,7 @@ class AimingSettings(Settings):
         return {"object": ("target", "other"), "event": EVENTS}
 
     def needs(self, machine: Machine) -> Names:
-        return {"axis": [self.trigger]} if self.end == "trigger" else {}
+        return {"button": [self.trigger]} if self.end == "trigger" else {}
 
     def doubts(self, machine: Machine) -> Mapping[str, str]:
         needed = shortest_s(self, machine)

@@ -1,4 +1,4 @@
-"""Exports recordings as a BIDS 1.11 data set: motion, events, eye tracking."""
+"""Export of recordings as a BIDS 1.11 data set: motion, events, eye tracking."""
 
 from collections.abc import Sequence
 

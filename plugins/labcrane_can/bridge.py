@@ -1,4 +1,4 @@
-"""From a CAN bus to the open gateway protocol and back (docs/gateway.md)."""
+"""Bridge from a CAN bus to the open gateway protocol and back (docs/gateway.md)."""
 
 import math
 import time

@@ -55,7 +55,10 @@ class ValveMap(Settings):
 
     def provides(self, machine: Machine) -> Names:
         pairs = [f"{what}.{joint}" for what in ("valve", "float") for joint in self.valves]
-        named: Names = {"axis": [*pairs, "panel.connected"]}
+        named: Names = {
+            "axis": [*pairs, "panel.connected"],
+            "button": [f"float.{joint}" for joint in self.valves],
+        }
         if self.map is not None and self.map.exists() and find_spec("cantools"):
             from labcrane_can.dbc import every_signal  # noqa: PLC0415 - loads for a moment
 

@@ -1,4 +1,4 @@
-"""Find out which stick is the left one, and where its axes rest and end."""
+"""Procedure that finds which stick is the left one, and where its axes rest and end."""
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence

@@ -20,4 +20,7 @@ class JoystickSettings(Settings):
     T.16000M unless said otherwise."""
 
     def provides(self, machine: Machine) -> Names:
-        return {"axis": [f"{side}.{part}" for side in SIDES for part in PARTS]}
+        return {
+            "axis": [f"{side}.{part}" for side in SIDES for part in PARTS],
+            "button": [f"{side}.trigger" for side in SIDES],
+        }

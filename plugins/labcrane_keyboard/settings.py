@@ -1,9 +1,14 @@
 """Settings of the keyboard."""
 
+from typing import Annotated
+
 from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
 
 from labcrane import Machine, Settings
-from labcrane.core import Names, ViewName
+from labcrane.core import Names, Reference, ViewName
+
+SentKey = Annotated[str, Reference("key of that view", of="view")]
+"""A key that the view sends."""
 
 
 class KeyboardSettings(Settings):
@@ -12,7 +17,7 @@ class KeyboardSettings(Settings):
     view: ViewName
     """Name of the view whose window has the keyboard's focus; the keys must be among its own."""
 
-    axes: dict[str, tuple[str, str]] = Field(min_length=1)
+    axes: dict[str, tuple[SentKey, SentKey]] = Field(min_length=1)
     """Two keys for each axis: the one towards -1, and the one towards 1. A scheme maps the axes as
     ``keyboard.NAME``."""
 

@@ -1,4 +1,4 @@
-"""Exports recordings for machines that learn from them: LeRobot and robomimic."""
+"""Export of recordings for machines that learn from them: LeRobot and robomimic."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Exports recordings as MAT files, version 5, which MATLAB and Octave load."""
+"""Export of recordings as MAT files, version 5, which MATLAB and Octave load."""
 
 from collections.abc import Sequence
 

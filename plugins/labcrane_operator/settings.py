@@ -75,7 +75,11 @@ class OperatorSettings(Settings):
     """How long the trigger of the right stick is pressed at rest inside the target, in seconds."""
 
     def provides(self, machine: Machine) -> Names:
-        return {"axis": [f"{side}.{part}" for side in ("left", "right") for part in STICK]}
+        sides = ("left", "right")
+        return {
+            "axis": [f"{side}.{part}" for side in sides for part in STICK],
+            "button": [f"{side}.trigger" for side in sides],
+        }
 
 
 class RecordedSettings(Settings):

@@ -90,16 +90,18 @@ class OperatorSettings(Settings):
     signal: float = Field(default=0.5, gt=0.0, le=1.0)
     """Share of full signal with which the jaws are moved."""
 
-    button: str | None = Field(default=None, pattern=r"^[a-z][a-z0-9_.]*$")
-    """A button that it has too, like the device it stands for (``float.base`` of a panel); it
-    presses it whenever it has reached a goal, and so reports a deformity that is near enough."""
+    button: ButtonName | None = None
+    """A button of the input that it has too, like the device it stands for (``float.base`` of a
+    panel); it presses it whenever it has reached a goal, and so reports a deformity that is near
+    enough."""
 
     errs: ErrorSettings | None = None
     """How it errs, so that counts and stop rules can be rehearsed; never, by default."""
 
     def provides(self, machine: Machine) -> Names:
         button = [self.button] if self.button else []
-        return {"axis": [*(f"valve.{name}" for name in machine.names), "panel.connected", *button]}
+        valves = [f"valve.{name}" for name in machine.names]
+        return {"axis": [*valves, "panel.connected", *button], "button": button}
 
     def needs(self, machine: Machine) -> Names:
         return {"joint": [self.jaws]}

@@ -1,4 +1,4 @@
-"""What a protocol may say about the monitors of signals."""
+"""Settings of the monitors of signals."""
 
 from typing import Literal
 

@@ -1,4 +1,4 @@
-"""Makes a tone with pyo, to a sound device or block by block into an array."""
+"""Synthesizer of a tone with pyo, to a sound device or block by block into an array."""
 
 import ctypes
 import os

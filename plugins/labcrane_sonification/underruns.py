@@ -1,4 +1,4 @@
-"""Counts the blocks that a sound server was not given in time."""
+"""Underruns: blocks that a sound server was not given in time, counted."""
 
 WINDOW = 64
 """Blocks after which the server's clock is looked at anew: it drifts, and it starts again."""

@@ -1,4 +1,4 @@
-"""Exports recordings as tables: CSV and Parquet for R and pandas, Psych-DS, an archive."""
+"""Export of recordings as tables: CSV and Parquet for R and pandas, Psych-DS, an archive."""
 
 from collections.abc import Sequence
 

@@ -1,10 +1,10 @@
 """Settings of a view."""
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal
+from string import ascii_lowercase, digits
+from typing import Annotated, Literal
 
 from pydantic import (
-    BeforeValidator,
     Field,
     NonNegativeFloat,
     NonNegativeInt,
@@ -14,7 +14,17 @@ from pydantic import (
 from pydantic import PositiveInt as Pixels
 
 from labcrane import Machine, Settings
-from labcrane.core import CameraName, EventName, LinkName, Names, SceneObject, Unit
+from labcrane.core import (
+    CameraName,
+    EventName,
+    LinkName,
+    Names,
+    Preset,
+    Reference,
+    SceneObject,
+    StudyPath,
+    Unit,
+)
 
 Triple = tuple[float, float, float]
 
@@ -75,23 +85,20 @@ CAMERAS: Mapping[str, CameraSettings] = {
 """Cameras that have a name."""
 
 
-def _named(value: Any) -> Any:
-    if not isinstance(value, str):
-        return value
-    if value not in CAMERAS:
-        from difflib import get_close_matches  # noqa: PLC0415 - only a mistake needs it
+Camera = Annotated[CameraSettings, Preset("camera", CAMERAS)]
 
-        meant = "".join(f"did you mean {each!r}? " for each in get_close_matches(value, CAMERAS, 1))
-        raise ValueError(f"there is no camera {value!r}; {meant}there is {', '.join(CAMERAS)}")
-    return CAMERAS[value]
+KEYS = (
+    *ascii_lowercase, *digits, *(f"f{number}" for number in range(1, 17)),
+    "arrow_left", "arrow_right", "arrow_up", "arrow_down", "page_up", "page_down", "home", "end",
+    "space", "enter", "escape", "tab", "backspace", "insert", "delete", "pause", "menu", "help",
+    "shift", "lshift", "rshift", "control", "lcontrol", "rcontrol", "alt", "lalt", "ralt", "meta",
+    "lmeta", "rmeta", "caps_lock", "num_lock", "scroll_lock", "shift_lock", "print_screen",
+    *",.-/;=[]`",
+)  # fmt: skip
+"""What Panda3D calls the keys of a keyboard."""
 
-
-NamedCamera = Annotated[str, Field(json_schema_extra={"enum": list(CAMERAS)})]
-Camera = Annotated[
-    CameraSettings,
-    BeforeValidator(_named, json_schema_input_type=NamedCamera | CameraSettings),
-]
-
+Key = Annotated[str, Reference("key", own=True)]
+"""A key of the keyboard."""
 
 ENTERING = ("target.entered",)
 """Events that tell whether the tip is where it should be."""
@@ -129,6 +136,9 @@ DepthCue = Literal["tip_shadow", "plumb_line", "ground_grid"]
 HudLine = Literal["block", "trial", "distance", "time", "speed", "load", "lateness"]
 """What a line of text can say."""
 
+
+MOST_PIXELS = 16_384
+"""Of a picture's edge; more is no screen, and graphics cards refuse it."""
 
 Screen = NonNegativeInt | Annotated[str, Field(min_length=1)]
 """A monitor: its number, counted from 0, or its name."""
@@ -182,8 +192,9 @@ class ViewSettings(Settings):
     language: Literal["en", "de", "pl"] = "en"
     """Of that text."""
 
-    font: str | None = None
-    """Font file for the text; DejaVu Sans by default, whose digits are as high as capitals."""
+    font: StudyPath | None = None
+    """Font file for the text, beside the protocol; DejaVu Sans by default, whose digits are as
+    high as capitals."""
 
     text_arcmin: PositiveFloat | None = None
     """Height of capitals and digits on the retina, in minutes of arc (ISO 9241-303 asks for 16 at
@@ -206,7 +217,7 @@ class ViewSettings(Settings):
     rate_hz: PositiveFloat | None = None
     """Most pictures per second; as many as the monitor shows by default."""
 
-    keys: tuple[str, ...] = ()
+    keys: tuple[Key, ...] = ()
     """Keys whose state is sent while the window has the focus, for the input ``keyboard``: letters,
     digits, ``arrow_left``, ``space``, ``lshift`` ..."""
 
@@ -252,8 +263,29 @@ class ViewSettings(Settings):
         return self.screens if self.screen is None else (self.screen,)
 
     def provides(self, machine: Machine) -> Names:
-        cameras = [camera.name for camera in (self.camera, *self.beside)]
-        return {"camera": cameras, "object": ("tip",)}
+        return {
+            "camera": [camera.name for camera in self.cameras],
+            "object": ("tip",),
+            "key": KEYS,
+            "key of that view": self.keys,
+        }
+
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        names = [camera.name for camera in self.cameras]
+        found = {}
+        if twice := [name for at, name in enumerate(names) if name in names[:at]]:
+            found["beside"] = (
+                f"has a second camera called {twice[0]!r}, so that their areas of interest and "
+                "their pictures for the supervisor have one name"
+            )
+        if max(self.size) > MOST_PIXELS:
+            found["size"] = f"is {self.size[0]} by {self.size[1]} pixels, more than any screen has"
+        return found
+
+    @property
+    def cameras(self) -> tuple[CameraSettings, ...]:
+        """The first camera, and those beside it."""
+        return (self.camera, *self.beside)
 
     @property
     def hud_lines(self) -> tuple[HudLine, ...]:

@@ -1,4 +1,4 @@
-"""Opens a window, or a picture without one, with whatever renderer there is."""
+"""Window, or a picture without one, by whatever renderer there is."""
 
 import os
 from collections.abc import Sequence
@@ -173,7 +173,7 @@ def _output(
     return (output, span) if output.is_valid() else None
 
 
-def font(path: str | None) -> Any:
+def font(path: Path | None) -> Any:
     """Return the font in a file, or a plain one.
 
     Raises
@@ -183,18 +183,18 @@ def font(path: str | None) -> Any:
     """
     if path is None:
         return _plain_font()
-    if not Path(path).is_file():
-        raise DeviceError(f"there is no font file {path!r}; correct font: or leave it out")
+    if not path.is_file():
+        raise DeviceError(f"there is no font file {str(path)!r}; correct font: or leave it out")
     loaded = core.FontPool.load_font(core.Filename.from_os_specific(path).get_fullpath())
     if loaded is None or not loaded.is_valid():
-        raise DeviceError(f"{path!r} cannot be read as a font; TrueType and OpenType can")
+        raise DeviceError(f"{str(path)!r} cannot be read as a font; TrueType and OpenType can")
     return loaded
 
 
-def font_name(path: str | None, loaded: Any) -> str:
+def font_name(path: Path | None, loaded: Any) -> str:
     """Return what the record calls a font."""
     if path is not None:
-        return Path(path).stem
+        return path.stem
     return "Panda3D's own" if loaded == core.TextNode.get_default_font() else "DejaVu Sans"
 
 

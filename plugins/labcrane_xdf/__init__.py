@@ -1,4 +1,4 @@
-"""Exports sessions as XDF: all streams in one file, on one clock."""
+"""Export of sessions as XDF: all streams in one file, on one clock."""
 
 from collections.abc import Sequence
 

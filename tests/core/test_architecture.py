@@ -257,3 +257,23 @@ def test_nothing_is_defined_that_only_tests_use() -> None:
         if used[name] == 1 and not name.startswith(("__", "test_", "labcrane_"))
     }
     assert {entry.partition(": ")[2] for entry in idle} <= ASKED_FOR_BY_OTHERS, idle
+
+
+VERBS = re.compile(
+    "(Find|Read|Run|Make|Write|Open|Walk|Unpack|Play|Print|Tell|Correct|Approve)s? "
+    "|(Imports|Exports|Watches|Counts|Presents|Starts|Records|Works|Measures) (?!of)"
+)
+QUESTIONS = ("How", "What", "When", "Where", "Whether", "Which", "Who", "Why", "From", "In", "To")
+
+
+@pytest.mark.parametrize("folder", ["labcrane", "plugins", "benchmarks"])
+def test_every_module_says_first_what_thing_it_is(folder: str) -> None:
+    first = {
+        str(path): (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "none")
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        if "templates" not in path.parts
+    }
+    assert len(first) > 15
+    assert [path for path, said in first.items() if said == "none"] == []
+    assert {path: said for path, said in first.items() if said.split()[0] in QUESTIONS} == {}
+    assert {path: said for path, said in first.items() if VERBS.match(said)} == {}

@@ -166,10 +166,10 @@ def the_record_says_it(protocol: Path) -> None:
     crew = FeedbackProcesses(Visit(study, "P001", 1, protocol.parent, simulated=True))
     try:
         assert crew.wait(lambda said: None, lambda: False)
-        (keeper,) = crew.keepers
+        (handle,) = crew.handles
     finally:
         crew.stop()
-    assert re.search(r"delay 4\d\.\d ms \(sd 0\.\d ms, 6 changes, \d+-\d+-\d+\)$", keeper.facts)
+    assert re.search(r"delay 4\d\.\d ms \(sd 0\.\d ms, 6 changes, \d+-\d+-\d+\)$", handle.facts)
 
 
 def test_without_a_sensor_delays_are_not_measured(

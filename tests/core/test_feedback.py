@@ -245,6 +245,9 @@ def test_the_situation_says_why_nobody_is_to_move() -> None:
         ("break.end", {"left": 0.0}, (), "", ""),
         ("waiting", {"what": "instructions"}, (), "instructions", ""),
         ("step.end", ended, (), "", ""),
+        ("pause.start", {"by": "input"}, ("input",), "", ""),
+        ("session.end", {"reason": "by order", "owed": "trial 2"}, ("input",), "", "by order"),
+        ("session.start", {"study": "a"}, (), "", ""),
         ("session.end", {"reason": "complete", "owed": ""}, (), "", "complete"),
     ):
         now = situation_after(now, Event(name, 1.0, data))

@@ -64,9 +64,9 @@ def test_a_slow_component_is_told_of_when_the_disk_has_room_again(journal: Filli
         def report(self, event: Event) -> None:
             pass
 
-    log, oversight = FrameLog(journal, RUN), CallMonitor()
-    slowness = OverrunReporter(oversight, RATE_HZ, log, Deaf())
-    oversight.overruns["scheme"] = Overrun(calls=FEW + 1, worst_s=0.05)
+    log, call_monitor = FrameLog(journal, RUN), CallMonitor()
+    slowness = OverrunReporter(call_monitor, RATE_HZ, log, Deaf())
+    call_monitor.overruns["scheme"] = Overrun(calls=FEW + 1, worst_s=0.05)
     journal.full = True
     frame = frame_with()
     frame.tick = Tick(7, 1.0, 1.0)

@@ -195,12 +195,17 @@ def test_a_recorder_takes_what_is_presented_without_a_search(
         assert recording.health()[0].condition != "absent"
 
 
-def test_what_nobody_records_says_why_after_a_time(
-    joined: Joined, monkeypatch: pytest.MonkeyPatch
+def test_who_is_not_recorded_or_hears_nothing_says_why_after_a_time(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(process, "TAKEN_S", 0.2)
-    context = SimpleNamespace(text="a trial", changed=time.sleep)
-    with pytest.raises(
-        StreamError, match=r"no recorder has taken what 'notes' presents.*PortRange"
+    joining = process.FeedbackProcess(
+        SimpleNamespace(name="notes", recorded=True, streams={}), lambda _: None
+    )
+    for text, why in (
+        ("a trial", r"no recorder has taken what 'notes' presents.*PortRange"),
+        ("", r"'notes' found the session's streams and heard nothing of them.*firewall"),
     ):
-        joined._process._join(context, SimpleNamespace(taken=False))
+        context = SimpleNamespace(text=text, changed=time.sleep)
+        with pytest.raises(StreamError, match=why):
+            joining._join(context, SimpleNamespace(taken=False))

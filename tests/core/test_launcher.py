@@ -12,6 +12,7 @@ from labcrane.launcher.launcher import Launcher
 from labcrane.session.commands import Command, Order, QueueConsole
 from labcrane.session.visit import visit_of
 from labcrane.streams.recorder import handle as recorder_handle
+from labcrane.streams.recorder.candidates import answered
 from labcrane.streams.recorder.handle import RecorderHandle
 
 
@@ -42,8 +43,10 @@ class LateRecorder:
     def unwatched(self) -> list[str]:
         return []
 
+    asks = False
+
     def taken(self) -> list[str]:
-        return ["eeg: was taken by type 'EEG' alone"]
+        return ["eeg: is asked for by type 'EEG' alone, and was confirmed"]
 
     def stop(self) -> None:
         pass
@@ -73,7 +76,59 @@ def test_a_note_that_is_given_while_streams_are_waited_for_is_in_the_record(
     assert events["page.denied"]["why"] == "somebody asked for end"
     assert "order.start" not in events
     assert "start: the session has not begun; order it again when it has" in said
-    assert said.count("eeg: was taken by type 'EEG' alone") == 1
+    assert said.count("eeg: is asked for by type 'EEG' alone, and was confirmed") == 1
+
+
+class AskingRecorder(LateRecorder):
+    """A recorder that flows, and asks which stream one of several is."""
+
+    @property
+    def asks(self) -> bool:
+        return self.status["streams"][0]["candidates"] != []
+
+    def __init__(self) -> None:
+        super().__init__()
+        fits = [{"identity": ["amp-1", "ActiChamp", "EEG"], "host": "lab-pc"}]
+        self.status["streams"] = [{"label": "eeg", "required": False, "candidates": fits}]
+
+    def confirm(self, text: str) -> str:
+        label, meant = answered(text, self.status["streams"])
+        self.status["streams"][0]["candidates"] = []
+        return f"stream {label} is {meant[1]}"
+
+
+@pytest.mark.parametrize("simulated", [False, True])
+def test_a_session_begins_when_it_was_said_which_stream_is_meant_and_that_is_in_the_record(
+    tmp_path: Path, *, simulated: bool
+) -> None:
+    protocol = tmp_path / "study.yaml"
+    protocol.write_text(
+        STUDY.format(study=unique("asked")) + "streams: {eeg: {type: EEG}}\n", encoding="utf-8"
+    )
+    console, said = QueueConsole(), []
+    visit = visit_of(protocol, "P001", 1, tmp_path, simulated=simulated, feedback=False)
+    launcher = Launcher(visit, console, said.append)
+    launcher._recorder = recorder = AskingRecorder()
+    if not simulated:  # where nobody can answer, nobody is waited for
+        console.give(Command(Order.TAKE, "oxygen", "supervisor"))
+        console.give(Command(Order.TAKE, "eeg", "supervisor", "10.0.0.7"))
+    assert launcher._gate()
+    assert recorder.asks is simulated
+    if not simulated:
+        assert said[0] == "take: no stream 'oxygen' is asked about; there is eeg"
+        assert said[1] == "stream eeg is ActiChamp"
+        note = Command(Order.NOTE, "stream eeg is ActiChamp", "supervisor", "10.0.0.7")
+        assert launcher._kept == [note]
+
+
+def test_nothing_is_taken_where_no_streams_are_recorded(tmp_path: Path) -> None:
+    protocol = tmp_path / "study.yaml"
+    protocol.write_text(STUDY.format(study=unique("none")), encoding="utf-8")
+    console, said = QueueConsole(), []
+    visit = visit_of(protocol, "P001", 1, tmp_path, simulated=True, feedback=False)
+    console.give(Command(Order.TAKE, "eeg"))
+    assert Launcher(visit, console, said.append)._orders() == []
+    assert said == ["take: the study records no streams of others"]
 
 
 STOPS_BUT_HANGS_AS_A_SPARE = """
@@ -98,26 +153,26 @@ def test_a_spare_recorder_that_hangs_keeps_no_recorder_from_closing_its_journal(
     (tmp_path / "hanging_spare.py").write_text(STOPS_BUT_HANGS_AS_A_SPARE, encoding="utf-8")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
     monkeypatch.setattr(recorder_handle, "MODULE", "hanging_spare")
-    keeper = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
-    wait_for(lambda: keeper.ready)
+    handle = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
+    wait_for(lambda: handle.ready)
     for _ in range(recorder_handle.SPARES):
-        assert not keeper.watch()
+        assert not handle.watch()
     monkeypatch.setattr(recorder_handle, "PATIENCE_S", 3.0)
-    keeper.stop()
+    handle.stop()
     assert [(tmp_path / f"heard-{part}").read_text(encoding="utf-8") for part in (1, 2)] == [
         "stop",
         "stop",
     ]
-    assert [one.exit_code for one in keeper._recorders] == [0, 0]
-    assert [one.exit_code for one in keeper._spares] == [-9, -9]
+    assert [one.exit_code for one in handle._recorders] == [0, 0]
+    assert [one.exit_code for one in handle._spares] == [-9, -9]
 
 
 def test_a_recorder_that_dies_as_it_is_given_its_orders_is_replaced(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(recorder_handle, "MODULE", "labcrane.errors")  # ends at once
-    keeper = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
-    wait_for(lambda: all(one.exit_code is not None for one in keeper._recorders))
-    assert keeper.watch()
-    assert keeper.restarts == recorder_handle.RECORDERS
-    keeper.stop()
+    handle = RecorderHandle(tmp_path / "ses-01_streams.xdf", [])
+    wait_for(lambda: all(one.exit_code is not None for one in handle._recorders))
+    assert handle.watch()
+    assert handle.restarts == recorder_handle.RECORDERS
+    handle.stop()

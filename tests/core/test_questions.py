@@ -28,6 +28,10 @@ def a_study(folder: Path, *changes: tuple[str, str]) -> Study:
     return load(path, discover(study=path))
 
 
+KEYBOARD = (
+    "input: {use: keyboard, view: front, axes: "
+    "{slew: [a, d], elbow: [s, w], wrist: [j, l], shoulder: [k, i]}}"
+)
 BLOCK = "      - block: {task: aiming, pairs: 1}\n"
 BALL = "feedback: {ball: {use: sphere}, tone: {use: sphere}}\nsessions:"
 GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
@@ -51,10 +55,18 @@ GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
          "some have no participants"),
         ([("sessions:", f"participants: {{planned: 9}}\n{GROUPS}")], "participants.planned",
          "a multiple of 2 is"),
+        ([("sessions:", "views: {front: {use: view, beside: [cab_left]}}\nsessions:")], "views.front.beside",
+         "a second camera called 'cab_left'"),
+        ([("sessions:", "views: {front: {use: view, size: [19200, 10800]}}\nsessions:")], "views.front.size",
+         "more than any screen has"),
+        ([("input: {use: dual_joystick}", KEYBOARD), ("left.x", "keyboard.slew"),
+          ("sessions:", "views: {front: {use: view, keys: [a, d, s, w, j, l, k, i]}}\nsessions:"),
+          ("left.y", "keyboard.elbow"), ("right.x", "keyboard.wrist"), ("right.y", "keyboard.shoulder")],
+         "operator", "has no keyboard.slew, keyboard.elbow, keyboard.wrist, keyboard.shoulder"),
         ([("sessions:", "participants: {planned: 3}\ndesign: {order: {pairs: williams}}\nsessions:")],
          "design.order.pairs", "which has 2 rows; a multiple of 2 does"),
         ([("sessions:", "streams: {eeg: {type: EEG}, gaze: {name: Neon}}\nsessions:")],
-         "streams.eeg", "a neighbour's as well; give the source_id"),
+         "streams.eeg", "each run asks which one is meant; give the source_id"),
     ],
 )  # fmt: skip
 def test_a_number_that_nobody_means_is_asked_about_until_it_is_answered(

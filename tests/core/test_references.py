@@ -64,7 +64,15 @@ def told(tmp_path: Path, registry: Registry):
         ("retrieval", "boom: 3", "bom: 3", "11:72: input.valves.bom is 'bom', and there is no such joint; did you mean 'boom'?"),
         ("retrieval", "boom: 3, ", "", "13:9: scheme needs the axis 'valve.boom', and there is no such axis"),
         ("retrieval", "fov_deg: 60}", "fov_deg: 60, on: bom}", "38:90: views.operator.camera.on is 'bom', and there is no such link; did you mean 'boom'?"),
-        ("aiming", "end: rest_inside", "trigger: left.knob", "20:85: tasks.aiming.trigger is 'left.knob', and there is no such axis;"),
+        ("aiming", "end: rest_inside", "trigger: left.knob", "20:85: tasks.aiming.trigger is 'left.knob', and there is no such button;"),
+        ("aiming", "end: rest_inside", "trigger: left.x", "20:85: tasks.aiming.trigger is 'left.x', and there is no such button; the input has left.trigger, right.trigger"),
+        ("retrieval", "find_axis: float.base", "find_axis: valve.base", "32:16: tasks.retrieval.find_axis is 'valve.base', and there is no such button; did you mean 'float.base'?"),
+        ("retrieval", "button: float.base", "button: float.bas", "12:44: operator.button is 'float.bas', and there is no such button; did you mean 'float.base'?"),
+        ("aiming", "camera: cab}", "camera: top, beside: [cap]}", "27:47: views.operator.beside[1]: there is no such camera as 'cap'; did you mean 'cab'? there is cab, cab_left, cab_right, free, top"),
+        ("aiming", "camera: cab", "font: arial.ttf", "27:31: views.operator.font is 'arial.ttf', and there is no such file;"),
+        ("aiming", "camera: cab", "keys: [a, lft]", "27:35: views.operator.keys[2] is 'lft', and there is no such key; did you mean 'lshift'?"),
+        ("aiming", "input: {use: dual_joystick}", "input: {use: keyboard, view: operator, axes: {slew: [a, d]}}", "11:54: input.axes.slew[1] is 'a', and there is no such key of that view; it has none"),
+        ("retrieval", "look: [1.0, ", "look: [true, ", "38:56: views.operator.camera.look[1]: true is no number; write one"),
         ("aiming", "camera: cab", "areas: [targt]", "27:33: views.operator.areas[1] is 'targt', and there is no such object; did you mean 'target'?"),
         ("aiming", "camera: cab", "patch: {on: [trial.strat]}", "27:38: views.operator.patch.on[1] is 'trial.strat', and there is no such event; did you mean 'trial.start'?"),
         ("aiming", "camera: cab", "supervisor: {cameras: [moon]}", "27:48: views.operator.supervisor.cameras[1] is 'moon', and there is no such camera;"),
@@ -158,10 +166,10 @@ def test_a_marked_name_is_found_however_deep_it_stands_and_a_default_is_left_out
     hand = Hand.model_validate(
         {"fingers": [{}, {"button": "a"}], "pair": ["b", "slew"], "map": {"boom": 1}}
     )
-    axis, joint = Reference("axis"), Reference("joint")
+    button, joint = Reference("button"), Reference("joint")
     assert list(mentioned(hand)) == [
-        Mentioned(axis, ("fingers", 1, "button"), "a"),
-        Mentioned(axis, ("pair", 0), "b"),
+        Mentioned(button, ("fingers", 1, "button"), "a"),
+        Mentioned(button, ("pair", 0), "b"),
         Mentioned(joint, ("pair", 1), "slew"),
         Mentioned(Covers("joint"), ("map",), {"boom": 1.0}),
         Mentioned(Once(), ("map",), {"boom": 1.0}),

@@ -54,10 +54,10 @@ def test_streams_that_are_there_missing_or_wrong_are_told_apart(
     assert "has 4 channels, 32 are expected" in about(found, "wrong").text
 
 
-def test_a_stream_asked_for_by_its_type_alone_is_named_and_rivals_are_refused() -> None:
+def test_a_stream_asked_for_by_its_type_alone_is_asked_about_and_rivals_are_refused() -> None:
     mine, his = (
-        pylsl.StreamOutlet(pylsl.StreamInfo(f"{NAME} {who}", kind, 4, 250.0, "float32", who))
-        for who, kind in (("mine", "DoctorEEG"), ("his", "DoctorEEG"))
+        pylsl.StreamOutlet(pylsl.StreamInfo(f"{NAME} twin", "DoctorEEG", 4, 250.0, "float32", who))
+        for who in ("mine", "his")
     )
     other = pylsl.StreamOutlet(
         pylsl.StreamInfo(f"{NAME} gaze", "DoctorGaze", 2, 60.0, "float32", "tracker-1")
@@ -65,6 +65,7 @@ def test_a_stream_asked_for_by_its_type_alone_is_named_and_rivals_are_refused() 
     found = lsl.examine(
         [
             StreamRequest("eeg", type="DoctorEEG"),
+            StreamRequest("either", name=f"{NAME} twin"),
             StreamRequest("all", type="DoctorEEG", several=True),
             StreamRequest("gaze", type="DoctorGaze"),
             StreamRequest("any", type="DoctorGaze", any_meant=True),
@@ -72,22 +73,23 @@ def test_a_stream_asked_for_by_its_type_alone_is_named_and_rivals_are_refused() 
         ]
     )
     del mine, his, other
-    rivals = about(found, "could be any")
-    assert rivals.verdict is Verdict.FAIL
-    assert rivals.text.startswith(
-        "stream eeg (type 'DoctorEEG') could be any of 2, and no run begins: "
-    )
+    rivals, either = about(found, "could be any"), about(found, "stream eeg (type 'DoctorEEG') is")
+    assert (rivals.verdict, either.verdict) == (Verdict.FAIL, Verdict.WARN)
+    assert "stream either (name " in rivals.text
+    assert "could be any of 2, and no run begins: " in rivals.text
+    assert "is asked for by its type alone, and a run asks which is meant: " in either.text
     for who in ("mine", "his"):
-        assert f"{f'{NAME} {who}'!r} (source_id {who!r}) of " in rivals.text
+        for one in (rivals, either):
+            assert f"{f'{NAME} twin'!r} (source_id {who!r}) of " in one.text
     assert rivals.advice.startswith("write the source_id of the one that is meant")
     asked, meant = (
-        about(found, f"stream {label} (type 'DoctorGaze') w") for label in ("gaze", "any")
+        about(found, f"stream {label} (type 'DoctorGaze') is") for label in ("gaze", "any")
     )
     assert (asked.verdict, meant.verdict) == (Verdict.WARN, Verdict.PASS)
-    assert f"would be taken by type 'DoctorGaze' alone: it is {f'{NAME} gaze'!r}" in asked.text
-    assert asked.advice == "write that source_id in the protocol if it is meant"
+    assert f"and a run asks which is meant: {f'{NAME} gaze'!r}" in asked.text
+    assert asked.advice == "write the source_id of the one that is meant in the protocol"
     assert not [one for one in found if "stream all" in one.text and "any of" in one.text]
-    assert not [one for one in found if "stream known" in one.text and "taken" in one.text]
+    assert not [one for one in found if "stream known" in one.text and "asks" in one.text]
 
 
 def test_ports_that_others_have_taken_are_counted() -> None:

@@ -52,7 +52,9 @@ def run_fast(protocol: Path) -> None:
 def run_through(protocol: Path) -> None:
     """Run fast, but write frames through and say where it is, as a session with people does."""
     session_module.BatchLog = FrameLog
-    session_module._watching = lambda visit, rig: visit.study.oversight.published(visit.whereabouts)
+    session_module._watching = lambda visit, rig: visit.study.call_monitor.published(
+        visit.whereabouts
+    )
     run_fast(protocol)
 
 

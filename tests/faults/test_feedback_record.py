@@ -49,7 +49,7 @@ class Changing(Examiner):
         self.begun = 0
 
     def all_have_presented(self) -> bool:
-        return min(keeper.presented for keeper in self.launcher._crew.keepers) > 60
+        return min(handle.presented for handle in self.launcher._feedback.handles) > 60
 
     def report(self, event: Event) -> None:
         super().report(event)

@@ -53,20 +53,20 @@ def kill_at_random(folder: Path, kills: int, seed: int) -> tuple[list[float], li
         program("counting_witness.py", source, into=witnesses[0]),
         program("counting_witness.py", source, into=witnesses[1]),
     ):
-        keeper = RecorderHandle(journal, requests)
+        handle = RecorderHandle(journal, requests)
         try:
 
             def look(until) -> None:
                 deadline = time.monotonic() + 240.0
                 while not until():
-                    assert time.monotonic() < deadline, keeper.status
-                    keeper.watch()
+                    assert time.monotonic() < deadline, handle.status
+                    handle.watch()
                     time.sleep(0.02)
 
             for kill in range(kills):
-                victims = [psutil.Process(one.pid) for one in keeper._recorders]
+                victims = [psutil.Process(one.pid) for one in handle._recorders]
                 look(lambda: all(recording(one) for one in victims))  # noqa: B023
-                look(lambda: sum(map(loaded, keeper._spares)) == SPARES)
+                look(lambda: sum(map(loaded, handle._spares)) == SPARES)
                 ends = time.monotonic() + draw.uniform(0.0, 0.7)
                 look(lambda: time.monotonic() > ends)  # noqa: B023
                 both = kill % 3 == 2
@@ -74,11 +74,11 @@ def kill_at_random(folder: Path, kills: int, seed: int) -> tuple[list[float], li
                     victim.kill()
                 if both:
                     doubles.append((time.perf_counter(), 0.0))
-                replaced = keeper.restarts + 1 + both
-                look(lambda: keeper.restarts >= replaced)  # noqa: B023
-            look(lambda: all(recording(psutil.Process(one.pid)) for one in keeper._recorders))
+                replaced = handle.restarts + 1 + both
+                look(lambda: handle.restarts >= replaced)  # noqa: B023
+            look(lambda: all(recording(psutil.Process(one.pid)) for one in handle._recorders))
         finally:
-            keeper.stop()
+            handle.stop()
     streams = {stream.header.name: stream for stream in read_streams(parts(journal))[0]}
     assert sorted(streams) == sorted(NAMES)
     seen = [witnessed(path) for path in witnesses]

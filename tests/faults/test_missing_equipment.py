@@ -54,7 +54,7 @@ def test_a_session_goes_on_without_what_is_missing_where_the_protocol_says_so(
     said: list[str] = []
     try:
         assert made.wait(said.append, lambda: False)
-        (ready,) = (keeper for keeper in made.keepers if not keeper.given_up)
+        (ready,) = (handle for handle in made.handles if not handle.given_up)
     finally:
         made.stop()
     assert ready.name == "plain"

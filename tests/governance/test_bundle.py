@@ -18,6 +18,7 @@ from needs import needs
 
 from labcrane.approval import bundle_install
 from labcrane.approval.bundle import bundle
+from labcrane.approval.materials import materials
 from labcrane.errors import ProtocolError
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
@@ -116,10 +117,14 @@ def test_a_file_of_a_bundle_that_was_changed_is_named_before_anything_is_install
     assert not (tmp_path / "there").exists()
 
 
-def test_data_that_lie_beside_the_study_are_no_part_of_its_bundle(
+def test_neither_data_beside_the_study_nor_the_labs_key_are_in_its_bundle_or_lock(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     protocol = study(tmp_path / "study")
+    with protocol.open("a", encoding="utf-8") as file:
+        file.write("page: {certificate: lab.pem, key: lab.key, logo: crane.svg}\n")
+    for name in ("lab.pem", "lab.key", "crane.svg"):
+        (protocol.parent / name).write_text(f"what is in {name}\n", encoding="utf-8")
     (protocol.parent / "data").mkdir()
     (protocol.parent / "data" / "P001.h5").write_bytes(b"somebody")
     registry = discover(study=protocol)
@@ -129,9 +134,17 @@ def test_data_that_lie_beside_the_study_are_no_part_of_its_bundle(
         "labcrane.approval.bundle.environment",
         lambda: {"system": "x", "python": "3.11", "packages": {}},
     )
+    assert "what is in lab" not in str(materials(load(protocol, registry), registry))
     made = bundle(load(protocol, registry), registry, tmp_path / "stick")
-    assert made.files == ("protocol.yaml",)
+    assert made.files == ("crane.svg", "protocol.yaml")
     there = {path.name for path in (tmp_path / "stick").rglob("*") if path.is_file()}
-    assert there == {"protocol.yaml", "requirements.txt", "bundle.json", "install.py", "SHA256SUMS"}
+    assert there == {
+        "protocol.yaml",
+        "crane.svg",
+        "requirements.txt",
+        "bundle.json",
+        "install.py",
+        "SHA256SUMS",
+    }
     with pytest.raises(ProtocolError, match="is there already; give the bundle a new folder"):
         bundle(load(protocol, registry), registry, tmp_path / "stick")

@@ -50,6 +50,18 @@ def test_everything_that_is_installed_is_in_the_lock_by_version_and_files(lab: L
     assert check_eligibility(lab.visit("P001")).otherwise_installed == ()
 
 
+def test_what_an_interrupted_installer_left_behind_is_no_package_and_stops_nobody(
+    lab: Lab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = lab.folder / "left"
+    for name in ("~inch-0.9.dist-info", "hoist-2.0.dist-info", "winch-2.0.egg-info"):
+        (left / name).mkdir(parents=True)
+    (left / "hoist-2.0.dist-info" / "METADATA").write_bytes(b"")
+    see(monkeypatch, str(left))
+    assert check_eligibility(lab.visit("P001")).otherwise_installed == ()
+    assert environment() == read_lock(lab.protocol).content["environment"]
+
+
 def test_another_version_of_a_package_is_refused_by_its_name(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:

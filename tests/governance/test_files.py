@@ -12,6 +12,7 @@ from needs import need
 
 from labcrane import ProtocolError
 from labcrane.approval.lock import lock_path
+from labcrane.approval.materials import referred
 from labcrane.participants.folders import Places
 from labcrane.session.eligibility import check_eligibility
 
@@ -101,3 +102,36 @@ def test_a_file_that_would_not_move_with_the_study_is_not_approved(rescue: Lab) 
         ProtocolError, match=r"questionnaires\.ssq names .*ssq\.yaml, which is not in the folder of"
     ):
         rescue.approve()
+
+
+URDF = """\
+<robot name="arm"><link name="base"><visual><geometry>
+<mesh filename="package://arm_description/meshes/base.stl"/></geometry></visual></link></robot>
+"""
+MJCF = """\
+<mujoco><compiler meshdir="solids"/><include file="more.xml"/>
+<asset><mesh name="boom" file="boom.stl"/></asset></mujoco>
+"""
+
+
+def test_the_meshes_that_a_robots_file_names_are_part_of_the_study(tmp_path: Path) -> None:
+    """Else the lock would not see them change, and a bundle would leave them at home."""
+    files = {
+        "robots/arm.urdf": URDF,
+        "meshes/base.stl": "solid",
+        "digger/digger.xml": MJCF,
+        "digger/more.xml": "<mujoco/>",
+        "digger/solids/boom.stl": "solid",
+        "meshes/of_another.stl": "solid",
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    for machine in ({"urdf": "robots/arm.urdf"}, {"mjcf": "digger/digger.xml"}):
+        (first,) = machine.values()
+        found = {
+            path.relative_to(tmp_path).as_posix()
+            for path in referred({"machine": machine}, tmp_path)
+        }
+        kind = "digger/" if "mjcf" in machine else ("robots/", "meshes/base.stl")
+        assert found == {name for name in files if name.startswith(kind)}, first

@@ -14,8 +14,7 @@ from selenium.webdriver.common.by import By
 
 from labcrane import open_recording
 
-# On request: not yet seen to pass in the hour of the gate.
-pytestmark = [needs_bullet, pytest.mark.soak]
+pytestmark = [needs_bullet, pytest.mark.long]
 
 SCENE = """\
 labcrane_scene: 1

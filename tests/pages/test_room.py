@@ -10,10 +10,11 @@ from labcrane.cli.terminal import KEYS as TERMINAL_KEYS
 from labcrane.core.records import Event
 from labcrane.session.commands import Command, Order, SettingChange, read_request
 from labcrane.session.live_settings import FeedbackSettings
+from labcrane.streams.recorder.candidates import answered
 from labcrane.testing import ch8
 from labcrane.web.examiner_page import KEYS
 from labcrane.web.room.bars import groups
-from labcrane.web.room.buttons import buttons
+from labcrane.web.room.buttons import answers, buttons
 from labcrane.web.room.condition import STATES, Lamp, lamp_of, state_of
 from labcrane.web.room.earlier import FEWEST, Earlier
 from labcrane.web.room.sentences import KINDS, SAID, sentence
@@ -97,6 +98,21 @@ def test_the_lamp_names_what_is_lost_until_it_is_back() -> None:
     assert lamp_of(after(*back), Punctual(), PERIOD_S) == Lamp("ok", "all is well")
 
 
+def test_the_lamp_names_every_trigger_that_is_lost() -> None:
+    lost = [
+        *BEGUN["running"],
+        *(("trigger.lost", {"trigger": name, "why": f"{name}: pulled out"}) for name in ("a", "b")),
+    ]
+    lamp = lamp_of(after(*lost), Punctual(), PERIOD_S)
+    assert (lamp.level, lamp.reason) == ("bad", "trigger failed: a: pulled out")
+    assert "plug the device in" in lamp.remedy
+    lost.append(("trigger.back", {"trigger": "a"}))
+    assert lamp_of(after(*lost), Punctual(), PERIOD_S).reason == "trigger failed: b: pulled out"
+    lost.append(("trigger.back", {"trigger": "b"}))
+    assert lamp_of(after(*lost), Punctual(), PERIOD_S).level == "ok"
+    assert sentence(Event(*lost[1][:1], 0.0, lost[1][1]), str).text == "Trigger a: pulled out"
+
+
 def test_the_lamp_tells_a_late_loop_and_one_that_says_nothing() -> None:
     live = Punctual()
     live.lateness_s = 0.05
@@ -117,6 +133,33 @@ def test_a_required_stream_that_is_silent_outweighs_the_warning_of_another() -> 
     assert lamp_of(view, Punctual(), PERIOD_S).reason == "stream eeg is silent"
     view.streams["streams"][1]["required"] = False
     assert lamp_of(view, Punctual(), PERIOD_S).reason == "stream gaze is slow"
+
+
+def test_a_stream_that_is_asked_about_has_a_button_for_each_answer() -> None:
+    fits = [
+        {"identity": ["amp-1", "ActiChamp", "EEG"], "host": "lab-pc"},
+        {"identity": ["amp-1", "Filtered", "EEG"], "host": "lab-pc"},
+        {"identity": ["amp-2", "LiveAmp", "EEG"], "host": "next-door"},
+    ]
+    asked = {
+        "label": "eeg", "condition": "asked about", "required": True, "candidates": fits,
+        "warnings": ["is asked for"], "signals": [],
+    }  # fmt: skip
+    given = [(one.order, one.text, one.label) for one in answers(asked)]
+    assert given == [
+        (Order.TAKE, "eeg=ActiChamp", "Take ActiChamp of lab-pc"),
+        (Order.TAKE, "eeg=Filtered", "Take Filtered of lab-pc"),
+        (Order.TAKE, "eeg=amp-2", "Take LiveAmp of next-door"),
+    ]
+    for (_, text, _), fit in zip(given, fits, strict=True):
+        assert answered(text, [asked]) == ("eeg", tuple(fit["identity"]))
+    assert answers(asked | {"required": False})[-1].text == "eeg=none"
+    assert answers(asked | {"candidates": []}) == []
+    view = after()
+    view.hear_of_streams({"streams": [asked]})
+    lamp = lamp_of(view, Punctual(), PERIOD_S)
+    assert (lamp.level, lamp.reason) == ("warn", "stream eeg is asked for")
+    assert lamp.remedy == "answer with the buttons beside it"
 
 
 def test_the_lamp_at_the_end_is_what_was_left_behind() -> None:

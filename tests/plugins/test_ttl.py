@@ -232,6 +232,31 @@ class Fixed(Trigger):
         return answers
 
 
+def test_what_a_line_with_a_fault_was_to_send_is_not_noted_as_sent() -> None:
+    from labcrane.core import Echo
+
+    notes, told, line = [], [], Fixed(trial_start=5, trial_end=6)
+    triggers = Triggers({"box": line}, lambda event, tick: notes.append(event), told.append)
+
+    def tick(name: str, fault: str | None) -> None:
+        due = time.perf_counter()
+        frame = make_frame(make_run(ch8()))
+        frame.tick, frame.events = Tick(1, due, due), (Event(name, due),)
+        line.fault = fault
+        triggers(frame)
+
+    tick("trial.start", "unplugged")
+    tick("trial.end", None)
+    line.answers = [Echo(5, time.perf_counter()), Echo(6, time.perf_counter())]
+    tick("session.end", None)
+    assert [event.name for event in notes] == [
+        "trigger.unsent", "trigger.lost", "trigger.sent", "trigger.back", *["trigger.echo"] * 2,
+    ]  # fmt: skip
+    assert notes[0].data == {"trigger": "box", "codes": "5", "why": "unplugged"}
+    assert notes[4].data["delay_s"] is None, "nobody waits for what was not sent"
+    assert notes[5].data["delay_s"] is not None
+
+
 def test_every_event_that_has_a_code_is_sent_and_noted_in_its_tick() -> None:
     from labcrane.core import Echo
 

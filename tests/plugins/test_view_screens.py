@@ -125,9 +125,9 @@ def test_the_state_stands_on_each_monitor_and_text_on_one() -> None:
 def test_a_window_goes_to_a_monitor_that_is_left_and_back_when_its_own_is_there() -> None:
     need("xwininfo")
     with a_view(display="window", screen=RIGHT, renderer="software") as view:
-        keeper = view._keeper  # the thread that looks once a second is not waited for
-        assert isinstance(keeper, Keeper)
-        keeper.close()
+        handle = view._keeper  # the thread that looks once a second is not waited for
+        assert isinstance(handle, Keeper)
+        handle.close()
         assert view.present(make_frame())[-1] == 0.0
         assert window_at("labcrane") == ((480, 0), (420, 400))
         for gone, where, lost in ((True, (0, 0), 1.0), (False, (480, 0), 0.0)):
@@ -135,7 +135,7 @@ def test_a_window_goes_to_a_monitor_that_is_left_and_back_when_its_own_is_there(
                 xrandr("--delmonitor", RIGHT)
             else:
                 xrandr("--setmonitor", RIGHT, "420/210x400/200+480+0", "none")
-            keeper.look()
+            handle.look()
             view.present(make_frame())
             assert view.present(make_frame())[-1] == lost
             assert window_at("labcrane") == (where, (420, 400))

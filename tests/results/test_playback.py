@@ -1,11 +1,13 @@
 """A recorded session is shown frame by frame, with what happened, at any speed from any second."""
 
 import random
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from faults.sessions import unique
+from rehearsal import ScriptedConsole, a_study
 from simple_crane import FORM
 
 from labcrane import open_recording
@@ -13,6 +15,9 @@ from labcrane.cli.app import main
 from labcrane.core.records import SessionState
 from labcrane.errors import RecordingError
 from labcrane.feedback.playback import RecordedFrames, played
+from labcrane.session.commands import Command, Order
+from labcrane.session.session import run
+from labcrane.session.visit import Visit
 from labcrane.streams.context import situation_after
 
 STUDY = (
@@ -82,6 +87,25 @@ def test_the_first_frame_brings_what_the_session_was_about_then(file: Path) -> N
     for event in events:
         situation = situation_after(situation, event)
     assert situation.trial == frame.trial == trials["trial"].iloc[1]
+
+
+def test_of_a_session_that_went_on_each_part_is_shown_with_its_own_events(tmp_path: Path) -> None:
+    """Ticks are counted anew in each part."""
+    visit = Visit(a_study(tmp_path), "P001", 1, tmp_path / "data", simulated=True, fast=True)
+    run(visit, ScriptedConsole({900: [Command(Order.END)]}))
+    file = run(replace(visit, resumed=True), ScriptedConsole())
+    record = open_recording(file).session(1)
+    assert sorted(set(record.events["part"])) == [1.0, 2.0]
+    clock, situation, happened, trials = Clock(0.0), SessionState(), [], set()
+    for frame, events in played(RecordedFrames(record), 0.0, 5.0, clock.now, clock.rest):
+        for event in events:
+            happened.append(event)
+            situation = situation_after(situation, event)
+        if frame.trial and not any(event.name == "trial.end" for event in events):
+            assert (situation.trial, situation.over) == (frame.trial, "")
+            trials.add(frame.trial)
+    assert [event.name for event in happened] == record.events["name"].tolist()
+    assert len(trials) > 1
 
 
 def test_what_cannot_be_shown_is_said_in_words(

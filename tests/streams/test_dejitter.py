@@ -113,3 +113,20 @@ def test_lines_that_swallowed_lost_samples_are_said_to_be_off(random):
     off = np.abs(evened - true)
     assert off.max() > 0.02
     assert np.mean(off <= left_open(true + late, evened, Dejitter.ENVELOPE) + 0.005) > 0.99
+
+
+@pytest.mark.parametrize("way", [Dejitter.LEAST_SQUARES, Dejitter.ENVELOPE])
+@pytest.mark.parametrize("silent_s", [0.0, 3600.0])
+def test_slow_streams_and_long_silences_are_evened_where_that_is_asked_for(
+    random, way: Dejitter, silent_s: float
+) -> None:
+    """A thermometer has fewer samples than seconds; so has any stream that was silent for long."""
+    times = regular(200.0, 0.5)
+    times[50:] += silent_s
+    late = random.exponential(0.002, len(times))
+    stamped = times + (late if way is Dejitter.ENVELOPE else late - np.median(late))
+    raw = source(SourceClock(), times, random, stamped=stamped)
+    corrected = correct(raw, Treatment(rate_hz=0.5, dejitter=way))
+    off = np.abs(corrected.time - times)
+    assert np.mean(off <= corrected.error) > 0.95
+    assert off.max() < 0.003

@@ -4,7 +4,7 @@ import pylsl
 import pytest
 
 from labcrane.errors import StreamError
-from labcrane.streams.request import StreamRequest, unstable_id
+from labcrane.streams.request import NOBODY, StreamRequest, identity, unstable_id
 
 
 def info(name="ActiChamp-0", kind="EEG", source_id="amp-1"):
@@ -38,15 +38,32 @@ def test_a_stream_is_meant_when_all_that_is_asked_for_fits(asked, offered, meant
         ({"source_id": "amp-1"}, False),
     ],
 )
-def test_which_stream_was_taken_is_said_where_any_of_its_type_would_have_been(asked, said):
+def test_what_is_asked_for_by_type_alone_is_asked_about_and_said(asked, said):
     request = StreamRequest("eeg", **asked)
+    assert request.asks is said
     text = request.taken("ActiChamp-0", "amp-1", "next-door")
     assert bool(text) is said
     if text:
         assert text == (
-            "was taken by type 'EEG' alone: it is 'ActiChamp-0' (source_id 'amp-1') of next-door; "
-            "write that source_id in the protocol if it is meant"
+            "is asked for by type 'EEG' alone, and was confirmed: it is 'ActiChamp-0' (source_id "
+            "'amp-1') of next-door"
         )
+
+
+def test_a_confirmed_request_means_that_stream_alone_also_when_its_program_starts_again():
+    def asked(*confirmed):
+        return StreamRequest.of({"label": "eeg", "type": "EEG", "confirmed": list(confirmed)})
+
+    mine = asked("amp-1", "ActiChamp-0", "EEG")
+    assert not mine.asks
+    assert mine.matches(info())
+    assert not mine.matches(info(source_id="amp-2"))
+    assert not mine.matches(info(name="filtered"))
+    nameless = asked(*identity(info(source_id="")))
+    assert nameless.matches(info(source_id=""))
+    assert nameless.matches(info(source_id="-1856742883652690083"))  # of pylsl, another each time
+    assert not nameless.matches(info())
+    assert not StreamRequest("eeg", type="EEG", confirmed=NOBODY).matches(info())
 
 
 def test_what_is_expected_is_compared_with_what_there_is():

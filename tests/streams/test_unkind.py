@@ -1,9 +1,13 @@
 """Corrections of unkind devices and clocks, drawn at random, against what really was."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from streams.unkind_score import Score, coverage, misnamed, score, shortcomings, worse_rows
+from streams.unkind_score import Score, coverage, draw, misnamed, score, shortcomings, worse_rows
 from streams.unkinder import ALL as ROWS
+
+from labcrane.streams.sync.report.certificate import Fault
 
 QUICK = (
     "60 Hz, single samples lost",
@@ -39,9 +43,62 @@ def test_a_slew_is_covered_that_probes_of_a_busy_computer_show_late(seed: int) -
 @pytest.mark.parametrize("row", ROWS)
 @pytest.mark.long
 def test_every_unkind_device_is_as_right_as_it_is_said_to_be(row: str) -> None:
-    (one,) = scores(row, 1)
-    assert shortcomings(one) == [], one
-    assert one.named == one.present
+    for one in scores(row, 2):
+        assert shortcomings(one) == [], one
+        assert one.named == one.present
+
+
+def test_every_fault_that_a_report_can_name_is_drawn_and_its_names_are_counted() -> None:
+    drawn = {fault for row in ROWS for fault in draw(row, 0).faults}
+    assert drawn == set(Fault)
+
+
+def a_score(**changes: object) -> Score:
+    good = Score(
+        row="a device", p95=0.02, most=0.1, cover=1.0, width=0.1, passed=True, usual=0.1,
+        untouched=9.0, named=frozenset(), present=frozenset(), clean=True, limit=0.1, samples=100,
+        apart=0.02, usual_apart=0.1, apart_limit=np.inf, chance=False,
+    )  # fmt: skip
+    return replace(good, **changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "broken"),
+    [
+        ({}, []),
+        ({"p95": 0.11}, ["error beyond 0.1 ms"]),
+        ({"p95": 0.11, "clean": False}, []),
+        ({"untouched": -0.09}, ["worse than no correction"]),
+        ({"apart": 0.21}, ["worse than pyxdf"]),
+        ({"apart": 0.21, "chance": True}, []),
+        ({"apart_limit": 0.01}, ["error beyond 0.01 ms beside what is hidden"]),
+        ({"cover": 0.94}, ["not covered"]),
+        ({"width": 0.31}, ["uncertainty wider than 0.3 ms"]),
+        ({"most": 1.01}, ["PASS beyond 1 ms"]),
+        ({"most": 1.01, "passed": False}, []),
+    ],
+)
+def test_each_promise_is_broken_by_what_breaks_it(
+    changes: dict[str, object], broken: list[str]
+) -> None:
+    assert shortcomings(a_score(**changes)) == broken
+
+
+def test_faults_left_out_and_named_for_nothing_are_counted_over_the_draws() -> None:
+    there = frozenset({Fault.STEPPED})
+    draws = [a_score(named=there, present=there)] * 18
+    draws += [a_score(present=there), a_score(named=there | {Fault.SLEPT}, present=there)]
+    found = misnamed([*draws, a_score(named=there)])
+    assert found == {Fault.STEPPED: (0.95, 0.95), Fault.SLEPT: (0.0, 1.0)}
+
+
+def test_a_device_is_worse_by_its_mean_or_by_the_worst_of_twenty_draws() -> None:
+    even = [
+        a_score(row="even", chance=True, p95=0.15 + 0.1 * (k % 2), usual=0.2) for k in range(20)
+    ]
+    mean = [a_score(row="mean", p95=0.31, usual=0.2) for _ in range(20)]
+    tail = [a_score(row="tail", p95=0.4 if k < 2 else 0.1, usual=0.2) for k in range(20)]
+    assert worse_rows([*even, *mean, *tail]) == ["mean", "tail"]
 
 
 @pytest.mark.soak

@@ -15,7 +15,9 @@ class Drawn:
     """A stream as received, when its samples were really taken, and what is wrong with it.
 
     ``hidden_s`` is by how much the two ways of all probes differ for good, halved: with the same
-    probes nobody can know it. ``apart_ms`` limits the error beside it.
+    probes nobody can know it. ``apart_ms`` limits the error beside it. ``chance`` is whether what
+    holds up either way differs all along: then any correction is off by chance, and which of two is
+    better can be told of many draws, not of one.
     ``perhaps`` is what may be named or not: a step of a millisecond, say, is a slew as well.
     """
 
@@ -29,6 +31,7 @@ class Drawn:
     perhaps: frozenset[Fault] = frozenset()
     hidden_s: float = 0.0
     apart_ms: float = np.inf
+    chance: bool = False
 
 
 @dataclass

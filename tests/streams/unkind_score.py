@@ -36,6 +36,7 @@ class Score:
     apart: float
     usual_apart: float
     apart_limit: float
+    chance: bool
 
 
 def draw(row: str, seed: int) -> Drawn:
@@ -67,6 +68,7 @@ def score(row: str, seed: int, *, usual: bool = False) -> Score:
         verdict is Verdict.PASS, theirs,
         float(np.quantile(raw, 0.95)), named, drawn.faults, drawn.clean, drawn.limit_ms, len(error),
         float(np.quantile(apart, 0.95)), theirs_apart, drawn.apart_ms,
+        drawn.chance,
     )  # fmt: skip
 
 
@@ -113,7 +115,7 @@ def shortcomings(one: Score) -> list[str]:
     if one.p95 > one.untouched + WORSE_MS:
         found.append("worse than no correction")
     # What a lasting asymmetry hides is in both, and the errors of either may cancel it by luck.
-    if one.apart > one.usual_apart + WORSE_MS:
+    if not one.chance and one.apart > one.usual_apart + WORSE_MS:
         found.append("worse than pyxdf")
     if one.apart > one.apart_limit:
         found.append(f"error beyond {one.apart_limit} ms beside what is hidden")
@@ -139,12 +141,17 @@ def table_line(found: list[Score]) -> str:
 
 
 def worse_rows(scores: list[Score]) -> list[str]:
-    """Return the rows whose error is larger than pyxdf's over all draws, nothing left out."""
-    return [
-        row
-        for row in dict.fromkeys(one.row for one in scores)
-        if np.mean([one.p95 - one.usual for one in scores if one.row == row]) > WORSE_MS
-    ]
+    """Return the rows whose error is larger than pyxdf's over all draws, nothing left out.
+
+    By its mean, or in the worst of twenty draws.
+    """
+    found = []
+    for row in dict.fromkeys(one.row for one in scores):
+        ours, usual = np.array([(one.p95, one.usual) for one in scores if one.row == row]).T
+        worst = np.quantile(ours, 0.95) - np.quantile(usual, 0.95)
+        if max(np.mean(ours) - np.mean(usual), worst) > WORSE_MS:
+            found.append(row)
+    return found
 
 
 def coverage(scores: list[Score]) -> float:

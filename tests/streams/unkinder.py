@@ -146,7 +146,7 @@ def bad_wireless(random):
     return received(
         random, Clock(random), regular(random, 250.0), 250.0, way=random.uniform(3e-4, 1e-3),
         reply=random.uniform(1e-3, 8e-3), congestion=congestion, clean=False,
-        perhaps=frozenset({Fault.CONGESTED}),
+        perhaps=frozenset({Fault.CONGESTED}), chance=True,
     )  # fmt: skip
 
 

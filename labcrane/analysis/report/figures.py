@@ -322,3 +322,16 @@ def power_curve(table: "pd.DataFrame") -> "Figure":
     axes.set_xticks(table["participants"])
     axes.legend(loc="center right")
     return figure
+
+
+def thresholds(table: "pd.DataFrame") -> "Figure":
+    """Return estimates of thresholds over the true ones, a picture for each track."""
+    names = list(dict.fromkeys(table["track"]))
+    figure, pictures = new_figure(len(names))
+    for name, axes in zip(names, pictures, strict=True):
+        own = table[table["track"] == name].dropna(subset=["estimate"])
+        axes.plot(own["truth"], own["estimate"], ".", markersize=3, alpha=0.4)
+        ends = [own["truth"].min(), own["truth"].max()]
+        axes.plot(ends, ends, color="0.3", linewidth=1)
+        axes.set(xlabel="threshold", ylabel="estimate", title=f"{name}, simulated operators")
+    return figure

@@ -1,6 +1,7 @@
 """Sample of a study: how many, how old, which gender, by group."""
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,7 +41,8 @@ def sample(answers: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
                 row |= _spread(item, own.loc[own["item"] == item, "value"].to_numpy(float))
         for item in (*GENDERS, HANDS):
             if (last["item"] == item).any():
-                row[item] = _counts(own.loc[own["item"] == item, "text"])
+                words = [word for word in own.loc[own["item"] == item, "text"] if word]
+                row |= {item: _counts(words), f"{item}_answers": len(words)}
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -58,23 +60,24 @@ def _spread(item: str, values: "np.ndarray[tuple[int], np.dtype[np.float64]]") -
     }
 
 
-def _counts(words: "pd.Series[str]") -> str:
-    counts = Counter(word for word in words if word)
-    return ", ".join(f"{count} {word}" for word, count in sorted(counts.items()))
+def _counts(words: Sequence[str]) -> str:
+    return ", ".join(f"{count} {word}" for word, count in sorted(Counter(words).items()))
 
 
 def in_words(table: "pd.DataFrame") -> str:
-    """Return the sample in a sentence."""
+    """Return the sample in a sentence; it says of how many an answer is known."""
     row = table.iloc[0].to_dict()
     parts = [f"{row['n']} participants"]
     about = []
-    gender = next((str(row[item]) for item in GENDERS if row.get(item)), "")
-    if gender:
-        about.append(gender)
+    item = next((item for item in GENDERS if row.get(item)), "")
+    if item:
+        silent = row["n"] - row[f"{item}_answers"]
+        about.append(str(row[item]) + (f" and {silent} without an answer" if silent else ""))
     if row.get("age_answers"):
         sd = f", SD = {row['age_sd']:.2f}" if np.isfinite(row["age_sd"]) else ""
         low, high = row["age_min"], row["age_max"]
-        about.append(f"{low:g} to {high:g} years old, M = {row['age_mean']:.2f}{sd}")
+        known = f", of {row['age_answers']} who said it" if row["age_answers"] < row["n"] else ""
+        about.append(f"{low:g} to {high:g} years old, M = {row['age_mean']:.2f}{sd}{known}")
     groups = [f"{own['n']} in {own['group']}" for own in table.iloc[1:].to_dict("records")]
     text = parts[0] + (f" ({'; '.join(about)})" if about else "")
     return text + (f": {', '.join(groups)}." if groups else ".")

@@ -13,6 +13,7 @@ from labcrane.errors import LabcraneError
 
 if TYPE_CHECKING:
     from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan
+    from labcrane.design.tracks import PlannedTrack
     from labcrane.protocol.questions import Question
     from labcrane.protocol.study import Study
 
@@ -158,9 +159,24 @@ def _row(session: "SessionPlan") -> dict[str, object]:
                 "trials": sum(trial.planned.counted for trial in block.trials),
                 "levels": {factor: list(levels) for factor, levels in block.levels.items()},
                 "expected_s": block.expected_s,
+                "track": _track_row(block),
             }
             for block in session.blocks
         ],
+    }
+
+
+def _track_row(block: "PlannedBlock") -> dict[str, object] | None:
+    """Return what can be said of levels that are chosen only while a session runs."""
+    track = block.track
+    if track is None:
+        return None
+    return {
+        "name": track.name,
+        "factor": track.settings.factor,
+        "rounds": track.settings.rounds,
+        "first": block.trials[0].planned.condition["track_level"],
+        "levels": track.settings.levels,
     }
 
 
@@ -186,7 +202,21 @@ def _block(block: "PlannedBlock") -> str:
     orders = [f"{factor}: {', '.join(levels)}" for factor, levels in block.levels.items()]
     asked = [f"after each: {', '.join(block.ask)}"] if block.ask else []
     about = f"{counted} trials, {block.expected_s / 60:.1f} minutes"
+    if block.track is not None:
+        orders, about = [_track(block, block.track), *orders], f"at most {about}"
     return f"block {block.number} {block.name}{practice}: {'; '.join([about, *orders, *asked])}"
+
+
+def _track(block: "PlannedBlock", track: "PlannedTrack") -> str:
+    """Return what a track does in a block: its levels are not known before the session."""
+    settings = track.settings
+    first = block.trials[0].planned.condition["track_level"]
+    by_number = sorted(settings.levels, key=settings.levels.__getitem__)
+    goes_on = ", or where the session before came to" if settings.carry else ""
+    return (
+        f"{settings.factor} by track {track.name!r} ({settings.by}), from {by_number[0]} to "
+        f"{by_number[-1]}, {settings.rounds} rounds at most, first {first}{goes_on}"
+    )
 
 
 def _other(step: "PlannedStep") -> str:

@@ -1,4 +1,4 @@
-"""Measures how long views and sounds take, with a photodiode or a microphone."""
+"""Command that measures how long views and sounds take, by a photodiode or a microphone."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -119,7 +119,10 @@ def record(
     folder: Annotated[Path, typer.Argument(help="where the recording goes; must be new")],
     stream: Annotated[
         list[str],
-        typer.Option(help="what to record: type=EEG, name=Gaze or source_id=...; may be repeated"),
+        typer.Option(
+            help="what to record: type=EEG (all of that type), name=Gaze or source_id=...; "
+            "may be repeated"
+        ),
     ],
     seconds: Annotated[
         float | None,
@@ -153,7 +156,7 @@ def _wanted(text: str) -> "StreamRequest":
     key, _, value = text.partition("=")
     if key not in {"type", "name", "source_id"} or not value:
         raise ProtocolError(f"stream {text!r} must be type=..., name=... or source_id=...")
-    return StreamRequest.of({"label": text, key: value})
+    return StreamRequest.of({"label": text, key: value, "several": key == "type"})
 
 
 def _wait(recorder: "RecorderHandle", seconds: float | None) -> None:

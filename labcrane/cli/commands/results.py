@@ -61,16 +61,16 @@ def export(
 
     registry = discover()
     offer = registry.find(Exporter, to)
-    oversight = CallMonitor()
+    call_monitor = CallMonitor()
     plugin = registry.plugin(Exporter, to)
-    place = oversight.place(f"exporter {to!r}", plugin, "export", offer.build)
+    place = call_monitor.place(f"exporter {to!r}", plugin, "export", offer.build)
     chosen = _settings(offer.settings, settings or [], to)
     if folder.exists() and any(folder.iterdir()):
         raise ProtocolError(f"{folder} is not empty, and nothing is overwritten; give a new folder")
     cohort = cohort_of(data.resolve() if scheduler else data, include)
     unknown = check_probed(cohort.included, accept=accept_unprobed)
     _, first = next(cohort.included[0].sessions())
-    exporter = oversight.call(place, offer.build, chosen, machine_of(first))
+    exporter = call_monitor.call(place, offer.build, chosen, machine_of(first))
 
     def attempt(cohort: "Cohort") -> None:
         people = _Read(_measured(cohort, workers, scheduler))
@@ -80,7 +80,7 @@ def export(
         ):
             handed = made.handing_out((person.name, person) for person in people.counted(advance))
             try:
-                oversight.call(place, exporter.export, handed, made.folder)
+                call_monitor.call(place, exporter.export, handed, made.folder)
             except LabcraneError as error:
                 if people.now is None:  # nobody's data were being read
                     raise

@@ -1,4 +1,4 @@
-"""Writes what R, MATLAB and Octave read alike into HDF5.
+"""Columns in HDF5 that R, MATLAB and Octave read alike.
 
 Numbers are one-dimensional float64 columns, everything else is UTF-8 text. No int64 (R turns it
 into NA), no truth values, no compound types, no variable-length arrays but texts.

@@ -1,4 +1,4 @@
-"""Opens a participant file for analysis."""
+"""Reader of a participant file, for analysis."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""Corrects the clocks of a participant file's streams again, from nothing but the file."""
+"""New correction of the clocks of a participant file's streams, from nothing but the file."""
 
 import json
 import re

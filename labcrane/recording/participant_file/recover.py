@@ -1,4 +1,4 @@
-"""Makes participant files of whatever journals a crash left."""
+"""Recovery of participant files from whatever journals a crash left."""
 
 from dataclasses import dataclass
 from pathlib import Path

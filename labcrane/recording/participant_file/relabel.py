@@ -1,4 +1,4 @@
-"""Writes a recording once more, under another pseudonym.
+"""Relabelling of a recording: written once more, under another pseudonym.
 
 Everything else is as it was: the new file is read again and compared before it is used.
 """

@@ -1,4 +1,4 @@
-"""Writes one session into a participant file."""
+"""Group of one session in a participant file, written."""
 
 import json
 from collections.abc import Mapping, Sequence

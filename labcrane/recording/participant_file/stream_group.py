@@ -1,4 +1,4 @@
-"""Writes the streams of others into a session of a participant file."""
+"""Groups of the streams of others in a session of a participant file, written."""
 
 import json
 from collections.abc import Mapping, Sequence

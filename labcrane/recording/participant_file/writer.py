@@ -1,4 +1,4 @@
-"""Makes the participant file of journals.
+"""Writer of the participant file, from journals.
 
 HDF5 is never open for writing while people are recorded. Each session is added to a new file beside
 the old one, which is brought to the disk, read again, and only then takes the old one's name.

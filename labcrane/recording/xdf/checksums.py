@@ -1,4 +1,4 @@
-"""Finds out which bytes of a journal are as they were written.
+"""Checksums that tell which bytes of a journal are as they were written.
 
 XDF has no checksums, so labcrane writes a stream of its own, ``labcrane.check``. Each sample
 says where a chunk ends and what the CRC-32 of the file up to there is. Any stretch between two

@@ -1,4 +1,4 @@
-"""Reads XDF files, whole ones, torn ones and damaged ones.
+"""Reader of XDF files, whole ones, torn ones and damaged ones.
 
 What is whole is read; what is not is reported. Journals of labcrane are verified against the checks
 they hold; in other files damage shows only where it breaks the structure of the chunks.

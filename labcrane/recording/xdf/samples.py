@@ -1,4 +1,4 @@
-"""Unpacks the samples of one stream of an XDF file."""
+"""Samples of one stream of an XDF file, unpacked."""
 
 import struct
 from collections.abc import Iterable, Iterator

@@ -1,4 +1,4 @@
-"""Walks through the chunks of an XDF file, and past what is damaged."""
+"""Scanner of the chunks of an XDF file, which goes past what is damaged."""
 
 import struct
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""Writes XDF 1.0 files that a killed process leaves readable.
+"""Writer of XDF 1.0 files that a killed process leaves readable.
 
 Every call is one write to the operating system. Beside what the specification asks for, a stream
 of its own, ``labcrane.check``, holds the running CRC-32 of all that was written

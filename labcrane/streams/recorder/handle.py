@@ -7,13 +7,15 @@ over at once, even when both die in one moment.
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from labcrane.processes.handle import Patience, ProcessHandle
 from labcrane.recording.paths import part_number, parts
-from labcrane.streams.recorder.process import KNOWN, STOP, RecorderConfig
-from labcrane.streams.request import StreamRequest
+from labcrane.streams.recorder.candidates import answered, called
+from labcrane.streams.recorder.process import CONFIRMED, KNOWN, STOP, RecorderConfig
+from labcrane.streams.request import NOBODY, StreamRequest
 
 MODULE = "labcrane.streams.recorder.process"
 
@@ -103,8 +105,31 @@ class RecorderHandle:
                 lines.append(f"{stream['label']}: {stream['condition']}")
         return list(dict.fromkeys(lines))
 
+    @property
+    def asks(self) -> bool:
+        """Whether somebody is asked which stream of a type is meant."""
+        return any(stream["candidates"] for stream in self.status.get("streams", ()))
+
+    def confirm(self, text: str) -> str:
+        """Let the stream of a type be recorded that somebody says is meant; say which it is.
+
+        ``text`` is read by :func:`labcrane.streams.recorder.candidates.answered`.
+
+        Raises
+        ------
+        StreamError
+            It answers no question.
+        """
+        label, meant = answered(text, self.status.get("streams", ()))
+        self._requests = tuple(
+            replace(one, confirmed=meant) if one.label == label else one for one in self._requests
+        )
+        for recorder in self._recorders:
+            recorder.tell({CONFIRMED: {label: meant}})
+        return f"stream {label} is {'none of them' if meant == NOBODY else called(meant)}"
+
     def taken(self) -> list[str]:
-        """Return which streams were taken by their type alone, one line each."""
+        """Return which streams were confirmed that only their type asked for, one line each."""
         streams = self.status.get("streams", ())
         return [f"{one['label']}: {one['taken']}" for one in streams if one["taken"]]
 

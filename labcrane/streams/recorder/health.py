@@ -51,6 +51,7 @@ class Condition(StrEnum):
     """How a stream is."""
 
     ABSENT = "absent"
+    ASKED = "asked about"  # one fits by its type alone, and nobody has said that it is meant
     OPENING = "opening"
     EMPTY = "empty"  # found, but no sample came yet
     FLOWS = "flows"
@@ -87,7 +88,11 @@ class Health:
     """Why a monitor does not look at it any more, by its name."""
 
     taken: str = ""
-    """Which stream it is, where any of its type would have been taken."""
+    """Which stream it is, where any of its type would have fitted."""
+
+    candidates: list[Mapping[str, Any]] = field(default_factory=list)
+    """Which streams may be the one that is meant, as of
+    :class:`labcrane.streams.recorder.candidates.Candidate`."""
 
     @property
     def sane(self) -> bool:

@@ -5,7 +5,7 @@ seconds after whoever started it has died, so that nothing of the end is lost.
 
 A launcher starts it by a :class:`labcrane.processes.handle.ProcessHandle`, before there is anything
 to record: it has loaded everything and waits for its :class:`RecorderConfig`. It is told ``stop``,
-and descriptions of streams it need not search for,
+descriptions of streams it need not search for, and which stream of a type is meant,
 and tells every second how each stream is, and whether all that is required flows. By hand, its
 orders are JSON, ``stop`` is a line of its standard input, a status a line of its standard output:
 
@@ -37,6 +37,9 @@ STATUS_S = 1.0
 STOP = "stop"
 KNOWN = "known"
 """Of a message: descriptions of streams that are there now."""
+
+CONFIRMED = "confirmed"
+"""Of a message: which stream of its type is meant, by the study's name for it."""
 
 STATUS_FD = 1
 
@@ -146,6 +149,8 @@ def _watch(orders: RecorderConfig, chief: Chief, recorder: Recorder) -> Iterator
         for told in said:
             if isinstance(told, Mapping):
                 recorder.know(told.get(KNOWN, ()))
+                for label, key in told.get(CONFIRMED, {}).items():
+                    recorder.confirm(label, key)
         if chief.gone.is_set():
             if ends == float("inf"):  # what the session's streams still send is recorded
                 ends = time.monotonic() + orders.grace_s

@@ -1,9 +1,9 @@
-"""Records the streams of others: whatever was asked for, late or again after a restart."""
+"""Recorder of the streams of others: whatever was asked for, late or again after a restart."""
 
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,11 +13,13 @@ from labcrane.errors import RecordingError
 from labcrane.recording.foreign_streams import OWN_CLOCK
 from labcrane.recording.paths import next_part, part_path
 from labcrane.recording.xdf.writer import XdfWriter
+from labcrane.streams.recorder.absence import PATIENCE_S, absent, missed
+from labcrane.streams.recorder.candidates import Candidate, question
 from labcrane.streams.recorder.health import Condition, Health, complaints, condition, rate
 from labcrane.streams.recorder.inlet import Inlet
 from labcrane.streams.recorder.own_clock import read_own_clock
 from labcrane.streams.recorder.signal_feed import SignalFeed
-from labcrane.streams.request import StreamRequest, unstable_id
+from labcrane.streams.request import NOBODY, Identity, StreamRequest, unstable_id
 from labcrane.streams.search import Search, known_stream
 
 if TYPE_CHECKING:
@@ -45,6 +47,8 @@ class _Recorded:
 class Recorder:
     """Records what is asked for as soon as it is there. Call ``look`` several times a second.
 
+    What is asked for by its type alone waits until somebody has said which stream is meant.
+
     Parameters
     ----------
     journal
@@ -65,7 +69,9 @@ class Recorder:
         known: Sequence[str] = (),
         monitors: Mapping[str, Any] | None = None,
     ) -> None:
-        self._requests = tuple(requests)
+        # Who names its stream comes before who would have any of its type.
+        self._requests = tuple(sorted(requests, key=lambda one: one.by_type_alone))
+        self._candidates: dict[str, list[Candidate]] = {}
         self._writer = XdfWriter(next_part(journal) if part is None else part_path(journal, part))
         self._streams: dict[tuple[str, str, str], _Recorded] = {}
         self._latest: dict[tuple[str, str, str], pylsl.StreamInfo] = {}
@@ -79,6 +85,7 @@ class Recorder:
         self.know(known)
         self._own = self._writer.add_stream(OWN_CLOCK) if read_own_clock() is not None else None
         self._search = Search(forget_s=FORGET_S)
+        self._began = time.monotonic()
 
     @property
     def path(self) -> Path:
@@ -92,8 +99,9 @@ class Recorder:
         now = time.monotonic()
         self._since = {info.uid(): self._since.get(info.uid(), now) for info in found}
         self._there = {_key(info) for info in found}
+        self._candidates = {}
         for info in found:
-            self._latest[_key(info)] = info  # a program that was started again has other ports
+            self._latest[_key(info)] = info  # one that was started again has other ports
             self._start(info)
         self._find_duplicates(found, now)
         self._find_strangers(found)
@@ -108,12 +116,20 @@ class Recorder:
                 self._latest[_key(info)] = info
                 self._start(info)
 
+    def confirm(self, label: str, meant: Identity) -> None:
+        """Record this stream as the one of its type that is meant; NOBODY for none."""
+        self._requests = tuple(
+            replace(one, confirmed=meant) if one.label == label and one.asks else one
+            for one in self._requests
+        )
+        self._candidates.pop(label, None)
+
     def health(self) -> list[Health]:
         """Return how each stream is now, also those asked for that are not there."""
         now = time.perf_counter()
         found = [_health(one, now, self._rivals(one)) for one in self._streams.values()]
         there = {one.request.label for one in self._streams.values()}
-        return found + [_absent(one) for one in self._requests if one.label not in there]
+        return found + [self._absent(one) for one in self._requests if one.label not in there]
 
     def status(self) -> dict[str, Any]:
         """Return how the recording is, ready for JSON."""
@@ -142,6 +158,19 @@ class Recorder:
             self._fault = str(error)
         return all(whole) and self._fault is None
 
+    def _absent(self, request: StreamRequest) -> Health:
+        """Return how a stream is that is not recorded: asked about, left out or not there."""
+        if candidates := self._candidates.get(request.label, ()):
+            kind, required = request.type or "", request.required
+            said = question(request.label, kind, candidates, required=required)
+        elif request.confirmed == NOBODY:
+            said = "was left out: no stream of its type is meant"
+        elif time.monotonic() - self._began < PATIENCE_S:
+            said = absent(request)
+        else:
+            said = missed(request, self._search.results())
+        return _absent(request, candidates, said)
+
     def _log_own_clock(self) -> None:
         reading = None if self._own is None else read_own_clock()
         if self._own is not None and reading is not None:
@@ -157,15 +186,17 @@ class Recorder:
         request = self._wanted(info)
         if request is None or key in self._streams:
             return
+        if request.asks:
+            known = self._candidates.setdefault(request.label, [])
+            if (candidate := Candidate.of(info)) not in known:
+                known.append(candidate)
+            return
         misfits = request.misfits(info.channel_count(), info.nominal_srate())
         warnings = list(misfits)
         taken = request.taken(info.name(), info.source_id(), info.hostname())
-        if taken is not None and not request.any_meant:
-            warnings.append(taken)
-        noted = taken if request.any_meant else None
         if (unstable := unstable_id(info.source_id())) is not None:
             warnings.append(unstable)
-        inlet = Inlet(info, self._writer, request.counter, (*warnings,), self._feed, noted)
+        inlet = Inlet(info, self._writer, request.counter, (*warnings,), self._feed, taken)
         self._streams[key] = _Recorded(request, inlet, misfits, warnings, taken or "")
 
     def _note_rivals(self) -> None:
@@ -275,7 +306,7 @@ def _health(recorded: _Recorded, now: float, rivals: list[str]) -> Health:
     return health
 
 
-def _absent(request: StreamRequest) -> Health:
+def _absent(request: StreamRequest, candidates: Sequence[Candidate], said: str) -> Health:
     return Health(
         label=request.label,
         name=request.name or "",
@@ -283,7 +314,7 @@ def _absent(request: StreamRequest) -> Health:
         source_id=request.source_id or "",
         host="",
         required=request.required,
-        condition=Condition.ABSENT,
+        condition=Condition.ASKED if candidates else Condition.ABSENT,
         samples=0,
         rate_hz=None,
         nominal_hz=request.rate_hz or 0.0,
@@ -294,5 +325,6 @@ def _absent(request: StreamRequest) -> Health:
         rtt_s=None,
         missing=0,
         resets=0,
-        warnings=[f"{request} is not on the network: start it, and check that LSL is enabled"],
+        warnings=[said],
+        candidates=[asdict(one) for one in candidates],
     )

@@ -42,8 +42,28 @@ STARTS: Mapping[str, str] = {
     "decision": "Go on all the same",
     "fault": "Go on",
 }
+NOT_YET = "the session waits for its streams and feedback, and begins by itself"
 PAUSABLE = {"waiting", "running", "break", "questionnaire", "between", "fault"}
 NO_TRIAL = "no trial is running"
+
+
+def answers(stream: Mapping[str, Any]) -> list[Button]:
+    """Return the buttons that say which stream of a type is meant, where that is asked."""
+    label, words = stream["label"], [each["identity"] for each in stream["candidates"]]
+    ids = [source_id for source_id, _, _ in words]
+    found = []
+    for at, (source_id, name, _) in enumerate(words):
+        # Programs may share a source_id, and then have names.
+        word = source_id if source_id and ids.count(source_id) == 1 else name
+        host = stream["candidates"][at]["host"]
+        found.append(
+            Button(
+                f"take-{label}-{at}", Order.TAKE, f"{label}={word}", f"Take {name} of {host}", "T"
+            )
+        )
+    if found and not stream["required"]:
+        found.append(Button(f"take-{label}-none", Order.TAKE, f"{label}=none", "Leave out", ""))
+    return found
 
 
 def buttons(view: SessionView) -> list[Button]:
@@ -51,6 +71,7 @@ def buttons(view: SessionView) -> list[Button]:
     state = state_of(view)
     over = "the session has ended" if state == "ended" else ""
     startable = (state in STARTS and state != "fault") or EXAMINER in view.holds
+    idle = NOT_YET if state == "starting" else "nothing waits to start"
     waits = view.stage.partition(": ")[2] if state == "waiting" else ""
     start = f"{STARTS.get(state, 'Start')}{': ' + waits if waits else ''}"
     pause = "" if state in PAUSABLE and EXAMINER not in view.holds else "nothing to pause"
@@ -60,7 +81,7 @@ def buttons(view: SessionView) -> list[Button]:
     return [
         Button(
             "order-start", Order.START, "", start, "Space",
-            over or ("" if startable else "nothing waits to start"), primary=startable,
+            over or ("" if startable else idle), primary=startable,
         ),
         Button(
             "order-pause", Order.PAUSE, "", "Pause", "P", over or pause,

@@ -28,9 +28,11 @@ class Lamp:
 
 
 REMEDIES: Mapping[str, str] = {
+    "trigger": "plug the device in; its codes stay in the record, and the session goes on",
     "input": "check the controls' cable and power; the session goes on when they are back",
     "disk": "free space or connect the disk again; nothing is lost meanwhile",
     "stream": "check the device and its program; the recorder goes on looking for it",
+    "asked": "answer with the buttons beside it",
     "feedback": "it is started again; end the session if it keeps failing",
 }
 """What to do about each kind of fault."""
@@ -91,6 +93,9 @@ def _of_streams(status: Mapping[str, Any]) -> list[Lamp]:
         label, condition = stream["label"], stream["condition"]
         if stream.get("required") and condition in {"absent", "silent"}:
             found.append(Lamp("bad", f"stream {label} is {condition}", REMEDIES["stream"]))
+        elif condition == "asked about":
+            asked = f"stream {label} {stream['warnings'][0]}"
+            found.append(Lamp("warn", asked, REMEDIES["asked"]))
         elif stream["warnings"]:
             found.append(Lamp("warn", f"stream {label} {stream['warnings'][0]}"))
         elif stream["signals"]:

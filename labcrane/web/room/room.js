@@ -154,7 +154,9 @@ export default {
           <svg viewBox="0 0 90 24" role="img" :aria-label="'rate of ' + one.label">
             <path :d="trace(one.trace)"/></svg>
           <span><strong>{{ one.label }}</strong> {{ one.words }}
-            <span v-for="line in one.lines" :key="line" class="room-line">{{ line }}</span></span>
+            <span v-for="line in one.lines" :key="line" class="room-line">{{ line }}</span>
+            <button v-for="a in one.answers" :key="a.ident" type="button" class="room-button"
+              :id="a.ident" @click="press(a)">{{ a.label }}</button></span>
         </div>
       </section>
       <section class="room-card" id="settings" v-show="s.state !== 'ended'">
@@ -321,6 +323,7 @@ export default {
       else if (at) document.getElementById(at)?.focus();
       else if (key === "F") document.querySelector("#settings input, #settings select")?.focus();
       else if (key === "Q") document.querySelector(".room-form button, .room-form input")?.focus();
+      else if (key === "T") document.querySelector("#streams button")?.focus();
       else if (key === "D") this.theme();
       else return;
       e.preventDefault();

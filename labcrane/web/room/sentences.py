@@ -70,6 +70,8 @@ SAID: Mapping[str, tuple[str, str, str]] = {
     "input.back": ("the controls are back", "faults", ""),
     "disk.lost": ("the disk takes nothing: {why}", "faults", "bad"),
     "disk.back": ("the disk takes data again", "faults", ""),
+    "trigger.lost": ("trigger {why}", "faults", "bad"),
+    "trigger.back": ("trigger {trigger} is back", "faults", ""),
     "plugin.slow": ("too slow: {why}", "faults", "warn"),
     "page.denied": ("refused: {why}", "faults", "warn"),
     "launcher.gone": ("the launcher is gone: the session ends", "faults", "bad"),

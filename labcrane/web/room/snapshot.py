@@ -12,7 +12,7 @@ from labcrane.protocol.questions import about, questions
 from labcrane.protocol.study import Study
 from labcrane.web.page import PageContext
 from labcrane.web.room.bars import groups
-from labcrane.web.room.buttons import buttons
+from labcrane.web.room.buttons import answers, buttons
 from labcrane.web.room.condition import lamp_of, state_of
 from labcrane.web.room.earlier import Earlier
 from labcrane.web.room.sentences import KINDS, sentence
@@ -268,6 +268,7 @@ def _stream(stream: Mapping[str, Any], trace: list[float | None]) -> dict[str, A
     return {
         "label": stream["label"], "level": level, "words": ", ".join(words),
         "trace": trace, "lines": [*stream["warnings"], *faults],
+        "answers": [button.as_json() for button in answers(stream)],
     }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""From valve signals to joint speeds: dead time, opening, and the model's speed."""
+"""Drive from valve signals to joint speeds: dead time, opening, and the model's speed."""
 
 import math
 from collections import deque

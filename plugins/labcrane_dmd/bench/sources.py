@@ -1,4 +1,4 @@
-"""Where a joint's signal and angle come from: a CAN bus, a log of one, LSL, or an earlier log."""
+"""Sources of a joint's signal and angle: a CAN bus, a log of one, LSL, or an earlier log."""
 
 import csv
 import math

@@ -1,4 +1,4 @@
-"""Make a model from recordings."""
+"""Fit of a model to recordings."""
 
 from collections.abc import Sequence
 from dataclasses import replace

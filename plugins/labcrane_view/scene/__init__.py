@@ -1,1 +1,1 @@
-"""What a view shows: the forest, the machine, meshes and shaders, as triangles and nodes."""
+"""Scene that a view shows: the forest, the machine, meshes and shaders, as triangles and nodes."""

@@ -1,0 +1,95 @@
+"""QUEST+: the level whose answer is expected to tell most of the threshold (Watson 2017).
+
+Our own sixty lines: the library that there is loads for seconds and takes two ticks of a loop for a
+choice. The tests compare the two.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from labcrane.protocol.tracks import QuestPlus
+from labcrane.types import FloatArray
+
+THRESHOLDS = 61
+"""Between the easiest and the hardest level."""
+
+SURE = 1e-12
+"""Nothing is surer than this: an impossible answer must not leave a posterior of zeros."""
+
+DIGITS = 9
+"""To which entropies are compared, so that sums in another order choose the same level."""
+
+
+@dataclass(frozen=True, slots=True)
+class Posterior:
+    """What is known of a participant.
+
+    Attributes
+    ----------
+    best
+        Number of the level that is expected to tell most.
+    mean, sd
+        Of the threshold, in the levels' unit.
+    """
+
+    best: int
+    mean: float
+    sd: float
+
+
+class Grid:
+    """Every threshold with every spread, and what each says of each level.
+
+    Parameters
+    ----------
+    levels
+        How hard each level is, shape ``(n_levels,)``.
+    """
+
+    def __init__(self, settings: QuestPlus, levels: Sequence[float]) -> None:
+        axis = np.linspace(min(levels), max(levels), THRESHOLDS)
+        self.thresholds = np.repeat(axis, len(settings.spreads))
+        spreads = np.tile(settings.spreads, THRESHOLDS)
+        normal = [
+            [0.5 * math.erfc((level - t) / (s * math.sqrt(2.0))) for t, s in self._pairs(spreads)]
+            for level in levels
+        ]
+        right = settings.guess + (1.0 - settings.guess - settings.lapse) * np.array(normal)
+        self._right = np.clip(right, SURE, 1.0 - SURE)
+        self._wrong = 1.0 - self._right
+        self._logs = np.log(self._right), np.log(self._wrong)
+
+    def _pairs(self, spreads: FloatArray) -> list[tuple[float, float]]:
+        return list(zip(self.thresholds.tolist(), spreads.tolist(), strict=True))
+
+    def posterior(self, successes: FloatArray, failures: FloatArray) -> Posterior:
+        """Return what is known after so many successes and failures at each level.
+
+        Parameters
+        ----------
+        successes, failures
+            Shape ``(n_levels,)``.
+        """
+        log_right, log_wrong = self._logs
+        likelihood = successes @ log_right + failures @ log_wrong
+        known = np.exp(likelihood - likelihood.max())
+        known /= known.sum()
+        mean = float(known @ self.thresholds)
+        sd = math.sqrt(float(known @ (self.thresholds - mean) ** 2))
+        surprise = known * np.log(np.maximum(known, np.finfo(float).tiny))
+        expected = 0.0
+        for chance, logs in ((self._right, log_right), (self._wrong, log_wrong)):
+            total = chance @ known  # of this answer at each level
+            told = (chance * logs) @ known + chance @ surprise
+            expected = expected + total * np.log(total) - told
+        return Posterior(int(np.argmin(np.round(expected, DIGITS))), mean, sd)
+
+
+@lru_cache(maxsize=64)
+def grid(settings: QuestPlus, levels: tuple[float, ...]) -> Grid:
+    """Return a grid, made once."""
+    return Grid(settings, levels)

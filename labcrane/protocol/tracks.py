@@ -1,0 +1,179 @@
+"""Tracks of a design: levels of a factor that are chosen by what the participant has done."""
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Self
+
+from pydantic import (
+    Field,
+    FiniteFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
+
+from labcrane.core.records import Phase, Value
+from labcrane.core.settings import Settings
+from labcrane.files.model import AtMost, was_run
+
+JUDGED = (Phase.SUCCESS, Phase.FAILURE, Phase.TIMEOUT)
+"""How trials end that say something of the participant."""
+
+
+class UpDown(Settings):
+    """A staircase: harder after some successes in a row, easier after some failures (Levitt 1971).
+
+    It settles where both are as likely: at 71 % of successes with 2 and 1, at 79 % with 3 and 1.
+    """
+
+    harder_after: PositiveInt = 2
+    """Successes in a row after which the level gets harder."""
+
+    easier_after: PositiveInt = 1
+    """Failures in a row after which it gets easier."""
+
+    steps: Annotated[tuple[PositiveInt, ...], Field(min_length=1)] = (1,)
+    """By how many levels, one number more after each change of direction; the last one stays:
+    ``[4, 2, 1]``."""
+
+    reversals: Annotated[int, Field(ge=2), AtMost(1000)] = 8
+    """Changes of direction after which a block ends."""
+
+    leave_out: NonNegativeInt = 2
+    """How many of the first of them are not in the estimate, the mean of the levels at the rest."""
+
+    @field_validator("leave_out")
+    @classmethod
+    def _some_are_left(cls, leave_out: int, info: ValidationInfo) -> int:
+        reversals = info.data.get("reversals")
+        if reversals is not None and leave_out > reversals - 2 and not was_run(info):
+            raise ValueError(
+                f"of {reversals} reversals {leave_out} are left out, and an estimate needs two; "
+                f"write {reversals - 2} or less"
+            )
+        return leave_out
+
+
+class QuestPlus(Settings):
+    """Always the level whose answer is expected to tell most (QUEST+, Watson 2017).
+
+    Success is less likely the harder a level is: ``guess + (1 - guess - lapse) * Phi((threshold -
+    level) / spread)``, Phi being the normal distribution's. Any threshold from the easiest to the
+    hardest level is as likely beforehand as any other.
+    """
+
+    spreads: Annotated[tuple[PositiveFloat, ...], Field(min_length=1, max_length=20)]
+    """Spreads that are possible, in the levels' unit, each as likely; ``[0.5, 1, 2]``."""
+
+    guess: float = Field(default=0.0, ge=0.0, lt=1.0)
+    """Probability of a success by chance."""
+
+    lapse: float = Field(default=0.02, ge=0.0, lt=1.0)
+    """Probability of a failure however easy the level is."""
+
+    until_sd: PositiveFloat | None = None
+    """A block ends when the standard deviation of the threshold is this or less, in the levels'
+    unit; without it, when all rounds are done."""
+
+    @field_validator("lapse")
+    @classmethod
+    def _ability_matters(cls, lapse: float, info: ValidationInfo) -> float:
+        guess = info.data.get("guess", 0.0)
+        if guess + lapse >= 1.0:
+            raise ValueError(
+                f"guess {guess:g} and lapse {lapse:g} leave nothing to be measured; together they "
+                "must be below 1"
+            )
+        return lapse
+
+
+class Track(Settings):
+    """Levels of a factor that are chosen round by round, by what the participant has done.
+
+    A round is what the task makes of one level: of ``aiming`` a pair of circles, with its approach.
+    """
+
+    factor: str
+    """Which factor of the task it is: ``pairs``."""
+
+    levels: Annotated[dict[str, FiniteFloat], Field(min_length=2, max_length=200)]
+    """How hard each of its levels is, a larger number being harder: ``{2m_far_left: 2,
+    4m_far_left: 4}``. Levels that are not named are not used."""
+
+    up_down: UpDown | None = None
+    """A staircase chooses; either this or ``quest_plus``."""
+
+    quest_plus: QuestPlus | None = None
+    """QUEST+ chooses."""
+
+    start: str = ""
+    """The first level; otherwise the easiest of a staircase, and the one that tells most of
+    QUEST+."""
+
+    rounds: Annotated[PositiveInt, AtMost(1000)] = 40
+    """Most rounds of a block."""
+
+    measure: str = ""
+    """A result of the task by which successful trials are judged, within ``at_least`` and
+    ``at_most``: ``movement_time``. Without it a trial that succeeds is a success."""
+
+    at_least: FiniteFloat | None = None
+    """The least value of the measure that is a success, in its unit."""
+
+    at_most: FiniteFloat | None = None
+    """The largest value of the measure that is a success, in its unit."""
+
+    carry: bool = True
+    """Whether a session goes on from what the participant did in the sessions before."""
+
+    @field_validator("levels")
+    @classmethod
+    def _differ(cls, levels: dict[str, float], info: ValidationInfo) -> dict[str, float]:
+        numbers = list(levels.values())
+        same = [name for name, number in levels.items() if numbers.count(number) > 1]
+        if same and not was_run(info):
+            raise ValueError(
+                f"levels {' and '.join(map(repr, same))} are as hard as each other; leave all but "
+                "one out, or give them numbers of their own"
+            )
+        return levels
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> Self:
+        if (self.up_down is None) == (self.quest_plus is None):
+            there = "both are there" if self.up_down else "neither is there"
+            raise ValueError(f"{there}; one of up_down and quest_plus chooses the levels")
+        if self.start and self.start not in self.levels:
+            raise ValueError(
+                f"start is {self.start!r}, which is no level; there is {', '.join(self.levels)}"
+            )
+        if bool(self.measure) != (self.at_least is not None or self.at_most is not None):
+            raise ValueError("a measure has at_least, at_most or both, and they have a measure")
+        return self
+
+    @property
+    def by(self) -> str:
+        """What chooses, as people call it."""
+        if self.up_down is not None:
+            up_down = self.up_down
+            return (
+                f"a staircase, harder after {up_down.harder_after} and easier after "
+                f"{up_down.easier_after}"
+            )
+        return "QUEST+"
+
+    def judge(self, outcome: Phase, results: Mapping[str, Value]) -> bool | None:
+        """Return whether a trial is a success; None where it says nothing of the participant."""
+        if outcome not in JUDGED:
+            return None
+        if outcome is not Phase.SUCCESS or not self.measure:
+            return outcome is Phase.SUCCESS
+        value = results.get(self.measure)
+        if not isinstance(value, int | float) or math.isnan(value):
+            return None
+        lowest = -math.inf if self.at_least is None else self.at_least
+        highest = math.inf if self.at_most is None else self.at_most
+        return lowest <= value <= highest

@@ -1,0 +1,179 @@
+"""Thresholds of simulated people whose threshold is known: how well a track finds them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from labcrane.design.tracks import PlannedTrack, standing
+from labcrane.design.up_down import settles_at
+from labcrane.errors import ProtocolError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+LEAST = 20
+"""Operators from whom bias and spread are told."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ability:
+    """How likely somebody's success is, as :class:`labcrane.protocol.tracks.QuestPlus` has it.
+
+    Attributes
+    ----------
+    threshold, spread
+        In the levels' unit.
+    guess, lapse
+        Probability of success by chance, and of failure however easy it is.
+    """
+
+    threshold: float
+    spread: float
+    guess: float = 0.0
+    lapse: float = 0.0
+
+    def success(self, level: float) -> float:
+        """Return the probability of a success at a level."""
+        from scipy.special import ndtr
+
+        able = float(ndtr((self.threshold - level) / self.spread))
+        return self.guess + (1.0 - self.guess - self.lapse) * able
+
+    def level_of(self, success: float) -> float:
+        """Return the level at which a success has this probability."""
+        from scipy.special import ndtri
+
+        able = (success - self.guess) / (1.0 - self.guess - self.lapse)
+        return self.threshold - self.spread * float(ndtri(able))
+
+
+@dataclass(frozen=True, slots=True)
+class Quality:
+    """How well a track finds thresholds, in the levels' unit.
+
+    Attributes
+    ----------
+    track, by
+        Which, and what chooses its levels.
+    operators, without
+        How many there were, and for how many there is no estimate.
+    bias, bias_low, bias_high
+        Mean of estimate minus truth, with its 95 % confidence interval.
+    spread
+        Standard deviation of estimate minus truth.
+    bias_in_sd
+        Bias as a share of the spread.
+    trials
+        Counted trials of a block on average.
+    ended
+        Share of the blocks that came to an end before all rounds were done.
+    """
+
+    track: str
+    by: str
+    operators: int
+    without: int
+    bias: float
+    bias_low: float
+    bias_high: float
+    spread: float
+    bias_in_sd: float
+    trials: float
+    ended: float
+
+
+def abilities(
+    track: PlannedTrack, operators: int, spreads: Sequence[float], seed: int
+) -> list[Ability]:
+    """Draw people: thresholds evenly from the easiest to the hardest level, a spread of the given.
+
+    Chance and lapses are those that QUEST+ believes in; with a staircase there are none.
+
+    Raises
+    ------
+    ProtocolError
+        No spread is given for a staircase, which knows of none.
+    """
+    law = track.settings.quest_plus
+    spreads = spreads or (law.spreads if law is not None else ())
+    if not spreads:
+        raise ProtocolError(
+            f"track {track.name!r} is a staircase, and says nothing of how steeply success falls "
+            "with the level; give --spread, in the levels' unit"
+        )
+    random = np.random.default_rng(seed)
+    numbers = list(track.settings.levels.values())
+    thresholds = random.uniform(min(numbers), max(numbers), operators).tolist()
+    steepness = random.choice(np.asarray(spreads, float), operators).tolist()
+    chance = (0.0, 0.0) if law is None else (law.guess, law.lapse)
+    return [Ability(*each, *chance) for each in zip(thresholds, steepness, strict=True)]
+
+
+def observe(track: PlannedTrack, people: Sequence[Ability], seed: int) -> "pd.DataFrame":
+    """Lead everybody through a block; return a row each.
+
+    Columns are ``threshold`` and ``spread`` as they were drawn, ``truth``, what the track is after,
+    ``estimate``, ``sd``, ``trials`` and whether it ``ended`` before all rounds were done.
+    """
+    import pandas as pd
+
+    random, settings = np.random.default_rng(seed), track.settings
+    counted = sum(each.counted for each in next(iter(track.rounds.values())))
+    up_down = settings.up_down
+    sought = None if up_down is None else settles_at(up_down)
+    rows = []
+    for person in people:
+        told: list[tuple[str, bool]] = []
+        where = standing(settings)
+        for _ in range(settings.rounds):
+            if where.level is None:
+                break
+            chance = person.success(settings.levels[where.level])
+            told += [(where.level, bool(hit)) for hit in random.uniform(size=counted) < chance]
+            where = standing(settings, (), told)
+        truth = person.threshold if sought is None else person.level_of(sought)
+        rows.append(
+            (person.threshold, person.spread, truth, where.estimate, where.sd, len(told),
+             where.level is None)
+        )  # fmt: skip
+    columns = ["threshold", "spread", "truth", "estimate", "sd", "trials", "ended"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def quality(track: PlannedTrack, found: "pd.DataFrame") -> Quality:
+    """Return bias and spread of a track's estimates."""
+    from scipy.stats import t
+
+    errors = (found["estimate"] - found["truth"]).dropna().to_numpy(float)
+    count = len(errors)
+    if count < LEAST:
+        raise ProtocolError(
+            f"track {track.name!r} has an estimate of {count} of {len(found)} operators, and bias "
+            f"needs {LEAST}; allow more rounds or fewer reversals, or take more --operators"
+        )
+    bias, spread = float(errors.mean()), float(errors.std(ddof=1))
+    reach = float(t.ppf(0.975, count - 1)) * spread / count**0.5
+    return Quality(
+        track.name, track.settings.by, len(found), len(found) - count, bias, bias - reach,
+        bias + reach, spread, bias / spread, float(found["trials"].mean()),
+        float(found["ended"].mean()),
+    )  # fmt: skip
+
+
+def paragraph(found: Sequence[Quality]) -> str:
+    """Return what an application to an ethics board says of tracks."""
+    sentences = []
+    for each in found:
+        none = f"; of {each.without} there was no estimate" if each.without else ""
+        sentences.append(
+            f"Levels of {each.track!r} are chosen by {each.by}. With {each.operators} simulated "
+            f"operators whose thresholds are known, its estimate was off by {each.bias:.3g} on "
+            f"average (95 % interval {each.bias_low:.3g} to {each.bias_high:.3g}), with a standard "
+            f"deviation of {each.spread:.3g}, after {each.trials:.1f} trials{none}."
+        )
+    sentences.append(
+        "The simulated operators are a model; the numbers hold for people as far as they do."
+    )
+    return " ".join(sentences)
