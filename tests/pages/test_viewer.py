@@ -21,7 +21,7 @@ from labcrane.errors import RecordingError
 from labcrane.machines.kinematics import link_frames
 from labcrane.registry.registry import discover
 from labcrane.web.room.shown import ShownShapes
-from labcrane.web.viewer.film import POINTS, Film
+from labcrane.web.viewer.film import POINTS, STEPS, WINDOW_SAMPLES, Film
 from labcrane.web.viewer.opened import opened
 
 STUDY = (
@@ -129,6 +129,44 @@ def test_a_session_without_frames_says_that_there_is_nothing_to_see(file: Path) 
         open_recording(file).session(1).streams["state"].column("joint")
 
 
+class Heard(Film):
+    """A film of which one signal is known."""
+
+    def __init__(self, time_s: np.ndarray, values: np.ndarray) -> None:
+        self.heard = time_s, values
+
+    def _signal(self, stream: str, column: str) -> tuple[np.ndarray, np.ndarray]:
+        return self.heard
+
+
+def test_a_spectrogram_has_a_tone_at_its_frequency_and_its_loudness_and_gaps_stay_gaps() -> None:
+    rate_hz, draw = 1000.0, np.random.default_rng(7)
+    time_s = np.arange(60_000) / rate_hz
+    for tone_hz in draw.uniform(20.0, 480.0, 8):
+        amplitude = draw.uniform(0.5, 20.0)
+        film = Heard(time_s, amplitude * np.sin(2 * np.pi * tone_hz * time_s) + 3.0)
+        found = film.spectrogram("Audio", "left", 0.0, 60.0)
+        bins = np.array(found["levels"])
+        assert bins.shape == (STEPS, WINDOW_SAMPLES // 2)
+        step_hz = rate_hz / WINDOW_SAMPLES
+        at = (bins.argmax(axis=1) + 1) * step_hz  # the mean is left out
+        assert np.abs(at - tone_hz).max() <= step_hz
+        assert found["top_hz"] == pytest.approx(500.0)
+        # A sine's power is half its amplitude squared; Hann spreads it over 1.5 bins, and loses
+        # up to 1.42 dB where the tone is between two.
+        whole_db = 10 * np.log10(amplitude**2 / 2 / (1.5 * step_hz))
+        assert whole_db - 1.5 <= found["most_db"] <= whole_db + 0.1
+    gap = (time_s < 20.0) | (time_s > 30.0)
+    film = Heard(time_s[gap], np.sin(time_s[gap]))
+    steps = film.spectrogram("Audio", "left", 0.0, 60.0)["levels"]
+    assert sum(row is None for row in steps) in {1, 2}, "only what the gap is in"
+    film = Heard(time_s, np.where(time_s < 30.0, np.nan, np.sin(time_s)))
+    steps = film.spectrogram("Audio", "left", 0.0, 60.0)["levels"]
+    assert [row is None for row in steps[:145] + steps[155:]] == [True] * 145 + [False] * 145
+    with pytest.raises(RecordingError, match="needs 512 samples, and Audio left has 100 there"):
+        film.spectrogram("Audio", "left", 0.0, 0.1)
+
+
 def copied(file: Path, folder: Path) -> Path:
     """Return a participant's folder with the journals only."""
     there = folder / file.parent.name
@@ -207,6 +245,16 @@ window['scene_' + document.querySelector('.nicegui-scene').id].traverse(o => {
 });
 return found;
 """
+AS_SPECTROGRAM = """
+const field = document.getElementById('as-0');
+field.value = 'spectrogram';
+field.dispatchEvent(new Event('change'));
+"""
+PAINTED = """
+const canvas = document.getElementById('spectrum-0');
+const pixels = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+return pixels.filter((v, n) => n % 4 === 0 && v > 64).length;
+"""
 GO = """
 const field = document.getElementById('second');
 field.value = arguments[0];
@@ -228,6 +276,10 @@ def test_the_page_shows_the_recorded_pose_at_any_time(
         shown(browser, "clock", "of 0:00:")
         wait_for(lambda: text(browser, "range-0"))
         check(browser, "viewer")
+        browser.execute_script(AS_SPECTROGRAM)
+        wait_for(lambda: "dB" in text(browser, "heard-0"))
+        assert browser.execute_script(PAINTED) > 100
+        check(browser, "viewer with a spectrogram")
         machine, times = film.machine, moments(film.length)
         angles = record.streams["state"].data[[f"joint.angle.{n}" for n in machine.names]]
         for at in times:
