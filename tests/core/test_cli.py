@@ -105,6 +105,7 @@ def test_fast_without_simulate_is_refused(
     assert "--fast needs --simulate" in capsys.readouterr().err
 
 
+@needs("pybullet")
 def test_check_says_that_a_protocol_is_fine(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(AIMING)]) == 0
     assert "study 'aiming' is fine: 1 session on the CH8 knuckle boom" in capsys.readouterr().out

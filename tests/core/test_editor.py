@@ -152,6 +152,7 @@ def own_server() -> Sequence[str]:
     return [sys.executable, "-m", "labcrane", "language-server"]
 
 
+@needs("pybullet")
 def test_labcranes_language_server_marks_what_a_check_finds(
     folder: Path, registry: Registry, own_server: Sequence[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -172,6 +173,7 @@ def test_labcranes_language_server_marks_what_a_check_finds(
         assert editor.save(path) == []
 
 
+@needs("pybullet")
 def test_mistakes_in_another_file_are_marked_where_the_protocol_names_it(
     tmp_path: Path, own_server: Sequence[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -189,6 +191,7 @@ def test_mistakes_in_another_file_are_marked_where_the_protocol_names_it(
         assert editor.save(path) == []
 
 
+@needs("pybullet")
 def test_the_supervisors_page_asks_what_a_check_asks(
     folder: Path, registry: Registry, capsys: pytest.CaptureFixture[str]
 ) -> None:

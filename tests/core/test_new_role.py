@@ -12,6 +12,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from needs import needs
 
 import labcrane
 from labcrane import FloatArray, LabcraneError, Machine, Offer, PluginError
@@ -164,6 +165,7 @@ def test_its_offers_are_described(registry: Registry, row: RoleEntry) -> None:
     assert sheet.example.endswith("use: bulb\n" + "  " * (1 + row.several) + "power: 40.0")
 
 
+@needs("pybullet")
 def test_its_page_of_the_reference_is_generated(
     registry: Registry, row: RoleEntry, monkeypatch: pytest.MonkeyPatch
 ) -> None:

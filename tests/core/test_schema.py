@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from jsonschema import Draft202012Validator
+from needs import needs
 from ruamel.yaml import YAML
 
 from labcrane.cli.app import main
@@ -86,6 +87,7 @@ def test_show_tells_settings_with_units_and_defaults_signals_and_an_example(
         assert word in said
 
 
+@needs("pybullet")
 def test_every_offer_can_be_shown_and_its_example_is_what_a_protocol_takes(
     schema: Draft202012Validator, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -106,6 +108,7 @@ def test_what_is_not_there_is_not_shown(capsys: pytest.CaptureFixture[str]) -> N
     assert "nothing called 'spere' is installed; did you mean 'sphere'?" in capsys.readouterr().err
 
 
+@needs("pybullet")
 def test_lists_checks_and_plans_are_there_for_programs(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from needs import needs
 from rehearsal import a_study
 
 import labcrane
@@ -34,6 +35,7 @@ def changed_machine(folder: Path) -> Path:
     return path
 
 
+@needs("pybullet")
 def test_a_whole_session_on_the_engine_is_bit_identical(tmp_path: Path) -> None:
     """The aiming study itself: 32 movements on PyBullet."""
     text = (ROOT / "protocols" / "aiming" / "protocol.yaml").read_text(encoding="utf-8")

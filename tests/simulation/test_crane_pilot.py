@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from needs import needs
 
 import labcrane
 from labcrane.cli.app import main
@@ -68,6 +69,7 @@ def test_both_protocols_say_in_their_head_what_is_the_papers_and_what_is_ours() 
         assert "# Ours" in head
 
 
+@needs("pybullet")
 def test_a_folder_stands_for_its_protocol(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
