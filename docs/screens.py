@@ -1,6 +1,7 @@
 """Pictures of every state of every page, and of the report, at three sizes.
 
-    python docs/screens.py
+    python docs/screens.py                             # all
+    python docs/screens.py tests/pages/test_study.py   # of one
 
 Runs the tests that look at each state (Chromium, its driver and axe-core are needed: `NODE_PATH`
 says where), and keeps what they saw in ``docs/screens``, smaller. What a test refuses is not kept.
@@ -29,7 +30,7 @@ def main() -> int:
     """Take all pictures; return the exit status of the tests."""
     with tempfile.TemporaryDirectory() as folder:
         done = subprocess.run(  # noqa: S603 - our own tests
-            [sys.executable, "-m", "pytest", "-n0", "-q", "-m", "long", *TESTS],
+            [sys.executable, "-m", "pytest", "-n0", "-q", "-m", "long", *(sys.argv[1:] or TESTS)],
             cwd=ROOT, env={**os.environ, "LABCRANE_SCREENS": folder}, check=False,
         )  # fmt: skip
         keep(sorted(Path(folder).glob("*.png")))
@@ -42,7 +43,7 @@ def keep(pictures: list[Path]) -> None:
     for path in pictures:
         with Image.open(path) as picture:
             picture.thumbnail((WIDEST, WIDEST))
-            picture.convert("RGB").save(KEPT / f"{path.stem}.jpg", quality=QUALITY, optimize=True)
+            picture.convert("RGB").save(KEPT / f"{path.stem}.webp", quality=QUALITY)
 
 
 if __name__ == "__main__":
