@@ -129,7 +129,8 @@ def several_of(part: Schema) -> str:
         return f"[{', '.join(takes(each) for each in part['prefixItems'])}]"
     if part["type"] == "array":
         return f"list of {takes(part.get('items', {}))}"
-    return f"by name: {takes(part.get('additionalProperties') or {})}"
+    named = part.get("additionalProperties")  # True where anything may be said
+    return f"by name: {takes(named if isinstance(named, dict) else {})}"
 
 
 def limits(part: Schema) -> Iterator[str]:

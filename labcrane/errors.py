@@ -18,7 +18,18 @@ class LabcraneError(Exception):
 
 
 class ProtocolError(LabcraneError):
-    """The study protocol, or what was asked of it, cannot be run as written."""
+    """The study protocol, or what was asked of it, cannot be run as written.
+
+    Parameters
+    ----------
+    at
+        The keys and indices, below what is being read or built, that lead to what is wrong: a check
+        points there, ``at=("distances", 2)``.
+    """
+
+    def __init__(self, message: str = "", *, at: Sequence[str | int] = ()) -> None:
+        super().__init__(message)
+        self.at = tuple(at)
 
 
 class PluginError(LabcraneError):

@@ -189,7 +189,7 @@ def promised_of(**changed: object) -> list[str]:
     kept = score.Score(
         row="unkind", p95=0.1, most=0.2, cover=1.0, width=0.1, passed=True, usual=0.5,
         untouched=0.5, named=frozenset({fault}), present=frozenset({fault}), clean=True, limit=0.2,
-        samples=1000, apart=0.1, usual_apart=0.5, apart_limit=0.2,
+        samples=1000, apart=0.1, usual_apart=0.5, apart_limit=0.2, chance=False,
     )  # fmt: skip
     draws = [kept] * 9 + [dataclasses.replace(kept, **changed)]
     sync = importlib.import_module("benchmarks.sync")

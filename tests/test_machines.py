@@ -106,8 +106,8 @@ def test_a_machine_beside_the_study_is_read_in_degrees_and_gives_radians(tmp_pat
         (
             "    effort: 9",
             "    effort: 9\n    rest_deg: 61",
-            "digger.yaml:5:5: joints[2]: rest_deg 61.0 is outside the joint's range; it must "
-            "be -60.0 to 60.0",
+            "digger.yaml:5:5: joints[2]: rest_deg 61 is outside the joint's range; it must "
+            "be -60 to 60",
         ),
         (
             "name: stick",

@@ -354,8 +354,8 @@ def _lines(text: str) -> Iterator[Text]:
             for sign, what in (("\t", "a tab"), ("\u00a0", "a no-break space")):
                 new = [*lines[: at - 1], sign + line[1:], *lines[at:]]
                 yield f"line {at} with {what}", "".join(new), at, True
-        elif ": " in line:
-            new = [*lines[: at - 1], line.replace(": ", ":", 1), *lines[at:]]
+        elif re.search(r": +[^ #]", line.split(" #")[0]):
+            new = [*lines[: at - 1], re.sub(r": +(?!#)", ":", line, count=1), *lines[at:]]
             yield f"line {at} without a space behind its colon", "".join(new), at, True
         for closing in "]}":
             code = line.split(" #")[0]

@@ -1,6 +1,6 @@
 """Every column of a participant's tables, with its unit and where it comes from."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from labcrane.analysis.cohort import Participant
@@ -18,6 +18,19 @@ IDENTITY = {
     "session": "number of the session, from 1",
     "session_name": "the protocol's name of the session",
 }
+EVENTS: Mapping[str, tuple[str, str]] = {
+    "participant": ("", IDENTITY["participant"]),
+    "session": ("1", "number of the session"),
+    "time": ("s", "when it happened, on the session's clock"),
+    "tick": ("1", "tick in which it happened"),
+    "part": ("1", "piece of the session, which grows with each interruption"),
+    "trial": ("1", "number of the trial it is of; 0 outside of one"),
+    "name": ("", "what happened"),
+    "label": ("", "plain name with block and condition, to epoch by"),
+    "data": ("", "what is known of it, as JSON"),
+}
+"""Unit and meaning of the columns of the table of events."""
+
 MEASURED, WRITTEN = "computed from the frames by labcrane", "recorded by the session"
 
 
@@ -28,6 +41,7 @@ def codebook_of(participant: Participant, measures: "pd.DataFrame") -> "pd.DataF
     sessions = [session for _, session in participant.sessions()]
     tables = [
         trial_codebook(measures, sessions[0], sessions),
+        event_codebook(),
         questionnaire_codebook(sessions),
         *map(stream_codebook, sessions),
     ]
@@ -64,6 +78,14 @@ def trial_codebook(
         else:
             row = (str(units.get(column, "")), column.replace("_", " "), WRITTEN)
         rows.append(("trials", column, *row))
+    return pd.DataFrame(rows, columns=["table", "column", "unit", "description", "source"])
+
+
+def event_codebook() -> "pd.DataFrame":
+    """Return the same of the table of events."""
+    import pandas as pd
+
+    rows = [("events", name, *about, WRITTEN) for name, about in EVENTS.items()]
     return pd.DataFrame(rows, columns=["table", "column", "unit", "description", "source"])
 
 

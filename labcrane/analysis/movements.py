@@ -20,6 +20,14 @@ Groups = Mapping[str, "pd.DataFrame"]
 
 ROUNDING_S = 1e-9
 
+USED: Mapping[str, tuple[str, ...]] = {
+    "loop": ("due", "trial", "paused", "elapsed"),
+    "input": (),
+    "command": ("command",),
+    "state": ("tip.position", "tip.velocity", "joint.angle"),
+}
+"""Signals that a movement has, by group; all of them where none is named."""
+
 
 @dataclass(frozen=True)
 class Movement:
@@ -80,10 +88,15 @@ class Movement:
 
 
 def groups(session: SessionRecord) -> dict[str, "pd.DataFrame"]:
-    """Read what a session's movements are cut out of."""
-    return {
-        name: session.streams[name].data for name in ("loop", "input", "command", "state", "task")
-    }
+    """Read what a session's movements are cut out of, and nothing else."""
+    import pandas as pd
+
+    found = {}
+    for group, wanted in USED.items():
+        stream = session.streams[group]
+        names = [name for name in stream.units if not wanted or _is_of(name, wanted)]
+        found[group] = pd.DataFrame(stream.columns(names), copy=False)
+    return found
 
 
 def machine_of(session: SessionRecord) -> Machine:
@@ -101,26 +114,33 @@ def movements_of(session: SessionRecord) -> Iterator[Movement]:
 def cut(frames: Groups, trials: "pd.DataFrame", rate_hz: float) -> Iterator[Movement]:
     """Yield the movement of each row of the trial table."""
     loop, state = frames["loop"], frames["state"]
-    due, trial = _array(loop, ["due"])[:, 0], _array(loop, ["trial"])[:, 0]
+    # Taken apart once: a hundred thousand rows cut out of tables, trial by trial, take long.
+    due, trial, elapsed = (_array(loop, [name])[:, 0] for name in ("due", "trial", "elapsed"))
     running = _array(loop, ["paused"])[:, 0] == 0.0
-    for _, row in trials.iterrows():
+    tip, velocity, angles = (_array(state, _below(state, name)) for name in USED["state"])
+    command = _array(frames["command"], _below(frames["command"], "command"))
+    axes = {name: _array(frames["input"], [name])[:, 0] for name in map(str, frames["input"])}
+    for row in trials.to_dict("records"):
         first, last = np.searchsorted(
             due, [float(row["started"]) - ROUNDING_S, float(row["ended"]) + ROUNDING_S]
         )
         ticks = np.arange(first, last)
         ticks = ticks[running[ticks] & (trial[ticks] == row["trial"])]
-        part = {name: table.iloc[ticks] for name, table in frames.items()}
         yield Movement(
             row={str(name): value for name, value in row.items()},
             rate_hz=rate_hz,
             due=due[ticks],
-            elapsed=_array(part["loop"], ["elapsed"])[:, 0],
-            tip=_array(part["state"], _below(state, "tip.position")),
-            velocity=_array(part["state"], _below(state, "tip.velocity")),
-            axes={str(name): part["input"][name].to_numpy(np.float64) for name in part["input"]},
-            command=_array(part["command"], _below(part["command"], "command")),
-            angles=_array(part["state"], _below(state, "joint.angle")),
+            elapsed=elapsed[ticks],
+            tip=tip[ticks],
+            velocity=velocity[ticks],
+            axes={name: values[ticks] for name, values in axes.items()},
+            command=command[ticks],
+            angles=angles[ticks],
         )
+
+
+def _is_of(name: str, signals: tuple[str, ...]) -> bool:
+    return name in signals or name.rpartition(".")[0] in signals
 
 
 def _below(table: "pd.DataFrame", signal: str) -> list[str]:

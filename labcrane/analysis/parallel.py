@@ -1,5 +1,6 @@
 """The same work for many things at once: here, on the cores of this computer, or on a cluster."""
 
+import os
 from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
 
@@ -13,6 +14,15 @@ RETRIES = 3
 
 CONNECT_S = 10.0
 """Longest time to wait for a scheduler to answer, in seconds."""
+
+SHARE = 4
+"""Pieces of work below which a worker loads libraries for longer than it works."""
+
+
+def usual_workers(orders: int) -> int:
+    """Return how many processes are worth it for so many pieces of work on this computer."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return max(1, min(cores or 1, orders // SHARE))
 
 
 def work(

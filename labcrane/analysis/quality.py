@@ -24,9 +24,9 @@ def loop_quality(participant: Participant) -> "pd.DataFrame":
 
     rows = []
     for number, session in participant.sessions():
-        loop = session.streams["loop"].data
-        lateness = (loop["woke"] - loop["due"]).to_numpy(np.float64)
-        wrote = loop["wrote"].to_numpy(np.float64)
+        loop = session.streams["loop"].columns(("woke", "due", "wrote", "paused"))
+        lateness = loop["woke"] - loop["due"]
+        wrote = loop["wrote"]
         rate_hz = float(session.attrs["rate_hz"])
         rows.append(
             {
@@ -34,7 +34,7 @@ def loop_quality(participant: Participant) -> "pd.DataFrame":
                 "session": number,
                 "clock": session.attrs.get("clock", ""),
                 "sync_verdict": session.sync_report.get("verdict", ""),
-                "ticks": len(loop),
+                "ticks": len(wrote),
                 "rate_hz": rate_hz,
                 "lateness_median_ms": 1e3 * float(np.median(lateness)),
                 "lateness_p99_ms": 1e3 * float(np.quantile(lateness, 0.99)),

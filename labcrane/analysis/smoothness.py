@@ -1,5 +1,7 @@
 """Smoothness of a movement."""
 
+from functools import cache
+
 import numpy as np
 
 from labcrane.types import FloatArray
@@ -68,13 +70,21 @@ def sub_movements(
     Counted after a second-order Butterworth low-pass run forwards and backwards. A peak rises by
     at least ``prominence`` of the largest speed above what separates it from a higher one.
     """
-    from scipy.signal import butter, find_peaks, sosfiltfilt
+    from scipy.signal import find_peaks, sosfiltfilt
 
-    sections = butter(2, low_pass_hz, fs=rate_hz, output="sos")
+    sections = _low_pass(low_pass_hz, rate_hz)
     padded = np.concatenate([[0.0], speed, [0.0]])  # a movement that ends fast still has a peak
     smooth = sosfiltfilt(sections, padded, padlen=min(int(rate_hz), len(padded) - 1))
     peaks, _ = find_peaks(smooth, prominence=prominence * float(smooth.max()))
     return len(peaks)
+
+
+@cache
+def _low_pass(low_pass_hz: float, rate_hz: float) -> FloatArray:
+    """Return the sections of a filter, which takes longer to work out than to use."""
+    from scipy.signal import butter
+
+    return np.asarray(butter(2, low_pass_hz, fs=rate_hz, output="sos"))
 
 
 def path_ratio(tip: FloatArray) -> float:

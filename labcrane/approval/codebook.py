@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from labcrane.core.records import Value
 from labcrane.core.signals import Layout
 from labcrane.design.plan import plan_session
-from labcrane.design.pseudonyms import pseudonyms
+from labcrane.files.pseudonyms import pseudonyms
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.recording.frame_log import LOOP

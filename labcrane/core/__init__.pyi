@@ -32,7 +32,7 @@ from .references import (
     SignalName,
     ViewName,
 )
-from .settings import AtMost, Names, StudyPath, Unit, read_csv_text, read_yaml, was_run
+from .settings import AtMost, Names, SceneFile, StudyPath, Unit, read_csv_text, read_yaml, was_run
 from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
 from .twin import Places, Twin
 
@@ -66,6 +66,7 @@ __all__ = [
     "PlannedTrial",
     "Preset",
     "Reference",
+    "SceneFile",
     "SceneObject",
     "Score",
     "SessionState",

@@ -137,7 +137,8 @@ EVENTS = (
     "feedback.lost", "feedback.ready", "feedback.setting", "instructions.shown", "pause.end",
     "pause.start", "practice.end", "questionnaire.answer", "questionnaire.end",
     "questionnaire.start", "session.end", "session.resumed", "session.start", "signal.bad",
-    "signal.good", "step.end", "step.start", "stream.back", "stream.lost", "trial.end",
+    "signal.good", "step.end", "step.start", "stream.back", "stream.confirmed",
+    "stream.lost", "trial.end",
     "trial.start",
 )  # fmt: skip
 """What every session can tell, whatever its task."""

@@ -67,3 +67,6 @@ def _beside(path: Path, info: ValidationInfo) -> Path:
 StudyPath = Annotated[Path, AfterValidator(_beside), Reference("file")]
 """A file of the study in a component's settings: a relative path counts from the folder of the
 protocol that names it."""
+
+SceneFile = Annotated[StudyPath, Reference("scene")]
+"""A scene's file, which the dynamics must have as well, if it says which it has."""

@@ -11,11 +11,8 @@ from labcrane.design.seeds import derive
 from labcrane.design.slots import group_of, place_of
 from labcrane.design.tracks import PlannedTrack, plan_rounds, standing
 from labcrane.protocol.design import AS_WRITTEN, Criterion
-from labcrane.protocol.steps import Block, Step
+from labcrane.protocol.steps import READING_S, Block, Step
 from labcrane.protocol.study import Study
-
-# Seconds an examiner and a participant are likely to spend on a page of text, for plans only.
-READING_S = 120.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from labcrane.core.records import Event, Frame, SessionState
-from labcrane.design.pseudonyms import pseudonyms
 from labcrane.errors import ProtocolError
 from labcrane.feedback.presenter import Presenter
 from labcrane.feedback.processes import host_orders
+from labcrane.files.pseudonyms import pseudonyms
 from labcrane.machines.scene_codec import SCENE_PLACED
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study

@@ -190,30 +190,32 @@ class AtMost:
         return value
 
 
-def quantities(model: BaseModel) -> Iterator[tuple[tuple[str | int, ...], str, float]]:
-    """Yield every number with a unit that was written into a model: its place, unit and value."""
+Number = tuple[tuple[str | int, ...], str | None, float]
+"""Where a number is, its unit, if it has one, and its value."""
+
+
+def numbers(model: BaseModel) -> Iterator[Number]:
+    """Yield every number that was written into a model."""
     for name in type(model).model_fields:
         if name in model.model_fields_set:
             field, value = type(model).model_fields[name], getattr(model, name)
             unit = unit_of(name, field.metadata)
             if _shape(field.annotation) is None:
                 unit = None
-            yield from _quantities((field.alias or name,), unit, value)
+            yield from _numbers((field.alias or name,), unit, value)
 
 
-def _quantities(
-    place: tuple[str | int, ...], unit: str | None, value: Any
-) -> Iterator[tuple[tuple[str | int, ...], str, float]]:
+def _numbers(place: tuple[str | int, ...], unit: str | None, value: Any) -> Iterator[Number]:
     if isinstance(value, BaseModel):
-        for inside, its, number in quantities(value):
+        for inside, its, number in numbers(value):
             yield (*place, *inside), its, number
     elif isinstance(value, Mapping):
         for key, each in value.items():
-            yield from _quantities((*place, key), None, each)
+            yield from _numbers((*place, key), None, each)
     elif isinstance(value, list | tuple):
         for at, each in enumerate(value):
-            yield from _quantities((*place, at), unit, each)
-    elif unit is not None and isinstance(value, int | float) and not isinstance(value, bool):
+            yield from _numbers((*place, at), unit, each)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
         yield place, unit, float(value)
 
 

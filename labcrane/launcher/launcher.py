@@ -26,7 +26,9 @@ from labcrane.session.commands import (
     Order,
     QueueConsole,
     StreamBack,
+    StreamConfirmed,
     StreamLost,
+    given_by,
 )
 from labcrane.session.eligibility import Admission, check_eligibility
 from labcrane.session.session import finish, outlook, recording, running, still_owed
@@ -189,12 +191,12 @@ class Launcher:
             self._say("take: the study records no streams of others")
             return
         try:
-            said = self._recorder.confirm(command.text)
+            what, which = self._recorder.confirm(command.text)
         except StreamError as error:
             self._say(str(error))
             return
-        self._say(said)
-        self._kept.append(Command(Order.NOTE, said, command.by, command.at))
+        self._say(f"stream {what} is {which}")
+        self._kept.append(StreamConfirmed(what, which, given_by(command)))
 
     def _told_to_end(self) -> bool:
         """Whether the run is to end before it has begun; what is for the record is kept for it."""

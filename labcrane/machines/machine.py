@@ -75,8 +75,8 @@ class Joint(StrictModel):
             )
         if not lowest <= self.rest_deg <= highest:
             raise ValueError(
-                f"rest_deg {self.rest_deg} is outside the joint's range; it must be {lowest} to "
-                f"{highest}"
+                f"rest_deg {self.rest_deg:g} is outside the joint's range; it must be "
+                f"{lowest:g} to {highest:g}"
             )
         return self
 

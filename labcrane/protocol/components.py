@@ -186,7 +186,7 @@ class ComponentResolver:
                 return None  # noted by the protocol's own check
             return read_machine(name, folder, recorded=self._source.recorded)
         except ProtocolError as error:
-            self._source.problem(("machine",), str(error))
+            self._source.problem(("machine", *error.at), str(error))
             return None
 
     def build(
@@ -202,7 +202,7 @@ class ComponentResolver:
             try:
                 component = choice.build(machine)
             except ProtocolError as error:
-                self._source.problem((section, name), str(error))
+                self._source.problem((section, name, *error.at), str(error))
                 continue
             assert isinstance(component, role)  # noqa: S101 - an offer of this role
             built[name] = component

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from labcrane.files.model import quantities
+from labcrane.files.model import numbers
 from labcrane.files.yaml import Place
 from labcrane.protocol.study import Study
 
@@ -31,6 +31,11 @@ class Quantity:
 
 def written_quantities(study: Study) -> Iterator[Quantity]:
     """Yield every number with a unit that the protocol itself writes."""
+    return (each for each in written_numbers(study) if each.unit)
+
+
+def written_numbers(study: Study) -> Iterator[Quantity]:
+    """Yield every number that the protocol itself writes; one without a unit has ``""``."""
     parts: dict[Place, Any] = {
         (): study.protocol,
         ("operator",): study.operator.settings,
@@ -38,9 +43,9 @@ def written_quantities(study: Study) -> Iterator[Quantity]:
     }
     data = study.source.data if study.source else {}
     for place, settings in parts.items():
-        for at, unit, value in quantities(settings):
+        for at, unit, value in numbers(settings):
             where = (*place, *at)
-            yield Quantity(where, value, unit, _at(data, where))
+            yield Quantity(where, value, unit or "", _at(data, where))
 
 
 def _at(node: Any, place: Place) -> Any:

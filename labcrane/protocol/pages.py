@@ -1,11 +1,12 @@
 """Settings of the pages: where they are served."""
 
+import re
 from pathlib import Path
 from typing import Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from labcrane.core.settings import Settings
+from labcrane.core.settings import Settings, StudyPath, was_run
 
 Language = Literal["en", "de", "pl", "fr", "es"]
 
@@ -50,9 +51,23 @@ class PageSettings(Settings):
     """The study's colour on the participant's page, as ``#rrggbb``: dark enough for white words to
     be read on it (4.5 to 1)."""
 
-    logo: Path | None = None
+    logo: StudyPath | None = None
     """The study's logo on the participant's page, PNG, JPEG or SVG; a path counts from the
     protocol."""
+
+    @field_validator("host")
+    @classmethod
+    def _is_an_address(cls, host: str, info: ValidationInfo) -> str:
+        if not was_run(info) and host != "127.0.0.1" and re.fullmatch(r"[\d.]+", host):
+            from ipaddress import ip_address  # noqa: PLC0415 - only an address needs it
+
+            try:
+                ip_address(host)
+            except ValueError:
+                raise ValueError(
+                    f"{host!r} is no address; write four numbers from 0 to 255, as 192.168.1.20"
+                ) from None
+        return host
 
     @field_validator("colour")
     @classmethod
@@ -69,7 +84,7 @@ class PageSettings(Settings):
     def _is_a_picture(cls, logo: Path | None) -> Path | None:
         if logo is not None and logo.suffix.lower() not in PICTURES:
             raise ValueError(
-                f"{str(logo)!r} is no picture that pages show; give {', '.join(PICTURES)}"
+                f"{logo.name!r} is no picture that pages show; give {', '.join(PICTURES)}"
             )
         return logo
 

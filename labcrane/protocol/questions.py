@@ -9,16 +9,21 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from labcrane.errors import LabcraneError, suggestion
+from labcrane.errors import LabcraneError, ProtocolError, suggestion
+from labcrane.files.pseudonyms import pseudonyms
+from labcrane.files.system import is_there
 from labcrane.files.yaml import Place
-from labcrane.protocol.effective import written_quantities
-from labcrane.protocol.steps import Block
+from labcrane.protocol.effective import written_numbers
+from labcrane.protocol.references import twice
+from labcrane.protocol.steps import READING_S, Block
 from labcrane.protocol.study import Study, trials_of
 
 _AT = re.compile(r"(.+?):(\d+)(?::(\d+))?: (.*)")
 
 LONGEST_BREAK_S = 3600.0
-LONGEST_SESSION_S = 8 * 3600.0
+LONGEST_SESSION_S = 4 * 3600.0
+"""Of a visit that does not say how long it may take."""
+
 FASTEST_HZ = 1000.0
 SLOWEST_HZ = 20.0
 REHEARSAL = "rehearsal."
@@ -39,6 +44,7 @@ PLAUSIBLE: Mapping[str, tuple[float, float]] = {
     "day": (0.0, 3650.0),
     "ppm": (0.0, 1e6),
     "uV": (1e-3, 1e6),
+    "": (1e-12, 1e12),
 }
 """Between which sizes a number of each unit can be meant in a study; 0 always can."""
 
@@ -150,9 +156,60 @@ def _doubts(study: Study) -> Doubts:
     yield from _of_sessions(study)
     yield from _of_stop_rules(study)
     yield from _of_streams(study)
-    pattern = study.protocol.participants.pattern
+    yield from _of_repeats(study)
+    yield from _of_pattern(study)
+    yield from _of_the_pages(study)
+
+
+def _of_the_pages(study: Study) -> Doubts:
+    """Question what is the laboratory's, and not here: a check may be made at another desk."""
+    page = study.protocol.page
+    for key, path in (("certificate", page.certificate), ("key", page.key)):
+        if path is not None and not study.recorded and not is_there(study.path.parent / path):
+            yield (
+                ("page", key),
+                f"page.{key} is {str(path)!r}, which is not on this computer",
+            )
+
+
+def _of_pattern(study: Study) -> Doubts:
+    pattern, planned = study.protocol.participants.pattern, study.protocol.participants.planned
+    place: Place = ("participants", "pattern")
+    try:
+        pseudonyms(pattern, planned)
+    except ProtocolError:
+        yield (
+            place,
+            f"the pattern {pattern!r} is not of letters and a number with room for {planned} "
+            f"participant{'s' if planned > 1 else ''}, so that plans and simulations can name none",
+        )
     if len(re.findall(r"(?<!\\)\{", pattern)) != len(re.findall(r"(?<!\\)\}", pattern)):
-        yield ("participants", "pattern"), f"the pattern {pattern!r} has a brace that stands alone"
+        yield place, f"the pattern {pattern!r} has a brace that stands alone"
+
+
+def _of_repeats(study: Study) -> Doubts:
+    """Question what is listed twice, and groups that are given the same."""
+    lists: dict[Place, Sequence[str]] = {
+        ("design", "groups", name): given for name, given in study.protocol.design.groups.items()
+    }
+    for place, block in _blocks(study):
+        kind = study.protocol.sessions[int(place[1])].steps[int(place[3])].kind
+        lists[*place, kind, "ask"] = block.ask
+        if isinstance(block.feedback, tuple):
+            lists[*place, kind, "feedback"] = block.feedback
+    for number, session in enumerate(study.protocol.sessions):
+        for at, step in enumerate(session.steps):
+            lists["sessions", number, "steps", at, "questionnaire"] = step.questionnaires
+    for place, names in lists.items():
+        for name in twice(names):
+            yield place, f"{key_of(place)} has {name!r} twice"
+    given: dict[frozenset[str], str] = {}
+    for name, feedback in study.protocol.design.groups.items():
+        if (other := given.setdefault(frozenset(feedback), name)) != name:
+            yield (
+                ("design", "groups", name),
+                f"groups {other!r} and {name!r} are given the same feedback",
+            )
 
 
 def _of_components(study: Study) -> Doubts:
@@ -173,11 +230,11 @@ def _of_components(study: Study) -> Doubts:
 
 
 def _of_sizes(study: Study) -> Doubts:
-    """Question every number that has a unit in which nobody would write it."""
-    for each in written_quantities(study):
+    """Question every number that nobody would write, in its unit or without one."""
+    for each in written_numbers(study):
         least, most = PLAUSIBLE[each.unit]
         if each.value and not least <= abs(each.value) <= most:
-            yield each.place, f"{key_of(each.place)} is {each.value:g} {each.unit}"
+            yield each.place, f"{key_of(each.place)} is {each.value:g} {each.unit}".rstrip()
 
 
 def _of_the_operator(study: Study) -> Iterator[Question]:
@@ -283,11 +340,31 @@ def _of_sessions(study: Study) -> Doubts:
             if step.kind == "break" and step.seconds > LONGEST_BREAK_S:
                 about = f"a break of {step.seconds / 3600:.3g} hours"
                 yield (*place, "steps", at, "break", "seconds"), about
-            long += step.seconds
+            long += step.seconds if step.kind == "break" else READING_S
             if step.block is not None:
-                long += trials_of(step.block, study.protocol, study.tasks[step.block.task])[1]
-        if long > LONGEST_SESSION_S:
-            yield place, f"session {session.name!r} is likely to take {long / 3600:.3g} hours"
+                task = study.tasks[step.block.task]
+                count, seconds = trials_of(step.block, study.protocol, task)
+                long += seconds - READING_S
+                until = step.block.until
+                if until is not None and until.successes > count:
+                    yield (
+                        (*place, "steps", at, "practice", "until", "successes"),
+                        f"practice is enough after {until.successes} successes in a row, and has "
+                        f"{count:.0f} trials at most",
+                    )
+        likely = f"session {session.name!r} is likely to take {_duration(long)}"
+        if session.window_s is not None and long > session.window_s:
+            yield (*place, "window_s"), f"{likely}, and may take {_duration(session.window_s)}"
+        elif session.window_s is None and long > LONGEST_SESSION_S:
+            yield place, likely
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 2 * 60.0:
+        return f"{seconds:.3g} s"
+    if seconds < 2 * 3600.0:
+        return f"{seconds / 60:.3g} minutes"
+    return f"{seconds / 3600:.3g} hours"
 
 
 def _of_streams(study: Study) -> Doubts:

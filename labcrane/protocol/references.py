@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ OWNERS: Mapping[str, str] = {
     "button": "the input",
     "joint": "the machine",
     "link": "the machine",
+    "scene": "the dynamics",
     "signal": "the study",
     "event": "the study",
     "object": "the picture",
@@ -45,11 +46,14 @@ class Parts:
         What was chosen, by its place in the protocol.
     tasks
         The tasks that could be built.
+    sections
+        Parts of the protocol that are nobody's components, by their place.
     """
 
     machine: Machine
     components: Mapping[Place, ComponentSpec]
     tasks: Mapping[str, Task]
+    sections: Mapping[Place, Settings] = field(default_factory=dict)
 
 
 class ReferenceChecker:
@@ -60,16 +64,18 @@ class ReferenceChecker:
         self._machine = parts.machine
         self._components = parts.components
         self._tasks = parts.tasks
+        self._sections = parts.sections
         self._known: dict[str, Known] = {}
 
     def check(self) -> None:
         """Look up what every component's settings mention, and what they need unmentioned."""
+        self._check_sections()
         for place, choice in self._components.items():
             settings = choice.settings
             written = list(mentioned(settings))
             for mention in written:
                 at = (*place, *mention.place)
-                if isinstance(mention.value, Path):
+                if mention.mark == Reference("file"):
                     self._is_there(at, mention.value)
                 elif isinstance(mention.mark, Reference):
                     self._refers(at, mention, mention.mark, choice)
@@ -83,14 +89,23 @@ class ReferenceChecker:
                         message = f"{_dotted(place)} needs the {kind} {name!r}, and "
                         self._source.problem(place, message + _has(kind, name, known))
 
+    def _check_sections(self) -> None:
+        """Look up the files that the protocol names beside its components."""
+        for place, section in self._sections.items():
+            for mention in mentioned(section):
+                if mention.mark == Reference("file"):
+                    self._is_there((*place, *mention.place), mention.value)
+
     def _refers(
         self, at: Place, mention: Mentioned, mark: Reference, choice: ComponentSpec
     ) -> None:
-        name = mark.bare(mention.value)
+        written = mention.value
+        name = written.name.split(".")[0] if isinstance(written, Path) else mark.bare(written)
         known = self._holds(mark, choice, at)
         if known is None or name in known:
             return
-        message = f"{_dotted(at)} is {mention.value!r}, and {_has(mark.kind, name, known)}"
+        said = name if isinstance(written, Path) else written
+        message = f"{_dotted(at)} is {said!r}, and {_has(mark.kind, name, known)}"
         self._source.problem(at, message, key=mention.key)
 
     def beyond_the_operator(self) -> Iterator[tuple[Place, str]]:
@@ -102,7 +117,7 @@ class ReferenceChecker:
             if place in {("input",), ("operator",)}:
                 continue
             named = [
-                ((*place, *each.place), each.mark.kind, each.mark.bare(each.value))
+                ((*place, *each.place), each.mark.kind, each.mark.bare(str(each.value)))
                 for each in mentioned(choice.settings)
                 if isinstance(each.mark, Reference) and not (each.mark.own or each.mark.of)
             ]
@@ -171,6 +186,8 @@ class ReferenceChecker:
             return frozenset(views if isinstance(views, dict) else ())
         if kind == "axis":
             return self._of([(device,)], kind)
+        if kind == "scene":
+            return self._of([("dynamics",)], kind)
         if kind == "button":
             said = self._of([(device,)], kind)
             return self._of([(device,)], "axis") if said is None else said

@@ -7,6 +7,7 @@ from pydantic import (
     Field,
     NonNegativeFloat,
     NonNegativeInt,
+    PositiveFloat,
     PositiveInt,
     field_validator,
 )
@@ -19,6 +20,9 @@ from labcrane.files.names import absent
 from labcrane.files.units import Unit
 from labcrane.files.yaml import Place, YamlFile, read_text
 from labcrane.protocol.design import Criterion
+
+READING_S = 120.0
+"""Seconds that people are likely to spend on a page of text, or questions; for plans only."""
 
 
 class Section(Settings):
@@ -103,6 +107,10 @@ class Session(Section):
 
     after_days: tuple[NonNegativeInt, NonNegativeInt] | None = None
     """Earliest and latest day after the session before: ``[1, 3]``."""
+
+    window_s: PositiveFloat | None = None
+    """How long the visit may take, in seconds, as participants are told and rooms are booked:
+    ``90 min``. A check asks about a session that is likely to take longer."""
 
     steps: tuple[Step, ...] = Field(min_length=1)
     """What happens, in order."""

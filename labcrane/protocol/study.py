@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TypeGuard
 
 from labcrane.core.roles import Controller, Dynamics, InputDevice, Questionnaire, Task
+from labcrane.core.settings import Settings
 from labcrane.errors import ProtocolError, nearest
 from labcrane.files.complaints import written
 from labcrane.files.names import check_name
@@ -153,6 +154,12 @@ class Study:
             raise ProtocolError(f"there is no session {number}; {self.path} has {listed}")
 
 
+OWN_STREAMS = tuple(
+    f"labcrane.{name}"
+    for name in ("state", "input", "markers", "labels", "codes", "frame", "context")
+)
+"""What every session sends (:mod:`labcrane.streams.outlets`)."""
+
 MOST_TRIALS = 100_000
 """Of a block."""
 
@@ -189,6 +196,7 @@ class Checker:
         if self._source.recorded:
             return  # what follows changes nothing of what was run, and was once accepted
         self._check_names()
+        self._check_own_streams()
         if self._protocol.participants.ends_early:
             self._source.problem(
                 ("participants", "pattern"),
@@ -204,6 +212,21 @@ class Checker:
             number = len(names) - 1 - names[::-1].index(name)
             message = f"two sessions are called {name!r}; give each a name of its own"
             self._source.problem(("sessions", number, "name"), message)
+
+    def _check_own_streams(self) -> None:
+        """Note streams of labcrane's own that no part of the study sends."""
+        views, sent = self._protocol.views, [*self._protocol.feedback, *self._protocol.views]
+        known = [*OWN_STREAMS, *(f"labcrane.pictures.{view}" for view in views)]
+        for label, need in self._protocol.streams.items():
+            name = need.name or ""
+            of = name.removeprefix("labcrane.feedback.").split(".")[0]
+            if not name.startswith("labcrane.") or name in known or of in sent:
+                continue
+            there = nearest(
+                name, [*known, *(f"labcrane.feedback.{each}" for each in sent)], "it has"
+            )
+            message = f"labcrane sends no stream {name!r}; {there}"
+            self._source.problem(("streams", label, "name"), message)
 
     def _check_blocks(self, tasks: Mapping[str, Task]) -> None:
         """Note blocks that name no task, or limit what the task does not vary."""
@@ -396,7 +419,8 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
             **{tuple(part.split(".", 1)): choice for part, choice in others.items()},
         }
         there = {place: choice for place, choice in chosen.items() if choice}
-        references = ReferenceChecker(source, Parts(machine[0], there, tasks))
+        pages: dict[Place, Settings] = {("page",): protocol.page} if protocol else {}
+        references = ReferenceChecker(source, Parts(machine[0], there, tasks, pages))
         references.check()
         beyond = tuple(references.beyond_the_operator())
     source.raise_problems()

@@ -19,6 +19,7 @@ from labcrane.session.commands import (
     Message,
     Order,
     StreamBack,
+    StreamConfirmed,
     StreamLost,
 )
 from labcrane.session.questionnaire import SIMULATION
@@ -27,6 +28,7 @@ from labcrane.types import FloatArray
 REPORTS: Mapping[str, Callable[[Mapping[str, Any]], Message]] = {
     "stream.lost": lambda data: StreamLost(data["what"]),
     "stream.back": lambda data: StreamBack(data["what"]),
+    "stream.confirmed": lambda data: StreamConfirmed(data["what"], data["which"], data["by"]),
     "feedback.lost": lambda data: FeedbackLost(
         data["what"], data["why"], left_out=bool(data.get("left_out"))
     ),

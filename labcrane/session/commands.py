@@ -197,6 +197,16 @@ class StreamBack:
 
 
 @dataclass(frozen=True, slots=True)
+class StreamConfirmed:
+    """Somebody has said which stream of its type is meant: ``which``, in words."""
+
+    what: str
+    which: str
+    by: str
+    kind: Literal["stream confirmed"] = "stream confirmed"
+
+
+@dataclass(frozen=True, slots=True)
 class SignalReport:
     """A signal of a stream has gone bad, or is well again."""
 
@@ -240,7 +250,15 @@ class LauncherGone:
     kind: Literal["launcher gone"] = "launcher gone"
 
 
-ProcessReport = StreamLost | StreamBack | SignalReport | FeedbackLost | FeedbackReady | LauncherGone
+ProcessReport = (
+    StreamLost
+    | StreamBack
+    | StreamConfirmed
+    | SignalReport
+    | FeedbackLost
+    | FeedbackReady
+    | LauncherGone
+)
 """What becomes of the other processes of a run: said by the launcher, not by people."""
 
 Message = Command | ProcessReport

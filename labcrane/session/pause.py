@@ -11,6 +11,7 @@ from labcrane.session.commands import (
     ProcessReport,
     SignalReport,
     StreamBack,
+    StreamConfirmed,
     StreamLost,
 )
 
@@ -90,6 +91,8 @@ class Suspenders:
             case StreamBack(what):
                 self._note("stream.back", {"what": what})
                 self.release(what)
+            case StreamConfirmed(what, which, by):
+                self._note("stream.confirmed", {"what": what, "which": which, "by": by})
             case SignalReport(stream, channel, fault, message, bad):
                 about: dict[str, Value] = {"stream": stream, "channel": channel, "kind": fault}
                 name = "signal.bad" if bad else "signal.good"

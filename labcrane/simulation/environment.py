@@ -19,8 +19,8 @@ from labcrane.core.records import Event, Frame, Phase, Run
 from labcrane.core.roles import InputDevice
 from labcrane.core.signals import Signal
 from labcrane.design.plan import plan_session
-from labcrane.design.pseudonyms import pseudonyms
 from labcrane.errors import ProtocolError
+from labcrane.files.pseudonyms import pseudonyms
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study, load
 from labcrane.recording.frame_log import FrameLog, columns

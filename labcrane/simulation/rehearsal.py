@@ -5,6 +5,7 @@ called as in a session, in its order, on a clock that does not wait.
 """
 
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count, islice
@@ -14,9 +15,9 @@ from labcrane.core.clock import ManualClock
 from labcrane.core.records import Event, Frame, Phase, Run, Trial
 from labcrane.core.roles import Cue
 from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan, plan_session
-from labcrane.design.pseudonyms import pseudonyms
 from labcrane.design.slots import group_of
 from labcrane.errors import LabcraneError, ProtocolError
+from labcrane.files.pseudonyms import pseudonyms
 from labcrane.files.yaml import Place
 from labcrane.protocol.components import ComponentSpec
 from labcrane.protocol.questions import Question
@@ -40,6 +41,13 @@ PATIENCE = 5.0
 
 BREAK_S = 0.1
 """What is left of a break."""
+
+HELD = 0.5
+"""Share of a tick's time that may go by in what a rehearsal computes: a session also waits for
+devices, and sends."""
+
+FEWEST_TICKS = 100
+"""Ticks over which the time of one is told: the first ones are slow."""
 
 DRAWN = 200
 """Frames of a session that cues are given: whatever they do wrong, they do soon."""
@@ -90,7 +98,8 @@ def rehearse(study: Study) -> Rehearsed:
                 continue
             trials += seen.ended
             for each in seen.questions:
-                questions.setdefault(each.key, each)
+                if each.key not in study.protocol.expected:
+                    questions.setdefault(each.key, each)
     if wrong:
         raise ProtocolError("\n".join(dict.fromkeys(wrong)))
     return Rehearsed(sessions, trials, tuple(questions.values()))
@@ -109,9 +118,12 @@ def _one_of_each_group(study: Study) -> Iterator[tuple[str, int]]:
     slots: dict[str, int] = {}
     for slot in islice(count(1), max(1, len(groups))):  # each run of slots has every group once
         slots.setdefault(group_of(study.protocol.study, groups, slot), slot)
-    names = pseudonyms(study.protocol.participants.pattern, 1)
+    try:
+        name = pseudonyms(study.protocol.participants.pattern, 1)[0]
+    except ProtocolError:  # which a check asks about; whose session it is changes nothing here
+        name = "P001"
     for slot in slots.values():
-        yield names[0], slot
+        yield name, slot
 
 
 def _shortened(steps: Sequence[PlannedStep]) -> Iterator[PlannedStep]:
@@ -151,6 +163,7 @@ class _Examiner:
         self._skipped = False
         self._running: PlannedBlock | None = None
         self.ended = 0
+        self.ticks = 0
         self.questions: list[Question] = []
 
     @property
@@ -186,6 +199,20 @@ class _Examiner:
             self.ended += 1
             self._judge(str(event.data.get("outcome")))
 
+    def timed(self, seconds: float) -> None:
+        """Judge a rate by the time that a processor took for all ticks, whatever else it did."""
+        period = 1.0 / self._rate_hz
+        took = seconds / max(1, self.ticks)
+        if self.ticks >= FEWEST_TICKS and took > HELD * period:
+            self.questions.append(
+                Question(
+                    "rehearsal.rate_hz",
+                    ("rate_hz",),
+                    f"rate_hz is {self._rate_hz:g} Hz, a tick every {1e3 * period:.3g} ms, and on "
+                    f"this computer one takes {1e3 * took:.3g} ms to compute; is that meant?",
+                )
+            )
+
     def _judge(self, outcome: str) -> None:
         block = self._running
         if block is None or not (self._skipped or outcome == Phase.TIMEOUT):
@@ -219,13 +246,16 @@ def _run(study: Study, plan: SessionPlan, examiner: _Examiner) -> None:
                 log.note(opening)
                 examiner.course = course = Sequencer(study, plan, rig, waits=False)
                 told = [drawing.draw, lambda frame: _tell(examiner, frame)]
+                began = time.thread_time()
                 loop.run(rig, run, course, ManualClock(), examiner, log, told)
+                examiner.timed(time.thread_time() - began - drawing.took_s)
             finally:
                 log.close()
                 drawing.close()
 
 
 def _tell(examiner: _Examiner, frame: Frame) -> None:
+    examiner.ticks += 1
     for event in frame.events:
         examiner.report(event)
 
@@ -235,6 +265,7 @@ class _Drawing:
 
     def __init__(self, study: Study, run: Run) -> None:
         self._left = DRAWN
+        self.took_s = 0.0  # of a processor: views draw in processes of their own
         self._call_monitor = study.call_monitor
         self._cues: list[tuple[str, Cue, tuple[int, int]]] = []
         for name, choice in study.cues.items():
@@ -249,9 +280,11 @@ class _Drawing:
         if not frame.trial or not self._left:
             return
         self._left -= 1
+        began = time.thread_time()
         for called, cue, (draw, values) in self._cues:
             self._call_monitor.call(draw, cue.draw, frame)
             self._call_monitor.call(values, promised, called, cue.signals, cue.values, frame)
+        self.took_s += time.thread_time() - began
 
     def close(self) -> None:
         """Close them all."""

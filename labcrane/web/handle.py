@@ -132,6 +132,8 @@ class PageHandle:
                 return False
             for event in self._told:
                 self._process.tell(event)
+        if self._browsers:  # whoever still looks comes again, and nobody else is waited for
+            self._browsers, self._left_at = 0, time.monotonic()
         self._say("the page died and is started again")
         return True
 

@@ -268,7 +268,7 @@ def _files(app: Any, context: PageContext) -> None:
         if named is None:
             return Response("the study has no logo", NOT_FOUND)
         kind, _ = mimetypes.guess_type(named.name)
-        return Response((context.study.path.parent / named).read_bytes(), media_type=kind)
+        return Response(named.read_bytes(), media_type=kind)
 
 
 if __name__ == "__main__":

@@ -69,8 +69,14 @@ class Aiming(Task):
                     raise ProtocolError(
                         f"the {which} circle of pair {pair.name!r} at "
                         f"({', '.join(_short(value) for value in point)}) m is out of reach of "
-                        f"the {machine.title}; move the centre or shorten the distance"
+                        f"the {machine.title}; move the centre or shorten the distance",
+                        at=self._to_blame(pair.distance, machine),
                     )
+
+    def _to_blame(self, distance: float, machine: Machine) -> tuple[str | int, ...]:
+        if reach(machine, self._settings.centre) is None:
+            return ("centre",)
+        return ("distances", self._settings.distances.index(distance))
 
     def factors(self) -> Mapping[str, Sequence[str]]:
         return {"pairs": tuple(self._pairs)}

@@ -47,6 +47,8 @@ class Episode:
         Rows per second.
     observation, action
         Shapes ``(n, n_observations)`` and ``(n, n_actions)``, in float32.
+    ticks
+        Of the session, in which each row was seen, shape ``(n,)``.
     """
 
     participant: str
@@ -59,6 +61,7 @@ class Episode:
     rate_hz: float
     observation: Table
     action: Table
+    ticks: npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -90,8 +93,10 @@ def layout_of(session: SessionRecord) -> Layout:
     return Layout(seen, tuple(name for name in units if name not in seen), units)
 
 
-def episodes_of(participant: Participant, layout: Layout, words: str) -> Iterator[Episode]:
-    """Yield a participant's episodes, in order; one in memory at a time.
+def episodes_of(
+    participant: Participant, layout: Layout, words: str, every: int = 1
+) -> Iterator[Episode]:
+    """Yield a participant's episodes, in order, with every so manieth row; one in memory at a time.
 
     Raises
     ------
@@ -125,10 +130,18 @@ def episodes_of(participant: Participant, layout: Layout, words: str) -> Iterato
                 task=_task(title, row),
                 success=str(row.get("outcome")) == "success",
                 skill=skill,
-                rate_hz=float(session.attrs["rate_hz"]),
-                observation=seen[:-1],
-                action=done[1:],
+                rate_hz=float(session.attrs["rate_hz"]) / every,
+                observation=seen[:-1:every],
+                action=done[1::every],
+                ticks=rows[:-1:every],
             )
+
+
+def ticks_of(session: SessionRecord, every: int) -> npt.NDArray[np.int64]:
+    """Return the ticks of all rows of a session's episodes, in order."""
+    found = [_rows(session, row) for row in session.trials.to_dict("records")]
+    rows = [each[:-1:every] for each in found if len(each) >= SHORTEST]
+    return np.unique(np.concatenate(rows)) if rows else np.empty(0, np.int64)
 
 
 def _outcomes(trials: "pd.DataFrame") -> list[object]:

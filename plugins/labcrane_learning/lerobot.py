@@ -4,7 +4,7 @@ The layout is that of https://huggingface.co/docs/lerobot/lerobot-dataset-v3.
 """
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +14,7 @@ import numpy as np
 from labcrane import RecordingError
 from labcrane.analysis import Exporter, Participant
 from labcrane_learning.episodes import Episode, Layout, episodes_of, layout_of
+from labcrane_learning.pictures import Histogram, Pictures, unpacked
 from labcrane_learning.settings import EpisodeSettings
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ FILES_PER_CHUNK = 1000
 DATA_FILE_MB = 100
 VIDEO_FILE_MB = 200
 PLACE = "chunk-{chunk_index:03d}/file-{file_index:03d}"
-OBSERVATION, ACTION = "observation.state", "action"
+OBSERVATION, ACTION, IMAGES = "observation.state", "action", "observation.images."
 COUNTERS = ("timestamp", "frame_index", "episode_index", "index", "task_index")
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 
@@ -34,16 +35,17 @@ class LeRobot(Exporter):
 
     ``observation.state`` is the machine's state and the task's signals, ``action`` the axes of the
     operator's controls in the next tick; names stand in ``meta/info.json``, units beside them.
+    ``observation.images.CAMERA`` are pictures of the cameras that are asked for, without loss.
     """
 
     def __init__(self, settings: EpisodeSettings) -> None:
         self._settings = settings
 
     def export(self, participants: Iterable[Participant], folder: Path) -> None:
-        book = _Book()
+        book = _Book(self._settings)
         for number, participant in enumerate(participants):
             book.begin(participant)
-            _write_data(folder, number, book, participant, self._settings.task)
+            _write_data(folder, number, book, participant)
         book.write(folder)
 
 
@@ -51,8 +53,10 @@ class LeRobot(Exporter):
 class _Book:
     """Everything that is known of the data set when its last episode is written."""
 
+    settings: EpisodeSettings
     layout: Layout | None = None
     rate_hz: float = 0.0
+    cameras: tuple[str, ...] = ()
     machine: str = ""
     frames: int = 0
     tasks: dict[str, int] = field(default_factory=dict)
@@ -60,18 +64,21 @@ class _Book:
 
     def begin(self, participant: Participant) -> None:
         for _, session in participant.sessions():
-            rate_hz = float(session.attrs["rate_hz"])
+            rate_hz = float(session.attrs["rate_hz"]) / self.settings.every
             if self.layout is None:
                 self.layout, self.rate_hz = layout_of(session), rate_hz
                 self.machine = str(participant.context.get("machine_name", "")) or "crane"
             if rate_hz != self.rate_hz or rate_hz != int(rate_hz):
                 raise RecordingError(
-                    f"{participant.name} was recorded at {rate_hz:g} Hz; a data set of LeRobot has "
-                    f"one whole number of frames a second for all, here {self.rate_hz:g}"
+                    f"{participant.name} has {rate_hz:g} rows a second; a data set of LeRobot has "
+                    f"one whole number of frames a second for all, here {self.rate_hz:g}; every= "
+                    "says every how many ticks there is one"
                 )
 
-    def add(self, episode: Episode, file: tuple[int, int]) -> "dict[str, np.ndarray[Any, Any]]":
-        """Enter an episode; return its columns."""
+    def add(
+        self, episode: Episode, file: tuple[int, int], seen: "Mapping[str, Histogram]"
+    ) -> "dict[str, np.ndarray[Any, Any]]":
+        """Enter an episode and what its pictures are like; return its columns of numbers."""
         count, number = len(episode.action), len(self.episodes)
         task = self.tasks.setdefault(episode.task, len(self.tasks))
         columns: dict[str, np.ndarray[Any, Any]] = {
@@ -104,6 +111,10 @@ class _Book:
         for name, values in columns.items():
             for what, value in _statistics(values).items():
                 row[f"stats/{name}/{what}"] = value
+        for name, histogram in seen.items():
+            for what, value in histogram.statistics(QUANTILES).items():
+                row[f"stats/{IMAGES}{name}/{what}"] = value
+        self.cameras = tuple(seen)
         self.episodes.append(row)
         self.frames += count
         return columns
@@ -134,6 +145,13 @@ class _Book:
             }
             for key, names in ((OBSERVATION, layout.observation), (ACTION, layout.action))
         }
+        width, height = self.settings.size
+        for name in self.cameras:
+            features[f"{IMAGES}{name}"] = {
+                "dtype": "image",
+                "shape": [height, width, 3],
+                "names": ["height", "width", "channels"],
+            }
         features["next.success"] = {"dtype": "bool", "shape": [1], "names": None}
         for name in COUNTERS:
             dtype = "float32" if name == "timestamp" else "int64"
@@ -155,9 +173,7 @@ class _Book:
         }
 
 
-def _write_data(
-    folder: Path, number: int, book: _Book, participant: Participant, words: str
-) -> None:
+def _write_data(folder: Path, number: int, book: _Book, participant: Participant) -> None:
     """Write a participant's episodes, one in memory at a time."""
     from pyarrow import parquet
 
@@ -167,16 +183,34 @@ def _write_data(
     writer = None
     if book.layout is None:
         raise AssertionError("a participant that counts has a session")
-    for episode in episodes_of(participant, book.layout, words):
-        table = _table(book.add(episode, (chunk, file)))
-        if writer is None:
-            writer = parquet.ParquetWriter(path, table.schema)
-        writer.write_table(table)
+    settings = book.settings
+    with Pictures(participant, settings) as pictures:
+        for episode in episodes_of(participant, book.layout, settings.task, settings.every):
+            packed, seen = _packed(pictures.of(episode))
+            table = _table(book.add(episode, (chunk, file), seen), packed)
+            if writer is None:
+                writer = parquet.ParquetWriter(path, table.schema)
+            writer.write_table(table)
     if writer is not None:
         writer.close()
 
 
-def _table(columns: "dict[str, np.ndarray[Any, Any]]") -> "pa.Table":
+def _packed(
+    pictures: "Iterator[dict[str, bytes]]",
+) -> "tuple[dict[str, list[bytes]], dict[str, Histogram]]":
+    """Return an episode's pictures by camera, and what they are like."""
+    packed: dict[str, list[bytes]] = {}
+    seen: dict[str, Histogram] = {}
+    for each in pictures:
+        for name, picture in each.items():
+            packed.setdefault(name, []).append(picture)
+            seen.setdefault(name, Histogram()).add(unpacked(picture))
+    return packed, seen
+
+
+def _table(
+    columns: "dict[str, np.ndarray[Any, Any]]", pictures: "Mapping[str, list[bytes]]"
+) -> "pa.Table":
     import pyarrow as pa
 
     arrays = {
@@ -185,6 +219,10 @@ def _table(columns: "dict[str, np.ndarray[Any, Any]]") -> "pa.Table":
         else pa.array(values)
         for name, values in columns.items()
     }
+    form = pa.struct([("bytes", pa.binary()), ("path", pa.string())])
+    for name, files in pictures.items():
+        rows = [{"bytes": each, "path": None} for each in files]
+        arrays[f"{IMAGES}{name}"] = pa.array(rows, form)
     return pa.table(arrays)
 
 
@@ -216,7 +254,7 @@ def _together(episodes: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
             return np.array([row[f"stats/{name}/{what}"] for row in episodes], np.float64)
 
         count, mean = of("count"), of("mean")
-        weight = count / count.sum()
+        weight = (count / count.sum()).reshape(-1, *[1] * (mean.ndim - 1))
         whole = (weight * mean).sum(axis=0)
         variance = (weight * (of("std") ** 2 + (mean - whole) ** 2)).sum(axis=0)
         found[name] = {

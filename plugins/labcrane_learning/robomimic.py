@@ -4,7 +4,7 @@ The layout is that of https://robomimic.github.io/docs/datasets/overview.html.
 """
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ import numpy as np
 from labcrane import RecordingError
 from labcrane.analysis import Exporter, Participant
 from labcrane_learning.episodes import Episode, Layout, episodes_of, layout_of
+from labcrane_learning.pictures import Pictures, unpacked
 from labcrane_learning.settings import EpisodeSettings
 
 if TYPE_CHECKING:
@@ -25,6 +26,8 @@ GYM = 2
 
 class Robomimic(Exporter):
     """``demonstrations.hdf5``: observations, actions, rewards and ends of each episode.
+
+    Pictures of the cameras that are asked for are ``obs/CAMERA_image``, of the modality ``rgb``.
 
     Beside what robomimic reads, each demonstration says whose it is, its task in words, whether it
     succeeded and the operator's skill; ``mask/success`` lists those that succeeded, and names and
@@ -44,14 +47,19 @@ class Robomimic(Exporter):
                 if layout is None:
                     _, session = next(participant.sessions())
                     layout = layout_of(session)
-                    _describe(data, layout, participant, float(session.attrs["rate_hz"]))
-                for episode in episodes_of(participant, layout, self._settings.task):
-                    name = f"demo_{count}"
-                    _write(data.create_group(name), episode, layout)
-                    count += 1
-                    total += len(episode.action)
-                    if episode.success:
-                        succeeded.append(name)
+                    rate_hz = float(session.attrs["rate_hz"]) / self._settings.every
+                    _describe(data, layout, participant, rate_hz)
+                with Pictures(participant, self._settings) as pictures:
+                    task, every = self._settings.task, self._settings.every
+                    for episode in episodes_of(participant, layout, task, every):
+                        name = f"demo_{count}"
+                        demo = data.create_group(name)
+                        _write(demo, episode, layout)
+                        _write_pictures(demo, pictures.of(episode), len(episode.action))
+                        count += 1
+                        total += len(episode.action)
+                        if episode.success:
+                            succeeded.append(name)
             if not count:
                 raise RecordingError("no trial was recorded that could be an episode")
             data.attrs["total"] = total
@@ -88,3 +96,21 @@ def _write(demo: "h5py.Group", episode: Episode, layout: Layout) -> None:
         seen = episode.observation[:, places]
         demo[f"obs/{group}"] = seen
         demo[f"next_obs/{group}"] = np.concatenate([seen[1:], seen[-1:]])
+
+
+def _write_pictures(demo: "h5py.Group", pictures: Iterator[dict[str, bytes]], count: int) -> None:
+    """Write pictures as they are taken: ``obs/CAMERA_image``, and those of each next row."""
+    for row, each in enumerate(pictures):
+        for name, png in each.items():
+            picture = unpacked(png)
+            for group in ("obs", "next_obs"):
+                path = f"{group}/{name}_image"
+                if path not in demo:
+                    one = (1, *picture.shape)
+                    demo.create_dataset(
+                        path, (count, *picture.shape), np.uint8, chunks=one, compression="gzip",
+                        compression_opts=1,
+                    )  # fmt: skip
+            demo[f"obs/{name}_image"][row] = picture
+            for at in {max(row - 1, 0), row} if row == count - 1 else {row - 1} - {-1}:
+                demo[f"next_obs/{name}_image"][at] = picture

@@ -48,11 +48,17 @@ class Scenario(Task):
     def __init__(self, settings: ScenarioSettings, machine: Machine) -> None:
         self._settings = settings
         self._machine = machine
-        self._scenes = {_name(path): load_scene(path) for path in settings.scenes}
-        if len(self._scenes) < len(settings.scenes):
-            raise ProtocolError(
-                f"two scenes have the same name, of {', '.join(map(_name, settings.scenes))}"
-            )
+        self._scenes: dict[str, Scene] = {}
+        for at, path in enumerate(settings.scenes):
+            if _name(path) in self._scenes:
+                raise ProtocolError(
+                    f"two scenes are called {_name(path)!r}; list each once, or rename a file",
+                    at=("scenes", at),
+                )
+            try:
+                self._scenes[_name(path)] = load_scene(path)
+            except ProtocolError as error:
+                raise ProtocolError(str(error), at=("scenes", at)) from error
         for name, scene in self._scenes.items():
             if scene.start_deg is not None and len(scene.start_deg) != len(machine.joints):
                 raise ProtocolError(

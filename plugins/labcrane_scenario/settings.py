@@ -3,7 +3,7 @@
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
 from labcrane import Machine, Settings
-from labcrane.core import ButtonName, JointName, Names, StudyPath
+from labcrane.core import ButtonName, JointName, Names, SceneFile
 
 EVENTS = (
     "goal.reached", "mistakes.too_many", "deformity.found", "drop", "overload", "contact.object",
@@ -15,7 +15,7 @@ EVENTS = (
 class ScenarioSettings(Settings):
     """Settings of the scenario task."""
 
-    scenes: tuple[StudyPath, ...] = Field(min_length=1)
+    scenes: tuple[SceneFile, ...] = Field(min_length=1)
     """Scene files, one run each; a scene's name is its file's. They are the levels of the factor
     ``scenes``."""
 

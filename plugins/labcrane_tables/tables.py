@@ -17,7 +17,7 @@ from labcrane.analysis import (
     measures_of,
     scores_of,
 )
-from labcrane.recording import SessionRecord
+from labcrane.recording import SessionRecord, labelled
 from labcrane_tables.frames import StreamTable, snake, stream_tables
 from labcrane_tables.settings import TableSettings
 
@@ -183,6 +183,8 @@ def _events(participant: Participant, number: int, session: SessionRecord) -> "p
         "{}" if name == "session.start" else json.dumps(data, ensure_ascii=False)
         for name, data in zip(events["name"], events["data"], strict=True)
     ]
+    said = zip(session.events["name"], session.events["data"], strict=True)
+    events.insert(list(events).index("name") + 1, "label", labelled(said))
     events.insert(0, "participant", participant.name)
     events.insert(1, "session", number)
     return events

@@ -9,7 +9,7 @@ from faults.sessions import STUDY, unique, wait_for
 from labcrane import open_recording
 from labcrane.launcher import launcher as launcher_module
 from labcrane.launcher.launcher import Launcher
-from labcrane.session.commands import Command, Order, QueueConsole
+from labcrane.session.commands import Command, Order, QueueConsole, StreamConfirmed
 from labcrane.session.visit import visit_of
 from labcrane.streams.recorder import handle as recorder_handle
 from labcrane.streams.recorder.candidates import answered
@@ -91,10 +91,10 @@ class AskingRecorder(LateRecorder):
         fits = [{"identity": ["amp-1", "ActiChamp", "EEG"], "host": "lab-pc"}]
         self.status["streams"] = [{"label": "eeg", "required": False, "candidates": fits}]
 
-    def confirm(self, text: str) -> str:
+    def confirm(self, text: str) -> tuple[str, str]:
         label, meant = answered(text, self.status["streams"])
         self.status["streams"][0]["candidates"] = []
-        return f"stream {label} is {meant[1]}"
+        return label, meant[1]
 
 
 @pytest.mark.parametrize("simulated", [False, True])
@@ -117,8 +117,7 @@ def test_a_session_begins_when_it_was_said_which_stream_is_meant_and_that_is_in_
     if not simulated:
         assert said[0] == "take: no stream 'oxygen' is asked about; there is eeg"
         assert said[1] == "stream eeg is ActiChamp"
-        note = Command(Order.NOTE, "stream eeg is ActiChamp", "supervisor", "10.0.0.7")
-        assert launcher._kept == [note]
+        assert launcher._kept == [StreamConfirmed("eeg", "ActiChamp", "supervisor")]
 
 
 def test_nothing_is_taken_where_no_streams_are_recorded(tmp_path: Path) -> None:

@@ -137,7 +137,7 @@ def test_an_order_that_takes_hours_to_draw_is_told_where_it_is_asked_for(
 def test_a_target_out_of_reach_is_told_before_anything_runs(complaint) -> None:
     (told,) = complaint(("distances: [2, 3]", "distances: [2, 12]"))
     assert told == (
-        "13:11: the far circle of pair '12m_far_left' at (9.74, 4.24, 0.80) m is out of reach of the "
+        "13:40: the far circle of pair '12m_far_left' at (9.74, 4.24, 0.80) m is out of reach of the "
         "CH8 knuckle boom of the crane study; move the centre or shorten the distance"
     )
 

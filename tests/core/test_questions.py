@@ -15,6 +15,7 @@ from labcrane.protocol.effective import written_quantities
 from labcrane.protocol.questions import questions
 from labcrane.protocol.study import Study, load
 from labcrane.registry.registry import discover
+from labcrane.simulation import rehearsal
 from labcrane.simulation.rehearsal import rehearse
 
 
@@ -63,6 +64,23 @@ GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
           ("sessions:", "views: {front: {use: view, keys: [a, d, s, w, j, l, k, i]}}\nsessions:"),
           ("left.y", "keyboard.elbow"), ("right.x", "keyboard.wrist"), ("right.y", "keyboard.shoulder")],
          "operator", "has no keyboard.slew, keyboard.elbow, keyboard.wrist, keyboard.shoulder"),
+        ([("sessions:", "page: {certificate: lab.pem, key: ../study.yaml}\nsessions:")],
+         "page.certificate", "'lab.pem', which is not on this computer"),
+        ([("sessions:", "participants: {pattern: P000, planned: 2}\nsessions:")], "participants.pattern",
+         "with room for 2 participants"),
+        ([("sessions:", "participants: {planned: 20_000}\nsessions:")], "participants.pattern",
+         "with room for 20000 participants"),
+        ([("name: only", "name: only\n    window_s: 10 s")], "sessions.1.window_s",
+         "and may take 10 s"),
+        ([(BLOCK, BLOCK.replace("block: {", "practice: {until: {successes: 9, rounds: 1}, "))],
+         "sessions.1.steps.1.practice.until.successes", "9 successes in a row, and has 3 trials"),
+        ([("sessions:", GROUPS.replace("none: []", "all: [ball]")),
+          (BLOCK, BLOCK.replace("pairs", "feedback: group, pairs"))],
+         "design.groups.ball", "groups 'all' and 'ball' are given the same feedback"),
+        ([(BLOCK, BLOCK.replace("pairs", "ask: [nasa_tlx, nasa_tlx], pairs"))],
+         "sessions.1.steps.1.block.ask", "has 'nasa_tlx' twice"),
+        ([("machine: ch8", "operator: {use: simulated_operator, reaction_sd: 1e300}\nmachine: ch8")],
+         "operator.reaction_sd", "is 1e+300"),
         ([("sessions:", "participants: {planned: 3}\ndesign: {order: {pairs: williams}}\nsessions:")],
          "design.order.pairs", "which has 2 rows; a multiple of 2 does"),
         ([("sessions:", "streams: {eeg: {type: EEG}, gaze: {name: Neon}}\nsessions:")],
@@ -230,10 +248,13 @@ def test_what_is_approved_or_amended_was_rehearsed(
     cue.parent.mkdir()
     cue.write_text(BROKEN.replace("return [1 / 0]", "return []"))
     (tmp_path / "consent.md").write_text("You may stop at any time.\n")
-    study = a_study(tmp_path, ("sessions:", "feedback: {ball: {use: broken}}\nsessions:"))
+    slow = ("rate_hz: 240", "rate_hz: 10")
+    study = a_study(tmp_path, ("sessions:", "feedback: {ball: {use: broken}}\nsessions:"), slow)
     path, lock = str(study.path), tmp_path / "study.lock.json"
     granted = ["--board", "B", "--reference", "R", "--valid-until", "2099-01-01"]
     assert main(["approve", path, *granted, "--consent", str(tmp_path / "consent.md")]) == 0
+    said = capsys.readouterr().err
+    assert ":4:10: question: rate_hz is 10 Hz" in said  # nobody asks again once it is locked
     locked = lock.read_text()
     cue.write_text(BROKEN)
     capsys.readouterr()
@@ -247,3 +268,58 @@ def test_a_trial_that_runs_out_of_time_is_asked_about(tmp_path: Path) -> None:
     (question,) = done.questions
     assert question.key == "rehearsal.aiming"
     assert "the simulated operator runs out of time" in question.text
+    answered = ("rate_hz: 240", "rate_hz: 240\nexpected: [rehearsal.aiming]")
+    study = a_study(tmp_path, ("movements: 2", "movements: 2, limit_s: 1.5"), answered)
+    assert questions(study) == rehearse(study).questions == ()
+
+
+SLOW = """\
+import time
+
+import numpy as np
+
+from labcrane import Controller, Settings, Signal, hookimpl, offer
+
+
+class Slow(Controller):
+    signals = (Signal("command", "rad/s", ("slew", "shoulder", "elbow", "wrist")),)
+
+    def __init__(self, settings, machine):
+        self._zeros = np.zeros(4)
+
+    def inverse(self, velocity, state):
+        return np.zeros(12)
+
+    def command(self, axes, state):
+        began = time.thread_time()
+        while time.thread_time() - began < 0.006:
+            pass
+        return self._zeros
+
+
+@hookimpl
+def labcrane_controllers():
+    return [offer("slow", Settings, Slow)]
+"""
+
+
+def test_a_rate_that_this_computer_cannot_hold_is_asked_about_by_a_rehearsal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rehearsal, "PATIENCE_S", 1.0)
+    monkeypatch.setattr(rehearsal, "PATIENCE", 0.0)
+    (tmp_path / "plugins").mkdir()
+    (tmp_path / "plugins" / "slow.py").write_text(SLOW)
+    scheme = SHORT[SHORT.index("scheme:") : SHORT.index("dynamics:")]
+    slow = (scheme, "scheme: {use: slow}\n")
+    asked = {each.key: each for each in rehearse(a_study(tmp_path, slow)).questions}
+    text = asked["rehearsal.rate_hz"].text
+    assert text.startswith(
+        "rate_hz is 240 Hz, a tick every 4.17 ms, and on this computer one takes "
+    )
+    assert (
+        float(text.partition(" one takes ")[2].split()[0]) >= 6.0
+    )  # ms, of a processor, however busy it is
+    assert asked["rehearsal.rate_hz"].place == ("rate_hz",)
+    fast = rehearse(a_study(tmp_path, slow, ("rate_hz: 240", "rate_hz: 50")))
+    assert "rehearsal.rate_hz" not in {each.key for each in fast.questions}

@@ -18,6 +18,7 @@ NEEDS = """\
 streams:
   eeg: {{source_id: {source}, rate_hz: 100, channels: 2, counter: Counter}}
   gaze: {{source_id: {source}-gaze, required: false}}
+  force: {{type: {source}-force, required: false}}
 """
 
 
@@ -28,9 +29,9 @@ RECORDER_KILLS = 4
 class Sender:
     """A device whose first channel counts its samples."""
 
-    def __init__(self, source: str) -> None:
+    def __init__(self, source: str, name: str = "Amplifier", kind: str = "EEG") -> None:
         self._arguments = [sys.executable, str(ROOT / "streams" / "emulation" / "sender.py")]
-        self._arguments += ["Amplifier", "EEG", source, "100"]
+        self._arguments += [name, kind, source, "100"]
         self._process: subprocess.Popen[bytes] | None = None
 
     def start(self, first: int = 0) -> None:
@@ -104,6 +105,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
     text = text.replace("session_died: redo_trial", "session_died: redo_trial, input_lost: pause")
     (folder / "study.yaml").write_text(text + NEEDS.format(source=source))
     sender = Sender(source)
+    plates = [Sender(f"{source}-{each}", each, f"{source}-force") for each in ("Mine", "His")]
     process = subprocess.Popen(
         [
             sys.executable,
@@ -125,6 +127,13 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
     said = Conversation(process)
     try:
         said.until("is not on the network")
+        for plate in plates:
+            plate.start()
+        said.until("; or 'Mine' (source_id")
+        said.order("take force")
+        said.until("2 streams that may be 'force'")
+        said.order(f"take force={source}-Mine")
+        said.until("stream force is 'Mine'")
         sender.start()
         said.until("space to start")
         said.order("start")
@@ -147,7 +156,8 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
         said.order("end")
         yield folder / "data" / "P001-PILOT" / "P001-PILOT.h5", said.end()
     finally:
-        sender.kill()
+        for each in (sender, *plates):
+            each.kill()
         if process.poll() is None:
             process.kill()
             process.wait()
@@ -158,6 +168,20 @@ def test_a_session_waits_for_its_streams_and_says_for_which(session) -> None:
     assert "waiting for streams:" in said
     waiting, started = said.index("is not on the network"), said.index("space to start")
     assert waiting < started
+
+
+def test_a_stream_of_a_type_is_the_one_that_somebody_confirmed_and_no_other_is_recorded(
+    session,
+) -> None:
+    path, said = session
+    recorded = open_recording(path).session(1)
+    assert recorded.streams["Mine"].data.shape[0] > 0
+    assert "His" not in recorded.streams
+    (told,) = recorded.events["data"][recorded.events["name"] == "stream.confirmed"]
+    assert (told["what"], told["by"]) == ("force", "terminal")
+    assert told["which"].startswith("'Mine' (source_id '")
+    assert "is asked for by type" in said
+    assert ", and was confirmed: it is 'Mine'" in said
 
 
 def test_a_lost_stream_pauses_the_session_until_it_is_back(session) -> None:

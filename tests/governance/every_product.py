@@ -32,7 +32,7 @@ PEOPLE = ("P001", "P0011", "VP-001")
 STUDY = GOVERNED.replace(
     "title:", "participants: {pattern: '(P\\d{3,4})|(VP-\\d{3})', planned: 4}\ntitle:"
 )
-EXPORTS = ("tables", "psychds", "matlab", "bids", "xdf", "zip")
+EXPORTS = ("tables", "psychds", "matlab", "bids", "xdf", "zip", "lerobot", "robomimic")
 
 
 def command(*words: object) -> None:

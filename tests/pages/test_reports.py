@@ -79,6 +79,9 @@ def test_a_deformity_is_reported_from_either_page_and_nothing_else_is(
         browser.refresh()  # a window in the background is not kept up to date
         press(browser, "order-start")
         shown(browser, "stage", "trial")
+        # The test as it stands, while it runs.
+        shown(browser, "performance", "test in lying, running")
+        shown(browser, "performance", "no indicator: no reference time of this scenario")
         assert ask(room, "POST", "/orders/report", cookie, "fire")[0] == 202
         shown(browser, "events", "this task asks for reports of deformity")
         browser.switch_to.window(participant)
@@ -107,6 +110,10 @@ def test_a_deformity_is_reported_from_either_page_and_nothing_else_is(
         press(browser, "order-end-sure")
         press(browser, "close-page")
         room.ended()
+    check_the_record(data)
+
+
+def check_the_record(data: Path) -> None:
     session = open_recording(data / "P001-PILOT" / "P001-PILOT.h5").session(1)
     events = session.events
     found = events[events["name"] == "deformity.found"]["data"].tolist()

@@ -2,24 +2,29 @@
 
 import random
 import re
+import threading
 from pathlib import Path
 
 import pytest
+from governed import TODAY, Lab
 
 from labcrane.cli.terminal import KEYS as TERMINAL_KEYS
 from labcrane.core.records import Event
+from labcrane.participants.enrolment import exclude
 from labcrane.session.commands import Command, Order, SettingChange, read_request
 from labcrane.session.live_settings import FeedbackSettings
 from labcrane.streams.recorder.candidates import answered
 from labcrane.testing import ch8
+from labcrane.web import handle
 from labcrane.web.examiner_page import KEYS
 from labcrane.web.room.bars import groups
 from labcrane.web.room.buttons import answers, buttons
 from labcrane.web.room.condition import STATES, Lamp, lamp_of, state_of
-from labcrane.web.room.earlier import FEWEST, Earlier
+from labcrane.web.room.earlier import FEWEST, Earlier, read_behind
 from labcrane.web.room.sentences import KINDS, SAID, sentence
 from labcrane.web.room.sliders import sliders
 from labcrane.web.room.snapshot import clock
+from labcrane.web.service import Opened, PageConfig
 from labcrane.web.state import Ended, SessionView
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sphere.settings import SphereSettings
@@ -262,6 +267,68 @@ def test_a_cohort_of_few_is_not_shown() -> None:
     earlier.others["error"] = [4.0, 1.0, 3.0, 2.0, 5.0]
     assert earlier.cohort("error") == (2.0, 3.0, 4.0, 5)
     assert earlier.cohort("nothing") is None
+
+
+def test_who_was_excluded_is_no_part_of_the_cohort(tmp_path: Path) -> None:
+    lab = Lab(tmp_path)
+    lab.approve()
+    for name in ("P001", "P002", "P003"):
+        lab.run(name)
+    folder = lab.places.root / "P001"
+
+    def medians(session: int) -> Earlier:
+        found = read_behind(folder, "rehearsal", session, ["movement_time"])
+        for thread in threading.enumerate():
+            if thread.name == "earlier":
+                thread.join()
+        return found
+
+    before = medians(2)
+    assert len(before.others["movement_time"]) == 2
+    assert len(before.mine["movement_time"]) == 1
+    exclude(lab.places, "P003", "did not follow the instructions", TODAY)
+    after = medians(1)
+    assert len(after.others["movement_time"]) == 1
+    assert after.mine == {}, "of this session nothing is from before"
+
+
+class Pages:
+    """A process of pages that dies when it is told to, and can be started again."""
+
+    def __init__(self, module: str, name: str, patience: object, take: object) -> None:
+        self.exit_code, self.waiting, self.restarts = None, True, 0
+        self.take = take
+
+    def start(self, order: object) -> None:
+        self.order = order
+
+    def restart(self, order: object) -> bool:
+        self.exit_code, self.restarts = None, self.restarts + 1
+        return True
+
+    def tell(self, message: object) -> None:
+        pass
+
+    def stop(self) -> None:
+        pass
+
+
+def test_a_browser_of_pages_that_died_is_not_waited_for_at_the_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(handle, "ProcessHandle", Pages)
+    monkeypatch.setattr(handle, "GONE_S", 0.0)
+    restarted = threading.Event()
+    pages = handle.PageHandle(PageConfig, lambda _: None, lambda _: restarted.set(), dict)
+    try:
+        pages._process.take(Opened(1))
+        assert pages._open()
+        pages._process.exit_code = 1
+        assert restarted.wait(30.0)
+        assert not pages._open()
+    finally:
+        pages._closed.set()
+        pages.close(Ended("ok", "over"))
 
 
 def test_times_are_minutes_and_seconds_and_hours_where_there_are_some() -> None:

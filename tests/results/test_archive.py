@@ -174,7 +174,8 @@ def test_an_archive_without_a_licence_is_refused_in_words(
 ) -> None:
     asked = ["--include", "simulated", "--to", "zip", "--out", str(tmp_path / "out")]
     assert main(["export", str(data), *asked]) == 2
-    assert "license: Field required" in " ".join(capsys.readouterr().err.split())
+    said = " ".join(capsys.readouterr().err.split())
+    assert "zip needs 'license'; write --set NAME=VALUE, where zip has license, authors," in said
 
 
 def test_a_participant_file_says_what_it_is(cohort: Cohort) -> None:

@@ -14,12 +14,14 @@ import pytest
 from needs import needs
 
 from labcrane import ProtocolError
-from labcrane.analysis.cohort import Cohort
+from labcrane.analysis.cohort import Cohort, find_cohort
 from labcrane.analysis.measures import measures_of
+from labcrane.design.plan import plan_session
 from labcrane.testing import ch8
 from labcrane_bids.bids import Bids
 from labcrane_bids.settings import BidsSettings
 from results.consumers import under
+from results.recorded import STUDY, record, study
 
 VALIDATOR = shutil.which("bids-validator-deno", path=Path(sys.executable).parent)
 NAME = "sub-P001_ses-01_task-acquisition"
@@ -167,6 +169,21 @@ def test_people_ethics_and_questionnaires_are_where_bids_wants_them(folder: Path
     tlx = (folder / "phenotype" / "tlx.tsv").read_text(encoding="utf-8")
     assert tlx.splitlines()[1] == "sub-P001\t35"
     assert "phenotype/tlx.json" in under(folder)
+
+
+def test_the_group_of_the_design_is_in_the_table_of_people(tmp_path: Path) -> None:
+    text = STUDY.replace("design:\n", "design:\n  groups: {none: [], slow: []}\n")
+    grouped = study(tmp_path, text.replace("movements: 2", "movements: 1"))
+    expected = {}
+    for name in ("P001", "P002", "P003"):
+        record(grouped, tmp_path / "data", name)
+        expected[f"sub-{name}"] = plan_session(grouped, name, 1).group
+    assert set(expected.values()) == {"none", "slow"}
+    out = tmp_path / "out"
+    out.mkdir()
+    Bids(BidsSettings(), ch8()).export(find_cohort(tmp_path / "data").included, out)
+    people = pd.read_csv(out / "participants.tsv", sep="\t", keep_default_na=False)
+    assert dict(zip(people["participant_id"], people["group"], strict=True)) == expected
 
 
 def test_missing_files_of_people_are_named(cohort: Cohort, tmp_path: Path) -> None:

@@ -14,7 +14,8 @@ from labcrane import open_recording
 from labcrane.cli.app import main
 from labcrane.core.records import SessionState
 from labcrane.errors import RecordingError
-from labcrane.feedback.playback import RecordedFrames, played
+from labcrane.feedback.playback import played
+from labcrane.recording.recorded_frames import RecordedFrames
 from labcrane.session.commands import Command, Order
 from labcrane.session.session import run
 from labcrane.session.visit import Visit

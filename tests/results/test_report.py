@@ -7,11 +7,16 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import ttest_rel
 
 from labcrane.analysis.cohort import Cohort, Status, find_cohort
 from labcrane.analysis.measures import measures_of
 from labcrane.analysis.quality import exclusions, is_result, loop_quality, sync_quality
+from labcrane.analysis.report.factors import factors_of, with_factors
+from labcrane.analysis.report.outcomes import gaze_tests
 from labcrane.analysis.report.report import write_report
+from labcrane.analysis.report.sample import in_words, sample
+from labcrane.analysis.report.words import STYLES, Results, paragraphs
 from labcrane.cli.app import main
 from results.consumers import under
 
@@ -28,13 +33,14 @@ def folder(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_each_figure_is_svg_png_and_pdf_and_its_table_csv(folder: Path) -> None:
+def test_each_figure_is_svg_and_of_the_study_png_and_pdf_and_its_table_csv(folder: Path) -> None:
     files = under(folder)
     figures = {path.removesuffix(".svg") for path in files if path.endswith(".svg")}
     assert {"figures/sequence_by_distance", "figures/fitts", "figures/P001_sticks"} <= figures
     for figure in figures:
-        assert (folder / f"{figure}.png").read_bytes().startswith(b"\x89PNG")
-        assert (folder / f"{figure}.pdf").read_bytes().startswith(b"%PDF")
+        if not figure.startswith("figures/P0"):
+            assert (folder / f"{figure}.png").read_bytes().startswith(b"\x89PNG")
+            assert (folder / f"{figure}.pdf").read_bytes().startswith(b"%PDF")
         ET.parse(folder / f"{figure}.svg")
         assert len(pd.read_csv(folder / f"{figure.replace('figures', 'tables')}.csv"))
 
@@ -68,6 +74,61 @@ def test_figure_tables_hold_the_means_of_participants_means(folder: Path) -> Non
         means = [group["movement_time"].mean() for _, group in own.groupby("participant")]
         assert table.loc[sequence, "mean"] == pytest.approx(np.mean(means))
         assert table.loc[sequence, "participants"] == len(means)
+
+
+def test_the_sample_in_words_says_of_how_many_an_answer_is_known() -> None:
+    ages, genders = [20.0, 30.0, np.nan, 25.0], ["female", "", "female", "male"]
+    answers = pd.DataFrame(
+        [(f"P{n}", "age", age, "") for n, age in enumerate(ages)]
+        + [(f"P{n}", "gender", np.nan, word) for n, word in enumerate(genders)],
+        columns=["participant", "item", "value", "text"],
+    )
+    groups = {f"P{n}": "" for n in range(5)}  # one was asked nothing
+    table = sample(answers, groups)
+    assert in_words(table) == (
+        "5 participants (2 female, 1 male and 2 without an answer; "
+        "20 to 30 years old, M = 25.00, SD = 5.00, of 3 who said it)."
+    )
+    assert table.loc[0, "gender_answers"] == table.loc[0, "age_answers"] == 3
+
+
+def test_areas_looked_at_are_told_of_fewer_people_too_than_a_test_needs(folder: Path) -> None:
+    movements = pd.read_csv(folder / "tables" / "movements.csv")
+    kept = movements[is_result(movements)]
+    assert kept.dropna(subset=["dwell_during_1"])["participant"].nunique() == 2
+    looked = pd.read_csv(folder / "tables" / "gaze.csv").set_index("distance")
+    for name in ("dwell_before_1", "dwell_during_1", "look_lead_1"):
+        for distance, own in kept.groupby("distance"):
+            means = own.groupby("participant")[name].mean().dropna()
+            assert looked.loc[distance, name] == pytest.approx(np.mean(list(means)))
+    assert ">Gaze</h2>" in (folder / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_looks_are_an_outcome_that_is_tested_and_put_into_words(seed: int) -> None:
+    """Two distances are a paired difference, and F is the square of its t."""
+    random = np.random.default_rng(seed)
+    rows = [
+        {"participant": f"P{person:03}", "sequence": place, "distance": distance,
+         "dwell_during_grapple": random.normal(0.2 * distance, 0.3), "outcome": "success"}
+        for person in range(8) for place, distance in enumerate([2.0, 4.0, 2.0, 4.0])
+    ]  # fmt: skip
+    table = with_factors(pd.DataFrame(rows))
+    factors = factors_of(table)
+    tests = gaze_tests(table, factors)
+    cells = table.groupby(["participant", "distance"])["dwell_during_grapple"].mean().unstack()
+    t, p = ttest_rel(cells[2.0], cells[4.0])
+    (row,) = tests.to_dict("records")
+    assert (row["measure"], row["factor"]) == ("dwell_during_grapple", "distance")
+    assert (row["df1"], row["df2"], row["epsilon"]) == (1, 7, 1.0)
+    assert [row["f"], row["p_gg"]] == pytest.approx([t**2, p])
+    nothing = pd.DataFrame()
+    counts = pd.DataFrame({"trials": [32], "time_outs": [0], "others": [0]})
+    results = Results("", nothing, nothing, nothing, nothing, tests, nothing, counts, factors)
+    said = paragraphs(results, STYLES["html"])[-1]
+    verb = "differed" if p < 0.05 else "did not differ"
+    begin = f"How long grapple was looked at during movements {verb} over distance"
+    assert said.startswith(f"{begin}, F(1, 7) = {t**2:.2f}, p ")
 
 
 def test_trials_that_are_no_results_are_listed_with_the_reason(data: Path) -> None:
@@ -126,7 +187,9 @@ def test_wrong_words_are_refused(
     assert main(["export", str(data), "--to", "table", "--out", out]) == 1
     assert "exporter 'table' is not installed; did you mean 'tables'?" in capsys.readouterr().err
     assert main(["export", str(data), "--to", "tables", "--out", out, "--set", "streams=xls"]) == 2
-    assert "exporter 'tables' can set streams; streams: Input should be" in capsys.readouterr().err
+    said = " ".join(capsys.readouterr().err.split())
+    assert "; write --set NAME=VALUE, where tables has streams" in said
+    assert "tables.streams is " in said
     assert main(["export", str(data), "--to", "bids", "--out", out, "--set", "every"]) == 2
     assert "--set 'every' sets nothing; write NAME=VALUE" in capsys.readouterr().err
 

@@ -132,7 +132,7 @@ def told(movements: pd.DataFrame, data: Path) -> dict[str, list[str]]:
     empty = pd.DataFrame()
     anova = anova_table(whole, factors)
     scores = pd.DataFrame(columns=list(SCORES))
-    results = Results("36 participants.", anova, empty, empty, empty, scores, empty, factors)
+    results = Results("36 participants.", anova, *[empty] * 4, scores, empty, factors)
     loops = pd.DataFrame({
         "late_ticks": [3, 0], "ticks": [1000, 1000], "lateness_worst_ms": [12.5, 1.0],
         "sync_verdict": ["WARN", "PASS"],

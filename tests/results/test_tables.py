@@ -11,6 +11,8 @@ import pytest
 
 from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.measures import Measured, measures_of
+from labcrane.core.records import Event
+from labcrane.recording.labels import Labels
 from labcrane_tables.psychds import PsychDs
 from labcrane_tables.settings import PsychDsSettings, TableSettings
 from labcrane_tables.tables import Tables
@@ -52,6 +54,7 @@ def test_the_codebook_has_every_column_and_the_units_of_the_file(folder: Path) -
     book = pd.read_csv(folder / "codebook.csv").set_index(["table", "column"])
     for name, path in {
         "trials": folder / "trials.csv",
+        "events": folder / "events.csv",
         "frames": folder / "streams" / "P001_ses-01_frames.csv.gz",
     }.items():
         assert set(pd.read_csv(path, nrows=1)) == set(book.loc[name].index)
@@ -112,6 +115,16 @@ def test_events_are_those_of_the_file_and_the_context_stays_there(
     assert len(events) == len(parquet) == sum(map(len, own))
     np.testing.assert_allclose(events["time"], pd.concat(own)["time"], rtol=1e-15)
     assert events.loc[events["name"] == "session.start", "data"].eq("{}").all()
+    for person in cohort.included:
+        for number, session in person.sessions():
+            mine = events[(events["participant"] == person.name) & (events["session"] == number)]
+            sent = Labels()
+            told = [
+                sent.label(Event(name, 0.0, data))
+                for name, data in zip(session.events["name"], session.events["data"], strict=True)
+            ]
+            assert list(mine["label"]) == told
+    assert events["label"].str.fullmatch(r"trial_start/block=.+").any()
     end = events[events["name"] == "trial.end"].iloc[0]
     assert json.loads(end["data"])["outcome"] == "success"
 

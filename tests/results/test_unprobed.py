@@ -35,3 +35,15 @@ def test_an_export_refuses_streams_never_probed_unless_told_and_says_so(
     )
     (noted,) = manifest["unprobed"]
     assert noted.startswith("eyes of P001, session 1 (12 of")
+
+
+def test_a_report_refuses_streams_never_probed_unless_told_and_says_so(
+    unprobed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    report = ["report", str(unprobed), "--out", str(tmp_path / "report")]
+    assert main(report) == 1
+    assert "--accept-unprobed" in capsys.readouterr().err
+    assert not (tmp_path / "report").exists()
+    assert main([*report, "--accept-unprobed"]) == 0
+    said = " ".join((tmp_path / "report" / "report.html").read_text(encoding="utf-8").split())
+    assert "nobody knows how right their times are: eyes of P001, session 1 (12 of" in said

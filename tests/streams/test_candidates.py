@@ -111,10 +111,10 @@ def test_nothing_of_a_stream_is_recorded_before_it_is_confirmed_and_it_is_asked_
         with pytest.raises(StreamError, match="2 streams that may be 'eeg'"):
             handle.confirm("eeg")
         said = handle.confirm("eeg=amplifier-1")
-        assert said == "stream eeg is 'Amplifier' (source_id 'amplifier-1')"
+        assert said == ("eeg", "'Amplifier' (source_id 'amplifier-1')")
         wait_for(lambda: watched("eeg").get("condition") == "flows")
         wait_for(lambda: len(watched("more").get("candidates", ())) == 1)
-        handle.confirm("more=none")
+        assert handle.confirm("more=none") == ("more", "none of them")
         wait_for(lambda: "was left out" in watched("more")["warnings"][0])
         for recorder in handle._recorders:  # those that take over know what was answered
             recorder.kill()

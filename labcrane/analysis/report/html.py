@@ -6,10 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from labcrane.analysis.report.figures import Drawing
+from labcrane.analysis.report.panels import svg_of
 from labcrane.analysis.report.style import save
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 STYLE = """
 :root { color-scheme: light dark; --back: #fff; --ink: #111827; --faint: #4b5563; --rule: #cbd5e1;
@@ -111,20 +113,32 @@ class Page:
         self.links({name: f"{self._up}{name}"})
 
     def draw(self, drawing: Drawing) -> None:
-        """Add a figure, and write it as SVG, PNG and PDF, and its table as CSV."""
+        """Add a figure by Matplotlib, as SVG, PNG and PDF, and its table as CSV."""
+        figure = drawing.figure
+        save(figure, self._figure(drawing))
+        self._show(drawing, _size(figure), "svg", "png", "pdf")
+
+    def sketch(self, drawing: Drawing) -> None:
+        """Add a figure as plain SVG, and write its table as CSV; a hundred times as fast."""
+        self._figure(drawing).with_suffix(".svg").write_text(
+            svg_of(drawing.panels), encoding="utf-8"
+        )
+        self._show(drawing, "", "svg")
+
+    def _figure(self, drawing: Drawing) -> Path:
         folder = self._root / "figures"
         folder.mkdir(exist_ok=True)
-        name = f"{self._prefix}{drawing.name}"
-        save(drawing.figure, folder / name)
+        return folder / f"{self._prefix}{drawing.name}"
+
+    def _show(self, drawing: Drawing, size: str, *forms: str) -> None:
         where = self._csv(drawing.name, drawing.table)
-        picture = f"{self._up}figures/{name}"
+        picture = f"{self._up}figures/{self._prefix}{drawing.name}"
+        links = [f'<a href="{picture}.{form}">{form.upper()}</a>' for form in forms]
+        links.append(f'<a href="{self._up}{where}">CSV</a>')
         self._body.append(
-            f'<figure><img loading="lazy" {_size(drawing)} src="{picture}.svg" '
+            f'<figure><img loading="lazy" {size} src="{picture}.svg" '
             f'alt="{html.escape(drawing.caption)}">'
-            f"<figcaption>{html.escape(drawing.caption)} "
-            f'(<a href="{picture}.svg">SVG</a>, <a href="{picture}.png">PNG</a>, '
-            f'<a href="{picture}.pdf">PDF</a>, <a href="{self._up}{where}">CSV</a>)'
-            "</figcaption></figure>"
+            f"<figcaption>{html.escape(drawing.caption)} ({', '.join(links)})</figcaption></figure>"
         )
 
     def write(self) -> Path:
@@ -159,9 +173,9 @@ class Page:
         return f"tables/{path.name}"
 
 
-def _size(drawing: Drawing) -> str:
+def _size(figure: "Figure") -> str:
     """Return a picture's size on the page: known before it has come, nothing jumps."""
-    wide, high = (round(PIXELS_PER_INCH * inches) for inches in drawing.figure.get_size_inches())
+    wide, high = (round(PIXELS_PER_INCH * inches) for inches in figure.get_size_inches())
     return f'width="{wide}" height="{high}" style="height:auto"'
 
 

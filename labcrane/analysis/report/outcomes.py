@@ -193,12 +193,29 @@ def gaze_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
     """Return means of how long each area was looked at, over participants' means."""
     import pandas as pd
 
-    columns = [name for name in results if str(name).startswith(("dwell_", "look_lead_"))]
+    columns = _of_gaze(results)
     if not columns:
         return pd.DataFrame()
     by = [*factors.between, *factors.over_phases, DISTANCE]
     each = results.groupby([*by, "participant"])[columns].mean()
     return each.groupby(level=by).mean().reset_index()
+
+
+def gaze_tests(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
+    """Return the tests of how long each area was looked at, over groups, phases and distances."""
+    within = [*factors.over_phases, DISTANCE]
+    tests = [
+        replace(test, factor=_words(test.factor, factors))
+        for name in _of_gaze(results)
+        for test in analyse(results, name, within, factors.between)
+    ]
+    return _frame(tests)
+
+
+def _of_gaze(results: "pd.DataFrame") -> list[str]:
+    """Return the columns of gaze of which there is something to say."""
+    names = [str(name) for name in results if str(name).startswith(("dwell_", "look_lead_"))]
+    return [name for name in names if results[name].notna().any()]
 
 
 def _frame(tests: Sequence[Anova]) -> "pd.DataFrame":

@@ -45,6 +45,7 @@ def write_report(
     leave_out: Callable[[str, str], None] | None = None,
     workers: int = 1,
     scheduler: str | None = None,
+    unprobed: Sequence[str] = (),
 ) -> Path:
     """Write the report of a cohort into ``folder``; return the page to open.
 
@@ -59,6 +60,8 @@ def write_report(
         Told whose data cannot be used, and why; the report is of the others, and says so.
     workers, scheduler
         Who does it; see :func:`labcrane.analysis.parallel.work`.
+    unprobed
+        Streams whose clock was never probed, which are used all the same, in words.
     """
     import pandas as pd
 
@@ -95,6 +98,10 @@ def write_report(
     quality = pd.concat(loops, ignore_index=True), pd.concat(syncs, ignore_index=True)
     page.table("loop_quality", quality[0])
     _syncs(page, quality[1])
+    if unprobed:
+        page.say(
+            f"Used as told, though nobody knows how right their times are: {'; '.join(unprobed)}."
+        )
     page.lead(answer(cohort, everything, quality, in_words(about), results))
     page.heading("Definitions")
     page.say(f"Settings of the measures: {settings.as_dict()}")
@@ -191,12 +198,13 @@ def _study(
     page.table("time_outs", counts)
     _movements(page, running(results, factors))
     said = _statistics(page, everything, results, factors)
+    looked = _gaze(page, results, factors)
     tests = outcomes.score_tests(scores, groups)
     if len(scores):
         page.heading("Questionnaires")
         page.table("scores", outcomes.score_table(scores, groups))
         page.table("score_tests", tests)
-    found = Results(about, *said, scores=tests, time_outs=counts, factors=factors)
+    found = Results(about, *said, looked, tests, counts, factors)
     _in_words(page, found)
     return found
 
@@ -282,12 +290,26 @@ def _statistics(
     if len(practised := outcomes.practice_table(everything, factors)):
         page.say("Practice against what counts.")
         page.table("practice", practised)
-    if len(looked := outcomes.gaze_table(results, factors)):
-        page.say("How long areas were looked at, before onset and during movements, in seconds.")
-        page.table("gaze", looked)
     for measure in PRIMARY:
         _mixed(page, results.assign(sequence=results[PLACE]), measure)
     return anovas, contrasts, trends, scales
+
+
+def _gaze(page: Page, results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
+    """Add how long areas were looked at; return the tests of it."""
+    looked = outcomes.gaze_table(results, factors)
+    tests = outcomes.gaze_tests(results, factors)
+    if len(looked):
+        page.heading("Gaze")
+        page.say(
+            "How long areas were looked at, before onset and during movements, and how long before "
+            "onset first, in seconds. Tests are of one area each, without a correction for their "
+            "number."
+        )
+        page.table("gaze", looked)
+        if len(tests):
+            page.table("gaze_tests", tests)
+    return tests
 
 
 def _mixed(page: Page, results: "pd.DataFrame", measure: str) -> None:
@@ -336,10 +358,10 @@ def _participant_page(
         results = running(whole[is_result(own)], factors_of(whole))
         curves = learning_curves(results.assign(sequence=results[PLACE]), "movement_time")
         if len(curves):
-            page.draw(figures.learning(results, curves, "movement_time"))
-        page.draw(figures.by_distance(results))
-        page.draw(figures.fitts(results))
-        page.draw(figures.sticks(results))
+            page.sketch(figures.learning(results, curves, "movement_time"))
+        page.sketch(figures.by_distance(results))
+        page.sketch(figures.fitts(results))
+        page.sketch(figures.sticks(results))
         page.table("movements", results[["trial", "sequence", "distance", *SHOWN]])
     page.heading("Exclusions")
     page.table("excluded_movements", exclusions(own))

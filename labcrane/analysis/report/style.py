@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 MM = 1.0 / 25.4
@@ -53,7 +52,7 @@ def styled() -> Iterator[None]:
         yield
 
 
-def new_figure(columns: int = 1, high: float = HIGH) -> "tuple[Figure, list[Axes]]":
+def new_figure(columns: int = 1, high: float = HIGH) -> "Figure":
     """Return an empty figure with some axes beside each other; needs no display.
 
     One has the width of a column of a journal, more that of its page. ``high`` is in inches.
@@ -66,7 +65,7 @@ def new_figure(columns: int = 1, high: float = HIGH) -> "tuple[Figure, list[Axes
         for one in axes:
             one.grid(alpha=0.3, linewidth=0.4)
             one.spines[["top", "right"]].set_visible(False)
-    return figure, axes
+    return figure
 
 
 def save(figure: "Figure", path: Path) -> None:

@@ -19,6 +19,11 @@ NAMES = {
     "absolute_error": "The distance from the target's centre",
 }
 UNITS = {"movement_time": "s", "circle_to_circle": "s", "absolute_error": "m"}
+LOOKED = {
+    "dwell_before_": "How long {} was looked at before onset",
+    "dwell_during_": "How long {} was looked at during movements",
+    "look_lead_": "How long before onset {} was looked at first",
+}
 SMALLEST = 0.001
 
 
@@ -87,7 +92,7 @@ class Results:
     ----------
     sample
         The sample in a sentence.
-    anova, contrasts, trends, scales, scores
+    anova, contrasts, trends, scales, gaze, scores
         The report's tables; empty ones say nothing.
     time_outs
         Counts by condition.
@@ -100,6 +105,7 @@ class Results:
     contrasts: "pd.DataFrame"
     trends: "pd.DataFrame"
     scales: "pd.DataFrame"
+    gaze: "pd.DataFrame"
     scores: "pd.DataFrame"
     time_outs: "pd.DataFrame"
     factors: Factors
@@ -116,10 +122,19 @@ def paragraphs(results: Results, style: Style) -> list[str]:
         more += [_scale(row, style) for row in _of(results.scales, measure)]
         more += [_contrast(row, style) for row in _of(results.contrasts, measure)]
         found.append(" ".join([text, *filter(None, more)]))
-    for outcome in _measures(results.scores):
-        sentences = [_effect(row, style) for row in _of(results.scores, outcome)]
-        found.append(f"{style.plain(outcome)} " + "; ".join(sentences) + ".")
+    for table in (results.gaze, results.scores):
+        for outcome in _measures(table):
+            sentences = [_effect(row, style) for row in _of(table, outcome)]
+            found.append(f"{style.plain(_looked(outcome))} " + "; ".join(sentences) + ".")
     return found
+
+
+def _looked(outcome: str) -> str:
+    """Return a measure of gaze as the beginning of a sentence; any other as it is."""
+    for start, words in LOOKED.items():
+        if outcome.startswith(start):
+            return words.format(outcome.removeprefix(start))
+    return outcome
 
 
 def _of(table: "pd.DataFrame", measure: str) -> list[dict[str, Any]]:

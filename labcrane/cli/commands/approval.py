@@ -2,13 +2,16 @@
 
 from datetime import date, datetime
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from labcrane.cli.options import ProtocolPath
 from labcrane.cli.output import out
 from labcrane.errors import ProtocolError
+
+if TYPE_CHECKING:
+    from labcrane.protocol.study import Study
 
 
 def approve(
@@ -22,12 +25,11 @@ def approve(
     from labcrane.approval import decision
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
-    from labcrane.simulation.rehearsal import rehearse
 
     registry = discover(study=protocol)
     grant = decision.Grant(board, reference, read_date(valid_until), consent)
     study = load(protocol, registry)
-    rehearse(study)
+    _rehearse(study)
     lock = decision.approve(study, registry, grant, today())
     materials = lock.content["materials"]
     files = ", ".join(materials["files"]) or "no files"
@@ -37,6 +39,15 @@ def approve(
         f"{materials['labcrane']['version']} and the plugins {', '.join(materials['plugins'])}",
         markup=False,
     )
+
+
+def _rehearse(study: "Study") -> None:
+    """Rehearse a study, and say what is asked of it: nobody asks again after it is locked."""
+    from labcrane.protocol.questions import about, questions
+    from labcrane.simulation.rehearsal import rehearse
+
+    for each in (*questions(study), *rehearse(study).questions):
+        typer.echo(about(study, each)["whole"], err=True)
 
 
 def amend(
@@ -52,7 +63,6 @@ def amend(
     from labcrane.approval.lock import read_lock
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
-    from labcrane.simulation.rehearsal import rehearse
 
     registry, old = discover(study=protocol), read_lock(protocol)
     grant = decision.Grant(
@@ -62,7 +72,7 @@ def amend(
         consent or old.consent,
     )
     study = load(protocol, registry)
-    rehearse(study)
+    _rehearse(study)
     lock = decision.amend(study, registry, grant, why, today())
     entry = lock.amendments[-1]
     out.print(f"{lock.path}: amendment {entry['number']}:", markup=False)

@@ -99,8 +99,8 @@ def plan(
     """Show blocks, each participant's order, and how long a session is likely to take."""
     from labcrane.design.allocation import allocate, as_csv, balance
     from labcrane.design.plan import plan_session
-    from labcrane.design.pseudonyms import pseudonyms
     from labcrane.files.atomic import SHARED_FILE, write_text
+    from labcrane.files.pseudonyms import pseudonyms
     from labcrane.protocol.effective import written_quantities
     from labcrane.protocol.questions import key_of
     from labcrane.protocol.study import load

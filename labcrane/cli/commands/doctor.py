@@ -110,7 +110,7 @@ def _print(check: "Check") -> None:
 def _session_bytes(study: "Study") -> float:
     """Return what the longest session takes, with the same margin as ``labcrane run`` asks for."""
     from labcrane.design.plan import plan_session
-    from labcrane.design.pseudonyms import pseudonyms
+    from labcrane.files.pseudonyms import pseudonyms
     from labcrane.protocol.rig import Rig
     from labcrane.recording.data_folder import needed_bytes
     from labcrane.recording.frame_log import frame_bytes

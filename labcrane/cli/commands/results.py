@@ -23,6 +23,13 @@ Include = Annotated[
     typer.Option(help="use also: simulated, pilot, half-finished; may be repeated"),
 ]
 Workers = Annotated[int, typer.Option(help="processes on this computer", min=1)]
+WorkersOrCores = Annotated[
+    int | None,
+    typer.Option(
+        help="processes on this computer; by default one a core, where people are many enough",
+        min=1,
+    ),
+]
 Scheduler = Annotated[
     str | None, typer.Option(help="a Dask scheduler whose workers do it: tcp://host:8786")
 ]
@@ -48,7 +55,7 @@ def export(
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="NAME=VALUE of the exporter; may be repeated")
     ] = None,
-    workers: Workers = 1,
+    workers: WorkersOrCores = None,
     scheduler: Scheduler = None,
     accept_unprobed: AcceptUnprobed = False,
 ) -> None:
@@ -140,12 +147,16 @@ def _tell_left_out(cohort: "Cohort") -> None:
     raise typer.Exit(LEFT_OUT)
 
 
-def _measured(cohort: "Cohort", workers: int, scheduler: str | None) -> "Sequence[Participant]":
+def _measured(
+    cohort: "Cohort", workers: int | None, scheduler: str | None
+) -> "Sequence[Participant]":
     """Return the participants; with many workers their measures, most of the work, are done."""
+    from labcrane.analysis.parallel import usual_workers, work
+
+    workers = workers or usual_workers(len(cohort.included))
     if workers == 1 and scheduler is None:
         return cohort.included
     from labcrane.analysis.measures import measure_or_say_why
-    from labcrane.analysis.parallel import work
 
     with progress_bar("measure", len(cohort.included)) as advance:
         done = {}
@@ -163,16 +174,17 @@ def report(
         "labcrane-report"
     ),
     include: Include = None,
-    workers: Workers = 1,
+    workers: WorkersOrCores = None,
     scheduler: Scheduler = None,
     accept_unprobed: AcceptUnprobed = False,
 ) -> None:
     """Write an HTML report of a study: figures, measures, statistics, quality."""
+    from labcrane.analysis.parallel import usual_workers
     from labcrane.analysis.quality import check_probed
     from labcrane.analysis.report.report import write_report
 
     cohort = cohort_of(data.resolve() if scheduler else data, include)
-    check_probed(cohort.included, accept=accept_unprobed)
+    unknown = check_probed(cohort.included, accept=accept_unprobed)
 
     def leave_out(name: str, why: str) -> None:
         nonlocal cohort
@@ -187,8 +199,9 @@ def report(
             made.folder,
             leave_out=leave_out,
             progress=lambda done, of: advance(),
-            workers=workers,
+            workers=workers or usual_workers(len(cohort.included)),
             scheduler=scheduler,
+            unprobed=unknown,
         )
     out.print(f"report: {folder / page.name}", markup=False)
     _tell_left_out(cohort)
@@ -385,6 +398,7 @@ def _settings(model: Any, words: list[str], name: str) -> Any:
     """Return an exporter's settings from NAME=VALUE; values are YAML, as in a protocol."""
     from pydantic import ValidationError
 
+    from labcrane.files.complaints import told
     from labcrane.files.yaml import parse_yaml
 
     given = {}
@@ -397,10 +411,10 @@ def _settings(model: Any, words: list[str], name: str) -> Any:
         return model.model_validate(given)
     except ValidationError as error:
         known = ", ".join(model.model_fields) or "nothing"
-        problems = "; ".join(
-            f"{'.'.join(map(str, one['loc']))}: {one['msg']}" for one in error.errors()
-        )
-        raise ProtocolError(f"exporter {name!r} can set {known}; {problems}") from None
+        problems = "; ".join(one.message for one in told(error.errors(), (name,), model))
+        raise ProtocolError(
+            f"{problems}; write --set NAME=VALUE, where {name} has {known}"
+        ) from None
 
 
 def _write_manifest(

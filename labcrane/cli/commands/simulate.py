@@ -38,7 +38,7 @@ def simulate(
 
     Participants who are in the folder already are kept: what was interrupted goes on.
     """
-    from labcrane.design.pseudonyms import pseudonyms
+    from labcrane.files.pseudonyms import pseudonyms
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
 
@@ -106,7 +106,7 @@ def power(
     The test is a t test of the participants' slopes, or differences, against zero; Welch's between
     groups. With labels permuted it says how often something is found where nothing is.
     """
-    from labcrane.design.pseudonyms import pseudonyms
+    from labcrane.files.pseudonyms import pseudonyms
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
     from labcrane.simulation.power import read_effect
@@ -280,10 +280,10 @@ def tracks(
 
     from labcrane.analysis.report.figures import thresholds
     from labcrane.cli.output import whole_table
-    from labcrane.design.pseudonyms import pseudonyms
     from labcrane.design.seeds import derive
     from labcrane.errors import ProtocolError
     from labcrane.files.atomic import make_folder, write_text
+    from labcrane.files.pseudonyms import pseudonyms
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
     from labcrane.simulation.track_cohort import abilities, observe, paragraph, quality

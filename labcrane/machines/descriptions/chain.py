@@ -24,7 +24,14 @@ ROUNDING = 1e-12
 
 
 class ChainError(ValueError):
-    """The joints of a file are no slewing base with pitch joints."""
+    """The joints of a file are no slewing base with pitch joints.
+
+    ``name`` is what is not in the file, where that is the matter.
+    """
+
+    def __init__(self, message: str, *, name: str = "") -> None:
+        super().__init__(message)
+        self.name = name
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import Field, PositiveFloat, ValidationError, model_validator
 
-from labcrane.errors import ProtocolError
+from labcrane.errors import ProtocolError, nearest
 from labcrane.files.model import StrictModel
 from labcrane.files.system import is_file
 from labcrane.machines.machine import FEWEST_JOINTS, Machine
@@ -50,15 +50,24 @@ class MachineDescription(StrictModel):
     """Whether links look like the first mesh that a URDF file gives them: STL, OBJ or glTF."""
 
     @model_validator(mode="after")
-    def _is_one_file_and_known_joints(self) -> "MachineDescription":
+    def _is_one_file(self) -> "MachineDescription":
         if (self.urdf is None) == (self.mjcf is None):
             raise ValueError("a machine is described by one file; write urdf or mjcf")
-        for key in ("rest_deg", "speeds_deg_s", "efforts"):
-            if unknown := set(getattr(self, key)) - set(self.names):
-                raise ValueError(
-                    f"{key} names {', '.join(sorted(unknown))}; joints are {', '.join(self.names)}"
-                )
         return self
+
+    def _check_names(self) -> None:
+        for key in ("rest_deg", "speeds_deg_s", "efforts"):
+            for name in getattr(self, key):
+                if name not in self.names:
+                    there = nearest(name, self.names, "its joints are")
+                    raise ProtocolError(f"{key} names {name!r}; {there}", at=(key, name))
+
+    def _place(self, name: str) -> tuple[str, ...]:
+        """Return where the protocol has a name of the file."""
+        called = [key for key, joint in self.names.items() if joint == name]
+        if called:
+            return ("joints", called[0]) if isinstance(self.joints, dict) else ("joints",)
+        return ("tip",) if name == self.tip else ()
 
     @property
     def names(self) -> dict[str, str]:
@@ -87,24 +96,30 @@ class MachineDescription(StrictModel):
         if not is_file(path):
             raise ProtocolError(
                 f"machine file {str(path)!r} does not exist; a path counts from the protocol's "
-                "folder"
+                "folder",
+                at=("mjcf" if self.urdf is None else "urdf",),
             )
+        self._check_names()
         try:
             found = self._file(path, folder)
             speeds = {name: math.radians(each) for name, each in self.speeds_deg_s.items()}
             axes = found.axes(self.names, self.tip, speeds, self.efforts)
             fields = machine_fields(axes, found.tip(self.tip), self.rest_deg, self.thickness)
         except ChainError as error:
-            raise ProtocolError(f"{path}: {error}") from error
+            raise ProtocolError(f"{path}: {error}", at=self._place(error.name)) from error
         fields = {"title": self.title or found.title, "source": f"{path.name}", **fields}
         try:
             machine = Machine.model_validate(fields, context={"folder": folder})
             return machine, json.dumps(fields, indent=1) + "\n"
         except ValidationError as error:
             first = error.errors()[0]
-            where = ".".join(map(str, first["loc"]))
+            what, loc = first["msg"].removeprefix("Value error, "), first["loc"]
+            named = list(self.names)[int(loc[1])] if loc[0] == "joints" and len(loc) > 1 else ""
+            key = next((key for key in ("rest_deg", "speeds_deg_s", "efforts") if key in what), "")
+            where = f"joint {named!r}" if named else ".".join(map(str, loc))
             raise ProtocolError(
-                f"{path} as a machine: {where}: {first['msg'].removeprefix('Value error, ')}"
+                f"{path} as a machine: {where}: {what}",
+                at=(key, named) if key and named in getattr(self, key) else (),
             ) from error
 
     def _file(self, path: Path, folder: Path) -> Any:

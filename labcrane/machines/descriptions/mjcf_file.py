@@ -65,7 +65,8 @@ class MjcfFile:
         for name in names.values():
             if name not in self.joint_names:
                 raise ChainError(
-                    f"there is no hinge {name!r}; {nearest(name, self.joint_names, 'it has')}"
+                    f"there is no hinge {name!r}; {nearest(name, self.joint_names, 'it has')}",
+                    name=name,
                 )
         self._at_zero(names)
         bodies = {int(self._model.joint(name).bodyid[0]): name for name in names.values()}
@@ -152,7 +153,8 @@ class MjcfFile:
         body = self._id("BODY", name)
         if body < 0:
             there: list[Any] = [self._model.body(at).name for at in range(1, self._model.nbody)]
-            raise ChainError(f"there is no site or body {name!r}; {nearest(name, there, 'it has')}")
+            listed = nearest(name, there, "it has")
+            raise ChainError(f"there is no site or body {name!r}; {listed}", name=name)
         return body
 
     def _id(self, kind: str, name: str) -> int:

@@ -67,7 +67,8 @@ class UrdfFile:
     def tip(self, link: str) -> FloatArray:
         """Return where the origin of a link is at zero, in m, shape ``(3,)``."""
         if link not in self._links:
-            raise ChainError(f"there is no link {link!r}; {nearest(link, self._links, 'it has')}")
+            there = nearest(link, self._links, "it has")
+            raise ChainError(f"there is no link {link!r}; {there}", name=link)
         return self._poses[link][:3, 3]
 
     def axes(
@@ -84,7 +85,7 @@ class UrdfFile:
         for name in names.values():
             if name not in self._joints:
                 there = nearest(name, self.joint_names, "it has")
-                raise ChainError(f"there is no joint {name!r}; {there}")
+                raise ChainError(f"there is no joint {name!r}; {there}", name=name)
         self.tip(tip)  # refused first, if it is not there
         way = self._way(tip)
         in_order = [name for name in way if name in names.values()]

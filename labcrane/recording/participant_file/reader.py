@@ -111,19 +111,29 @@ class Stream:
         RecordingError
             The stream has no such column.
         """
+        return self.columns([name], start, stop)[name]
+
+    def columns(
+        self, names: Sequence[str], start: int = 0, stop: int | None = None
+    ) -> dict[str, npt.NDArray[Any]]:
+        """Return samples ``start`` to ``stop`` of some columns by name, as :meth:`column` does."""
+        known = ("time", *self._paths) if set(names) - {"time"} else ("time",)
+        if unknown := [name for name in names if name not in known]:
+            raise RecordingError(
+                f"stream {self.name!r} of {self._path} has no column {unknown[0]!r}; it has "
+                + ", ".join(known)
+            )
+        cut, found = slice(start, stop), {}
         with reading(self._path) as file:
-            if name == "time":
-                return np.asarray(file[self._time][start:stop], np.float64)
-            if name in self._paths:
-                dataset = file[self._paths[name]]
-                cut = slice(start, stop)
-                return np.asarray(
-                    dataset.asstr("utf-8")[cut] if holds_texts(dataset) else dataset[cut]
-                )
-        raise RecordingError(
-            f"stream {self.name!r} of {self._path} has no column {name!r}; it has "
-            + ", ".join(("time", *self._paths))
-        )
+            for name in names:
+                dataset = file[self._time if name == "time" else self._paths[name]]
+                if name == "time":
+                    found[name] = np.asarray(dataset[cut], np.float64)
+                else:
+                    found[name] = np.asarray(
+                        dataset.asstr("utf-8")[cut] if holds_texts(dataset) else dataset[cut]
+                    )
+        return found
 
     def batches(
         self,

@@ -51,17 +51,17 @@ def cause(
             "nothing can be searched for; end programs that search all the time, or set "
             "PortRange = 128 in lsl_api.cfg (docs/lab.md)"
         )
-    others = [one for one in seen if not one.name().startswith(OURS)]
+    others = sorted(
+        f"{one.name()!r} ({one.type()}, source_id {one.source_id()!r}) of {one.hostname()}"
+        for one in seen
+        if not one.name().startswith(OURS)
+    )
     if others:
-        named = sorted(
-            f"{one.name()!r} ({one.type()}, source_id {one.source_id()!r}) of {one.hostname()}"
-            for one in others[:MOST_NAMED]
-        )
         more = f" and {len(others) - MOST_NAMED} more" if len(others) > MOST_NAMED else ""
         return (
-            f"what is there is {', '.join(named)}{more}; correct the protocol if one of them is "
-            "meant, else start its program; labcrane doctor --peer ADDRESS tells whether a "
-            "firewall stops it"
+            f"what is there is {', '.join(others[:MOST_NAMED])}{more}; correct the protocol if "
+            "one of them is meant, else start its program; labcrane doctor --peer ADDRESS tells "
+            "whether a firewall stops it"
         )
     if network.loopback:
         return (

@@ -18,7 +18,7 @@ NONE = "none"
 """The answer that no stream that is there is the one."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, order=True)
 class Candidate:
     """A stream that may be the one that is meant, ready for JSON."""
 

@@ -110,10 +110,11 @@ class RecorderHandle:
         """Whether somebody is asked which stream of a type is meant."""
         return any(stream["candidates"] for stream in self.status.get("streams", ()))
 
-    def confirm(self, text: str) -> str:
-        """Let the stream of a type be recorded that somebody says is meant; say which it is.
+    def confirm(self, text: str) -> tuple[str, str]:
+        """Let the stream of a type be recorded that somebody says is meant.
 
-        ``text`` is read by :func:`labcrane.streams.recorder.candidates.answered`.
+        ``text`` is read by :func:`labcrane.streams.recorder.candidates.answered`. Returns the
+        study's name for it, and in words which it is.
 
         Raises
         ------
@@ -126,7 +127,7 @@ class RecorderHandle:
         )
         for recorder in self._recorders:
             recorder.tell({CONFIRMED: {label: meant}})
-        return f"stream {label} is {'none of them' if meant == NOBODY else called(meant)}"
+        return label, "none of them" if meant == NOBODY else called(meant)
 
     def taken(self) -> list[str]:
         """Return which streams were confirmed that only their type asked for, one line each."""

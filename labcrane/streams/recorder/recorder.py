@@ -160,7 +160,8 @@ class Recorder:
 
     def _absent(self, request: StreamRequest) -> Health:
         """Return how a stream is that is not recorded: asked about, left out or not there."""
-        if candidates := self._candidates.get(request.label, ()):
+        # In one order, whichever answers first: who is told it again looks for what is new.
+        if candidates := sorted(self._candidates.get(request.label, ())):
             kind, required = request.type or "", request.required
             said = question(request.label, kind, candidates, required=required)
         elif request.confirmed == NOBODY:

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from labcrane.errors import LabcraneError
+from labcrane.participants.folders import Places
+from labcrane.participants.register import struck
 from labcrane.recording.data_folder import DataFolder
 
 FEWEST = 3
@@ -45,7 +47,8 @@ class Earlier:
 def read_behind(folder: Path, study: str, session: int, measures: Iterable[str]) -> Earlier:
     """Return what is read of the other participants beside ``folder``, by a thread, as it goes.
 
-    Only folders with the same stamps as this one's count: pilots are not compared with people.
+    Only folders with the same stamps as this one's count: pilots are not compared with people. Who
+    was excluded counts nowhere.
     """
     found = Earlier()
     wanted = tuple(measures)
@@ -58,11 +61,19 @@ def read_behind(folder: Path, study: str, session: int, measures: Iterable[str])
 
 def _read(found: Earlier, folder: Path, study: str, session: int, wanted: tuple[str, ...]) -> None:
     stamps = folder.name.removeprefix(DataFolder.pseudonym(folder.name))
-    files = sorted(folder.parent.glob("*/*.h5"))[: MOST + 1]
-    for file in files:
-        name = file.parent.name
-        if file.stem != name or name.removeprefix(DataFolder.pseudonym(name)) != stamps:
-            continue
+    try:
+        left_out = struck(Places(folder.parent))
+    except LabcraneError:  # whom it excludes nobody knows, so nobody is compared
+        return
+    others = [
+        file
+        for file in sorted(folder.parent.glob("*/*.h5"))
+        if file.stem == (name := file.parent.name)
+        and name.removeprefix(DataFolder.pseudonym(name)) == stamps
+        and name not in left_out
+        and file.parent != folder
+    ]
+    for file in (folder / f"{folder.name}.h5", *others[:MOST]):
         with contextlib.suppress(LabcraneError, OSError, KeyError):  # it is for orientation only
             _take(found, file, study, wanted, session if file.parent == folder else None)
 

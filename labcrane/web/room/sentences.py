@@ -63,6 +63,7 @@ SAID: Mapping[str, tuple[str, str, str]] = {
     "feedback.ready": ("{what} presents", "other", ""),
     "feedback.lost": ("{what} failed: {why}", "faults", "bad"),
     "stream.lost": ("stream {what} is lost", "faults", "bad"),
+    "stream.confirmed": ("stream {what} is {which}", "other", ""),
     "stream.back": ("stream {what} is back", "faults", ""),
     "signal.bad": ("signal of {stream} {channel}: {message}", "faults", "warn"),
     "signal.good": ("signal of {stream} {channel} is well again", "faults", ""),

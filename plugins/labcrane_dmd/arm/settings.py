@@ -1,5 +1,6 @@
 """Settings of the arm and its valves."""
 
+from collections.abc import Mapping
 from typing import Annotated
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
@@ -91,13 +92,24 @@ class ArmSettings(Settings):
         from labcrane.machines import load_scene  # noqa: PLC0415 - loads numpy
 
         things = {thing for path in self.scenes for thing in load_scene(path).things}
-        written = read_yaml(self.model)
-        described = written.get("segments") if isinstance(written, dict) else None
-        laws = [*(described if isinstance(described, dict) else ()), *self.proportional]
         return {
-            "speed law": laws,
+            "speed law": [*self._described(), *self.proportional],
+            "scene": [path.name.split(".")[0] for path in self.scenes],
             "object": [*sorted(things), *(("jaw_upper", "jaw_lower") if self.jaws else ())],
         }
+
+    def _described(self) -> tuple[str, ...]:
+        """Return the joints that the model describes."""
+        written = read_yaml(self.model)
+        described = written.get("segments") if isinstance(written, dict) else None
+        return tuple(described) if isinstance(described, dict) else ()
+
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        described = self._described()
+        both = [name for name in self.proportional if name in described]
+        if not both:
+            return {}
+        return {"proportional": f"has {', '.join(both)}, which {self.model.name} describes as well"}
 
     def needs(self, machine: Machine) -> Names:
         return {"joint": [self.jaws.joint] if self.jaws else [], "speed law": machine.names}

@@ -24,6 +24,8 @@ def pseudonyms(pattern: str, count: int) -> list[str]:
             names = (name for name in candidates if re.fullmatch(pattern, name))
             if len(found := list(itertools.islice(names, count))) == count:
                 return found
+    if count == 1 and re.fullmatch(pattern, pattern):
+        return [pattern]  # of one person
     raise ProtocolError(
         f"no {count} names of letters and a number match the pattern {pattern!r}; "
         "name participants with --participant"
