@@ -36,7 +36,7 @@ class ScenarioOperator(InputDevice):
     def __init__(self, settings: OperatorSettings, machine: Machine) -> None:
         button = (Signal(settings.button, "1"),) if settings.button else ()
         self.signals = (
-            Signal("valve", "1", machine.names),
+            *(Signal(name, "1") for name in settings.axes_of(machine)),
             Signal("panel.connected", "1"),
             *button,
         )
@@ -46,6 +46,8 @@ class ScenarioOperator(InputDevice):
             )
         self._settings = settings
         self._joint = machine.names.index(settings.jaws)
+        turned = settings.axes.get(settings.jaws, "").startswith("-")
+        self._turned = -1.0 if turned else 1.0
         self._limits = machine.limits[self._joint]
         self._connected = len(machine.names)
         self._out = np.zeros(self._connected + 1 + len(button))
@@ -104,7 +106,7 @@ class ScenarioOperator(InputDevice):
         if distance <= seen.task.item(self._radius):
             self._move_jaws(seen, out)
         if lapses is not None and lapses.presses_on(held=self._holds(seen)):
-            out[self._joint] = -self._settings.signal
+            out[self._joint] = -self._turned * self._settings.signal
         return out
 
     def _holds(self, seen: Frame) -> bool:
@@ -117,4 +119,4 @@ class ScenarioOperator(InputDevice):
         lowest, highest = self._limits
         away = lowest + wanted * (highest - lowest) - seen.state.item(self._angle)
         if abs(away) > CLOSE_RAD:
-            out[self._joint] = math.copysign(self._settings.signal, away)
+            out[self._joint] = self._turned * math.copysign(self._settings.signal, away)

@@ -3,7 +3,7 @@
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
 from labcrane import Machine, Settings
-from labcrane.core import ButtonName, JointName, Names, SceneFile
+from labcrane.core import AxisName, ButtonName, JointName, Names, SceneFile
 
 EVENTS = (
     "goal.reached", "mistakes.too_many", "deformity.found", "drop", "overload", "contact.object",
@@ -90,6 +90,10 @@ class OperatorSettings(Settings):
     signal: float = Field(default=0.5, gt=0.0, le=1.0)
     """Share of full signal with which the jaws are moved."""
 
+    axes: dict[JointName, AxisName] = Field(default={})
+    """Axes of the input that it stands for, by the joint that each moves (``{jaws: -right.x}``),
+    with a minus where the scheme has one. A joint left out has its own axis: ``valve.jaws``."""
+
     button: ButtonName | None = None
     """A button of the input that it has too, like the device it stands for (``float.base`` of a
     panel); it presses it whenever it has reached a goal, and so reports a deformity that is near
@@ -100,8 +104,11 @@ class OperatorSettings(Settings):
 
     def provides(self, machine: Machine) -> Names:
         button = [self.button] if self.button else []
-        valves = [f"valve.{name}" for name in machine.names]
-        return {"axis": [*valves, "panel.connected", *button], "button": button}
+        return {"axis": [*self.axes_of(machine), "panel.connected", *button], "button": button}
+
+    def axes_of(self, machine: Machine) -> list[str]:
+        """Return the name of the axis that moves each joint."""
+        return [self.axes.get(name, f"valve.{name}").lstrip("-") for name in machine.names]
 
     def needs(self, machine: Machine) -> Names:
         return {"joint": [self.jaws]}

@@ -105,7 +105,10 @@ def test_what_was_switched_on_is_in_the_trial_table(tmp_path: Path) -> None:
         (FED.replace("sonification", "sonifcation"), "did you mean 'sonification'?"),
         (FED.replace("far: 3.0", "fat: 3.0"), "did you mean 'far'"),
         (FED + "views: {ball: {use: view}}\n", "'ball' is the name of a feedback already"),
-        (FED + "views: {v: {use: view, camera: moon}}\n", "there is no camera 'moon'; there is"),
+        (
+            FED + "views: {v: {use: view, camera: moon}}\n",
+            "there is no such camera as 'moon'; there is",
+        ),
         (
             FED + "views: {v: {use: view, camera: cab_lft}}\n",
             "'cab_lft'; did you mean 'cab_left'? there is",

@@ -27,7 +27,7 @@ views:
 MESSAGES = {
     "mirror": r"the window is flipped, which the software renderer cannot; use OpenGL \(Mesa's",
     "second": r"there is no screen 7; there is 0 \(\S+, 1000x700\)",
-    "lettered": r"there is no font file 'no\.ttf'; correct font: or leave it out",
+    "lettered": r"'\S+no\.ttf' cannot be read as a font; TrueType and OpenType can",
     "tone": r"the jack sound system does not take 48000 Hz in .*; start a JACK server first",
 }
 
@@ -43,6 +43,7 @@ def bare_computer() -> Iterator[None]:
 
 
 def crew(folder: Path, text: str, policy: str) -> FeedbackProcesses:
+    (folder / "no.ttf").write_text("letters without a font", encoding="utf-8")
     study = a_study(folder, SHORT + text + f"on_fault: {{feedback_lost: {policy}}}\n")
     return FeedbackProcesses(Visit(study, "P001", 1, folder, simulated=True))
 

@@ -131,7 +131,7 @@ def test_without_the_right_token_nothing_is_given(visited) -> None:
 def test_a_refusal_says_why_and_gives_nothing_away(visited) -> None:
     answers, *_ = visited
     text = answers["no token"][2]
-    assert text == "labcrane: no token; use the link that labcrane run has printed"
+    assert text == "labcrane: no token; use the link that labcrane has printed"
     assert answers["participant's order"][2] == (
         "the participant page asked for end: no right to order it"
     )

@@ -4,6 +4,7 @@ Each also has the button with which a deformity is reported.
 """
 
 import math
+import shutil
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,6 +20,7 @@ from faults.sessions import wait_for
 from ruamel.yaml import YAML
 from virtual_sticks import desk
 
+from labcrane.cli.app import main
 from labcrane.core import PlannedTrial
 from labcrane.core.clock import Tick
 from labcrane.protocol.rig import Rig
@@ -239,3 +241,22 @@ def test_each_control_has_a_button_with_which_a_deformity_is_reported(controls) 
             ((by, limb),) = found
             assert by == "operator"
             assert limb in {"left_forearm", "left_shank", "right_shank"}
+
+
+@pytest.mark.long
+@needs_bullet
+@pytest.mark.parametrize("turned", ["", "-"])
+@pytest.mark.parametrize("name", ["joysticks.yaml", "keyboard.yaml"])
+def test_whichever_controls_there_are_the_study_can_be_rehearsed(
+    name: str, turned: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(RETRIEVAL, tmp_path / "study")
+    path = tmp_path / "study" / name
+    text = path.read_text(encoding="utf-8")
+    axis = {"joysticks.yaml": "jaws: right.x", "keyboard.yaml": "jaws: keyboard.jaws"}[name]
+    assert text.count(axis) == 2  # in the scheme, and of the operator who stands in
+    path.write_text(text.replace(axis, axis.replace(": ", f": {turned}")), encoding="utf-8")
+    assert main(["check", str(path), "--rehearse"]) == 0
+    said = capsys.readouterr()
+    assert said.err == ""  # no scene ran out of time, which would be asked about
+    assert said.out.endswith("and was rehearsed\n")
