@@ -25,7 +25,7 @@ from benchmarks.table import Row, missed
 
 SUBJECTS = (
     "tick", "scenario", "oversight", "beside", "real_time", "recording", "length", "sync",
-    "signals", "view", "sound", "analysis", "cohort", "start_up", "pages",
+    "signals", "view", "viewer", "sound", "analysis", "report", "cohort", "start_up", "pages",
 )  # fmt: skip
 RESULTS = Path(__file__).with_name("RESULTS.md")
 HEAD = "| benchmark | figure | labcrane | reference | | ratio | at most | measured |"

@@ -23,6 +23,7 @@ from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
 from labcrane.web.door.access import SCOPE, SUPERVISOR, Gate, Keys
 from labcrane.web.door.denials import Denials
+from labcrane.web.door.serving import MOST_HEAD, build_pages
 from labcrane.web.live import Live
 from labcrane.web.page import PageContext
 from labcrane.web.pictures import Pictures
@@ -37,14 +38,11 @@ the pages could not be reached for more than a minute."""
 
 AWAY_S = 30.0
 """How long a browser may be without connection, as a tablet or a laptop that sleeps, and find its
-page as it was. After that the page is loaded anew, without what was half written."""
+page as it was. After that the page is loaded anew; what was half written is in the browser."""
 
 MISSED = 10_000
 """How many changes of a page are kept for a browser that is away: more than come in ``AWAY_S``. One
 that has missed more is loaded anew too."""
-
-MOST_HEAD = 16_384
-"""Bytes of a request's line and headers."""
 
 
 @dataclass(frozen=True)
@@ -129,8 +127,7 @@ def serve(order: PageConfig, parent: Parent) -> None:
     if hasattr(os, "nice"):
         os.nice(NICENESS)
     import uvicorn  # noqa: PLC0415
-    from fastapi import FastAPI  # noqa: PLC0415
-    from nicegui import ui  # noqa: PLC0415 - loads for a second
+    from fastapi import FastAPI  # noqa: PLC0415 - loads for a second
 
     from labcrane.web.door.guard import BoundedProtocol, Guard  # noqa: PLC0415
 
@@ -158,7 +155,7 @@ def serve(order: PageConfig, parent: Parent) -> None:
     )
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     _routes(app, context, lambda browsers: parent.tell(Opened(browsers)))
-    ui.run_with(app, title="labcrane", show_welcome_message=False, message_history_length=MISSED)
+    build_pages(app, MISSED)
     secure = order.certificate is not None
     gate = Gate(app, order.keys, lambda page: parent.tell(Used(page)), denials, secure=secure)
     config = uvicorn.Config(

@@ -1,6 +1,8 @@
 """What can be measured of how a page looks: accessibility by axe-core, and text in its boxes."""
 
 import json
+import os
+import re
 from functools import cache
 
 from needs import need, node_module
@@ -13,6 +15,9 @@ const [tags, done] = arguments;
 axe.run(document, {runOnly: tags, resultTypes: ['violations']}).then(found => done(
     found.violations.map(v => v.id + ': ' + v.nodes.map(n => n.html.slice(0, 200)).join(' | '))));
 """
+SCREENS = os.environ.get("LABCRANE_SCREENS")
+"""Folder for pictures of every state that is checked: ``python docs/screens.py`` gives one."""
+
 SIZES = ((1280, 800), (1920, 1080), (768, 1024))
 
 BOXES = """
@@ -74,8 +79,8 @@ def complaints(browser: webdriver.Chrome) -> list[str]:
     return list(browser.execute_async_script(RUN, WCAG_AA))
 
 
-def misplaced(browser: webdriver.Chrome) -> dict[str, list[str]]:
-    """Return text that is cut or over other text, by the window's size."""
+def misplaced(browser: webdriver.Chrome, state: str) -> dict[str, list[str]]:
+    """Return text that is cut or over other text, by the window's size; take a picture of each."""
     found = {}
     for width, height in SIZES:
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
@@ -84,7 +89,10 @@ def misplaced(browser: webdriver.Chrome) -> dict[str, list[str]]:
             "scrollTo(0, 0); requestAnimationFrame(() => requestAnimationFrame(arguments[0]))"
         )
         lines, wrong = browser.execute_script(BOXES)
-        assert lines > 1, "there is text to measure"
+        assert lines, "there is text to measure"
+        if SCREENS:
+            name = "-".join(re.findall(r"\w+", state.lower()))
+            browser.save_screenshot(f"{SCREENS}/{name}-{width}.png")
         if wrong:
             found[f"{width}x{height}"] = wrong
     browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
@@ -95,5 +103,5 @@ def check(browser: webdriver.Chrome, state: str) -> None:
     """See that a page in this state can be used by everybody, and that nothing of it is cut."""
     wrong = complaints(browser)
     assert not wrong, f"{state}: {json.dumps(wrong, indent=1)}"
-    cut = misplaced(browser)
+    cut = misplaced(browser, state)
     assert not cut, f"{state}: {json.dumps(cut, indent=1)}"

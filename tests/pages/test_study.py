@@ -89,6 +89,7 @@ def test_every_session_has_its_quality_and_every_person_consent_and_deviations(l
     assert "moved away" in people["P003"].why
     assert all(person.consent_level == "ok" for person in people.values())
     assert people["P004"].sat == ()
+    assert people["P001"].sat[0].day == TODAY.isoformat(), "as the register has it"
     for name, person in people.items():
         folder = lab.places.root / name
         assert person.bytes == sum(f.stat().st_size for f in folder.rglob("*") if f.is_file())

@@ -1,6 +1,7 @@
 """The viewer: poses, curves and events are those of the record; its page shows them."""
 
 import random
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -20,7 +21,8 @@ from labcrane.errors import RecordingError
 from labcrane.machines.kinematics import link_frames
 from labcrane.registry.registry import discover
 from labcrane.web.room.shown import ShownShapes
-from labcrane.web.viewer.film import POINTS, Film
+from labcrane.web.viewer.film import POINTS, STEPS, WINDOW_SAMPLES, Film
+from labcrane.web.viewer.opened import opened
 
 STUDY = (
     "labcrane: 1\nstudy: {study}\ntitle: Viewed\nrate_hz: 240\n"
@@ -127,6 +129,114 @@ def test_a_session_without_frames_says_that_there_is_nothing_to_see(file: Path) 
         open_recording(file).session(1).streams["state"].column("joint")
 
 
+class Heard(Film):
+    """A film of which one signal is known."""
+
+    def __init__(self, time_s: np.ndarray, values: np.ndarray) -> None:
+        self.heard = time_s, values
+
+    def _signal(self, stream: str, column: str) -> tuple[np.ndarray, np.ndarray]:
+        return self.heard
+
+
+def test_a_spectrogram_has_a_tone_at_its_frequency_and_its_loudness_and_gaps_stay_gaps() -> None:
+    rate_hz, draw = 1000.0, np.random.default_rng(7)
+    time_s = np.arange(60_000) / rate_hz
+    for tone_hz in draw.uniform(20.0, 480.0, 8):
+        amplitude = draw.uniform(0.5, 20.0)
+        film = Heard(time_s, amplitude * np.sin(2 * np.pi * tone_hz * time_s) + 3.0)
+        found = film.spectrogram("Audio", "left", 0.0, 60.0)
+        bins = np.array(found["levels"])
+        assert bins.shape == (STEPS, WINDOW_SAMPLES // 2)
+        step_hz = rate_hz / WINDOW_SAMPLES
+        at = (bins.argmax(axis=1) + 1) * step_hz  # the mean is left out
+        assert np.abs(at - tone_hz).max() <= step_hz
+        assert found["top_hz"] == pytest.approx(500.0)
+        # A sine's power is half its amplitude squared; Hann spreads it over 1.5 bins, and loses
+        # up to 1.42 dB where the tone is between two.
+        whole_db = 10 * np.log10(amplitude**2 / 2 / (1.5 * step_hz))
+        assert whole_db - 1.5 <= found["most_db"] <= whole_db + 0.1
+    gap = (time_s < 20.0) | (time_s > 30.0)
+    film = Heard(time_s[gap], np.sin(time_s[gap]))
+    steps = film.spectrogram("Audio", "left", 0.0, 60.0)["levels"]
+    assert sum(row is None for row in steps) in {1, 2}, "only what the gap is in"
+    film = Heard(time_s, np.where(time_s < 30.0, np.nan, np.sin(time_s)))
+    steps = film.spectrogram("Audio", "left", 0.0, 60.0)["levels"]
+    assert [row is None for row in steps[:145] + steps[155:]] == [True] * 145 + [False] * 145
+    with pytest.raises(RecordingError, match="needs 512 samples, and Audio left has 100 there"):
+        film.spectrogram("Audio", "left", 0.0, 0.1)
+
+
+def copied(file: Path, folder: Path) -> Path:
+    """Return a participant's folder with the journals only."""
+    there = folder / file.parent.name
+    there.mkdir()
+    for journal in file.parent.glob("ses-01_*"):
+        shutil.copy(journal, there)
+    return there
+
+
+def same_as_far_as(film: Film, cut: Film) -> None:
+    for at in moments(cut.length, 30):
+        whole, part = film.frame(at), cut.frame(at)
+        assert part == pytest.approx(whole, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize("share", [0.6, 0.9])
+def test_a_killed_session_is_shown_as_far_as_its_journal_goes_and_nothing_is_written(
+    share: float, file: Path, film: Film, tmp_path: Path
+) -> None:
+    folder = copied(file, tmp_path)
+    journal = folder / "ses-01_run.xdf"
+    journal.write_bytes(journal.read_bytes()[: int(share * journal.stat().st_size)])
+    before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
+    said: list[str] = []
+    cut = Film(opened(folder, 1, tmp_path / "scratch", said.append), "cut")
+    assert 0.3 * film.length < cut.length < film.length
+    same_as_far_as(film, cut)
+    assert "shown is what its journals hold" in said[0]
+    assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
+
+
+def test_a_damaged_participant_file_is_shown_from_its_journals(
+    file: Path, film: Film, tmp_path: Path
+) -> None:
+    folder = copied(file, tmp_path)
+    damaged = folder / file.name
+    damaged.write_bytes(file.read_bytes()[:4000])
+    said: list[str] = []
+    whole = Film(opened(damaged, 1, tmp_path / "scratch", said.append), "whole")
+    assert (len(whole.time), len(said)) == (len(film.time), 1)
+    same_as_far_as(film, whole)
+    for journal in folder.glob("*.xdf"):
+        journal.unlink()
+    with pytest.raises(RecordingError, match=r"P001-SIMULATED\.h5"):
+        opened(damaged, 1, tmp_path / "other", said.append)
+
+
+def test_two_trials_are_shown_from_their_starts_side_by_side(file: Path, film: Film) -> None:
+    table = open_recording(file).session(1).trials.set_index("trial")
+    one, other = table.index[:2]
+    apart_s = table.loc[other, "started"] - table.loc[one, "started"]
+    assert film.start_of(other) - film.start_of(one) == pytest.approx(apart_s, abs=1e-3)
+    with pytest.raises(RecordingError, match=r"has no trial 9; there are 2 to 3"):
+        film.start_of(9)
+    with pytest.raises(RecordingError, match="no trial 7"):
+        check_view(file, "--trial", f"{one:g}", "--beside-trial", "7")
+    assert main(["view", str(file), "--beside-trial", "2"]) == 2
+
+
+def check_view(file: Path, *words: str) -> None:
+    """Have the command look at a file, and let what it raises through."""
+    import typer
+
+    from labcrane.cli.commands.results import view
+
+    app = typer.Typer()
+    app.command()(view)
+    app([str(file), *words], standalone_mode=False)
+
+
 POSES = """
 const found = {};
 window['scene_' + document.querySelector('.nicegui-scene').id].traverse(o => {
@@ -134,6 +244,16 @@ window['scene_' + document.querySelector('.nicegui-scene').id].traverse(o => {
         found[o.name.slice(5)] = o.matrixWorld.elements; }
 });
 return found;
+"""
+AS_SPECTROGRAM = """
+const field = document.getElementById('as-0');
+field.value = 'spectrogram';
+field.dispatchEvent(new Event('change'));
+"""
+PAINTED = """
+const canvas = document.getElementById('spectrum-0');
+const pixels = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+return pixels.filter((v, n) => n % 4 === 0 && v > 64).length;
 """
 GO = """
 const field = document.getElementById('second');
@@ -156,6 +276,10 @@ def test_the_page_shows_the_recorded_pose_at_any_time(
         shown(browser, "clock", "of 0:00:")
         wait_for(lambda: text(browser, "range-0"))
         check(browser, "viewer")
+        browser.execute_script(AS_SPECTROGRAM)
+        wait_for(lambda: "dB" in text(browser, "heard-0"))
+        assert browser.execute_script(PAINTED) > 100
+        check(browser, "viewer with a spectrogram")
         machine, times = film.machine, moments(film.length)
         angles = record.streams["state"].data[[f"joint.angle.{n}" for n in machine.names]]
         for at in times:

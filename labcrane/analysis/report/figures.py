@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from labcrane.analysis.report.panels import COLOURS, GREY, Panel, Series, figure_of, new_figure
+from labcrane.analysis.report.panels import FAINT, GREY, Panel, Series, figure_of, lighter
+from labcrane.analysis.report.style import COLOURS, HIGH, new_figure, styled
 from labcrane.analysis.statistics.fitts import regress
 from labcrane.analysis.statistics.learning import CURVES
 from labcrane.types import FloatArray
@@ -27,6 +28,12 @@ WORDS = {
 
 
 PLACE_WORDS = "position in the sequence"
+MEANS = "Points: means over participants' means, bars: 95 % confidence intervals (t),"
+MOST_NAMED = 60
+"""Participants that have their names in a figure; more of them would fill a page."""
+
+LINE = 0.13
+"""Inches from one name to the next."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,18 +51,21 @@ class Drawing:
         return figure_of(self.panels)
 
 
-class Bars(Drawing):
-    """One bar for each participant, and a line at their mean."""
+class Lines(Drawing):
+    """A dot on a line of its own for each participant, and a line at their mean."""
 
     @property
     def figure(self) -> "Figure":
-        figure = new_figure()
-        (axes,) = figure.axes
-        who, values = self.table["participant"], self.table["throughput"]
-        axes.bar(who, values, color="C4")
-        axes.tick_params(axis="x", rotation=90, labelsize="x-small")
-        axes.axhline(float(values.mean()), color="k", lw=0.8)
-        axes.set(ylabel="throughput (bit/s)")
+        own = self.table.sort_values("throughput")
+        named = len(own) <= MOST_NAMED
+        with styled():
+            figure = new_figure(high=max(HIGH, LINE * len(own) + 0.6) if named else HIGH)
+            (axes,) = figure.axes
+            places = np.arange(len(own))
+            axes.plot(own["throughput"], places, "o", color=COLOURS[0])
+            axes.set_yticks(places if named else [], own["participant"] if named else [])
+            axes.axvline(float(own["throughput"].mean()), color="k", lw=0.8)
+            axes.set(xlabel="throughput (bit/s)", ylabel="participant")
         return figure
 
 
@@ -78,9 +88,7 @@ def over(movements: "pd.DataFrame", measure: str, by: list[str]) -> "pd.DataFram
 def by_sequence(movements: "pd.DataFrame", measure: str) -> Drawing:
     """Draw a measure over the sequence: everybody thin, the mean of each group thick."""
     each = movements.groupby(["participant", "sequence"])[measure].mean().unstack(level=0)
-    series = [
-        Series(_numbers(each.index), _numbers(each[name]), "#bfbfbf", "line") for name in each
-    ]
+    series = [Series(_numbers(each.index), _numbers(each[name]), FAINT, "line") for name in each]
     groups = movements["group"].nunique() > 1 if "group" in movements else False
     by = ["group", "sequence"] if groups else ["sequence"]
     table = over(movements, measure, by)
@@ -90,7 +98,8 @@ def by_sequence(movements: "pd.DataFrame", measure: str) -> Drawing:
             series.append(_with_ci(own, COLOURS[number % len(COLOURS)], label))
     panel = Panel(PLACE_WORDS, WORDS.get(measure, measure), series, legend="group")
     caption = (
-        f"{WORDS.get(measure, measure)} over the sequence; mean with 95 % CI, each participant"
+        f"{_begun(WORDS.get(measure, measure))}, over the sequence. {MEANS} of "
+        f"{_of(movements, 'group' if groups else '')}; thin lines: each participant."
     )
     return Drawing(f"{measure}_by_sequence", caption, [panel], table)
 
@@ -115,13 +124,25 @@ def by_distance(movements: "pd.DataFrame") -> Drawing:
     panels, tables = [], []
     for at, measure in enumerate(shown):
         table = over(movements, measure, ["distance", "sequence"])
-        series = [
-            _with_ci(part, COLOURS[number % len(COLOURS)], "" if at else f"{distance:g} m")
-            for number, (distance, part) in enumerate(table.groupby("distance"))
-        ]
-        panels.append(Panel(PLACE_WORDS, WORDS[measure], series, legend="distance"))
+        own = movements.groupby(["distance", "participant", "sequence"])[measure].mean()
+        count = table["distance"].nunique()
+        dots, means = [], []
+        for number, (distance, part) in enumerate(table.groupby("distance")):
+            colour, aside = COLOURS[number % len(COLOURS)], _aside(number, count)
+            each = own.loc[distance].reset_index()
+            where = _numbers(each["sequence"]) + aside
+            dots.append(Series(where, _numbers(each[measure]), lighter(colour), "dots"))
+            beside = part.assign(sequence=part["sequence"] + aside)
+            means.append(_with_ci(beside, colour, "" if at else f"{distance:g} m"))
+        panels.append(
+            Panel(PLACE_WORDS, WORDS[measure], [*dots, *means], legend="distance", keep=_range(own))
+        )
         tables.append(table.assign(measure=measure))
-    caption = "times and accuracy over the sequence, per distance; means with 95 % CI"
+    caption = (
+        f"Times and accuracy over the sequence, for each distance. {MEANS} of {_of(movements)}, "
+        "beside each other so that they can be told apart; dots: each participant. An interval of "
+        "few participants may be wider than what is shown."
+    )
     return Drawing("sequence_by_distance", caption, panels, pd.concat(tables))
 
 
@@ -131,7 +152,7 @@ def fitts(movements: "pd.DataFrame") -> Drawing:
 
     cells = movements.groupby(["participant", "difficulty"])["movement_time"].mean().reset_index()
     x, y = _numbers(cells["difficulty"]), _numbers(cells["movement_time"])
-    series, title = [Series(x, y, GREY, "dots")], ""
+    series, law = [Series(x, y, GREY, "dots")], ""
     rows = []
     for participant, own in movements.groupby("participant"):
         rows.append(_line(str(participant), own["difficulty"], own["movement_time"]))
@@ -139,10 +160,14 @@ def fitts(movements: "pd.DataFrame") -> Drawing:
     rows.append(_line("all (participants' means)", cells["difficulty"], cells["movement_time"]))
     if whole is not None:
         ends = np.array([x.min(), x.max()])
-        series.append(Series(ends, whole.intercept + whole.slope * ends, COLOURS[3], "line"))
-        title = f"{whole.intercept:.2f} s + {whole.slope:.2f} s/bit, R² {whole.r2:.2f}"
-    panel = Panel("index of difficulty (bit)", WORDS["movement_time"], series, title)
-    return Drawing("fitts", "Fitts' law", [panel], pd.DataFrame(rows))
+        series.append(Series(ends, whole.intercept + whole.slope * ends, COLOURS[0], "line"))
+        law = f" Line: {whole.intercept:.2f} s + {whole.slope:.2f} s/bit, R² = {whole.r2:.2f}."
+    panel = Panel("index of difficulty (bit)", WORDS["movement_time"], series)
+    caption = (
+        f"Fitts' law: movement time over the index of difficulty. Dots: each participant's mean at "
+        f"each difficulty, {_of(movements)}.{law}"
+    )
+    return Drawing("fitts", caption, [panel], pd.DataFrame(rows))
 
 
 def _numbers(column: "pd.Series[Any] | pd.Index[Any]") -> FloatArray:
@@ -187,7 +212,12 @@ def learning(movements: "pd.DataFrame", curves: "pd.DataFrame", measure: str) ->
         fitted = curve(n, row.asymptote, row.gain, row.rate)
         series.append(Series(n + before, fitted, colour, "line"))
     panel = Panel(PLACE_WORDS, WORDS.get(measure, measure), series)
-    return Drawing(f"learning_{measure}", "learning curves, one per participant", [panel], curves)
+    caption = (
+        f"Learning curves of {_begun(WORDS.get(measure, measure)).lower()}. Dots: each "
+        f"participant's means; lines: the better of an exponential and a power curve, n = "
+        f"{len(people)} {_people(len(people))}."
+    )
+    return Drawing(f"learning_{measure}", caption, [panel], curves)
 
 
 def sticks(movements: "pd.DataFrame") -> Drawing:
@@ -197,16 +227,55 @@ def sticks(movements: "pd.DataFrame") -> Drawing:
     panels, tables = [], []
     for measure in ("simultaneous", "bimanual", "reversals"):
         table = over(movements, measure, ["sequence"])
-        panels.append(Panel(PLACE_WORDS, WORDS[measure], [_with_ci(table, COLOURS[2])]))
+        each = movements.groupby(["participant", "sequence"])[measure].mean().unstack(level=0)
+        thin = [Series(_numbers(each.index), _numbers(each[one]), FAINT, "line") for one in each]
+        panels.append(Panel(PLACE_WORDS, WORDS[measure], [*thin, _with_ci(table, COLOURS[0])]))
         tables.append(table.assign(measure=measure))
-    caption = "use of the sticks over the sequence; means with 95 % CI"
+    caption = (
+        f"Use of the sticks over the sequence. {MEANS} of {_of(movements)}; thin lines: each "
+        "participant."
+    )
     return Drawing("sticks", caption, panels, pd.concat(tables))
 
 
 def throughputs(table: "pd.DataFrame") -> Drawing:
-    """Draw each participant's throughput."""
-    caption = f"throughput, mean of means {table['throughput'].mean():.3f} bit/s"
-    return Bars("throughput", caption, (), table)
+    """Draw each participant's throughput, the least at the bottom, each on a line of its own."""
+    mean, count = float(table["throughput"].mean()), len(table)
+    caption = (
+        f"Throughput: mean of means. Dots: each participant, n = {count} {_people(count)}; "
+        f"line: their mean, {mean:.3f} bit/s."
+    )
+    return Lines("throughput", caption, (), table)
+
+
+def _range(values: "pd.Series[float]") -> tuple[float, float]:
+    """Return the range of what was measured: an interval of two people would press it flat."""
+    low, high = float(values.min()), float(values.max())
+    aside = 0.08 * (high - low) or 0.1 * abs(high) or 1.0
+    return low - aside, high + aside
+
+
+def _begun(words: str) -> str:
+    return words[:1].upper() + words[1:].partition(" (")[0]
+
+
+def _people(count: int) -> str:
+    return "participant" if count == 1 else "participants"
+
+
+def _of(movements: "pd.DataFrame", by: str = "") -> str:
+    """Return how many there are, and in which group."""
+    count = int(movements["participant"].nunique())
+    said = f"n = {count} {_people(count)}"
+    if not by:
+        return said
+    sizes = movements.groupby(by)["participant"].nunique()
+    return f"{said} ({', '.join(f'{size} {name}' for name, size in sizes.items())})"
+
+
+def _aside(number: int, count: int) -> float:
+    """Return how far a level stands beside its position, so that bars do not cover each other."""
+    return 0.12 * (number - (count - 1) / 2.0)
 
 
 def _with_ci(table: "pd.DataFrame", colour: str, label: str = "") -> Series:
@@ -217,6 +286,7 @@ def _with_ci(table: "pd.DataFrame", colour: str, label: str = "") -> Series:
     )
 
 
+@styled()
 def power_curve(table: "pd.DataFrame", whose: str) -> "Figure":
     """Return the power over the size of the cohort, beside the rate of findings in nothing.
 

@@ -9,20 +9,22 @@ import html
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from textwrap import fill
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from labcrane.analysis.report.style import COLOURS, MARKERS, new_figure, styled
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-COLOURS = ("#1f77b4", "#ff7f0e", "#2ca02c", "#d62728", "#9467bd", "#8c564b", "#e377c2", "#7f7f7f",
-           "#bcbd22", "#17becf")  # fmt: skip
-GREY = "#999999"
+GREY, FAINT = "#999999", "#c7c7c7"
+"""Of dots, and of thin lines behind everything else."""
+
 WIDTH, HEIGHT = 5.2, 3.8
-"""Of a panel, in inches, as Matplotlib counts them."""
+"""Of a panel in SVG, in inches."""
 
 DOTS_PER_INCH = 72
 LEFT, RIGHT, TOP, BOTTOM = 58.0, 12.0, 24.0, 44.0
@@ -68,6 +70,8 @@ class Panel:
         What the axes are, with their units.
     legend
         What the labels of the series are.
+    keep
+        What the upright axis keeps to where Matplotlib draws it; None for all that there is.
     """
 
     across: str
@@ -75,37 +79,45 @@ class Panel:
     series: Sequence[Series]
     title: str = ""
     legend: str = ""
+    keep: tuple[float, float] | None = None
 
 
-def new_figure(count: int = 1) -> "Figure":
-    """Return a figure of Matplotlib with some axes beside each other; needs no display."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(WIDTH * count, HEIGHT), layout="constrained")
-    for at in range(count):
-        axes = figure.add_subplot(1, count, at + 1)
-        axes.grid(alpha=0.3)
-        axes.spines[["top", "right"]].set_visible(False)
-    return figure
+WORDS_A_LINE = 30
+"""Letters of an axis' name beside a figure of one column: longer ones go into two lines."""
 
 
+def lighter(colour: str) -> str:
+    """Return a colour as it looks at a third of its strength on white."""
+    parts = (int(colour[at : at + 2], 16) for at in (1, 3, 5))
+    return "#" + "".join(f"{255 - (255 - part) // 3:02x}" for part in parts)
+
+
+@styled()
 def figure_of(panels: Sequence[Panel]) -> "Figure":
     """Return panels as a figure of Matplotlib."""
     figure = new_figure(len(panels))
     for axes, panel in zip(figure.axes, panels, strict=True):
         for one in panel.series:
-            dots = "" if one.kind == "line" else "o"
-            size = 4 if one.kind == "both" else 2
+            known = COLOURS.index(one.colour) if one.colour in COLOURS else 0
+            dots = {"line": "", "dots": ".", "both": MARKERS[known]}[one.kind]
             line = "" if one.kind == "dots" else "-"
-            style = {"color": one.colour, "marker": dots, "ms": size, "linestyle": line}
+            style = {"color": one.colour, "marker": dots, "linestyle": line}
             label = one.label or None
             if one.reach is None:
-                axes.plot(one.x, one.y, lw=0.8, label=label, **style)  # type: ignore[arg-type]  # of several kinds
+                width = 0.5 if one.colour == FAINT else 0.8
+                axes.plot(one.x, one.y, lw=width, label=label, **style)  # type: ignore[arg-type]  # of several kinds
             else:
-                axes.errorbar(one.x, one.y, one.reach, capsize=2, label=label, **style)  # type: ignore[arg-type]
-        if any(one.label for one in panel.series):
-            axes.legend(title=panel.legend or None, fontsize="small")
-        axes.set(xlabel=panel.across, ylabel=panel.up, title=panel.title)
+                axes.errorbar(one.x, one.y, one.reach, capsize=1.5, label=label, **style)  # type: ignore[arg-type]
+        axes.set(xlabel=panel.across, ylabel=fill(panel.up, WORDS_A_LINE), title=panel.title)
+        if panel.keep is not None:
+            axes.set_ylim(*panel.keep)
+    named = [
+        each for axes in figure.axes for each in zip(*axes.get_legend_handles_labels(), strict=True)
+    ]
+    if named:
+        handles, labels = zip(*named, strict=True)
+        title = panels[0].legend or None
+        figure.legend(handles, labels, title=title, loc="outside upper center", ncols=4)
     return figure
 
 

@@ -11,6 +11,7 @@ from labcrane.analysis.parallel import work
 from labcrane.analysis.quality import exclusions, is_result, loop_quality, sync_quality
 from labcrane.analysis.questionnaires import answers_of, scores_of
 from labcrane.analysis.report import figures, outcomes
+from labcrane.analysis.report.answer import answer
 from labcrane.analysis.report.factors import (
     GROUP,
     PLACE,
@@ -90,15 +91,18 @@ def write_report(
     about = sample(_joined(answers), groups)
     page.heading("Sample")
     page.table("sample", about)
+    results = None
     if _is_aiming(everything[is_result(everything)]):
-        _study(page, everything, _joined(scores), groups, in_words(about))
+        results = _study(page, everything, _joined(scores), groups, in_words(about))
     page.heading("Loop and clocks")
-    page.table("loop_quality", pd.concat(loops, ignore_index=True))
-    _syncs(page, pd.concat(syncs, ignore_index=True))
+    quality = pd.concat(loops, ignore_index=True), pd.concat(syncs, ignore_index=True)
+    page.table("loop_quality", quality[0])
+    _syncs(page, quality[1])
     if unprobed:
         page.say(
             f"Used as told, though nobody knows how right their times are: {'; '.join(unprobed)}."
         )
+    page.lead(answer(cohort, everything, quality, in_words(about), results))
     page.heading("Definitions")
     page.say(f"Settings of the measures: {settings.as_dict()}")
     page.table("definitions", _definitions())
@@ -179,8 +183,8 @@ def _study(
     scores: "pd.DataFrame",
     groups: dict[str, str],
     about: str,
-) -> None:
-    """Add what is only known of all together: figures, tests, and the results in words."""
+) -> Results:
+    """Add what is only known of all together, and return what was found."""
     everything = with_factors(everything)
     factors = factors_of(everything)
     results = everything[is_result(everything)]
@@ -200,7 +204,9 @@ def _study(
         page.heading("Questionnaires")
         page.table("scores", outcomes.score_table(scores, groups))
         page.table("score_tests", tests)
-    _in_words(page, Results(about, *said, looked, tests, counts, factors))
+    found = Results(about, *said, looked, tests, counts, factors)
+    _in_words(page, found)
+    return found
 
 
 def _in_words(page: Page, results: Results) -> None:

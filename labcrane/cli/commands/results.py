@@ -274,16 +274,23 @@ def _show(recording: Path, session: int, protocol: Path | None, speed: float, be
 
 
 def view(
-    recording: Annotated[Path, typer.Argument(metavar="FILE", help="a participant file")],
+    recording: Annotated[
+        Path, typer.Argument(metavar="FILE", help="a participant file, or the folder with journals")
+    ],
     session: Annotated[int, typer.Option(help="which session")] = 1,
     beside: Annotated[
         Path | None, typer.Option(help="another participant file, shown at the same second")
     ] = None,
     at: Annotated[float, typer.Option(help="the second to begin at")] = 0.0,
+    trial: Annotated[int | None, typer.Option(help="the trial to begin at instead")] = None,
+    beside_trial: Annotated[
+        int | None, typer.Option(help="a trial beside it, both from their starts")
+    ] = None,
     port: Annotated[int, typer.Option(help="where it is served; 0 takes a free one")] = 0,
 ) -> None:
     """Look at a recorded session in a browser: machine, time line, signals, events."""
-    from labcrane.recording.participant_file.reader import open_recording
+    from tempfile import TemporaryDirectory
+
     from labcrane.registry.offers import LAB, not_installed
     from labcrane.registry.registry import discover
 
@@ -292,13 +299,30 @@ def view(
     from labcrane.web.door.serving import HOST
     from labcrane.web.handle import free_port
     from labcrane.web.viewer.film import Film
+    from labcrane.web.viewer.opened import opened
     from labcrane.web.viewer.viewer import serve
 
     stay_on_this_computer()
-    paths = [recording, *([beside] if beside else [])]
-    films = [Film(open_recording(path).session(session), path.stem) for path in paths]
-    out.print("Ctrl-C ends it", markup=False)
-    serve(films, discover(), free_port(HOST, port), at, lambda line: out.print(line, markup=False))
+
+    def say(line: str) -> None:
+        out.print(line, markup=False)
+
+    if beside_trial is not None and trial is None:
+        raise ProtocolError("--beside-trial is put beside a trial; give --trial too")
+    paths = [recording, *([beside or recording] if beside or beside_trial is not None else [])]
+    with TemporaryDirectory(prefix="labcrane-view-") as scratch:
+        films = [
+            Film(opened(path, session, Path(scratch) / str(number), say), path.stem)
+            for number, path in enumerate(paths)
+        ]
+        if trial is not None:
+            at = films[0].start_of(trial)
+        if beside_trial is not None:
+            films[1].shift = films[1].start_of(beside_trial) - at
+            films[0].called += f", trial {trial}"
+            films[1].called += f", trial {beside_trial}"
+        say("Ctrl-C ends it")
+        serve(films, discover(), free_port(HOST, port), at, say)
 
 
 def _write_measures(recording: Path, session: int, frames: "Groups", path: Path) -> None:

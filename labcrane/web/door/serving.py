@@ -11,6 +11,8 @@ HOST = "127.0.0.1"
 MOST_HEAD = 16_384
 """Bytes of a request's line and headers."""
 
+MOST_MISSED = 1000
+
 
 def serve_here(app: Any, page: str, port: int, say: Callable[[str], None]) -> None:
     """Serve an application whose first page is ``page``; ``say`` is told its one-time link."""
@@ -33,3 +35,16 @@ def serve_here(app: Any, page: str, port: int, say: Callable[[str], None]) -> No
     )
     say(f"{page}: {link}")
     uvicorn.Server(config).run()
+
+
+def build_pages(app: Any, missed: int = MOST_MISSED) -> None:
+    """Let NiceGUI build the pages of an application.
+
+    ``missed`` is how many changes of a page are kept for a browser that is away.
+    """
+    from nicegui import app as own  # noqa: PLC0415 - loads for a second
+    from nicegui import ui  # noqa: PLC0415
+
+    # The bar that tells of each request has no name, and screen readers would tell of it.
+    own.config.quasar_config["loadingBar"]["skipHijack"] = True
+    ui.run_with(app, title="labcrane", show_welcome_message=False, message_history_length=missed)

@@ -255,6 +255,8 @@ class Reader:
             level = "ok" if version is None or "-" in name else "bad"
             said = "" if level == "ok" else "none in the register"
             return Person(name, status, why, consent=said, consent_level=level, sat=sat, bytes=held)
+        days = {sitting.session: sitting.date for sitting in entry.sessions}
+        sat = tuple(replace(each, day=days.get(each.number, each.day)) for each in sat)
         given = entry.consent[-1] if entry.consent else None
         said = f"{given.version}, {given.date}" if given else "none"
         level = "ok" if given or not sat else "bad"
@@ -343,7 +345,9 @@ def _quality(
     if (why := unfinished(record)) is not None:
         levels.append("warn")
         said.append(why)
-    day = str(record.attrs.get("started", ""))[:10]
+    # A clock that jumps begins in 1970.
+    known = record.attrs.get("clock") != "manual"
+    day = str(record.attrs.get("started", ""))[:10] if known else ""
     return Sat(number, day, max(levels, key=WORST.index), tuple(said))
 
 

@@ -4,18 +4,19 @@ import asyncio
 from collections.abc import Callable
 from datetime import date, datetime
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from labcrane.errors import LabcraneError
-from labcrane.recording.participant_file.reader import open_recording
 from labcrane.recording.participant_file.writer import DAMAGED
 from labcrane.recording.paths import participant_path
 from labcrane.registry.registry import Registry
 from labcrane.web.door.access import STUDY
-from labcrane.web.door.serving import serve_here
+from labcrane.web.door.serving import build_pages, serve_here
 from labcrane.web.study.overview import Reader
 from labcrane.web.study.study_page import page_of
 from labcrane.web.viewer.film import Film
+from labcrane.web.viewer.opened import opened
 
 NOT_FOUND, BROKEN = 404, 500
 PATIENCE_S = 60.0
@@ -29,16 +30,16 @@ def serve(
 
     ``registry`` gives what draws recorded cues, when the first recording is looked at.
     """
-    from fastapi import FastAPI  # noqa: PLC0415
-    from nicegui import ui  # noqa: PLC0415 - loads for a second
+    from fastapi import FastAPI  # noqa: PLC0415 - loads for a second
 
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    _routes(app, reader, registry)
-    ui.run_with(app, title="labcrane", show_welcome_message=False)
-    serve_here(app, STUDY, port, say)
+    with TemporaryDirectory(prefix="labcrane-study-") as scratch:
+        _routes(app, reader, registry, Path(scratch))
+        build_pages(app)
+        serve_here(app, STUDY, port, say)
 
 
-def _routes(app: Any, reader: Reader, registry: Callable[[], Registry]) -> None:
+def _routes(app: Any, reader: Reader, registry: Callable[[], Registry], scratch: Path) -> None:
     from fastapi import Response  # noqa: PLC0415
     from fastapi.responses import FileResponse, HTMLResponse, PlainTextResponse  # noqa: PLC0415
     from nicegui import ui  # noqa: PLC0415
@@ -69,14 +70,16 @@ def _routes(app: Any, reader: Reader, registry: Callable[[], Registry]) -> None:
     async def viewer(person: str, session: int = 1, beside: str = "") -> None:
         people = [person, *([beside] if beside else [])]
         try:
-            films = [await asyncio.to_thread(_film, reader.data, one, session) for one in people]
+            films = [
+                await asyncio.to_thread(_film, reader.data, one, session, scratch) for one in people
+            ]
         except (LabcraneError, *DAMAGED) as error:
             ui.label(f"{person}, session {session} cannot be shown: {error}").props("role=alert")
             return
         viewer_page(films, registry(), 0.0)
 
 
-def _film(data: Path, person: str, session: int) -> Film:
+def _film(data: Path, person: str, session: int, scratch: Path) -> Film:
     """Return a recording as it can be looked at; a name that is none of a folder there is refused.
 
     Raises
@@ -85,4 +88,6 @@ def _film(data: Path, person: str, session: int) -> Film:
         There is none, or nothing is in it.
     """
     folder = next((each for each in data.iterdir() if each.name == person), data / "nobody")
-    return Film(open_recording(participant_path(folder)).session(session), person)
+    said: list[str] = []
+    record = opened(participant_path(folder), session, scratch / f"{session}", said.append)
+    return Film(record, f"{person} ({'; '.join(said)})" if said else person)

@@ -22,9 +22,11 @@ def page_of(overview: Overview, today: date, made: str) -> str:
     made
         When it was made, for whoever reads it.
     """
+    folder = overview.folder.absolute()
+    where = f"{folder.parent.name}/{folder.name}"
     parts = [
         f"<header><h1>{escape(overview.study)}</h1>"
-        f"<p class=faint>{escape(overview.approval)} · {escape(str(overview.folder))} · as of "
+        f"<p class=faint>{escape(overview.approval)} · {escape(where)} · as of "
         f"{escape(made)} · <a href=/study>look again</a></p></header>",
         _figures(overview),
         _due(overview, today),

@@ -8,6 +8,7 @@ from collections import OrderedDict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,13 @@ WINDOW_S = 20.0
 
 POINTS = 600
 """How many steps a curve has, each with the lowest and highest value in it."""
+
+STEPS = 300
+"""How many steps a spectrogram has."""
+
+WINDOW_SAMPLES = 256
+RANGE_DB = 80.0
+"""What is fainter than the loudest by more is shown as silence."""
 
 KEPT = 6
 """Signals that are kept while they are looked at."""
@@ -69,10 +77,13 @@ class Film:
     ----------
     run
         What was run, as far as drawing it goes; nobody can steer it.
+    shift
+        How many seconds later than another film beside it this one is shown.
     """
 
     def __init__(self, record: SessionRecord, called: str) -> None:
         self.called = called
+        self.shift = 0.0
         self._record = record
         try:
             self._own: Mapping[str, Stream] = {name: record.streams[name] for name in GROUPS}
@@ -101,6 +112,7 @@ class Film:
         )
         self._window = (0, 0)
         self._rows: dict[str, FloatArray] = {}
+        self._reading = Lock()  # each curve is asked for by a thread of its own
         self._curves: OrderedDict[tuple[str, str], tuple[FloatArray, FloatArray]] = OrderedDict()
 
     def _layout(self, group: str) -> Layout:
@@ -182,6 +194,21 @@ class Film:
                 found[-1] |= {"to": at, "outcome": event.data["outcome"]}
         return found
 
+    def start_of(self, trial: int) -> float:
+        """Return when the newest attempt at a trial began.
+
+        Raises
+        ------
+        RecordingError
+            There was none.
+        """
+        begun = [one["from"] for one in self.trials if one["counted"] and one["trial"] == trial]
+        if not begun:
+            there = sorted({one["trial"] for one in self.trials if one["counted"]})
+            known = f"{there[0]} to {there[-1]}" if there else "none"
+            raise RecordingError(f"{self.called} has no trial {trial}; there are {known}")
+        return float(begun[-1])
+
     @cached_property
     def gaps(self) -> list[tuple[float, float]]:
         """From when to when no frame was recorded."""
@@ -219,7 +246,44 @@ class Film:
             high.append(float(part.max()) if len(part) else None)
         return {"low": low, "high": high}
 
+    def spectrogram(self, stream: str, column: str, begin: float, end: float) -> dict[str, Any]:
+        """Return how loud each frequency of a signal is between two times, as levels of 0 to 255.
+
+        Each step holds the power spectral density (Hann window, without the mean) of
+        ``WINDOW_SAMPLES`` samples at its middle, in decibels: 255 is the loudest, 0 is ``RANGE_DB``
+        below it. A step with a gap, or without a number, is None.
+        """
+        from scipy.signal import periodogram  # noqa: PLC0415 - loads for a second
+
+        time, values = self._signal(stream, column)
+        first, last = np.searchsorted(time, (begin, end)).tolist()
+        count = last - first
+        if count < 2 * WINDOW_SAMPLES:
+            raise RecordingError(
+                f"a spectrogram needs {2 * WINDOW_SAMPLES} samples, and {stream} {column} has "
+                f"{count} there; show a longer time"
+            )
+        rate_hz = 1.0 / float(np.median(np.diff(time[first:last])))
+        starts = np.linspace(first, last - WINDOW_SAMPLES, STEPS).astype(np.intp)
+        windows = values[starts[:, None] + np.arange(WINDOW_SAMPLES)]
+        spans = time[starts + WINDOW_SAMPLES - 1] - time[starts]
+        whole = np.isfinite(windows).all(axis=1) & (spans < 1.1 * WINDOW_SAMPLES / rate_hz)
+        if not whole.any():
+            return {"levels": [None] * STEPS, "top_hz": rate_hz / 2.0, "most_db": None}
+        _, density = periodogram(windows[whole], rate_hz, window="hann", detrend="constant")
+        decibels = 10.0 * np.log10(np.maximum(density[:, 1:], np.finfo(float).tiny))
+        most = float(decibels.max())
+        scaled = np.clip(1.0 + (decibels - most) / RANGE_DB, 0.0, 1.0)
+        levels: list[list[int] | None] = [None] * STEPS
+        for at, row in zip(np.flatnonzero(whole).tolist(), scaled, strict=True):
+            levels[at] = np.rint(255.0 * row).astype(int).tolist()
+        return {"levels": levels, "top_hz": rate_hz / 2.0, "most_db": most}
+
     def _signal(self, stream: str, column: str) -> tuple[FloatArray, FloatArray]:
+        with self._reading:
+            return self._signal_kept(stream, column)
+
+    def _signal_kept(self, stream: str, column: str) -> tuple[FloatArray, FloatArray]:
         key = stream, column
         if key not in self._curves:
             if len(self._curves) >= KEPT:

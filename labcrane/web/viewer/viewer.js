@@ -18,6 +18,13 @@ export default {
           @change="ask(at)"><option value="">none</option>
           <option v-for="(one, n) in about.signals" :key="n" :value="n">{{ one.label }}{{ one.unit && one.unit !== '1' ? ', ' + one.unit : '' }}</option>
         </select></label>
+        <label v-if="chart.signal !== ''" class="room-field">as <select :id="'as-' + at" v-model="chart.as"
+          @change="ask(at)"><option value="curve">curve</option><option value="spectrogram">spectrogram</option>
+        </select></label>
+        <div v-show="chart.as === 'spectrogram' && chart.signal !== ''" class="view-spectrum">
+          <canvas :id="'spectrum-' + at" width="300" height="128" role="img"
+            :aria-label="'spectrogram of signal ' + (at + 1)" @click="into($event)"></canvas>
+          <p class="room-faint" :id="'heard-' + at">{{ chart.heard }}</p></div>
         <svg v-if="chart.path" class="room-chart" viewBox="0 0 600 110" preserveAspectRatio="none" role="img"
           :aria-label="'signal ' + (at + 1)" @click="into($event)"><path class="room-late" :d="chart.path"/>
           <line class="view-now" :x1="place(t)" :x2="place(t)" y1="0" y2="110"/></svg>
@@ -60,7 +67,7 @@ export default {
   props: { about: Object },
   data() {
     return { t: 0, speed: 1, span: 0, playing: false, find: "", came: 0, asked: 0,
-      charts: [0, 1, 2].map(() => ({ signal: "", path: "", said: "" })) };
+      charts: [0, 1, 2].map(() => ({ signal: "", path: "", said: "", as: "curve", heard: "" })) };
   },
   computed: {
     begin() { return this.span ? Math.min(Math.max(0, this.t - this.span / 2), Math.max(0, this.about.length - this.span)) : 0; },
@@ -126,9 +133,28 @@ export default {
       const chart = this.charts[at];
       if (chart.signal === "") { chart.path = ""; return; }
       const { stream, column } = this.about.signals[chart.signal];
-      this.$emit("curve", { at, stream, column, begin: this.begin, end: this.end });
+      if (chart.as === "spectrogram") chart.path = "";
+      this.$emit("curve", { at, stream, column, begin: this.begin, end: this.end, as: chart.as });
     },
-    curve(at, { low, high, unit }) {
+    curve(at, found) {
+      if (this.charts[at].as === "spectrogram") this.spectrum(at, found);
+      else if (found.low) this.drawn(at, found);
+    },
+    spectrum(at, { levels, top_hz, most_db, why }) { // faint to loud as black, violet, orange, white
+      const canvas = document.getElementById(`spectrum-${at}`), paint = canvas.getContext("2d");
+      paint.clearRect(0, 0, canvas.width, canvas.height);
+      this.charts[at].heard = why ?? (most_db === null ? "no value here"
+        : `up to ${top_hz.toPrecision(4)} Hz, from ${(most_db - 80).toFixed(0)} to ${most_db.toFixed(0)} dB`);
+      if (!levels) return;
+      const image = paint.createImageData(canvas.width, canvas.height);
+      levels.forEach((row, x) => row?.forEach((v, y) => {
+        const place = 4 * ((canvas.height - 1 - y) * canvas.width + x), u = v / 255;
+        image.data.set([255 * Math.min(1, 2 * u), 255 * Math.max(0, 2 * u - 1),
+          255 * (u < 0.5 ? u : Math.max(0, 3 * u - 2, 1 - u)), 255], place);
+      }));
+      paint.putImageData(image, 0, 0);
+    },
+    drawn(at, { low, high, unit }) {
       const known = [...low, ...high].filter((v) => v !== null);
       const chart = this.charts[at];
       if (!known.length) { chart.path = "M0,55"; chart.said = "no value here"; return; }

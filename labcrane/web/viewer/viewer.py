@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from labcrane.errors import RecordingError
 from labcrane.registry.registry import Registry
 from labcrane.web.door.access import VIEWER
-from labcrane.web.door.serving import serve_here
+from labcrane.web.door.serving import build_pages, serve_here
 from labcrane.web.page import PRIMARY, speak
 from labcrane.web.room.model import MachineModel, span
 from labcrane.web.room.shown import ShownShapes
@@ -49,6 +51,7 @@ class Screen:
 
     def show(self, at: float) -> None:
         """Show a time, in seconds from the film's start."""
+        at += self._film.shift
         frame, situation = self._film.frame(at), self._film.situation(at)
         names = self._film.machine.names
         angles = [frame.get(f"state.joint.angle.{name}", math.nan) for name in names]
@@ -93,10 +96,6 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
         for screen in screens:
             screen.look(name)
 
-    def curve(stream: str, column: str, begin: float, end: float) -> dict[str, Any]:
-        units = {(one["stream"], one["column"]): one["unit"] for one in first.signals}
-        return {**first.curve(stream, column, begin, end), "unit": units[stream, column]}
-
     about = {
         "title": " and ".join(film.called for film in films),
         "said": f"{len(first.trials)} attempts at trials, {len(first.events)} events, "
@@ -110,7 +109,7 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
         "gaps": first.gaps,
         "signals": first.signals,
     }
-    line = Timeline(about, show, curve)
+    line = Timeline(about, show, partial(_curve, first), partial(_spectrogram, first))
     with line.add_slot("machine"):
         with ui.row().classes("gap-2 mb-2").props('role=group aria-label="Cameras"'):
             for name in CAMERAS:
@@ -120,6 +119,18 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
         with ui.element("div").classes("view-machines"):
             for screen in screens:
                 screen.build()
+
+
+def _curve(film: Film, stream: str, column: str, begin: float, end: float) -> dict[str, Any]:
+    units = {(one["stream"], one["column"]): one["unit"] for one in film.signals}
+    return {**film.curve(stream, column, begin, end), "unit": units[stream, column]}
+
+
+def _spectrogram(film: Film, stream: str, column: str, begin: float, end: float) -> dict[str, Any]:
+    try:
+        return film.spectrogram(stream, column, begin, end)
+    except RecordingError as error:
+        return {"why": str(error)}
 
 
 def serve(
@@ -135,5 +146,5 @@ def serve(
     def viewer() -> None:
         viewer_page(films, registry, at)
 
-    ui.run_with(app, title="labcrane", show_welcome_message=False)
+    build_pages(app)
     serve_here(app, VIEWER, port, say)

@@ -1,0 +1,152 @@
+"""Answer of a study: what stands on the first page of its report, in words with their numbers."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from labcrane.analysis.cohort import Cohort
+from labcrane.analysis.quality import is_result
+from labcrane.analysis.report.factors import GROUP, PHASE, PLACE, Factors, with_factors
+from labcrane.analysis.report.outcomes import ADJUSTED, DISTANCE, SEQUENCE, SIDE
+from labcrane.analysis.report.words import LEVEL, NAMES, STYLES, UNITS, Results, f_test
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+STYLE = STYLES["html"]
+TESTED = "Tests need three or more participants with a value in every cell; there are none here."
+
+
+def answer(
+    cohort: Cohort,
+    everything: "pd.DataFrame",
+    quality: "tuple[pd.DataFrame, pd.DataFrame]",
+    about: str,
+    results: Results | None,
+) -> dict[str, list[str]]:
+    """Return the paragraphs of the first page by what they are about.
+
+    Parameters
+    ----------
+    everything
+        All movements, also those that count for nothing.
+    quality
+        Tables of the loop and of the clocks.
+    about
+        The sample in a sentence.
+    results
+        What was tested; None for a study of which nothing is.
+    """
+    return {
+        "Design": [_design(cohort, everything, results)],
+        "Participants": [about, *_left_out(cohort)],
+        "Main effects": _effects(everything, results),
+        "Data quality": list(_quality(*quality)),
+        "Exclusions": [_exclusions(everything)],
+    }
+
+
+def _design(cohort: Cohort, everything: "pd.DataFrame", results: Results | None) -> str:
+    context = cohort.included[0].context
+    sessions = int(everything["session"].nunique()) if len(everything) else 0
+    said = f"{context.get('title') or context.get('study', 'A study')}: "
+    said += f"{sessions} {'session' if sessions == 1 else 'sessions'} with movements"
+    if results is None:
+        return f"{said}. Nothing of it is tested here."
+    factors = results.factors
+    within = [name for name, _, _ in _columns(factors) if name != GROUP]
+    between = (
+        f"Between participants: {len(factors.groups)} groups ({', '.join(factors.groups)})."
+        if factors.groups
+        else "There are no groups."
+    )
+    return f"{said}. Within participants: {', '.join(within)}. {between}"
+
+
+def _columns(factors: Factors) -> Iterator[tuple[str, str, str]]:
+    """Yield the name of each factor in the tests, its column, and the unit of its levels."""
+    if factors.groups:
+        yield GROUP, GROUP, ""
+    if len(factors.phases) > 1:
+        yield factors.kind, PHASE, ""
+    yield DISTANCE, DISTANCE, " m"
+    yield SIDE, SIDE, ""
+    yield SEQUENCE, PLACE, ""
+
+
+def _left_out(cohort: Cohort) -> list[str]:
+    counts = Counter(str(person.status) for person in cohort.left_out)
+    if not counts:
+        return ["Nobody was left out."]
+    listed = ", ".join(f"{count} {status}" for status, count in counts.items())
+    return [f"Left out: {listed}; each with the reason in the table of participants."]
+
+
+def _effects(everything: "pd.DataFrame", results: Results | None) -> list[str]:
+    if results is None:
+        return []
+    if not len(results.anova):
+        return [TESTED]
+    whole = with_factors(everything)
+    counted = whole[is_result(whole)]
+    found = []
+    for measure in results.anova["measure"].unique():
+        rows = results.anova[results.anova["measure"] == measure].to_dict("records")
+        by_factor = {str(row["factor"]): {str(k): v for k, v in row.items()} for row in rows}
+        said = [
+            _effect(row, counted, str(measure), column, unit)
+            for name, column, unit in _columns(results.factors)
+            if (row := _test_of(name, by_factor)) is not None and column in counted
+        ]
+        if said:
+            found.append(f"{NAMES.get(str(measure), str(measure))} {'; '.join(said)}.")
+    return found or [TESTED]
+
+
+def _test_of(name: str, rows: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """Return the test of a factor; of positions, that which takes pairs' means away first."""
+    return rows.get(name + ADJUSTED, rows.get(name))
+
+
+def _effect(
+    row: Mapping[str, Any], counted: "pd.DataFrame", measure: str, column: str, unit: str
+) -> str:
+    """Return ``differed over distance (2 m: 3.21 s, 6 m: 5.40 s; F(1, 35) = 90.1, p < .001)``."""
+    name = str(row["factor"]).removesuffix(ADJUSTED)
+    said = "differed over" if row["p_gg"] < LEVEL else "did not differ over"
+    cells = counted.groupby([column, "participant"])[measure].mean().dropna()
+    means = cells.groupby(level=0).mean()
+    if name == SEQUENCE and len(means) > 2:  # noqa: PLR2004 - the first and the last are enough
+        means = means.iloc[[0, -1]]
+    of = "position " if name == SEQUENCE else ""
+    levels = ", ".join(
+        f"{of}{f'{level:g}' if isinstance(level, float) else level}{unit}: "
+        f"{mean:.3g} {UNITS.get(measure, '')}".rstrip()
+        for level, mean in means.items()
+    )
+    return f"{said} {name} ({levels}; {f_test(row, STYLE)})"
+
+
+def _quality(loops: "pd.DataFrame", syncs: "pd.DataFrame") -> Iterator[str]:
+    late, ticks = int(loops["late_ticks"].sum()), int(loops["ticks"].sum())
+    yield (
+        f"{len(loops)} sessions of {ticks:,} ticks: {late:,} were late ({late / max(1, ticks):.3%}"
+        f"), the worst by {loops['lateness_worst_ms'].max():.1f} ms."
+    )
+    verdicts = Counter(word for word in loops["sync_verdict"].astype(str) if word)
+    if verdicts:
+        listed = ", ".join(f"{count} {word}" for word, count in verdicts.most_common())
+        yield f"Time stamps by their sync reports: {listed}."
+    if len(syncs):
+        unknown = int((syncs["corrected"] == "no").sum())
+        yield (
+            f"{len(syncs)} streams of others were recorded, {unknown} of them without a time on "
+            "the session's clock."
+        )
+
+
+def _exclusions(everything: "pd.DataFrame") -> str:
+    count = len(everything)
+    out = count - int(is_result(everything).sum()) if count else 0
+    share = f" ({out / count:.1%})" if count else ""
+    return f"{out} of {count} movements count for no average{share}; each is listed with why."

@@ -1,0 +1,51 @@
+"""Opening of a recording to be looked at: as far as it goes, also after a kill or with damage.
+
+Nothing is written beside the recording: what its journals hold is put together elsewhere.
+"""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+from labcrane.errors import RecordingError
+from labcrane.recording.participant_file.reader import SessionRecord, open_recording
+from labcrane.recording.participant_file.recover import recover
+from labcrane.recording.participant_file.writer import DAMAGED
+from labcrane.recording.paths import participant_path
+from labcrane.session.postprocess import conclude
+
+
+def opened(path: Path, session: int, scratch: Path, say: Callable[[str], None]) -> SessionRecord:
+    """Return a session of a participant file, or of the journals beside it where that has none.
+
+    Parameters
+    ----------
+    path
+        A participant file, or the participant's folder.
+    scratch
+        Where journals are put together; it is to stay for as long as the session is looked at.
+    say
+        Told when it is not the participant file that is shown, and why.
+
+    Raises
+    ------
+    RecordingError
+        Neither can be read.
+    """
+    file = participant_path(path) if path.is_dir() else path
+    try:
+        return open_recording(file).session(session)
+    except (RecordingError, *DAMAGED) as error:
+        journals = sorted(file.parent.glob(f"ses-{session:02d}_*"))
+        if not any(journal.suffix == ".xdf" for journal in journals):
+            raise
+        why = str(error).partition("\n")[0]
+    folder = scratch / file.stem
+    folder.mkdir(parents=True, exist_ok=True)
+    for journal in journals:
+        shutil.copyfile(journal, folder / journal.name)
+    say(f"{file.name} does not give session {session} ({why}); shown is what its journals hold")
+    for done in recover(folder, conclude):
+        if done.session == session and done.problem:
+            raise RecordingError(f"neither {file} nor its journals can be read: {done.problem}")
+    return open_recording(participant_path(folder)).session(session)
