@@ -273,4 +273,9 @@ def _files(app: Any, context: PageContext) -> None:
 
 if __name__ == "__main__":
     # What it sends is unpickled by the name of this module, which is not __main__.
-    sys.exit(importlib.import_module("labcrane.web.service").main())
+    status = importlib.import_module("labcrane.web.service").main()
+    # A thread that reads recordings may have h5py's lock when Python is torn down: what is given
+    # back then would wait for it for ever, and the process outlive its session.
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)

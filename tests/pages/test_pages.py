@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -196,3 +198,32 @@ def test_no_answer_is_lost_when_the_session_is_killed_in_the_middle(
     events = open_recording(data / "P001-PILOT" / "P001-PILOT.h5").session(1).events
     [done] = events[events["name"] == "questionnaire.end"]["data"]
     assert (done["questionnaire"], done["missing"]) == ("demographics", 0)
+
+
+READING = """\
+import importlib, runpy, sys, threading
+import h5py
+from h5py._objects import phil
+
+service = importlib.import_module("labcrane.web.service")
+held = threading.Event()
+
+def read():
+    with phil:  # as while a recording is read
+        held.set()
+        threading.Event().wait()
+
+def main():
+    threading.Thread(target=read, daemon=True).start()
+    held.wait()
+    return 3
+
+service.main = main
+opened = h5py.File(sys.argv[1], "w")
+runpy.run_module("labcrane.web.service", run_name="__main__")
+"""
+
+
+def test_the_pages_end_while_a_recording_is_being_read(tmp_path: Path) -> None:
+    words = [sys.executable, "-W", "ignore", "-c", READING, str(tmp_path / "being_read.h5")]
+    assert subprocess.run(words, timeout=60, check=False).returncode == 3
