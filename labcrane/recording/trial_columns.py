@@ -13,7 +13,6 @@ UNITS = {
     "attempt": "1",
     "block": "1",
     "completion": "1",
-    "track_success": "1",
 }
 """Units of the columns that every trial table has."""
 

@@ -85,7 +85,7 @@ def _all(path: tuple[str, ...]) -> tuple[tuple[str, EntryPoint], ...]:
         from importlib.metadata import distributions  # noqa: PLC0415 - what this module spares
 
         return _first_of_each(
-            (each.metadata["Name"], [(point.group, point) for point in each.entry_points])
+            (_name(each), [(point.group, point) for point in each.entry_points])
             for each in distributions()
         )
     return _first_of_each(
@@ -93,6 +93,14 @@ def _all(path: tuple[str, ...]) -> tuple[tuple[str, EntryPoint], ...]:
         for place in path
         for folder in _information(place)
     )
+
+
+def _name(found: "Distribution") -> str:
+    """Return what a distribution is called; nothing for what an installer left behind."""
+    try:
+        return found.metadata["Name"] or ""
+    except FileNotFoundError:  # as later libraries say it
+        return ""
 
 
 def _first_of_each(

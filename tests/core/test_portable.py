@@ -38,6 +38,7 @@ UNIX_NAMES = {
 }  # fmt: skip
 
 TWINS = {
+    "labcrane/analysis/parallel.py": ("os.sched_getaffinity",),  # elsewhere all cores there are
     "labcrane/cli/typed.py": ("select", "termios", "tty"),  # msvcrt, and a thread
     "labcrane/doctor/clock.py": (
         "time.CLOCK_MONOTONIC", "time.CLOCK_MONOTONIC_RAW", "time.clock_gettime",

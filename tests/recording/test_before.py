@@ -24,7 +24,7 @@ BEFORE = Path(__file__).parent / "before"
 NAME = "P001-SIMULATED"
 OF_THE_COMPUTER = {"versions", "sync"}
 """What the start of a session says of the program: versions, and the limits that it judges by."""
-ADDED = {"track_success", "done", "owed", "circle_to_circle", "between_circles"}
+ADDED = {"done", "owed", "circle_to_circle", "between_circles"}
 """What events say since, beside all that they said: whether a step was done, what is owed, and at
 the end of an aiming movement, the times between circles."""
 ABOUT_THE_FILE = {"README", "dataset_description", "CITATION"}
