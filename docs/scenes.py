@@ -29,7 +29,7 @@ SIDE = {"reach_through": {"eye": (2.85, 0.1, 1.3), "look": (1.6, 0.0, 0.85), "fo
 
 SIZE = (1200, 450)
 
-COLOURS = 96
+COLOURS = 256
 """They are enough to see what is where, and the files a quarter of the size."""
 
 

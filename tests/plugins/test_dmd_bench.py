@@ -94,11 +94,10 @@ def test_driven_segments_move_as_the_formula_says_within_the_integrators_error(n
 @needs_bullet
 @pytest.mark.long
 def test_every_segment_direction_and_level_of_the_paper_is_driven_and_agrees() -> None:
-    rate_hz = 60.0  # a quarter of the steps
-    model, levels = driven(("arm", "boom", "jaws"), (20, 60, 100, 140, 180, 220), rate_hz)
+    model, levels = driven(("arm", "boom", "jaws"), (20, 60, 100, 140, 180, 220))
     assert len(levels) == 3 * 13
     for each in levels:
-        agrees_with_the_formula(model, each, rate_hz)
+        agrees_with_the_formula(model, each)
 
 
 @needs_bullet
