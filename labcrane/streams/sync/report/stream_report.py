@@ -86,10 +86,9 @@ def judge_quality(
 ) -> list[Finding]:
     """Judge corrected times by themselves."""
     findings = _flow(nominal, samples, quality, limits)
-    if nominal > 0:
-        findings += _stamping(quality, limits)
-        if limits.silent_s.judge(quality.silent_s) is not Verdict.PASS:
-            findings.append(_died(quality, required=required))
+    findings += _stamping(quality, limits)
+    if nominal > 0 and limits.silent_s.judge(quality.silent_s) is not Verdict.PASS:
+        findings.append(_died(quality, required=required))
     findings += _clock(quality, limits) + _changes(quality) + _certainty(quality, limits)
     return findings
 
