@@ -14,6 +14,7 @@ QUICK = (
     "a clock ahead of the probed one",
     "a clock behind the probed one",
     "a clock that drifts away",
+    "stamps that stand still",
     "60 Hz, single samples lost",
     "markers, wander and step",
     "rate changes at once",

@@ -319,6 +319,17 @@ def foreign_drifting(random):
     return replace(drawn, raw=RawStream.of(stamps, drawn.raw.probes, drawn.raw.arrivals))
 
 
+def frozen(random):
+    """Stamps that stand still at times, while samples go on."""
+    drawn = received(random, Clock(random), regular(random, 250.0), 250.0)
+    stamps = drawn.raw.stamps.copy()
+    for at in random.integers(500, len(stamps) - 500, int(random.integers(3, 20))):
+        stop = at + int(random.integers(5, 200))
+        stamps[at:stop] = stamps[at]
+    raw = RawStream.of(stamps, drawn.raw.probes, drawn.raw.arrivals)
+    return replace(drawn, raw=raw, faults=frozenset({Fault.FROZEN}), clean=False)
+
+
 STEPPED = frozenset({Fault.STEPPED})
 EITHER = frozenset({Fault.STEPPED, Fault.SLEWED})
 
@@ -345,6 +356,7 @@ MORE: dict[str, Callable] = {
     "a clock ahead of the probed one": partial(foreign_nearby, side=1.0),
     "a clock behind the probed one": partial(foreign_nearby, side=-1.0),
     "a clock that drifts away": foreign_drifting,
+    "stamps that stand still": frozen,
     "seconds only": brief,
     "two hours, wandering": long,
     "steady, clean probes": clean_probes,

@@ -45,6 +45,9 @@ LAG_BLOCK_S, LAG_BLOCK = 30.0, 40
 """So long, and of so many samples of irregular streams, lags are looked at together."""
 
 DRIFTED_S = 0.002
+FROZEN_SHARE = 0.2
+"""Where more samples repeat a stamp, chunks have one each."""
+
 ARRIVAL_SCATTERS_S = (0.0005, 0.002, 0.01, 0.05)
 
 
@@ -65,6 +68,8 @@ class Placement:
     whose
         What the stamps are of where they are not of the clock that was probed: "receiver" or
         "foreign"; empty where they are.
+    frozen
+        Samples that have the stamp of the one before, though others have their own.
     """
 
     time: FloatArray
@@ -73,6 +78,7 @@ class Placement:
     curves: tuple[OffsetCurve, ...] = ()
     least_lag: float = np.nan
     whose: str = ""
+    frozen: int = 0
 
 
 _Piece = tuple[int, int, Epoch, OffsetCurve | None]
@@ -98,7 +104,23 @@ def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> Placement
     if whose:
         curves = [None] * len(stretches)
     probed = tuple(curve for curve in curves if curve is not None)
-    return Placement(time, error, segments, probed, least, whose)
+    frozen = _hold_frozen(raw.stamps, time, error) if regular else 0
+    return Placement(time, error, segments, probed, least, whose, frozen)
+
+
+def _hold_frozen(stamps: FloatArray, time: FloatArray, error: FloatArray) -> int:
+    """Let samples of one stamp be anywhere until the next stamp; return how many repeat one."""
+    same = np.diff(stamps) == 0.0
+    if not same.any() or same.mean() > FROZEN_SHARE:
+        return 0
+    starts = np.r_[0, np.flatnonzero(~same) + 1]
+    stops = np.r_[starts[1:], len(stamps)]
+    for start, stop in zip(starts, stops, strict=True):
+        if stop - start > 1:
+            after = time[min(stop, len(time) - 1)] - time[start]
+            before = time[start] - time[max(start - 1, 0)]
+            error[start:stop] += max(abs(after), abs(before))
+    return int(np.count_nonzero(same))
 
 
 def _placed(

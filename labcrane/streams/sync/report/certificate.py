@@ -32,6 +32,7 @@ class Fault(StrEnum):
     SLOW = "stamps long before arrival"
     LATE_STAMPS = "stamped when sent"
     NOISY = "noisy stamps"
+    FROZEN = "stamps that stand still"
     STEPPED = "clock stepped"
     RESTARTED = "restarted"
     SLEPT = "computer slept"
@@ -53,6 +54,7 @@ _FAULTS: dict[Fault, Callable[[Quality, float], bool]] = {
     Fault.CHANGED_RATE: lambda q, _: bool(np.isfinite(q.first_rate_hz)),
     Fault.LATE_STAMPS: lambda q, _: q.late_stamps > 0,
     Fault.NOISY: lambda q, _: q.noise_s > 0.0 and not q.late_stamps,
+    Fault.FROZEN: lambda q, _: q.frozen > 0,
     Fault.DIED: lambda q, _: q.silent_s > SILENT_S,
 }
 """Of regular streams only."""
