@@ -105,6 +105,7 @@ def test_the_supervisors_page_is_reached_by_keyboard_and_readable(
     go_to(browser, "note-field")
     type_in(browser, "hello", Keys.ENTER)
     shown(browser, "events", "Note: hello")
+    wait_for(lambda: not value(browser, "note-field"))  # it is a draft until the page is told
 
 
 VALUE = "return document.getElementById(arguments[0])?.value ?? ''"
@@ -124,6 +125,7 @@ def test_what_is_half_written_outlives_a_connection_that_was_lost(
 ) -> None:
     browser.get(room.links()["supervisor"])
     shown(browser, "stage", "questionnaire: Zu Ihrer Person")
+    assert value(browser, "note-field") == ""
     go_to(browser, "note-field")
     type_in(browser, "half a ")
     browser.set_script_timeout(240)
@@ -131,6 +133,7 @@ def test_what_is_half_written_outlives_a_connection_that_was_lost(
     assert browser.execute_script("return window.stays")
     type_in(browser, "note", Keys.ENTER)
     shown(browser, "events", "Note: half a note")
+    wait_for(lambda: not value(browser, "note-field"))
 
 
 def value(browser: webdriver.Chrome, ident: str) -> str:

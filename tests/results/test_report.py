@@ -7,7 +7,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import ttest_rel
+from scipy.stats import ttest_ind, ttest_rel
 
 from labcrane.analysis.cohort import Cohort, Status, find_cohort
 from labcrane.analysis.measures import measures_of
@@ -129,6 +129,33 @@ def test_looks_are_an_outcome_that_is_tested_and_put_into_words(seed: int) -> No
     verb = "differed" if p < 0.05 else "did not differ"
     begin = f"How long grapple was looked at during movements {verb} over distance"
     assert said.startswith(f"{begin}, F(1, 7) = {t**2:.2f}, p ")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_looks_are_compared_over_groups_and_sessions(seed: int) -> None:
+    """Of two groups, and of two sessions, F is the square of a t."""
+    random = np.random.default_rng(seed)
+    rows = [
+        {"participant": f"P{person:03}", "group": "beep" if person % 2 else "none",
+         "session": session, "sequence": place, "distance": 3.0, "outcome": "success",
+         "dwell_during_grapple": random.normal(0.3 * session + 0.2 * (person % 2), 0.3)}
+        for person in range(10) for session in (1, 2) for place in range(3)
+    ]  # fmt: skip
+    table = with_factors(pd.DataFrame(rows))
+    found = gaze_tests(table, factors_of(table)).set_index("factor")
+    means = table.groupby(["participant", "group", "session"])["dwell_during_grapple"].mean()
+    cells = means.unstack().reset_index("group")
+    groups = [own[[1, 2]].mean(axis=1) for _, own in cells.groupby("group")]
+    between = ttest_ind(*groups)
+    assert found.loc["group", "f"] == pytest.approx(between.statistic**2)
+    assert found.loc["group", "p_gg"] == pytest.approx(between.pvalue)
+    assert found.loc["group", ["df1", "df2"]].tolist() == [1, 8]
+    gain = cells[2] - cells[1]
+    slopes = ttest_ind(*(own for _, own in gain.groupby(cells["group"])))
+    assert found.loc["group:session", "f"] == pytest.approx(slopes.statistic**2)
+    # With groups of one size the sessions are tested against what is left within groups.
+    left = sum(((own - own.mean()) ** 2).sum() for _, own in gain.groupby(cells["group"]))
+    assert found.loc["session", "f"] == pytest.approx(gain.mean() ** 2 * len(gain) / (left / 8))
 
 
 def test_trials_that_are_no_results_are_listed_with_the_reason(data: Path) -> None:

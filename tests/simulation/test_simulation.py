@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -272,26 +272,33 @@ def test_two_cores_report_and_export_the_same(
 
 
 @contextmanager
-def killed_at_work(address: str, worker: "subprocess.Popen[bytes]") -> Iterator[list[str]]:
-    """Kill a worker as soon as it has something to do; say what that was."""
+def killed_at_work(
+    address: str, workers: "Sequence[subprocess.Popen[bytes]]"
+) -> Iterator[list[subprocess.Popen[bytes]]]:
+    """Kill the first worker that has something to do; say which that was."""
     from distributed import Client
 
-    done: list[str] = []
-    over = threading.Event()
+    killed: list[subprocess.Popen[bytes]] = []
+    ready, over = threading.Event(), threading.Event()
 
     def watch() -> None:
         with Client(address, set_as_default=False) as client:
+            client.wait_for_workers(len(workers))
             whose = {pid: where for where, pid in client.run(os.getpid).items()}
+            ready.set()
             while not over.is_set():
-                if at_work := client.processing().get(whose[worker.pid]):
-                    done.extend(map(str, at_work))
-                    worker.kill()
-                    return
+                busy = client.processing()
+                for worker in workers:
+                    if busy.get(whose[worker.pid]):
+                        killed.append(worker)
+                        worker.kill()
+                        return
 
     watching = threading.Thread(target=watch)
     watching.start()
     try:
-        yield done
+        assert ready.wait(240)
+        yield killed
     finally:
         over.set()
         watching.join()
@@ -317,11 +324,10 @@ def test_a_cluster_does_what_one_process_does_even_when_a_worker_is_killed(
         kept.unlink()  # of measures: they are to be worked out again
     with (
         cluster(tmp_path) as (address, workers),
-        killed_at_work(address, workers[0]) as killed,
+        killed_at_work(address, workers) as killed,
     ):
         assert main([*words, "--out", str(tmp_path / "two"), "--scheduler", address]) == 0
-        assert workers[0].wait(240) == -signal.SIGKILL
-    assert killed
+    assert [worker.wait(240) for worker in killed] == [-signal.SIGKILL]
     one, two = (
         {name: each for name, each in digests(tmp_path / where).items() if name.endswith(".csv")}
         for where in ("one", "two")
