@@ -6,10 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from labcrane import InputDevice, ProtocolError, Signal, Task
 from labcrane.core import Event, Phase, PlannedTrial
 from labcrane.machines import load_scene, place_objects
+from labcrane.machines.meshes.reader import read_surfaces
+from labcrane.machines.scene_part import load_part
 from labcrane.testing import (
     InputContract,
     TaskContract,
@@ -138,6 +141,19 @@ def test_things_are_placed_while_a_session_runs_without_a_file_being_read(tmp_pa
     shutil.rmtree(tmp_path / "scenes")
     assert {path: place_objects(scene, 1) for path, scene in scenes.items()} == before
     assert len(before) == 6
+
+
+def test_a_part_that_is_drawn_by_a_mesh_is_touched_where_it_is_seen() -> None:
+    (stone,) = load_part(RETRIEVAL / "scenes" / "parts" / "boulder.yaml").shapes.values()
+    assert stone.mesh is not None
+    touched = ConvexHull(np.array(stone.points))
+    corners = np.concatenate([one.points[one.faces] for one in read_surfaces(stone.mesh.file)])
+    beyond = corners.reshape(-1, 3) @ touched.equations[:, :3].T + touched.equations[:, 3]
+    assert beyond.max() < 1e-6
+    # A closed surface that turns outwards has this volume (divergence theorem).
+    volume = float(np.linalg.det(corners).sum() / 6.0)
+    assert volume == pytest.approx(touched.volume, rel=1e-5)
+    assert 0.1 < volume < 0.2
 
 
 def test_a_goal_of_which_the_state_says_nothing_is_refused_before_the_session(
