@@ -10,6 +10,11 @@ from streams.unkinder import ALL as ROWS
 from labcrane.streams.sync.report.certificate import Fault
 
 QUICK = (
+    "the receiver's clock, a little off",
+    "a clock ahead of the probed one",
+    "a clock behind the probed one",
+    "a clock that drifts away",
+    "stamps that stand still",
     "60 Hz, single samples lost",
     "markers, wander and step",
     "rate changes at once",

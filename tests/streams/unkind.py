@@ -18,6 +18,8 @@ class Drawn:
     probes nobody can know it. ``apart_ms`` limits the error beside it. ``chance`` is whether what
     holds up either way differs all along: then any correction is off by chance, and which of two is
     better can be told of many draws, not of one.
+    ``lag_s`` is how long its samples are under way: arrivals cannot tell that from a clock that is
+    behind, and the uncertainty must say so.
     ``perhaps`` is what may be named or not: a step of a millisecond, say, is a slew as well.
     """
 
@@ -32,6 +34,7 @@ class Drawn:
     hidden_s: float = 0.0
     apart_ms: float = np.inf
     chance: bool = False
+    lag_s: float = 0.0
 
 
 @dataclass
@@ -377,7 +380,7 @@ def noisy(random):
     scatter = random.normal(0.0, random.uniform(1e-3, 3e-3), len(times))
     return received(
         random, Clock(random), times, 100.0, stamped=times + scatter, sent=times + 0.01,
-        faults=frozenset({Fault.NOISY}),
+        faults=frozenset({Fault.NOISY}), lag_s=0.02,
     )  # fmt: skip
 
 

@@ -37,6 +37,7 @@ class Score:
     usual_apart: float
     apart_limit: float
     chance: bool
+    lag: float = 0.0
 
 
 def draw(row: str, seed: int) -> Drawn:
@@ -68,7 +69,7 @@ def score(row: str, seed: int, *, usual: bool = False) -> Score:
         verdict is Verdict.PASS, theirs,
         float(np.quantile(raw, 0.95)), named, drawn.faults, drawn.clean, drawn.limit_ms, len(error),
         float(np.quantile(apart, 0.95)), theirs_apart, drawn.apart_ms,
-        drawn.chance,
+        drawn.chance, 1e3 * drawn.lag_s,
     )  # fmt: skip
 
 
@@ -121,7 +122,7 @@ def shortcomings(one: Score) -> list[str]:
         found.append(f"error beyond {one.apart_limit} ms beside what is hidden")
     if one.cover < 0.95:
         found.append("not covered")
-    if one.clean and one.width > 0.3:
+    if one.clean and one.width > 0.3 + one.lag:
         found.append("uncertainty wider than 0.3 ms")
     if one.passed and one.most > 1.0:
         found.append("PASS beyond 1 ms")

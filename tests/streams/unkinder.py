@@ -268,6 +268,68 @@ def together(random):
     )  # fmt: skip
 
 
+def announced(random):
+    """Return times and nominal rate: of a regular device, one that says nothing, or markers."""
+    times = regular(random, 250.0)
+    match random.integers(3):
+        case 0:
+            return times, 250.0
+        case 1:
+            return times, 0.0
+    span = times[-1] - times[0]
+    return times[0] + np.sort(random.uniform(0.0, span, int(random.integers(200, 900)))), 0.0
+
+
+def a_little_off(random, low, high):
+    """Return a size between these, in seconds, any magnitude of them as likely."""
+    return float(np.exp(random.uniform(np.log(low), np.log(high))))
+
+
+def receivers_nearby(random):
+    """Stamps of our clock already, and a source's clock that is not far from it."""
+    times, rate = announced(random)
+    clock = Clock(random)
+    clock.ppm = random.uniform(-2.0, 2.0)
+    clock.offset = random.choice([-1, 1]) * a_little_off(random, 4e-3, 0.4)
+    clock.offset -= 1e-6 * clock.ppm * START
+    drawn = received(random, clock, times, rate, faults=frozenset({Fault.RECEIVER}), clean=False)
+    return replace(drawn, raw=RawStream.of(times, drawn.raw.probes, drawn.raw.arrivals))
+
+
+def foreign_nearby(random, *, side):
+    """Stamps of a clock that is ahead of the probed one, or behind it as if samples were late."""
+    times, rate = announced(random)
+    off = a_little_off(random, 4e-3, 0.4)
+    drawn = received(random, Clock(random), times, rate, clean=False)
+    raw = RawStream.of(drawn.raw.stamps + side * off, drawn.raw.probes, drawn.raw.arrivals)
+    if side > 0:
+        return replace(drawn, raw=raw, faults=frozenset({Fault.FOREIGN}))
+    slow = frozenset({Fault.SLOW})
+    return replace(drawn, raw=raw, faults=slow if off > 0.05 else frozenset(), perhaps=frozenset())
+
+
+def foreign_drifting(random):
+    """Stamps of a clock that drifts away from the probed one."""
+    times, rate = announced(random)
+    ppm = random.choice([-1, 1]) * random.uniform(40.0, 200.0)
+    drawn = received(
+        random, Clock(random), times, rate, faults=frozenset({Fault.FOREIGN}), clean=False
+    )
+    stamps = drawn.raw.stamps + 1e-6 * ppm * (times - times[0])
+    return replace(drawn, raw=RawStream.of(stamps, drawn.raw.probes, drawn.raw.arrivals))
+
+
+def frozen(random):
+    """Stamps that stand still at times, while samples go on."""
+    drawn = received(random, Clock(random), regular(random, 250.0), 250.0)
+    stamps = drawn.raw.stamps.copy()
+    for at in random.integers(500, len(stamps) - 500, int(random.integers(3, 20))):
+        stop = at + int(random.integers(5, 200))
+        stamps[at:stop] = stamps[at]
+    raw = RawStream.of(stamps, drawn.raw.probes, drawn.raw.arrivals)
+    return replace(drawn, raw=raw, faults=frozenset({Fault.FROZEN}), clean=False)
+
+
 STEPPED = frozenset({Fault.STEPPED})
 EITHER = frozenset({Fault.STEPPED, Fault.SLEWED})
 
@@ -290,6 +352,11 @@ MORE: dict[str, Callable] = {
     "most probes lost": few_probes,
     "wrong nominal rate": wrong_rate,
     "sent long after they were stamped": slow_way,
+    "the receiver's clock, a little off": receivers_nearby,
+    "a clock ahead of the probed one": partial(foreign_nearby, side=1.0),
+    "a clock behind the probed one": partial(foreign_nearby, side=-1.0),
+    "a clock that drifts away": foreign_drifting,
+    "stamps that stand still": frozen,
     "seconds only": brief,
     "two hours, wandering": long,
     "steady, clean probes": clean_probes,

@@ -156,14 +156,17 @@ def _correct(raw: RawStream, treatment: Treatment, end: float | None) -> Correct
 
 def _examined(raw: RawStream, placed: Placement) -> list[_Sampled]:
     """Return how each clock's samples were sampled."""
-    arrival = raw.arrival()
+    arrival, times = raw.arrival(), placed.time
+    if placed.frozen:  # what stood still says nothing of how samples were taken
+        own = np.flatnonzero(np.r_[True, np.diff(raw.stamps) != 0.0])
+        times = np.interp(np.arange(len(times)), own, times[own])
     found = []
     for segment in placed.segments:
         part = slice(segment.start, segment.stop)
         if segment.basis is not Basis.NOTHING:
             sampling = examine(
                 raw.stamps[part],
-                placed.time[part],
+                times[part],
                 None if arrival is None else arrival[part],
                 None if raw.index is None else raw.index[part],
             )
@@ -248,6 +251,7 @@ def _summed(
         unsure=sum(segment.unsure for segment in segments),
         unprobed=sum(s.stop - s.start for s in segments if s.basis is not Basis.PROBES),
         whose=placed.whose,
+        frozen=placed.frozen,
         **_trips(raw),
         **_errors(time, error, placed.time),
         **_flow(placed, sampled),

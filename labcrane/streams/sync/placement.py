@@ -28,10 +28,26 @@ EARLY_S = 0.005
 LATE_S = 0.05
 """The least delay of a stream is below this; nothing else tells a wrong clock from a slow way."""
 
+SOONER_S = 0.0005
+"""Beyond what probes leave open, no stamp of the probed clock is so long after its arrival."""
+
+USUAL_LAG_S = 0.0005
+"""Nothing needs longer from one program to the next, unless something holds it up."""
+
+SHORT_LAG_S = 0.0002
+"""Most of these lags are shorter than this."""
+
 SOON = 0.02
 FOREIGN_S = 1.0
 PULL_S = 0.03
 BLOCK_S = 10.0
+LAG_BLOCK_S, LAG_BLOCK = 30.0, 40
+"""So long, and of so many samples of irregular streams, lags are looked at together."""
+
+DRIFTED_S = 0.002
+FROZEN_SHARE = 0.2
+"""Where more samples repeat a stamp, chunks have one each."""
+
 ARRIVAL_SCATTERS_S = (0.0005, 0.002, 0.01, 0.05)
 
 
@@ -52,6 +68,8 @@ class Placement:
     whose
         What the stamps are of where they are not of the clock that was probed: "receiver" or
         "foreign"; empty where they are.
+    frozen
+        Samples that have the stamp of the one before, though others have their own.
     """
 
     time: FloatArray
@@ -60,6 +78,7 @@ class Placement:
     curves: tuple[OffsetCurve, ...] = ()
     least_lag: float = np.nan
     whose: str = ""
+    frozen: int = 0
 
 
 _Piece = tuple[int, int, Epoch, OffsetCurve | None]
@@ -71,19 +90,58 @@ def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> Placement
     arrival = raw.arrival()
     least = _least_lag(raw.stamps, arrival, stretches, curves, regular=regular)
     whose = ""
-    if regular and arrival is not None and np.isfinite(least):
-        whose = _stamped_by(raw.stamps, arrival, least)
-        if whose:
-            curves = [None] * len(stretches)
+    if arrival is not None and np.isfinite(least):
+        hidden = max(curve.least_rtt / 2.0 for curve in curves if curve is not None)
+        whose = _stamped_by(raw.stamps, arrival, (least, hidden), regular=regular)
+    time, error, segments = _placed(raw, stretches, curves, (least, whose), regular=regular)
+    if arrival is not None and np.isfinite(least) and not whose:
+        lags = _lags(time, error, arrival, regular=regular)
+        if lags is None:
+            whose = "foreign"
+            time, error, segments = _placed(raw, stretches, curves, (least, whose), regular=regular)
+        else:
+            error = np.maximum(error, lags)
+    if whose:
+        curves = [None] * len(stretches)
+    probed = tuple(curve for curve in curves if curve is not None)
+    frozen = _hold_frozen(raw.stamps, time, error) if regular else 0
+    return Placement(time, error, segments, probed, least, whose, frozen)
+
+
+def _hold_frozen(stamps: FloatArray, time: FloatArray, error: FloatArray) -> int:
+    """Let samples of one stamp be anywhere until the next stamp; return how many repeat one."""
+    same = np.diff(stamps) == 0.0
+    if not same.any() or same.mean() > FROZEN_SHARE:
+        return 0
+    starts = np.r_[0, np.flatnonzero(~same) + 1]
+    stops = np.r_[starts[1:], len(stamps)]
+    for start, stop in zip(starts, stops, strict=True):
+        if stop - start > 1:
+            after = time[min(stop, len(time) - 1)] - time[start]
+            before = time[start] - time[max(start - 1, 0)]
+            error[start:stop] += max(abs(after), abs(before))
+    return int(np.count_nonzero(same))
+
+
+def _placed(
+    raw: RawStream,
+    stretches: list[Epoch],
+    curves: list[OffsetCurve | None],
+    lag_and_whose: tuple[float, str],
+    *,
+    regular: bool,
+) -> tuple[FloatArray, FloatArray, tuple[Segment, ...]]:
+    """Return times, errors and segments, where it is known whose clock the stamps are of."""
+    least, whose = lag_and_whose
+    arrival = raw.arrival()
+    if whose:
+        least, curves = 0.0, [None] * len(stretches)
     time, error = np.full((2, len(raw.stamps)), np.nan)
     pieces = _pieces(raw, arrival, stretches, curves, (least, time, error, whose), regular=regular)
-    if not whose and regular and least > LATE_S:
-        error += least
     known = arrival is not None
     segments = tuple(_segment(*piece, known=known) for piece in _joined(pieces))
     _blur_steps(segments, error)
-    probed = tuple(curve for curve in curves if curve is not None)
-    return Placement(time, error, segments, probed, least, whose)
+    return time, error, segments
 
 
 def _curves(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> list[OffsetCurve | None]:
@@ -141,14 +199,84 @@ def _soonest(lag: FloatArray, arrival: FloatArray) -> float:
     return float(np.quantile(np.minimum.reduceat(lag, starts), SOON))
 
 
-def _stamped_by(stamps: FloatArray, arrival: FloatArray, least: float) -> str:
+def _stamped_by(
+    stamps: FloatArray, arrival: FloatArray, least_and_hidden: tuple[float, float], *, regular: bool
+) -> str:
     """Return whose clock the stamps are of, if samples could not have come when they came."""
+    least, hidden = least_and_hidden
     raw = _soonest(arrival - stamps, arrival)
-    if -EARLY_S <= raw <= LATE_S and (least < -EARLY_S or raw < least - EARLY_S):
+    early = SOONER_S + hidden
+    if -early <= raw <= LATE_S and (least < -early or raw < least - 2.0 * early):
         return "receiver"
-    if -EARLY_S <= least <= LATE_S:
+    # Without a sampler to go by, what seems to be too early may be the curve's own uncertainty.
+    sooner = EARLY_S if regular else WRONG_CLOCK_S
+    if -sooner <= least <= LATE_S:
         return ""
-    return "foreign" if least < -EARLY_S or least > FOREIGN_S else ""
+    return "foreign" if least < -sooner or least > FOREIGN_S else ""
+
+
+def _lags(
+    time: FloatArray, error: FloatArray, arrival: FloatArray, *, regular: bool
+) -> FloatArray | None:
+    """Return by how much arrivals allow the stamps to be off, shape ``(n,)``, in seconds.
+
+    A stamp may be too early by as long as its samples took at least, be it on their way or by a
+    clock that is behind. None where they came before they were taken, or ever later: then the
+    stamps are of another clock than that which was probed.
+    """
+    lag = arrival - time
+    starts = np.r_[0, np.flatnonzero(np.diff(arrival)) + 1]
+    least = np.minimum.reduceat(lag, starts)
+    sizes = np.diff(starts)
+    unit = max(int(np.gcd.reduce(sizes)), 1) if regular and len(sizes) else 1
+    before = np.r_[arrival[starts[:-1]] - time[starts[1:] + unit - 1], np.nan]
+    if regular:
+        block = np.floor((arrival[starts] - arrival[0]) / LAG_BLOCK_S)
+    else:
+        early = int(np.count_nonzero(lag + error < -SOONER_S))
+        if early >= max(2, 0.02 * len(lag)):
+            return None
+        block = np.floor(starts / LAG_BLOCK)
+    parts = np.split(np.arange(len(starts)), np.flatnonzero(np.diff(block)) + 1)
+    if len(parts) > 1 and len(parts[-1]) < len(parts[-2]) / 2:
+        parts[-2:] = [np.concatenate(parts[-2:])]
+    allowed = np.minimum.reduceat(lag + error, starts)
+    high = np.array([_quantile(least[part], SOON if regular else 0.0) for part in parts])
+    if regular:
+        impossible = [_quantile(allowed[part], SOON) < -SOONER_S for part in parts]
+        if np.mean(impossible) > 0.2:  # noqa: PLR2004
+            return None
+        # The next sample had not come by then: it tells a lag from pulls that wait for a sample.
+        low = np.array([_quantile(before[part], 0.9) for part in parts])
+    else:
+        low = high - PULL_S / 10.0
+        sure = error <= 2.0 * np.nanmedian(error)  # none near a step
+        high[low <= USUAL_LAG_S] = lag[sure].min(initial=np.inf)
+    middle = np.array([float(arrival[starts[part]].mean()) for part in parts])
+    if _drifts(middle, high, low):
+        return None
+    usual = (high <= USUAL_LAG_S) | (low <= USUAL_LAG_S) & regular
+    late = np.where(usual, np.minimum(high, SHORT_LAG_S), high)
+    late = np.maximum(late, SHORT_LAG_S - high)
+    around = np.pad(late, 1, mode="edge")
+    late = np.maximum(late, np.maximum(around[:-2], around[2:]))
+    counts = np.diff([*(int(starts[part[0]]) for part in parts), len(time)])
+    return np.asarray(np.nan_to_num(np.repeat(late, counts), posinf=0.0))
+
+
+def _quantile(values: FloatArray, part: float) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.quantile(known, part)) if len(known) else 0.0
+
+
+def _drifts(middle: FloatArray, high: FloatArray, low: FloatArray) -> bool:
+    """Whether the least lag of blocks goes steadily up: the stamps' clock drifts away."""
+    if len(middle) < 4 or not low[-1] > high[0] + DRIFTED_S:  # noqa: PLR2004
+        return False
+    slope, level = np.polyfit(middle - middle[0], high, 1)
+    rest = high - level - slope * (middle - middle[0])
+    gone = float(slope) * float(middle[-1] - middle[0])
+    return gone > DRIFTED_S and 4.0 * float(rest.std()) < gone
 
 
 def _pieces(

@@ -98,6 +98,8 @@ class Quality:
         Samples near a step that may be of the other clock; samples of clocks never probed.
     whose
         Whose clock the stamps are of, where it is not the probed one: "receiver" or "foreign".
+    frozen
+        Samples of regular streams that repeat the stamp of the one before.
     """
 
     error_p50_s: float = np.nan
@@ -134,6 +136,7 @@ class Quality:
     unsure: int = 0
     unprobed: int = 0
     whose: str = ""
+    frozen: int = 0
 
 
 def worst_second(time: FloatArray, error: FloatArray) -> tuple[float, float]:

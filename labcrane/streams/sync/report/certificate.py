@@ -32,6 +32,7 @@ class Fault(StrEnum):
     SLOW = "stamps long before arrival"
     LATE_STAMPS = "stamped when sent"
     NOISY = "noisy stamps"
+    FROZEN = "stamps that stand still"
     STEPPED = "clock stepped"
     RESTARTED = "restarted"
     SLEPT = "computer slept"
@@ -51,11 +52,9 @@ _FAULTS: dict[Fault, Callable[[Quality, float], bool]] = {
         np.isnan(q.first_rate_hz) and abs(q.rate_hz / hz - 1.0) > RATE_OFF
     ),
     Fault.CHANGED_RATE: lambda q, _: bool(np.isfinite(q.first_rate_hz)),
-    Fault.RECEIVER: lambda q, _: q.whose == "receiver",
-    Fault.FOREIGN: lambda q, _: q.whose == "foreign",
-    Fault.SLOW: lambda q, _: not q.whose and q.lag_s > LATE_S,
     Fault.LATE_STAMPS: lambda q, _: q.late_stamps > 0,
     Fault.NOISY: lambda q, _: q.noise_s > 0.0 and not q.late_stamps,
+    Fault.FROZEN: lambda q, _: q.frozen > 0,
     Fault.DIED: lambda q, _: q.silent_s > SILENT_S,
 }
 """Of regular streams only."""
@@ -67,6 +66,9 @@ _CLOCK_FAULTS: dict[Fault, Callable[[Quality], bool]] = {
     Fault.SLEWED: lambda q: q.slews > 0 or q.own_slews > 0,
     Fault.CONGESTED: lambda q: q.congested_s > CONGESTED_S,
     Fault.UNPROBED: lambda q: not q.whose and q.unprobed > 0,
+    Fault.RECEIVER: lambda q: q.whose == "receiver",
+    Fault.FOREIGN: lambda q: q.whose == "foreign",
+    Fault.SLOW: lambda q: not q.whose and q.lag_s > LATE_S,
     Fault.PROBES_MISSING: lambda q: q.probe_age_s > UNPROBED_S,
 }
 

@@ -86,10 +86,9 @@ def judge_quality(
 ) -> list[Finding]:
     """Judge corrected times by themselves."""
     findings = _flow(nominal, samples, quality, limits)
-    if nominal > 0:
-        findings += _stamping(quality, limits)
-        if limits.silent_s.judge(quality.silent_s) is not Verdict.PASS:
-            findings.append(_died(quality, required=required))
+    findings += _stamping(quality, limits)
+    if nominal > 0 and limits.silent_s.judge(quality.silent_s) is not Verdict.PASS:
+        findings.append(_died(quality, required=required))
     findings += _clock(quality, limits) + _changes(quality) + _certainty(quality, limits)
     return findings
 
@@ -169,6 +168,9 @@ def _stamping(quality: Quality, limits: Limits) -> list[Finding]:
             "at most",
             "its times are right; feedback that used it was late: look what kept its program",
         )
+    if quality.frozen:
+        text = f"{quality.frozen} samples have the stamp of the one before"
+        _add(found, Verdict.WARN, text, "leave out the trials they are in; look at its program")
     if quality.late_stamps:
         text = f"chunks are stamped when they are sent ({1e3 * quality.noise_s:.1f} ms of scatter)"
         _add(found, Verdict.WARN, text, "measure the delay and give it as latency_s or min_delay_s")
