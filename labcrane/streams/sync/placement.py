@@ -253,7 +253,7 @@ def _lags(
         sure = error <= 2.0 * np.nanmedian(error)  # none near a step
         high[low <= USUAL_LAG_S] = lag[sure].min(initial=np.inf)
     middle = np.array([float(arrival[starts[part]].mean()) for part in parts])
-    if _drifts(middle, high, low):
+    if _drifts(middle, high, low, _scatter(time) if regular else 0.0):
         return None
     usual = (high <= USUAL_LAG_S) | (low <= USUAL_LAG_S) & regular
     late = np.where(usual, np.minimum(high, SHORT_LAG_S), high)
@@ -269,14 +269,27 @@ def _quantile(values: FloatArray, part: float) -> float:
     return float(np.quantile(known, part)) if len(known) else 0.0
 
 
-def _drifts(middle: FloatArray, high: FloatArray, low: FloatArray) -> bool:
-    """Whether the least lag of blocks goes steadily up: the stamps' clock drifts away."""
-    if len(middle) < 4 or not low[-1] > high[0] + DRIFTED_S:  # noqa: PLR2004
+def _scatter(time: FloatArray) -> float:
+    """Return by how much stamps of an even stream scatter: the standard deviation of most."""
+    steps = np.diff(time)
+    if not len(steps):
+        return 0.0
+    return float(1.4826 * np.median(np.abs(steps - np.median(steps))) / np.sqrt(2.0))
+
+
+def _drifts(middle: FloatArray, high: FloatArray, low: FloatArray, scatter: float) -> bool:
+    """Whether the least lag of blocks goes steadily up: the stamps' clock drifts away.
+
+    Stamps that scatter make the least lags seem shorter and the others longer, and lags also slide
+    with the phase of the pulls against the samples.
+    """
+    gone_at_least = DRIFTED_S + 4.0 * scatter
+    if len(middle) < 4 or not low[-1] > high[0] + gone_at_least:  # noqa: PLR2004
         return False
     slope, level = np.polyfit(middle - middle[0], high, 1)
     rest = high - level - slope * (middle - middle[0])
     gone = float(slope) * float(middle[-1] - middle[0])
-    return gone > DRIFTED_S and 4.0 * float(rest.std()) < gone
+    return gone > gone_at_least and 4.0 * float(rest.std()) < gone
 
 
 def _pieces(
