@@ -1,4 +1,4 @@
-"""Cohort of a simulated study beside bare PyBullet ticks: one core, two, and memory.
+"""Cohort of a simulated study beside bare PyBullet ticks: one core, two, memory, and power.
 
     python -m benchmarks.cohort [--participants 36]
 
@@ -6,6 +6,10 @@ Every participant of the aiming study is simulated and consolidated; after each,
 makes as many ticks: four motors set, one step, four joints read, with the settings that a crane
 needs by itself (200 solver passes, no residual threshold, limits of 1e7 N m), and with the 400
 passes that labcrane's crane is given. Times of one core are the process's own.
+
+The crane study is simulated by the command, with two workers and all start-up. Its 15 s on two idle
+cores are 30 s of the processor, and those 0.35 of what bare ticks take where 36 us is one. For
+power, cohorts of two numbers are drawn from a pool, and what one more takes gives a thousand.
 """
 
 import argparse
@@ -16,7 +20,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from benchmarks.bare_engine import BareEngine
-from benchmarks.own_process import Use, used
+from benchmarks.own_process import Use, spent_s, used
 from benchmarks.table import Row, show
 from labcrane.core.records import Frame
 from labcrane.protocol.study import Study, load
@@ -25,7 +29,17 @@ from labcrane.simulation.fast_forward import FastForward
 from labcrane.simulation.simulation import SimulationJob, simulate
 
 AIMING = Path(__file__).parents[1] / "protocols" / "aiming" / "protocol.yaml"
+CRANE_PILOT = AIMING.parents[1] / "crane_pilot" / "protocol.yaml"
 PASSES = (200, 400)
+SAMPLE = 100_000
+"""Bare ticks from which as many as a cohort's are told."""
+
+PILOT_TIMES = 0.35
+"""What the crane study's 36 may take beside bare ticks."""
+
+COHORTS, FEW, MORE = 1000, 20, 120
+POWER_S = 600.0
+"""What so many cohorts of 36 may take, with their pool, in seconds of the processor."""
 
 
 def rows(participants: int = 36) -> list[Row]:
@@ -35,6 +49,8 @@ def rows(participants: int = 36) -> list[Row]:
         found = one_core(folder, participants)
         found.append(two_cores(folder, max(participants // 3, 4)))
         found.append(memory(folder, participants))
+        found.append(pilot(folder, participants))
+        found += [power(folder, test, participants) for test in ("trend", "anova")]
     return found
 
 
@@ -138,6 +154,28 @@ def memory(folder: Path, few: int) -> Row:
     """Compare the memory for few participants and for four times as many."""
     small, large = (command(folder / "memory", count, 1).megabytes for count in (few, 4 * few))
     return Row("cohort", f"{4 * few} participants, MB at most", large, small, f"{few} of them", 1.1)
+
+
+def pilot(folder: Path, participants: int) -> Row:
+    """Simulate the crane study as people do, with two workers."""
+    data, study = folder / "pilot", load(CRANE_PILOT, discover())
+    words = ("--participants", str(participants), "--workers", "2")
+    ours = spent_s("simulate", str(CRANE_PILOT), "--out", str(data), *words)
+    ticks = sum(map(recorded, data.glob("*/*.h5")))
+    bare = bare_s(study, PASSES[0], SAMPLE) * ticks / SAMPLE
+    what = f"crane_pilot, {participants} participants, two workers, processor's s with start-up"
+    return Row("cohort", what, ours, bare, f"bare PyBullet, {ticks} ticks", PILOT_TIMES)
+
+
+def power(folder: Path, test: str, size: int) -> Row:
+    """Plan the crane study by one of the report's tests: pool and few cohorts, then some more."""
+    words = ["power", str(CRANE_PILOT), "--out", str(folder / f"power-{test}"), "--test", test]
+    words += ["--participants", str(size), "--effect", "movement_time~sequence", "--cohorts"]
+    first = spent_s(*words, str(FEW))
+    few, more = (spent_s(*words, str(count)) for count in (FEW, MORE))  # the pool is there
+    whole = first + (COHORTS - FEW) * (more - few) / (MORE - FEW)
+    what = f"power, {test}, {COHORTS} cohorts of {size}, processor's s"
+    return Row("cohort", what, whole, POWER_S, "promised", 1.0)
 
 
 if __name__ == "__main__":

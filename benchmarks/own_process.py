@@ -1,6 +1,7 @@
 """Commands in processes of their own, and what each of them used itself."""
 
 import json
+import resource
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -36,3 +37,12 @@ def used(*words: str) -> Use:
         [sys.executable, "-c", PROGRAM, *words], check=True, capture_output=True, text=True
     )
     return Use(*json.loads(done.stdout.splitlines()[-1]))
+
+
+def spent_s(*words: str) -> float:
+    """Run a labcrane command to its end; return the processor's seconds, also of its workers."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    run = [sys.executable, "-m", "labcrane", *words]
+    subprocess.run(run, check=True, stdout=subprocess.DEVNULL)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime

@@ -130,7 +130,21 @@ def unkind(draws: int, page: Path | None) -> list[Row]:
         after = rest.partition(END)[2]
         table = "\n".join([*lines, "", f"{draws} draws of each. {summary(every)}"])
         page.write_text(f"{before}{BEGIN}\n\n{table}\n\n{END}{after}", encoding="utf-8")
-    return promises(every)
+    return [*promises(every), *of_devices(every)]
+
+
+def of_devices(every: Sequence["Score"]) -> list[Row]:
+    """Return the error of each unkind device beside its limit, or beside what is stated of it."""
+    found = []
+    for device in dict.fromkeys(one.row for one in every):
+        draws = [one for one in every if one.row == device]
+        error = float(np.mean([one.p95 for one in draws]))
+        if all(one.clean for one in draws):
+            limit, whose = min(one.limit for one in draws), "docs/accuracy.md"
+        else:
+            limit, whose = float(np.mean([one.stated for one in draws])), "95 % of what is stated"
+        found.append(Row("sync", f"{device}, 95 % of errors below, ms", error, limit, whose, 1.0))
+    return found
 
 
 def summary(every: Sequence["Score"]) -> str:

@@ -3,14 +3,13 @@
     python -m benchmarks.viewer [--minutes 60]
 
 A recorded session is repeated until it is an hour long, and EEG is put beside it; `labcrane view`
-shows it in headless Chromium. A jump is from the order in the browser until the machine stands in
-the browser's scene as it was recorded; how soon that is painted is the graphics card's, and there
-is none here. Needs Chromium.
+shows it in headless Chromium. A jump is from the order in the browser until the frame after the one
+in which the machine was painted as it was recorded: on this computer's processor, where there is no
+graphics card. Needs Chromium.
 """
 
 import argparse
 import random
-import statistics
 import subprocess
 import sys
 import tempfile
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 
 TESTS = Path(__file__).parents[1] / "tests"
 CHANNELS, EEG_HZ = 64, 500.0
-JUMPS = 20
+JUMPS = 40
 OPEN_S, JUMP_S, FLAT = 10.0, 0.2, 1.1
 
 LAST = "return Boolean(document.getElementById('range-0')?.innerText)"
@@ -45,7 +44,10 @@ const there = () => Object.entries(wanted).every(([name, pose]) => {
     return pose.every((value, n) => Math.abs(bodies[name].matrixWorld.elements[n] - value) < 1e-6);
 });
 const began = performance.now();
-const look = () => there() ? done(performance.now() - began) : setTimeout(look, 2);
+// Callbacks come before a frame is painted: in the one after it, the machine has been.
+const painted = () => requestAnimationFrame(() => requestAnimationFrame(
+    () => done(performance.now() - began)));
+const look = () => there() ? painted() : setTimeout(look, 2);
 const field = document.getElementById('second');
 field.value = at;
 field.dispatchEvent(new Event('change'));
@@ -67,14 +69,14 @@ def rows(minutes: float = 60.0) -> list[Row]:
     return [
         Row("viewer", f"{size}: open, s", whole.opened, OPEN_S, "promised", 1.0),
         Row("viewer", f"{size}: a jump, s of the processor", whole.used, JUMP_S, "promised", 1.0),
-        Row("viewer", f"{size}: the usual jump, s", whole.jump, JUMP_S, "promised", 1.0),
+        Row("viewer", f"{size}: 19 of 20 jumps, painted, s", whole.jump, JUMP_S, "promised", 1.0),
         Row("viewer", f"{size}: MB after {JUMPS} jumps", whole.after, whole.before, "before", FLAT),
     ]
 
 
 @dataclass(frozen=True)
 class Looked:
-    """Seconds to open, of the usual jump, of the processor for one; MB before and after all."""
+    """Seconds to open, of 19 of 20 jumps, of the processor for one; MB before and after all."""
 
     opened: float
     jump: float
@@ -185,11 +187,11 @@ def looked(file: Path, browser: object) -> Looked:
         viewer.terminate()
         viewer.wait(60)
         viewer.stdout.close()
-    return Looked(opened, statistics.median(took), used, before, after)
+    return Looked(opened, float(np.quantile(took, 0.95)), used, before, after)
 
 
 def jump(browser: object, film: "Film", at: float) -> float:
-    """Go to a second; return how long it took until the machine stood as it did then."""
+    """Go to a second; return how long it took until the machine was painted as it stood then."""
     from labcrane.machines.kinematics import link_frames  # noqa: PLC0415
 
     frame = film.frame(at)

@@ -4,9 +4,9 @@ mkdocs calls :func:`on_files` while it builds the site, so these pages are never
 In the repository they stand as ``python docs/generate.py docs`` wrote them; a test compares.
 """
 
+import argparse
 import ast
 import re
-import sys
 import tomllib
 from collections.abc import Iterator, Mapping
 from inspect import cleandoc
@@ -315,11 +315,23 @@ def on_page_markdown(markdown: str, *, page: Any, **_: Any) -> str:
     return MENTION.sub(lambda match: f"[{match[1]}]({up}{match[1]}.md)", markdown)
 
 
-if __name__ == "__main__" and sys.argv[1] == "--architecture":
-    page = HERE / "architecture.md"
-    page.write_text(with_floors(page.read_text(encoding="utf-8")), encoding="utf-8")
-elif __name__ == "__main__":
-    for name, text in pages().items():
-        target = Path(sys.argv[1]) / name
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_text(text, encoding="utf-8")
+def main() -> None:
+    """Write the generated pages into a folder, or the floors into the page of the architecture."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("folder", type=Path, nargs="?", help="where the pages go, as docs")
+    parser.add_argument("--architecture", action="store_true", help="the floors alone")
+    asked = parser.parse_args()
+    if asked.architecture:
+        page = HERE / "architecture.md"
+        page.write_text(with_floors(page.read_text(encoding="utf-8")), encoding="utf-8")
+    elif asked.folder is None:
+        parser.error("give the folder in which the pages are written, as docs")
+    else:
+        for name, text in pages().items():
+            target = asked.folder / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

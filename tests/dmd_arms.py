@@ -1,5 +1,6 @@
 """The arm of the retrieval study, standing in a scene."""
 
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +17,14 @@ from labcrane_dmd.arm.settings import ArmSettings, JawsSettings
 RETRIEVAL = Path(__file__).parents[1] / "protocols" / "retrieval"
 MODEL = RETRIEVAL / "arm.dmd.yaml"
 MAP = {"slew": "left.x", "shoulder": "left.y", "elbow": "right.x", "wrist": "-right.y"}
+
+
+def with_files(folder: Path) -> Path:
+    """Put machine, model and scenes of the retrieval study beside a protocol of a test's own."""
+    for name in ("ied_arm.yaml", MODEL.name):
+        shutil.copy(RETRIEVAL / name, folder)
+    shutil.copytree(RETRIEVAL / "scenes", folder / "scenes", dirs_exist_ok=True)
+    return folder
 
 
 def build(machine=None, **settings) -> Dynamics:

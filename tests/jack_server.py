@@ -23,8 +23,9 @@ def a_jack_server(folder: Path, *, real_time: bool = False) -> Iterator[tuple[st
     with log.open("w", encoding="utf-8") as file:
         server = subprocess.Popen(["jackd", "-n", name, *how, *driver], stdout=file, stderr=file)
         try:
-            waiting = ["jack_wait", "-s", name, "-w", "-t", "20"]
-            subprocess.run(waiting, capture_output=True, check=True)
+            waiting = ["jack_wait", "-s", name, "-w", "-t", "60"]
+            done = subprocess.run(waiting, capture_output=True, check=False)
+            assert not done.returncode, f"no JACK server: {log.read_text(encoding='utf-8')}"
             yield name, log
         finally:
             server.terminate()

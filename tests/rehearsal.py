@@ -58,6 +58,26 @@ class ScriptedConsole:
         self.told.append(event)
 
 
+class DiesError(Exception):
+    """Stands for a process that is gone."""
+
+
+class DiesInTrial(ScriptedConsole):
+    """Ends everything some ticks into a trial, as a killed process does."""
+
+    def __init__(self, trial: int, ticks: int) -> None:
+        super().__init__()
+        self._trial, self._left = trial, ticks
+
+    def commands(self) -> list[Command]:
+        running = [event for event in self.told if event.name == "trial.start"]
+        if running and running[-1].data["trial"] == self._trial:
+            self._left -= 1
+        if self._left == 0:
+            raise DiesError
+        return []
+
+
 class NoLog:
     """A log on a disk that never fails, and keeps nothing."""
 

@@ -219,6 +219,23 @@ def test_each_promise_of_unkind_devices_that_is_broken_is_missed(
         assert line.startswith(f"sync: {words},")
 
 
+def test_each_unkind_device_is_a_row_with_a_limit_that_its_error_can_miss() -> None:
+    score = importlib.import_module("streams.unkind_score")
+    sync = importlib.import_module("benchmarks.sync")
+    missed = importlib.import_module("benchmarks.table").missed
+    good = score.Score(
+        row="good", p95=0.1, most=0.2, cover=1.0, width=0.1, passed=True, usual=0.5,
+        untouched=0.5, named=frozenset(), present=frozenset(), clean=True, limit=0.2,
+        samples=1000, apart=0.1, usual_apart=0.5, apart_limit=0.2, chance=False, stated=3.0,
+    )  # fmt: skip
+    beyond = dataclasses.replace(good, row="beyond", p95=0.31)
+    late = dataclasses.replace(good, row="late", p95=2.9, clean=False)
+    untold = dataclasses.replace(late, row="untold", p95=3.1)
+    rows = sync.of_devices([good, good, good, beyond, late, untold])
+    assert [row.what.partition(",")[0] for row in rows] == ["good", "beyond", "late", "untold"]
+    assert [line.partition(",")[0] for line in missed(rows)] == ["sync: beyond", "sync: untold"]
+
+
 @pytest.mark.parametrize(("wrong", "clocks"), [(0, 3), (1, 3), (0, 2), (0, 4)])
 def test_a_wrong_stamp_or_a_clock_that_is_not_found_after_restarts_is_missed(
     wrong: int, clocks: int

@@ -71,6 +71,7 @@ indicator: {}
 design:
   groups: {without: [], with: [ball, tone]}
   order: {pairs: {rule: shuffled, times: 1, in_a_row: 2}}
+  primary: [movement_time, sparc]
 sessions:
   - name: first
     steps:

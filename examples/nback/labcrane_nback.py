@@ -26,7 +26,7 @@ from labcrane import (
     hookimpl,
     offer,
 )
-from labcrane.core import Shape, Sphere
+from labcrane.core import ButtonName, Names, Shape, Sphere
 
 labcrane_api = 1
 
@@ -54,11 +54,14 @@ class NbackSettings(Settings):
     match_share: float = Field(default=1 / 3, gt=0.0, lt=1.0)
     """Share of the balls that are where they were."""
 
-    button: str = "right.trigger"
-    """The input's signal with which the operator answers."""
+    button: ButtonName = "right.trigger"
+    """The input's button with which the operator answers."""
 
     seed: int = 1
     """Another seed is another order of places."""
+
+    def needs(self, machine: Machine) -> Names:
+        return {"button": [self.button]}
 
 
 @dataclass(frozen=True)

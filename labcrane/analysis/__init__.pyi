@@ -8,6 +8,7 @@ from .exporter import Exporter
 from .measures import measures_of
 from .movements import Movement, movements_of
 from .questionnaires import answers_of, asked_in, beside_trials, scores_of
+from .tables.annotations import annotations_of
 from .tables.dataset import Dataset, open_dataset
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "Movement",
     "Participant",
     "Sampled",
+    "annotations_of",
     "answers_of",
     "asked_in",
     "beside_trials",

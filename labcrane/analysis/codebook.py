@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 from labcrane.analysis.cohort import Participant
 from labcrane.analysis.gaze import gaze_units
-from labcrane.analysis.measures import MEASURES
 from labcrane.analysis.questionnaires import ANSWERS, MEANING, SCORES, asked_in, score_column
+from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.recording.participant_file.reader import SessionRecord
 
 if TYPE_CHECKING:

@@ -61,7 +61,7 @@ def looks(session: SessionRecord) -> Looks | None:
     """Return what a session's gaze stream says, or None when it has none."""
     for stream in session.streams.values():
         if stream.attrs.get("type") == KIND and CHANNEL in stream.data:
-            return Looks(stream.time, [_name(value) for value in stream.data[CHANNEL]])
+            return Looks(stream.time, [area_name(value) for value in stream.data[CHANNEL]])
     return None
 
 
@@ -187,7 +187,8 @@ def drift(
     return Drift(right, down, spread)
 
 
-def _name(value: object) -> str:
+def area_name(value: object) -> str:
+    """Return the area that a sample of ``aoi`` names; "" for none."""
     if isinstance(value, str):
         return value
     number = float(str(value))

@@ -11,6 +11,7 @@ from labcrane.analysis.gaze import gaze_measures, looks
 from labcrane.analysis.movements import Groups, Movement, cut, groups, machine_of
 from labcrane.analysis.smoothness import ldlj, path_ratio, sparc, sub_movements
 from labcrane.analysis.sticks import coordination, effort, limit_hits, reversals, stick_use
+from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.analysis.tables.measure_cache import kept
 from labcrane.errors import LabcraneError
 from labcrane.machines.machine import Machine
@@ -60,28 +61,6 @@ class MeasureSettings:
 
 
 DEFAULTS = MeasureSettings()
-
-MEASURES: Mapping[str, tuple[str, str]] = {
-    "sequence": ("1", "position in the session of the pair of targets, from 1"),
-    "position": ("1", "position in the session of the movement among the counted ones, from 1"),
-    "constant_error": ("m", "signed error along the task axis, positive for too far"),
-    "absolute_error": ("m", "distance of the tip from the target's centre at the end"),
-    "amplitude": ("m", "way made along the task axis, from onset to offset"),
-    "path_ratio": ("1", "length of the way over the straight distance between its ends"),
-    "peak_speed_tip": ("m/s", "largest speed of the tip between onset and offset"),
-    "sub_movements": ("1", "peaks of the tip's speed"),
-    "sparc": ("1", "spectral arc length of the tip's speed"),
-    "ldlj": ("1", "log dimensionless jerk of the tip's speed"),
-    "reversals": ("1/s", "changes of direction of all stick axes together, per second"),
-    "simultaneous": ("1", "fraction of the movement time with two or more axes in use"),
-    "axes_used": ("1", "mean number of axes in use"),
-    "bimanual": ("1", "of the time with a stick in use, the fraction with more than one"),
-    "coordination": ("1", "largest cross-correlation of both sticks' deflections"),
-    "coordination_lag": ("s", "its lag, positive when the right stick follows"),
-    "effort": ("1", "root mean square of the joint commands, as a fraction of full speed"),
-    "limit_hits": ("1", "times a joint came to one of its limits"),
-}
-"""Unit and meaning of what is measured here; the trial table's own columns stand beside it."""
 
 
 @dataclass(frozen=True)

@@ -26,15 +26,15 @@ from labcrane.approval.environment import (
     fingerprint_of,
     installed,
     is_working_copy,
-    one_name,
     source,
 )
 from labcrane.approval.lock import lock_path, read_lock
-from labcrane.approval.materials import study_files
+from labcrane.approval.materials import files_of_settings, study_files
 from labcrane.errors import ProtocolError
 from labcrane.files.atomic import UNFINISHED, copy, sha256, write_text
 from labcrane.files.yaml import YamlFile
 from labcrane.protocol.study import Study
+from labcrane.registry.entry_points import one_name
 from labcrane.registry.registry import Registry
 
 WHEELS, STUDY, REQUIREMENTS = "wheels", "study", "requirements.txt"
@@ -128,6 +128,7 @@ def _study_files(study: Study, registry: Registry) -> Iterator[str]:
     """Yield what of the protocol's folder is the study: neither data beside it, nor keys."""
     folder = study.path.parent
     found = {study.path, *study_files(YamlFile.read(study.path).data, folder)}
+    found |= set(files_of_settings(study))
     found |= set(registry.local.values())
     if (lock := lock_path(study.path)).exists():
         found |= {lock, read_lock(study.path).consent}

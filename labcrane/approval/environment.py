@@ -12,12 +12,15 @@ from functools import lru_cache
 from importlib.metadata import Distribution, distributions
 from typing import Any
 
+from labcrane.registry.entry_points import one_name
+
 OF_THE_INSTALLER = frozenset(
     {"INSTALLER", "RECORD", "REQUESTED", "direct_url.json", "uv_cache.json", "uv_build.json"}
 )
 """Files that say how a package came here, and not what it is."""
 
-_NAME = re.compile(r"^Name: *\S", re.MULTILINE | re.IGNORECASE)
+# The parser of mail, which the standard library reads each of them with, takes most of the time.
+_FIELD = re.compile(r"^(Name|Version):[ \t]*(\S.*)$", re.MULTILINE | re.IGNORECASE)
 
 Environment = Mapping[str, Any]
 
@@ -38,8 +41,8 @@ def environment() -> dict[str, Any]:
 @lru_cache(maxsize=1)
 def _environment(path: tuple[str, ...]) -> dict[str, Any]:
     packages = {
-        one_name(each.name): {"version": each.version, "sha256": fingerprint(each)}
-        for each in installed(path)
+        name: {"version": version, "sha256": fingerprint(each)}
+        for name, version, each in _named(path)
     }
     return {
         "system": sysconfig.get_platform(),
@@ -54,19 +57,20 @@ def installed(path: Sequence[str]) -> Iterator[Distribution]:
     What an installer that was interrupted left behind has no name and is none: on Windows, where
     files in use cannot be removed, such folders are common.
     """
+    return (each for _, _, each in _named(path))
+
+
+def _named(path: Sequence[str]) -> Iterator[tuple[str, str | None, Distribution]]:
+    """Yield each package with its name, by PEP 503, and its version."""
     seen: set[str] = set()
     for each in distributions(path=list(path)):
         about = each.read_text("METADATA") or each.read_text("PKG-INFO") or each.read_text("")
-        if not _NAME.search(about or ""):
-            continue
-        if (name := one_name(each.name)) not in seen:
+        fields: dict[str, str] = {}
+        for field, value in _FIELD.findall((about or "").partition("\n\n")[0]):
+            fields.setdefault(field.lower(), value)
+        if "name" in fields and (name := one_name(fields["name"])) not in seen:
             seen.add(name)
-            yield each
-
-
-def one_name(project: str) -> str:
-    """Return the one way to write a project's name, by PEP 503."""
-    return re.sub(r"[-_.]+", "-", project).lower()
+            yield name, fields.get("version"), each
 
 
 def fingerprint(of: Distribution) -> str | None:

@@ -7,18 +7,31 @@ from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 from xml.etree import ElementTree
 
 from labcrane.approval.source_tree import hashes
 from labcrane.errors import ProtocolError
 from labcrane.files.atomic import sha256
+from labcrane.files.names import outside
+from labcrane.files.system import is_file, is_folder, is_there
 from labcrane.files.yaml import YamlFile, parse_yaml
+from labcrane.protocol.referenced_files import paths_in
 from labcrane.protocol.study import Study
 from labcrane.registry.entry_points import EntryPoint, entry_points_of
 from labcrane.registry.hookspecs import PROJECT
 from labcrane.registry.registry import Registry
 
 DATA = frozenset({".yaml", ".yml", ".json"})
+NAMELESS = frozenset({".obj", ".stl", ".pdf"})
+"""What names no other file that is used."""
+
+MOST_TEXT = 1_000_000
+"""Bytes of a file of no known kind that may be YAML and name others."""
+
+MOST_JSON = 100_000_000
+"""Bytes of a mesh's description."""
+
 ROBOTS = frozenset({".urdf", ".xml"})
 OF_THE_LAB = frozenset({"certificate", "key"})
 """What of a page is the laboratory's: everybody may read a lock, and a private key is nobody's to
@@ -48,7 +61,8 @@ def materials(
     """
     protocol = YamlFile.read(study.path).data
     folder = study.path.parent
-    named = {path.relative_to(folder).as_posix(): path for path in study_files(protocol, folder)}
+    said = [*study_files(protocol, folder), *files_of_settings(study)]
+    named = {_inside(path, folder): path for path in said}
     found: dict[str, Any] = {
         "protocol": protocol,
         "files": {name: content(path) for name, path in sorted(named.items())},
@@ -77,6 +91,28 @@ def settings(study: Study) -> dict[str, Any]:
     }
 
 
+def files_of_settings(study: Study) -> list[Path]:
+    """Return the files that settings name, those by default included, and what these name."""
+    paths = [
+        path
+        for choice in study.choices.values()
+        for path in paths_in(choice.settings.model_dump())
+        if not outside(path, study.path.parent)
+    ]
+    return referred([str(path.absolute()) for path in paths], study.path.parent)
+
+
+def _inside(path: Path, folder: Path) -> str:
+    """Return a path as it is named from the study's folder, by whatever way it was named.
+
+    A link inside the folder keeps its own name; a way to the folder through one does not count.
+    """
+    whole, above = (Path(os.path.abspath(each)) for each in (path, folder))  # noqa: PTH100 - links are left as they are
+    if not whole.is_relative_to(above):
+        whole, above = path.resolve(), folder.resolve()
+    return whole.relative_to(above).as_posix()
+
+
 def _portable(value: object, folder: Path, part: str) -> Any:
     """Return settings as plain data that are the same on every computer."""
     if isinstance(value, Mapping):
@@ -85,13 +121,9 @@ def _portable(value: object, folder: Path, part: str) -> Any:
         return [_portable(item, folder, part) for item in value]
     if not isinstance(value, Path):
         return value if isinstance(value, bool | int | float | str | None) else str(value)
-    inside, named = (Path(os.path.abspath(path)) for path in (folder, value))  # noqa: PTH100 - links are left as they are
-    if not named.is_relative_to(inside):
-        raise ProtocolError(
-            f"{part} names {value}, which is not in the folder of the protocol, {folder}; put it "
-            "there, so that it moves with the study and is part of the lock"
-        )
-    return named.relative_to(inside).as_posix()
+    if why := outside(value, folder):
+        raise ProtocolError(f"{part} names {value}: {why}")
+    return _inside(value, folder)
 
 
 def study_files(protocol: Mapping[str, Any], folder: Path) -> list[Path]:
@@ -139,10 +171,42 @@ def _named_in(path: Path) -> Any:
         return list(_named_by_robot(path))
     if path.suffix == ".gltf":  # names its textures and its numbers
         try:
-            return json.loads(path.read_text(encoding="utf-8"))
+            return _unquoted(json.loads(path.read_text(encoding="utf-8")))
         except (ValueError, RecursionError) as error:
             raise ProtocolError(f"{path} is no glTF file: {str(error)[:100]}; export it") from error
-    return None
+    if path.suffix == ".glb":
+        return _named_in_glb(path)
+    if path.suffix in NAMELESS or (text := _short_text(path)) is None:
+        return None
+    return _parsed(text)  # whatever it is called
+
+
+def _unquoted(data: object) -> list[str]:
+    """Return texts of a glTF file as the addresses and as the names that they may be."""
+    texts = list(_strings(data))
+    return [*texts, *map(unquote, texts)]
+
+
+def _named_in_glb(path: Path) -> Any:
+    """Return what a binary glTF file names: its first chunk is JSON, behind 12 bytes and 8."""
+    with path.open("rb") as file:
+        head = file.read(20)
+        size = int.from_bytes(head[12:16], "little")
+        try:
+            return _unquoted(json.loads(file.read(min(size, MOST_JSON))))
+        except (ValueError, RecursionError) as error:
+            raise ProtocolError(f"{path} is no glTF file: {str(error)[:100]}; export it") from error
+
+
+def _short_text(path: Path) -> str | None:
+    """Return what a file says, if it is a text that is short enough to be YAML."""
+    if path.stat().st_size > MOST_TEXT:
+        return None
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        return None
+    return None if "\0" in text else text
 
 
 def _named_by_robot(path: Path) -> Iterator[str]:
@@ -166,14 +230,14 @@ def _named_by_robot(path: Path) -> Iterator[str]:
 
 
 def _paths(text: str, beside: Path, folder: Path) -> list[Path]:
-    if not text or len(text) > 255 or "\n" in text or "\0" in text:  # noqa: PLR2004 - NAME_MAX
+    if not text or "\0" in text:
         return []
     path = beside / text
-    if not path.resolve().is_relative_to(folder.resolve()):
+    if not is_there(path) or outside(path, folder):
         return []
-    if path.is_file():
+    if is_file(path):
         return [path]
-    if path.is_dir() and "/" in text:
+    if is_folder(path) and "/" in text:
         return [file for file in sorted(path.rglob("*")) if file.is_file()]
     return []
 

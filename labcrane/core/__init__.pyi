@@ -23,6 +23,7 @@ from .references import (
     CameraName,
     Covers,
     EventName,
+    InputAxis,
     JointName,
     LinkName,
     Once,
@@ -32,7 +33,20 @@ from .references import (
     SignalName,
     ViewName,
 )
-from .settings import AtMost, Names, SceneFile, StudyPath, Unit, read_csv_text, read_yaml, was_run
+from .settings import (
+    AtMost,
+    Names,
+    SceneFile,
+    StudyPath,
+    Unit,
+    Usual,
+    WrongKey,
+    outside,
+    read_csv_text,
+    read_settings,
+    read_yaml,
+    was_run,
+)
 from .signals import Layout, SignalChannel, SignalFault, SignalStream, signals_of
 from .twin import Places, Twin
 
@@ -53,6 +67,7 @@ __all__ = [
     "EventName",
     "Finding",
     "GrappleSettings",
+    "InputAxis",
     "Item",
     "JointName",
     "Layout",
@@ -81,12 +96,16 @@ __all__ = [
     "TrialStatus",
     "Twin",
     "Unit",
+    "Usual",
     "Value",
     "Verdict",
     "ViewName",
+    "WrongKey",
     "compiled",
     "numeric_answers",
+    "outside",
     "read_csv_text",
+    "read_settings",
     "read_yaml",
     "signals_of",
     "twin",

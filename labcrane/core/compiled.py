@@ -5,12 +5,22 @@ import a module with compiled functions in :meth:`labcrane.Component.twin` and n
 Arithmetic is Python's, operation by operation: nothing is reordered or fused, and a root, a sine or
 a cube root is the C library's, as Python's is. ``math.hypot`` and ``math.dist`` are not: Python
 3.12 rounds them otherwise than 3.11. Write the root of a sum of squares, here and in the component.
+
+What was compiled is kept beside its source, for whoever runs it next. Of several processes that
+want it at once, as all that make a cohort do on a computer where nothing was compiled yet, one
+compiles and the others wait for it: each by itself would work as long.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any, TypeVar
+
+from labcrane.files.lock import exclusive
+
+TURN = "labcrane.lock"
+"""File that whoever compiles holds, in the folder in which numba keeps what was compiled."""
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -47,7 +57,7 @@ def signatures() -> Signatures:
 
 def part(function: F) -> F:
     """Compile a function that others in the same module call."""
-    return _compiled(function)
+    return compile_function(function)
 
 
 def tick(function: F) -> F:
@@ -55,12 +65,12 @@ def tick(function: F) -> F:
 
     ``function(own, places, seen, row)``: all of float64, but ``places`` of int64.
     """
-    return _compiled(function, signatures().tick)
+    return compile_function(function, signatures().tick)
 
 
 def inverse(function: F) -> F:
     """Compile the inverse of a controller: ``function(own, places, velocity, seen, row)``."""
-    return _compiled(function, signatures().inverse)
+    return compile_function(function, signatures().inverse)
 
 
 def read(function: F) -> F:
@@ -69,12 +79,27 @@ def read(function: F) -> F:
     ``function(own, places, seen, row, inverse, theirs)``: the last two are the controller's inverse
     and what its twin knows, to be called as ``inverse(theirs, places, velocity, seen, row)``.
     """
-    return _compiled(function, signatures().read)
+    return compile_function(function, signatures().read)
 
 
-def _compiled(function: F, *signature: Any) -> F:
+def as_signed(signature: Any) -> Callable[[F], F]:
+    """Return a decorator that compiles a function of this signature."""
+
+    def compile_it(function: F) -> F:
+        return compile_function(function, signature)
+
+    return compile_it
+
+
+def compile_function(function: F, signature: Any = None) -> F:
+    """Compile a function, now where its signature is given, else when it is called first."""
     import numba  # noqa: PLC0415
 
     compile_it: Any = numba.njit  # some versions have types, for fewer ways to call it
-    made: F = compile_it(*signature, cache=True, error_model="numpy", fastmath=False)(function)
-    return made
+    made: Any = compile_it(cache=True, error_model="numpy", fastmath=False)(function)
+    if signature is not None:
+        with exclusive(Path(made.stats.cache_path) / TURN):
+            made.compile(signature)
+        made.disable_compile()
+    kept: F = made
+    return kept

@@ -1,10 +1,17 @@
 """Settings of cranes: how their drives follow, and what hangs on the tip."""
 
+import math
+from collections.abc import Mapping
+
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from labcrane.core.settings import Names, Settings
 from labcrane.machines.actuator import ACTUATOR_PRESETS, ActuatorSettings
 from labcrane.machines.machine import Machine
+
+GRAVITY = 9.81
+
+LONGEST_LAG_S = 5.0
 
 
 class CraneSettings(Settings):
@@ -14,7 +21,14 @@ class CraneSettings(Settings):
     """Delay between command and motion: ideal, electric, hydraulic, sluggish, or written out."""
 
     def provides(self, machine: Machine) -> Names:
-        return {"object": ()}
+        return {"object": (), "scene": ()}
+
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        drive = self.actuator
+        late = drive.dead_time_s + drive.lag_s
+        if late <= LONGEST_LAG_S:
+            return {}
+        return {"actuator": f"follows {late:g} s late: nobody steers such a crane"}
 
 
 class GrappleSettings(Settings):
@@ -43,7 +57,24 @@ class LoadedCraneSettings(CraneSettings):
     """None by default. ``{}`` is one with the values above."""
 
     def provides(self, machine: Machine) -> Names:
-        return {"object": ("grapple", "grapple rod") if self.grapple else ()}
+        hanging = ("grapple", "grapple rod") if self.grapple else ()
+        return {"object": hanging, "scene": ()}
+
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        found = dict(super().doubts(machine))
+        reach = sum(math.hypot(joint.a, joint.d) for joint in machine.joints)
+        strongest = max(joint.effort for joint in machine.joints)
+        if self.grapple and self.grapple.length_m > reach:
+            found["grapple.length_m"] = (
+                f"is {self.grapple.length_m:g} m, and the crane itself reaches {reach:.3g} m"
+            )
+        if self.hanging_kg * GRAVITY * reach / 2 > strongest:
+            found["payload_kg"] = (
+                f"is {self.payload_kg:g} kg, and with it what hangs there needs "
+                f"{self.hanging_kg * GRAVITY * reach / 2:.3g} N m at half of the reach, where the "
+                f"strongest joint has {strongest:.3g}"
+            )
+        return found
 
     @property
     def loaded(self) -> bool:

@@ -10,11 +10,12 @@ This is names only, so that a protocol is checked without loading what works wit
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from types import UnionType
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from pydantic import BaseModel, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
@@ -34,7 +35,8 @@ class Reference:
     signed
         Whether a leading minus is allowed, and means the same thing turned round.
     own
-        Whether it must be among what the component itself provides.
+        Whether it must be among what the component itself provides: the settings in which the
+        field is, or else those around them.
     of
         The key beside it that names a view, which must provide it.
     """
@@ -51,9 +53,13 @@ class Reference:
 
 @dataclass(frozen=True, slots=True)
 class Covers:
-    """A mark on a mapping's type: its keys name everything of a kind that there is."""
+    """A mark on a mapping's type: its keys name everything of a kind that there is.
+
+    With ``own`` that is what the component itself provides.
+    """
 
     kind: str
+    own: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +71,11 @@ Mark = Reference | Covers | Once
 
 AxisName = Annotated[str, Field(pattern=r"^-?[a-z][a-z0-9_.]*$"), Reference("axis", signed=True)]
 """An axis of the input, ``right.y``; a leading minus turns it round."""
+
+InputAxis = Annotated[
+    str, Field(pattern=r"^-?[a-z][a-z0-9_.]*$"), Reference("axis of the input", signed=True)
+]
+"""An axis of the input, named by whoever stands in for it: an operator's own axes are others."""
 
 ButtonName = Annotated[str, Reference("button")]
 """A button: an axis of the input that is pressed or not, and has no sign: ``right.trigger``. Of an
@@ -152,12 +163,15 @@ class Mentioned:
     ----------
     place
         The keys and indices below the component's settings; with ``key`` the key itself is meant.
+    holders
+        The settings in which it is, from the outermost to those whose field it is.
     """
 
     mark: Mark
     place: Place
     value: Any
     key: bool = False
+    holders: tuple[BaseModel, ...] = field(default=(), compare=False)
 
 
 def mentioned(settings: BaseModel) -> Iterator[Mentioned]:
@@ -166,11 +180,16 @@ def mentioned(settings: BaseModel) -> Iterator[Mentioned]:
     Defaults are left out: what a component needs without being told, it says by
     :meth:`Settings.needs`.
     """
-    for name, field in type(settings).model_fields.items():
+    for name, about in type(settings).model_fields.items():
         if name in settings.model_fields_set:
-            value, key = getattr(settings, name), field.alias or name
-            yield from _marked(field.metadata, (key,), value)
-            yield from _within(field.annotation, (key,), value)
+            value, key = getattr(settings, name), about.alias or name
+            for each in _of_field(about, (key,), value):
+                yield replace(each, holders=(settings, *each.holders))
+
+
+def _of_field(about: FieldInfo, place: Place, value: Any) -> Iterator[Mentioned]:
+    yield from _marked(about.metadata, place, value)
+    yield from _within(about.annotation, place, value)
 
 
 def _marked(metadata: list[Any], place: Place, value: Any, *, key: bool = False) -> Iterator[Any]:
@@ -184,7 +203,7 @@ def _within(annotation: Any, place: Place, value: Any, *, key: bool = False) -> 
     origin, arguments = get_origin(annotation), get_args(annotation)
     if isinstance(value, BaseModel):
         for each in mentioned(value):
-            yield Mentioned(each.mark, (*place, *each.place), each.value, each.key)
+            yield replace(each, place=(*place, *each.place))
     elif origin is Annotated:
         yield from _marked(list(annotation.__metadata__), place, value, key=key)
         yield from _within(arguments[0], place, value, key=key)

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
-from pydantic import AfterValidator, ValidationInfo
+from pydantic import AfterValidator, BaseModel, ValidationInfo
 
 from labcrane.core.references import Reference
+from labcrane.files.complaints import WrongKey as WrongKey  # noqa: PLC0414 - public here
 from labcrane.files.model import AtMost as AtMost  # noqa: PLC0414 - public here
 from labcrane.files.model import StrictModel
+from labcrane.files.model import Usual as Usual  # noqa: PLC0414
 from labcrane.files.model import was_run as was_run  # noqa: PLC0414
+from labcrane.files.names import outside as outside  # noqa: PLC0414 - public here
 from labcrane.files.table import read_csv_text as read_csv_text  # noqa: PLC0414 - public here
 from labcrane.files.units import Unit as Unit  # noqa: PLC0414 - public here
+from labcrane.files.yaml import YamlFile
 from labcrane.files.yaml import read_yaml as read_yaml  # noqa: PLC0414 - public here
 
 if TYPE_CHECKING:
@@ -21,6 +25,20 @@ if TYPE_CHECKING:
 
 Names = Mapping[str, Sequence[str]]
 """Names by kind: ``{"axis": ("left.x", "left.y")}``."""
+
+
+ModelT = TypeVar("ModelT", bound=BaseModel)
+
+
+def read_settings(path: Path, model: type[ModelT]) -> ModelT:
+    """Return a YAML file as a model.
+
+    Raises
+    ------
+    ProtocolError
+        With one line for every mistake: file, line, column, what is written, what is possible.
+    """
+    return YamlFile.read(path).checked(model)
 
 
 class Settings(StrictModel):
@@ -42,7 +60,7 @@ class Settings(StrictModel):
         """Return numbers that hardly anybody means, by key: ``{"limit_s": "is 0.1 s, and ..."}``.
 
         ``labcrane check`` asks whether each is meant, until the protocol says so. The key may lead
-        inside: ``"jaws.grip_n"``.
+        inside: ``"jaws.grip_n"``, or to an item, counted from 1: ``"questions.2"``.
         """
         return {}
 

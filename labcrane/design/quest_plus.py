@@ -11,17 +11,18 @@ from functools import lru_cache
 
 import numpy as np
 
-from labcrane.protocol.tracks import QuestPlus
+from labcrane.protocol.tracks import THRESHOLDS, QuestPlus
 from labcrane.types import FloatArray
-
-THRESHOLDS = 61
-"""Between the easiest and the hardest level."""
 
 SURE = 1e-12
 """Nothing is surer than this: an impossible answer must not leave a posterior of zeros."""
 
 DIGITS = 9
 """To which entropies are compared, so that sums in another order choose the same level."""
+
+
+GRIDS = 1024
+"""That are kept, some kB each: more than the tracks of any study, so that none is made twice."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +90,7 @@ class Grid:
         return Posterior(int(np.argmin(np.round(expected, DIGITS))), mean, sd)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=GRIDS)
 def grid(settings: QuestPlus, levels: tuple[float, ...]) -> Grid:
     """Return a grid, made once."""
     return Grid(settings, levels)

@@ -121,6 +121,10 @@ class PlannedTrack:
     count: int
     rounds: Mapping[str, tuple[PlannedTrial, ...]]
 
+    def __post_init__(self) -> None:
+        # A grid and a process's first product of matrices take longer than a tick: both come now.
+        standing(self.settings)
+
     @property
     def size(self) -> int:
         """Trials of a round."""
@@ -130,6 +134,16 @@ class PlannedTrack:
     def longest_s(self) -> float:
         """How long a round is likely to take at the level that takes longest, in seconds."""
         return max(sum(each.expected_s for each in trials) for trials in self.rounds.values())
+
+    @property
+    def counted(self) -> int:
+        """Trials of a round that count, and tell the track something."""
+        return sum(trial.counted for trial in next(iter(self.rounds.values())))
+
+    @property
+    def described(self) -> dict[str, Any]:
+        """What a recording says of it: the law and how many trials of a round count."""
+        return {"settings": self.settings.model_dump(mode="json"), "counted": self.counted}
 
     def at(self, number: int, level: str) -> PlannedTrial | None:
         """Return what the trial of this number is at a level; None where there is none such."""

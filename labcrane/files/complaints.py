@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import date
 from difflib import get_close_matches
 from math import isfinite
 from typing import Any
@@ -22,6 +23,32 @@ class Truth(str):
     """``true`` or ``false`` where a number is asked for: pydantic would take it for 1 or 0."""
 
     __slots__ = ()
+
+
+class WrongKey(ValueError):  # noqa: N818 - no error of labcrane's, but a complaint about a key
+    """What a validator of several keys says of one of them: a check points there.
+
+    Parameters
+    ----------
+    at
+        The keys and indices, below what is validated, that lead to what is wrong.
+
+    Examples
+    --------
+    >>> class Zone(Settings):
+    ...     inner_m: float
+    ...     outer_m: float
+    ...
+    ...     @model_validator(mode="after")
+    ...     def _rises(self) -> Self:
+    ...         if self.inner_m >= self.outer_m:
+    ...             raise WrongKey(f"{self.outer_m:g} is too small", at=("outer_m",))
+    ...         return self
+    """
+
+    def __init__(self, message: str, *, at: Sequence[str | int]) -> None:
+        super().__init__(message)
+        self.at = tuple(at)
 
 
 OF_KEYS = "[key]"
@@ -49,7 +76,7 @@ def told(
     """
     unions: dict[Place, list[ErrorDetails]] = {}
     inside: set[Place] = set()
-    for each in errors:
+    for each in map(_of_one_key, errors):
         loc = each["loc"]
         if _follows(each, errors):
             continue
@@ -74,6 +101,12 @@ def told(
         head = texts[0].partition("; it must be ")[0]
         wanted = [text.partition("; it must be ")[2] or text for text in texts]
         yield Complaint(loc, f"{head}; it must be {', or '.join(dict.fromkeys(wanted))}")
+
+
+def _of_one_key(error: ErrorDetails) -> ErrorDetails:
+    """Return a complaint with the place that a :class:`WrongKey` says."""
+    why = error.get("ctx", {}).get("error")
+    return {**error, "loc": (*error["loc"], *why.at)} if isinstance(why, WrongKey) else error
 
 
 def _follows(error: ErrorDetails, errors: Sequence[ErrorDetails]) -> bool:
@@ -168,6 +201,7 @@ NUMBERS = {"a number", "a whole number"}
 PATTERNS = {
     "^[0-9a-f]{4}:[0-9a-f]{4}$": "vendor and product of a USB device, four hexadecimal digits "
     "each, as 044f:b10a",
+    "^#[0-9a-fA-F]{6}$": "red, green and blue in hexadecimal, in quotation marks, as '#0d47a1'",
     "^[a-z][a-z0-9_-]*$": "lower-case letters, digits, hyphens and underscores, a letter first",
     "^[a-z][a-z0-9_]*$": "lower-case letters, digits and underscores, a letter first",
     "^-?[a-z][a-z0-9_.]*$": "the name of an axis, as left.x, or -left.x to turn it round",
@@ -198,6 +232,8 @@ def written(value: object) -> str:
         return str(value).lower()
     if isinstance(value, float) and not isfinite(value):
         return {"nan": ".nan", "inf": ".inf", "-inf": "-.inf"}[str(value)]
+    if isinstance(value, date):
+        return value.isoformat()
     if isinstance(value, Mapping):
         return f"{{{', '.join(f'{key}: {written(each)}' for key, each in value.items())}}}"
     if isinstance(value, list | tuple):

@@ -100,6 +100,8 @@ SAID = {
     "stands for",
     "expected a mapping node": "a tag that asks for keys with values, before none; remove it",
     "expected a sequence": "a tag that asks for a list, before none; remove it",
+    "unknown escape character": "a backslash in double quotation marks begins a sign of its own; "
+    "write single ones: 'P\\d{3}'",
     "for merging": "<<: takes what an anchor names, as <<: *base, and nothing else; write keys out",
     "while scanning a quoted": "a quotation mark that is not closed; close it",
     "found unexpected end of stream": "a quotation mark that is not closed; close it",

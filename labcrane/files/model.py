@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from types import UnionType
-from typing import Any, Literal, Union, get_args, get_origin
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from pydantic import (
     BaseModel,
@@ -18,6 +18,7 @@ from pydantic import (
     ValidationInfo,
     field_validator,
 )
+from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticKnownError, core_schema
 
@@ -111,8 +112,8 @@ def _no_truth(annotation: Any, value: Any) -> Any:
     elif isinstance(value, list | dict) and origin in {Union, UnionType}:
         for one in arguments:  # one of them, at most, is of this kind
             value = _no_truth(one, value)
-    elif isinstance(value, list) and origin in {tuple, list}:
-        of: Any = Union[arguments]  # noqa: UP007 - of what is only known now
+    elif isinstance(value, list) and (origin in {tuple, list} or _named_items(annotation)):
+        of: Any = Union[arguments or _named_items(annotation)]  # noqa: UP007 - of what is only known now
         return [_no_truth(of, each) for each in value]
     elif isinstance(value, dict) and origin is dict:
         return {key: _no_truth(arguments[1], each) for key, each in value.items()}
@@ -190,8 +191,53 @@ class AtMost:
         return value
 
 
-Number = tuple[tuple[str | int, ...], str | None, float]
-"""Where a number is, its unit, if it has one, and its value."""
+@dataclass(frozen=True, slots=True)
+class Usual:
+    """A mark of a number that is asked about where it is not of a usual size; 0 always is.
+
+    A number whose default is not 0 needs none: it is asked about beyond :data:`SPREAD` times its
+    default, and below a :data:`SPREAD` th of it.
+
+    Attributes
+    ----------
+    least, most
+        Between which sizes it is usual, in the key's unit.
+
+    Examples
+    --------
+    >>> class Drill(Settings):
+    ...     delay_s: Annotated[NonNegativeFloat, Usual(0.001, 5.0)] = 0.0
+    """
+
+    least: float
+    most: float
+
+
+SPREAD = 100.0
+
+
+def usual(field: FieldInfo) -> Usual | None:
+    """Return of what size a key's number usually is, as marked or as its default; or None."""
+    for mark in field.metadata:
+        if isinstance(mark, Usual):
+            return mark
+    default = field.get_default(call_default_factory=False)
+    sizes = [abs(float(each)) for each in _flat(default)]
+    if _shape(field.annotation) is None or not any(sizes):
+        return None
+    return Usual(min(sizes) / SPREAD, max(sizes) * SPREAD)
+
+
+def _flat(value: Any) -> Iterator[float]:
+    if isinstance(value, list | tuple):
+        for each in value:
+            yield from _flat(each)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield value
+
+
+Number = tuple[tuple[str | int, ...], str | None, float, Usual | None]
+"""Where a number is, its unit, if it has one, its value, and of what size it usually is."""
 
 
 def numbers(model: BaseModel) -> Iterator[Number]:
@@ -202,21 +248,30 @@ def numbers(model: BaseModel) -> Iterator[Number]:
             unit = unit_of(name, field.metadata)
             if _shape(field.annotation) is None:
                 unit = None
-            yield from _numbers((field.alias or name,), unit, value)
+            yield from _numbers((field.alias or name,), unit, value, usual(field))
 
 
-def _numbers(place: tuple[str | int, ...], unit: str | None, value: Any) -> Iterator[Number]:
+def _numbers(
+    place: tuple[str | int, ...], unit: str | None, value: Any, size: Usual | None
+) -> Iterator[Number]:
     if isinstance(value, BaseModel):
-        for inside, its, number in numbers(value):
-            yield (*place, *inside), its, number
+        for inside, its, number, its_size in numbers(value):
+            yield (*place, *inside), its, number, its_size
     elif isinstance(value, Mapping):
         for key, each in value.items():
-            yield from _numbers((*place, key), None, each)
+            yield from _numbers((*place, key), None, each, None)
     elif isinstance(value, list | tuple):
         for at, each in enumerate(value):
-            yield from _numbers((*place, at), unit, each)
+            yield from _numbers((*place, at), unit, each, size)
     elif isinstance(value, int | float) and not isinstance(value, bool):
-        yield place, unit, float(value)
+        yield place, unit, float(value), size
+
+
+def _named_items(annotation: Any) -> tuple[Any, ...]:
+    """Return the types of a named tuple's items; none of anything else."""
+    if not (isinstance(annotation, type) and issubclass(annotation, tuple)):
+        return ()
+    return tuple(get_type_hints(annotation).values())
 
 
 def _shape(annotation: Any) -> type | None:
@@ -224,8 +279,9 @@ def _shape(annotation: Any) -> type | None:
     origin, arguments = get_origin(annotation), get_args(annotation)
     if annotation in {int, float}:
         return float
-    if origin in {tuple, list}:
-        return list if any(_shape(each) for each in arguments) else None
+    if origin in {tuple, list} or _named_items(annotation):
+        items = arguments or _named_items(annotation)
+        return list if any(_shape(each) for each in items) else None
     if origin in {Union, UnionType}:
         return next((shape for each in arguments if (shape := _shape(each))), None)
     return _shape(arguments[0]) if arguments and hasattr(annotation, "__metadata__") else None

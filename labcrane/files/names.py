@@ -144,6 +144,19 @@ MOST_LISTED = 10
 """Files of a folder that a message lists."""
 
 
+def outside(path: Path, folder: Path) -> str | None:
+    """Return that a file is not in a study's folder, and what to do; None if it is.
+
+    A link counts as what it leads to.
+    """
+    if path.resolve().is_relative_to(folder.resolve()):
+        return None
+    return (
+        f"{path.resolve()} is not in the folder of the protocol, {folder.resolve()}; put it there, "
+        "so that it moves with the study and is part of its approval"
+    )
+
+
 def absent(path: Path) -> str:
     """Return that there is no such file, and which one beside it may be meant."""
     beside = sorted(each.name for each in path.parent.glob("*")) if is_folder(path.parent) else []

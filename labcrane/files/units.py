@@ -15,9 +15,11 @@ if TYPE_CHECKING:
 
 KINDS: Mapping[str, str] = {
     "m": "a length",
+    "mm": "a length",
     "s": "a time",
     "deg": "an angle",
     "rad": "an angle",
+    "arcmin": "an angle",
     "Hz": "a rate",
     "kg": "a mass",
     "N": "a force",
@@ -28,6 +30,7 @@ KINDS: Mapping[str, str] = {
     "day": "a time",
     "ppm": "a share",
     "uV": "a voltage",
+    "px": "a number of pixels",
 }
 """What is measured in the units that keys ask for."""
 
@@ -37,6 +40,8 @@ ENDINGS: Mapping[str, str] = {
     "_per_s": "1/s",
     "_s": "s",
     "_m": "m",
+    "_mm": "mm",
+    "_arcmin": "arcmin",
     "_deg": "deg",
     "_hz": "Hz",
     "_kg": "kg",
@@ -48,6 +53,8 @@ ENDINGS: Mapping[str, str] = {
 
 EXAMPLES: Mapping[str, str] = {
     "m": "50 cm",
+    "mm": "2 cm",
+    "arcmin": "0.3 deg",
     "s": "200 ms",
     "deg": "0.5 rad",
     "Hz": "1 kHz",
@@ -61,6 +68,7 @@ EXAMPLES: Mapping[str, str] = {
     "deg/s": "0.2 rad/s",
     "day": "2 weeks",
     "uV": "0.1 mV",
+    "px": "1920 px",
 }
 """How the same could be written in another unit."""
 
@@ -70,8 +78,10 @@ SPELT = r"^[-+]?[0-9.]+(e[-+]?[0-9]+)? *[A-Za-zµ°Ω][^\n]{0,29}$"
 _QUANTITY = re.compile(
     r"\s*(?P<number>[-+]?[\d.,]+(?:e[-+]?\d+)?)\s*(?P<unit>[A-Za-zµμ°Ω%].{0,29})?\s*", re.I
 )
+_PART = re.compile(r"[-+]?[\d.]+\s*[A-Za-zµμ°]+")
+_SEVERAL = re.compile(r"\s*[\d.]+\s*[A-Za-zµμ°]+(?:\s+[\d.]+\s*[A-Za-zµμ°]+)+\s*")
 _CLOCK = re.compile(r"\s*(\d{1,4}):(\d\d)\s*")
-_UNIT = re.compile(r"[A-Za-zµμ°Ω]+[A-Za-z²³\^\d\s*/·-]*")
+_UNIT = re.compile(r"%|[A-Za-zµμ°Ω]+[A-Za-z²³\^\d\s*/·-]*")
 _MORE = re.compile(r"\d{3}|\^[^\d-]|\*\*")
 
 
@@ -117,6 +127,8 @@ def in_unit(text: str, unit: str) -> float | None:
         raise ValueError(
             f"{text!r} is no number of seconds; write {seconds} for {text} minutes, or {seconds} s"
         )
+    if _SEVERAL.fullmatch(text):  # 1 min 30 s
+        return float(f"{sum(in_unit(part, unit) or 0.0 for part in _PART.findall(text)):.12g}")
     found = _QUANTITY.fullmatch(text)
     if found is None or found["unit"] is None:
         return None
@@ -135,16 +147,28 @@ def in_unit(text: str, unit: str) -> float | None:
     )
     if not _UNIT.fullmatch(of) or _MORE.search(of):
         raise ValueError(f"{text!r} has no unit that is known, {asked}")
+    if of.lower() == "fps" and unit in {"Hz", "1/s"}:  # of pictures, and not of feet
+        return number
+    return _converted(number, of, unit, text, asked)
+
+
+def _converted(number: float, of: str, unit: str, text: str, asked: str) -> float:
+    """Return a number of a unit as one of another; ``text`` and ``asked`` are for the message."""
     import pint  # noqa: PLC0415 - most files have plain numbers
 
     units = _registry()
+    failures = (pint.errors.PintError, ArithmeticError, AttributeError, TypeError)
     try:
-        quantity = units.Quantity(number, units.parse_units(of.replace("°", "deg")))
+        measured = units.parse_units(of.replace("°", "deg").replace("%", "percent"))
+    except (ValueError, *failures) as error:  # as of "min 30"
+        raise ValueError(f"{text!r} has no unit that is known, {asked}") from error
+    try:
+        quantity = units.Quantity(number, measured)
         if _root(quantity.units) != _root(unit):
             kinds = (kind for name, kind in KINDS.items() if _root(name) == _root(quantity.units))
             raise ValueError(f"{text!r} is {next(kinds, 'something else')}, {asked}")
         return float(f"{quantity.to(unit).magnitude:.12g}")
-    except (pint.errors.PintError, ArithmeticError, AttributeError, TypeError) as error:
+    except failures as error:
         raise ValueError(f"{text!r} has no unit that is known, {asked}") from error
 
 
@@ -152,7 +176,9 @@ def in_unit(text: str, unit: str) -> float | None:
 def _registry() -> "pint.UnitRegistry[float]":
     import pint  # noqa: PLC0415
 
-    return pint.UnitRegistry()
+    units: pint.UnitRegistry[float] = pint.UnitRegistry()
+    units.define("px = pixel")  # of pictures: in print it is a length, 1/96 inch
+    return units
 
 
 def _root(unit: Any) -> Any:

@@ -2,10 +2,11 @@
 
 import re
 import warnings
-from collections.abc import Mapping, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from datetime import date
 from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -33,6 +34,7 @@ MOST_BITS = 1000
 
 _MARKS = re.compile(r"[,:\[\]{}\n-]")
 _BRACKETS = re.compile(r"[\[\]{}]")
+_TWO_WHOLE = re.compile(r"[-+]?\d+,\d+(?![\d.eE])")
 _STAIRS = re.compile(r"(?:[-?:] *){50}| {200}")
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
@@ -92,6 +94,11 @@ class YamlFile:
         line, column = self.position(place)
         return f"{self.path}:{line}:{column}"
 
+    @property
+    def wrong(self) -> int:
+        """How many mistakes were noted."""
+        return len(self._problems)
+
     def problem(self, place: Place, message: str, *, key: bool = False) -> None:
         """Note a mistake in the value at ``place``, or in its ``key``.
 
@@ -99,6 +106,14 @@ class YamlFile:
         """
         line, column = self.position(place, key=key)
         self._problems += [(line, column, each) for each in message.splitlines()]
+
+    def uneven_commas(self) -> Iterator[tuple[Place, str]]:
+        """Yield where numbers of a list are apart by commas with and without a space.
+
+        That is the place of the list, and the first two numbers without a space, as they are
+        written: ``1,5``, which whoever writes decimals with a comma means as one.
+        """
+        yield from _uneven_commas(self._marked, (), self.text.split("\n"))
 
     def check(self, model: type[ModelT], place: Place = (), value: Any = None) -> ModelT | None:
         """Return what stands at ``place`` as a ``model``, or note what is wrong and return None.
@@ -139,6 +154,35 @@ class YamlFile:
                 f"{self.path}:{line}:{at}: {text}" for line, at, text in sorted(self._problems)
             ]
             raise ProtocolError("\n".join(dict.fromkeys(lines)))
+
+
+def _uneven_commas(node: Any, place: Place, lines: Sequence[str]) -> Iterator[tuple[Place, str]]:
+    if isinstance(node, CommentedMap):
+        for key, value in node.items():
+            yield from _uneven_commas(value, (*place, str(key)), lines)
+    elif isinstance(node, CommentedSeq):
+        if len(node) > 2 and all(_is_number(each) for each in node):  # noqa: PLR2004 - of two commas
+            if found := _without_a_space(node, lines):
+                yield place, found
+            return
+        for at, value in enumerate(node):
+            yield from _uneven_commas(value, (*place, at), lines)
+
+
+def _is_number(node: Any) -> bool:
+    return isinstance(node, int | float) and not isinstance(node, bool)
+
+
+def _without_a_space(node: CommentedSeq, lines: Sequence[str]) -> str:
+    """Return the first two whole numbers without the space between them that others have."""
+    first, spaced = "", False
+    spots = [node.lc.item(at) for at in range(len(node))]
+    for (line, column), (below, after) in pairwise(spots):
+        apart = below > line or lines[line][after - 1].isspace()
+        spaced = spaced or apart
+        if not apart and (found := _TWO_WHOLE.match(lines[line], column)):
+            first = first or found[0]
+    return first if spaced else ""
 
 
 def _held(node: Any, step: str | int) -> tuple[tuple[int, int], tuple[int, int], Any]:

@@ -9,6 +9,7 @@ from .links import link_boxes
 from .machine import Body, Joint
 from .meshes.mesh_file import MeshFile
 from .meshes.reader import read_surfaces
+from .meshes.solids import in_frame, read_solids, turned
 from .meshes.surface import MeshError, Surface
 from .scene import Geom, PlacedObject, Scene, ShapeKind, load_scene, place_objects
 from .scene_codec import SCENE_PLACED, read_placed, write_placed
@@ -34,6 +35,7 @@ __all__ = [
     "ShapeKind",
     "Surface",
     "beside",
+    "in_frame",
     "jacobian",
     "link_boxes",
     "link_frames",
@@ -43,9 +45,11 @@ __all__ = [
     "place_objects",
     "reach",
     "read_placed",
+    "read_solids",
     "read_surfaces",
     "segments",
     "stands",
+    "turned",
     "urdf_joint",
     "urdf_link",
     "urdf_of",

@@ -3,7 +3,7 @@
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import (
     GetJsonSchemaHandler,
@@ -16,19 +16,19 @@ from pydantic_core import CoreSchema
 
 from labcrane.errors import suggestion
 from labcrane.files.complaints import written
-from labcrane.files.model import StrictModel
+from labcrane.files.model import AtMost, StrictModel, Usual
 
 
 class ActuatorSettings(StrictModel):
     """How a drive follows its command: written out, or a name in :data:`ACTUATOR_PRESETS`."""
 
-    dead_time_s: NonNegativeFloat = 0.0
+    dead_time_s: Annotated[NonNegativeFloat, AtMost(60), Usual(0.001, 5.0)] = 0.0
     """Time before a command has any effect, in seconds; rounded to whole ticks."""
 
-    lag_s: NonNegativeFloat = 0.0
+    lag_s: Annotated[NonNegativeFloat, AtMost(60), Usual(0.001, 5.0)] = 0.0
     """Time constant of the first-order lag, in seconds."""
 
-    rate_limit: PositiveFloat | None = None
+    rate_limit: Annotated[PositiveFloat | None, Usual(0.1, 500.0)] = None
     """Largest change of speed, as a fraction of full joint speed per second; none by default."""
 
     @classmethod

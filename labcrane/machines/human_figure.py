@@ -41,6 +41,8 @@ class Geom:
         What it looks like instead.
     points
         Corners of a hull, about its centre, in m.
+    drawn
+        Whether it is drawn; not where the mesh of a shape before it, of the same name, shows it.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Geom:
     yaw: float
     mesh: MeshFile | None = None
     points: tuple[Point, ...] = ()
+    drawn: bool = True
 
 
 LIMBS: dict[str, tuple[str | None, float, float, Point]] = {

@@ -1,6 +1,7 @@
 """Library parts: things of several shapes, each in a file of its own that scenes use."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -9,6 +10,7 @@ from pydantic import (
     Field,
     NonNegativeFloat,
     PositiveFloat,
+    PrivateAttr,
     ValidationInfo,
     model_validator,
 )
@@ -16,7 +18,7 @@ from pydantic import (
 from labcrane.files.model import StrictModel
 from labcrane.files.yaml import YamlFile
 from labcrane.machines.human_figure import Geom, Point, ShapeKind
-from labcrane.machines.meshes.mesh_file import Looks
+from labcrane.machines.meshes.mesh_file import Looks, MeshFile
 
 FEWEST = 4
 """Points that a solid has at least."""
@@ -25,12 +27,14 @@ FEWEST = 4
 class PartShape(StrictModel):
     """One shape of a library part."""
 
-    shape: Literal["box", "cylinder", "sphere", "hull"]
-    """A cylinder stands upright; a hull is the smallest solid without hollows around its points."""
+    shape: Literal["box", "cylinder", "sphere", "hull", "mesh"]
+    """A cylinder stands upright; a hull is the smallest solid without hollows around its points; a
+    mesh is touched as it is seen: it is made of solids that may stand in each other, each closed
+    and without hollows, and so may have hollows itself."""
 
     size: Point = (0.0, 0.0, 0.0)
     """Edge lengths in metres; a cylinder's and a sphere's first is the diameter, a cylinder's last
-    the height. A hull has none."""
+    the height. A hull and a mesh have none."""
 
     points: tuple[Point, ...] = ()
     """Corners of a hull, about its centre, in metres."""
@@ -46,16 +50,71 @@ class PartShape(StrictModel):
     by default."""
 
     mesh: Looks | None = None
-    """What it looks like instead, in a frame at its centre; its touch is the same."""
+    """What it looks like instead, in a frame at its centre; its touch is the same. Of a mesh that
+    is touched an OBJ file, which stands in the record as text: from there it is replayed."""
+
+    _solids: tuple[tuple[Point, ...], ...] = PrivateAttr(default=())
 
     @model_validator(mode="after")
     def _has_an_extent(self) -> "PartShape":
-        if self.shape == "hull":
+        if self.shape == "mesh":
+            self._read_solids()
+        elif self.shape == "hull":
             if len(self.points) < FEWEST or any(self.size):
                 raise ValueError(f"a hull has {FEWEST} points or more, and no size")
         elif self.points or min(self.size) <= 0.0:
             raise ValueError(f"a {self.shape} has a size of three lengths, and no points")
         return self
+
+    def _read_solids(self) -> None:
+        """Read the mesh once: things are placed while a session runs."""
+        # What is read with needs SciPy, which a scene without meshes does without.
+        from labcrane.machines.meshes.solids import read_solids  # noqa: PLC0415
+
+        if self.mesh is None or self.points or any(self.size):
+            raise ValueError("a mesh that is touched has its file under mesh, no size, no points")
+        if self.mesh.file.suffix.lower() != ".obj":
+            raise ValueError(
+                f"{self.mesh.file.name!r} is no OBJ file, which a mesh that is touched must be: as "
+                "text it is kept with every recording"
+            )
+        self._solids = tuple(
+            tuple((float(x), float(y), float(z)) for x, y, z in corners)
+            for corners in read_solids(self.mesh)
+        )
+
+    def geoms(self, name: str) -> tuple[Geom, ...]:
+        """Return its solids, all of one name: a force on any of them is one on it."""
+        yaw = math.radians(self.yaw_deg)
+        if self.shape != "mesh":
+            size = _extent(self.points) if self.points else self.size
+            kind = ShapeKind(self.shape)
+            return (Geom(name, kind, size, self.centre, yaw, self.mesh, self.points),)
+        found = [self._solid(name, points, yaw) for points in self._solids]
+        for at, geom in enumerate(found):  # the first shows them all
+            found[at] = replace(
+                geom, mesh=self._seen_from(geom) if at == 0 else None, drawn=at == 0
+            )
+        return tuple(found)
+
+    def _solid(self, name: str, points: tuple[Point, ...], yaw: float) -> Geom:
+        """Return one of its solids about the middle of the box around it."""
+        middle = [(max(along) + min(along)) / 2.0 for along in zip(*points, strict=True)]
+        own = tuple((x - middle[0], y - middle[1], z - middle[2]) for x, y, z in points)
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        (x, y, z), (ahead, left, up) = self.centre, middle
+        centre = (x + cos * ahead - sin * left, y + sin * ahead + cos * left, z + up)
+        return Geom(name, ShapeKind.HULL, _extent(own), centre, yaw, None, own)
+
+    def _seen_from(self, first: Geom) -> MeshFile | None:
+        """Return its mesh in the frame of its first solid."""
+        if self.mesh is None:
+            return None
+        cos, sin = math.cos(first.yaw), math.sin(first.yaw)
+        x, y, z = (at - mine for at, mine in zip(self.centre, first.centre, strict=True))
+        away = (cos * x + sin * y, -sin * x + cos * y, z)
+        position = tuple(a + b for a, b in zip(self.mesh.position, away, strict=True))
+        return self.mesh.model_copy(update={"position": position})
 
 
 class Part(StrictModel):
@@ -93,18 +152,7 @@ class Part(StrictModel):
 
     def geoms(self) -> tuple[Geom, ...]:
         """Return its shapes."""
-        return tuple(
-            Geom(
-                name,
-                ShapeKind(each.shape),
-                each.size if each.shape != "hull" else _extent(each.points),
-                each.centre,
-                math.radians(each.yaw_deg),
-                each.mesh,
-                each.points,
-            )
-            for name, each in self.shapes.items()
-        )
+        return tuple(geom for name, each in self.shapes.items() for geom in each.geoms(name))
 
     def limits(self) -> dict[str, float]:
         """Return the largest force on each shape that has one, in N."""

@@ -7,6 +7,9 @@ from labcrane.files.names import STAMPS
 
 LETTER = r"[A-Za-z0-9]"
 
+LABELS = ("sub-", "subject-")
+"""What stands before a pseudonym in BIDS and in Psych-DS."""
+
 
 def spellings(name: str) -> list[str]:
     """Return how a pseudonym is written: as it is, and as BIDS and Psych-DS want it.
@@ -35,12 +38,19 @@ class Mentions:
         return {self._owners[match[0]] for match in self._pattern.finditer(text)}
 
     def renamed(self, text: str, old: str, new: str) -> str:
-        """Return ``text`` with ``new`` where ``old`` was, each in the same spelling."""
-        words = dict(zip(_all_spellings(old), _all_spellings(new), strict=True))
+        """Return ``text`` with ``new`` where ``old`` was, each in the same spelling.
+
+        A name that is all letters and digits is its own spelling in BIDS and Psych-DS; it is taken
+        for that where they put it, behind ``sub-`` and ``subject-``.
+        """
+        words = dict(reversed([*zip(_all_spellings(old), _all_spellings(new), strict=True)]))
+        bare = _all_spellings(new)[1]
 
         def put(match: re.Match[str]) -> str:
             word = match[0]
-            return words[word] if self._owners[word] == old else word
+            if self._owners[word] != old:
+                return word
+            return bare if word == old and text[: match.start()].endswith(LABELS) else words[word]
 
         return self._pattern.sub(put, text)
 

@@ -7,7 +7,7 @@ from datetime import date
 from pathlib import Path
 
 from labcrane.errors import ProtocolError
-from labcrane.files.atomic import copy, make_folder, replacing, sync_folder
+from labcrane.files.atomic import copy, make_folder, replacing, sync_folder, write_text
 from labcrane.files.names import check_name
 from labcrane.participants.copies import (
     Reach,
@@ -29,6 +29,7 @@ from labcrane.participants.register import (
     read,
 )
 from labcrane.participants.transfer import transfer
+from labcrane.recording.annotations import is_annotations
 from labcrane.recording.participant_file.relabel import (
     relabel_journal,
     relabel_participant_file,
@@ -139,6 +140,8 @@ def _relabel_files(source: Path, target: Path, old: str, new: str) -> None:
         if path.suffix == ".h5":
             with replacing(place) as beside:
                 relabel_participant_file(path, beside, old, new, sizes)
+        elif is_annotations(path):
+            write_text(place, rename(path.read_text(encoding="utf-8")))
         else:
             copy(path, place)
 

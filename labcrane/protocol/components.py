@@ -9,11 +9,13 @@ from typing import Any, TypeVar
 from labcrane.core.roles import Component, Cue, Feedback, Questionnaire, SignalMonitor
 from labcrane.core.settings import Settings
 from labcrane.errors import PluginError, ProtocolError
+from labcrane.files.complaints import named
+from labcrane.files.names import outside
 from labcrane.files.yaml import Place, YamlFile
 from labcrane.machines.library import read_machine
 from labcrane.machines.machine import Machine
 from labcrane.protocol.protocol import Protocol, Use
-from labcrane.protocol.referenced_files import plain_settings
+from labcrane.protocol.referenced_files import YAML, plain_settings, used
 from labcrane.registry.call_monitor import CallMonitor
 from labcrane.registry.hookspecs import ROLES
 from labcrane.registry.offers import Offer
@@ -173,6 +175,10 @@ class ComponentResolver:
     def machine(self) -> tuple[Machine, str] | None:
         """Return the machine and its file's text, or note what is wrong."""
         name, folder = self._at(("machine",)), self._source.path.parent
+        if not self._source.recorded and (why := _elsewhere(name, folder)):
+            at, what = why
+            self._source.problem(("machine", *at), what)
+            return None
         try:
             if isinstance(name, dict):
                 # Few machines are described so, and every command would read what describes them.
@@ -213,3 +219,20 @@ class ComponentResolver:
         for step in place:
             node = node.get(step) if isinstance(node, dict) else None
         return node
+
+
+def _elsewhere(machine: object, folder: Path) -> tuple[Place, str] | None:
+    """Return which file of a machine, or what it uses, is not in the study's folder, and why not.
+
+    What comes with labcrane lies where labcrane does.
+    """
+    kinds: dict[Place, object] = {(): machine}
+    if isinstance(machine, Mapping):
+        kinds = {(kind,): machine.get(kind) for kind in ("urdf", "mjcf")}
+    for place, name in kinds.items():
+        if not isinstance(name, str) or (not place and not name.endswith(YAML)):
+            continue
+        for path in (folder / name, *used(folder / name)):
+            if why := outside(path, folder):
+                return place, f"{named(('machine', *place))} is {name!r}, and {why}"
+    return None

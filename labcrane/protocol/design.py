@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from pydantic import Field, PositiveInt, ValidationInfo, field_validator
 
 from labcrane.core.settings import Settings
-from labcrane.files.model import AtMost
+from labcrane.files.model import AtMost, Usual
 from labcrane.protocol.tracks import Track
 
 RULES = ("as_written", "blocked", "latin_square", "shuffled", "williams")
@@ -29,7 +29,7 @@ class Order(Settings):
     times: Annotated[PositiveInt, AtMost(1000)] = 1
     """How often each level comes in a block."""
 
-    in_a_row: PositiveInt | None = None
+    in_a_row: Annotated[PositiveInt | None, Usual(1, 50)] = None
     """How often a level may come in a row, where the order is random."""
 
     @field_validator("rule")
@@ -88,6 +88,19 @@ class Design(Settings):
     tracks: dict[str, Track] = Field(default_factory=dict)
     """Levels that are chosen while the session runs, by what the participant does: staircases and
     QUEST+. Blocks name them as ``track``."""
+
+    primary: tuple[str, ...] = ()
+    """The primary outcomes, by which the study is judged: results of its tasks or measures of a
+    movement, ``[circle_to_circle, absolute_error]``. Their trends share one correction for several
+    tests; where none are named, all outcomes that the report tests share it."""
+
+    @field_validator("primary")
+    @classmethod
+    def _once(cls, primary: tuple[str, ...]) -> tuple[str, ...]:
+        for at, name in enumerate(primary):
+            if name in primary[:at]:
+                raise ValueError(f"{name!r} stands there twice; once is enough")
+        return primary
 
     @field_validator("order", mode="before", json_schema_input_type=dict[str, RuleName | Order])
     @classmethod

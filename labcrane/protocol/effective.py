@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from labcrane.files.model import numbers
+from labcrane.files.model import Usual, numbers
 from labcrane.files.yaml import Place
 from labcrane.protocol.study import Study
 
@@ -21,12 +21,15 @@ class Quantity:
         What is used.
     written
         What stands there; a plain number, or one with a unit of its own.
+    usual
+        Of what size it usually is; None where that is not known.
     """
 
     place: Place
     value: float
     unit: str
     written: Any
+    usual: Usual | None = None
 
 
 def written_quantities(study: Study) -> Iterator[Quantity]:
@@ -43,9 +46,9 @@ def written_numbers(study: Study) -> Iterator[Quantity]:
     }
     data = study.source.data if study.source else {}
     for place, settings in parts.items():
-        for at, unit, value in numbers(settings):
+        for at, unit, value, size in numbers(settings):
             where = (*place, *at)
-            yield Quantity(where, value, unit or "", _at(data, where))
+            yield Quantity(where, value, unit or "", _at(data, where), size)
 
 
 def _at(node: Any, place: Place) -> Any:

@@ -6,7 +6,7 @@ from typing import Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from labcrane.core.settings import Settings, StudyPath, was_run
+from labcrane.core.settings import Settings, StudyPath, WrongKey, was_run
 
 Language = Literal["en", "de", "pl", "fr", "es"]
 
@@ -58,14 +58,19 @@ class PageSettings(Settings):
     @field_validator("host")
     @classmethod
     def _is_an_address(cls, host: str, info: ValidationInfo) -> str:
-        if not was_run(info) and host != "127.0.0.1" and re.fullmatch(r"[\d.]+", host):
+        if was_run(info) or host == "127.0.0.1":
+            return host
+        if re.fullmatch(r"[\d.]+", host) or not re.fullmatch(
+            r"[\w.-]+", host
+        ):  # of names nothing more is said
             from ipaddress import ip_address  # noqa: PLC0415 - only an address needs it
 
             try:
                 ip_address(host)
             except ValueError:
                 raise ValueError(
-                    f"{host!r} is no address; write four numbers from 0 to 255, as 192.168.1.20"
+                    f"{host!r} is no address; write four numbers from 0 to 255, as 192.168.1.20, "
+                    "and the port as port:"
                 ) from None
         return host
 
@@ -91,5 +96,6 @@ class PageSettings(Settings):
     @model_validator(mode="after")
     def _both_or_none(self) -> Self:
         if (self.certificate is None) != (self.key is None):
-            raise ValueError("certificate and key belong together: give both, or none")
+            there = "key" if self.certificate is None else "certificate"
+            raise WrongKey("certificate and key belong together: give both, or none", at=(there,))
         return self

@@ -9,18 +9,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from labcrane.core.references import Reference, mentioned
 from labcrane.errors import LabcraneError, ProtocolError, suggestion
 from labcrane.files.pseudonyms import pseudonyms
 from labcrane.files.system import is_there
 from labcrane.files.yaml import Place
+from labcrane.protocol.components import ComponentSpec
 from labcrane.protocol.effective import written_numbers
 from labcrane.protocol.references import twice
 from labcrane.protocol.steps import READING_S, Block
+from labcrane.protocol.streams import SHARES
 from labcrane.protocol.study import Study, trials_of
 
 _AT = re.compile(r"(.+?):(\d+)(?::(\d+))?: (.*)")
 
 LONGEST_BREAK_S = 3600.0
+LONGEST_LATENCY_S = 2.0
 LONGEST_SESSION_S = 4 * 3600.0
 """Of a visit that does not say how long it may take."""
 
@@ -31,9 +35,11 @@ REHEARSAL = "rehearsal."
 
 PLAUSIBLE: Mapping[str, tuple[float, float]] = {
     "m": (1e-5, 1000.0),
+    "mm": (1e-2, 1e6),
     "s": (1e-5, 86_400.0),
     "deg": (0.0, 360.0),
     "rad": (0.0, 2 * math.pi),
+    "arcmin": (0.0, 21_600.0),
     "Hz": (1e-3, 1e6),
     "kg": (1e-3, 1e5),
     "N": (1e-3, 1e7),
@@ -44,6 +50,7 @@ PLAUSIBLE: Mapping[str, tuple[float, float]] = {
     "day": (0.0, 3650.0),
     "ppm": (0.0, 1e6),
     "uV": (1e-3, 1e6),
+    "px": (1.0, 1e5),
     "": (1e-12, 1e12),
 }
 """Between which sizes a number of each unit can be meant in a study; 0 always can."""
@@ -146,16 +153,26 @@ Doubts = Iterator[tuple[Place, str]]
 
 
 def _doubts(study: Study) -> Doubts:
+    yield from _of_sizes(study)  # first: what others ask of the same number says more
     yield from _of_components(study)
-    yield from _of_sizes(study)
+    yield from _of_commas(study)
     yield from _of_the_loop(study)
     yield from _of_feedback(study)
+    yield from _of_what_is_shared(study)
+    yield from _of_buttons(study)
+    yield from _of_monitors(study)
+    yield from _of_the_machine(study)
     yield from _of_silent_blocks(study)
     yield from _of_groups(study)
     yield from _of_squares(study)
     yield from _of_sessions(study)
     yield from _of_stop_rules(study)
+    yield from _of_what_is_not_used(study)
+    yield from _of_what_is_not_asked(study)
+    yield from _of_orders_of_steps(study)
+    yield from _of_fading(study)
     yield from _of_streams(study)
+    yield from _of_limits(study)
     yield from _of_repeats(study)
     yield from _of_pattern(study)
     yield from _of_the_pages(study)
@@ -180,11 +197,11 @@ def _of_pattern(study: Study) -> Doubts:
     except ProtocolError:
         yield (
             place,
-            f"the pattern {pattern!r} is not of letters and a number with room for {planned} "
+            f"the pattern '{pattern}' is not of letters and a number with room for {planned} "
             f"participant{'s' if planned > 1 else ''}, so that plans and simulations can name none",
         )
     if len(re.findall(r"(?<!\\)\{", pattern)) != len(re.findall(r"(?<!\\)\}", pattern)):
-        yield place, f"the pattern {pattern!r} has a brace that stands alone"
+        yield place, f"the pattern '{pattern}' has a brace that stands alone"
 
 
 def _of_repeats(study: Study) -> Doubts:
@@ -216,7 +233,8 @@ def _of_components(study: Study) -> Doubts:
     for part, choice in study.choices.items():
         place: Place = tuple(part.split(".", 1))
         for key, text in choice.settings.doubts(study.machine).items():
-            yield (*place, *key.split(".")), f"{part}.{key} {text}"
+            steps = [int(step) - 1 if step.isdecimal() else step for step in key.split(".")]
+            yield (*place, *steps), f"{part}.{key} {text}"
         for warning in choice.settings.warnings():
             yield place, f"{part}: {warning}"
         if part in {f"views.{name}" for name in study.views} and (
@@ -233,12 +251,26 @@ def _of_sizes(study: Study) -> Doubts:
     """Question every number that nobody would write, in its unit or without one."""
     for each in written_numbers(study):
         least, most = PLAUSIBLE[each.unit]
+        said = f"{key_of(each.place)} is {each.value:g} {each.unit}".rstrip()
         if each.value and not least <= abs(each.value) <= most:
-            yield each.place, f"{key_of(each.place)} is {each.value:g} {each.unit}".rstrip()
+            yield each.place, said
+        elif (size := each.usual) and each.value:
+            if abs(each.value) > size.most:
+                yield each.place, f"{said}, and {size.most:g} is very much"
+            elif abs(each.value) < size.least:
+                yield each.place, f"{said}, and {size.least:g} is very little"
 
 
 def _of_the_operator(study: Study) -> Iterator[Question]:
     """Question an operator who cannot stand in for the input: nothing can be simulated."""
+    if needs_people(study.operator):
+        yield Question(
+            "operator",
+            ("operator", "use"),
+            f"the operator, {study.operator.name!r}, is a device that somebody moves, so that the "
+            "study can be neither simulated nor rehearsed; is that meant?",
+        )
+        return
     if lacks := dict.fromkeys(name for _, name in study.beyond_operator):
         place = ("operator",) if "operator" in study.written else study.beyond_operator[0][0]
         yield Question(
@@ -248,6 +280,12 @@ def _of_the_operator(study: Study) -> Iterator[Question]:
             f"there, has no {', '.join(lacks)}, so that the study can be neither simulated nor "
             "rehearsed; is that meant?",
         )
+
+
+def needs_people(operator: ComponentSpec) -> bool:
+    """Whether what stands in for the input is itself hardware, or a view's keyboard."""
+    shown = (each.mark for each in mentioned(operator.settings))
+    return operator.offer.examine is not None or any(mark == Reference("view") for mark in shown)
 
 
 def _of_the_loop(study: Study) -> Doubts:
@@ -280,6 +318,64 @@ def _of_feedback(study: Study) -> Doubts:
             yield ("feedback", name), f"feedback {name!r} is never switched on"
 
 
+def _of_what_is_shared(study: Study) -> Doubts:
+    """Question views that fill one screen, one over the other, and what writes to one port."""
+    first: dict[tuple[str, str], str] = {}
+    for part, choice in study.choices.items():
+        key, _, name = part.partition(".")
+        given = choice.settings.provides(study.machine)
+        for kind, does in (("screen", "fill"), ("port", "write to")):
+            for what in given.get(kind, ()):
+                if (other := first.setdefault((kind, what), name)) != name:
+                    yield (key, name), f"{key} {other!r} and {name!r} both {does} {kind} {what}"
+
+
+def _of_buttons(study: Study) -> Doubts:
+    """Question a button that the scheme and a task both go by: one press does two things."""
+    scheme = study.choices["scheme"].settings
+    taken = {
+        str(each.value): each.place
+        for each in mentioned(scheme)
+        if isinstance(each.mark, Reference) and each.mark.kind == "button"
+    }
+    for part, choice in study.choices.items():
+        if part.startswith("tasks."):
+            for button in choice.settings.needs(study.machine).get("button", ()):
+                if button in taken:
+                    yield (
+                        tuple(part.split(".", 1)),
+                        f"{part} goes by {button!r}, and so does {key_of(taken[button])} of the "
+                        "scheme: one press does both",
+                    )
+
+
+def _of_monitors(study: Study) -> Doubts:
+    """Question monitors of streams of another type than theirs."""
+    for label, need in study.protocol.streams.items():
+        choice = study.choices.get(f"monitors.{label}")
+        types = choice.settings.provides(study.machine).get("stream type", ()) if choice else ()
+        if choice and types and need.type and need.type.lower() not in map(str.lower, types):
+            yield (
+                ("monitors", label),
+                f"monitors.{label} is {choice.name!r}, for streams of type {' or '.join(types)}, "
+                f"and streams.{label} is of type {need.type!r}",
+            )
+
+
+FASTEST_JOINT_DEG_S = 360.0
+HEAVIEST_LINK_KG = 50_000.0
+
+
+def _of_the_machine(study: Study) -> Doubts:
+    """Question joints that no crane has."""
+    for joint, speed in zip(study.machine.joints, study.machine.speeds, strict=True):
+        named = f"joint {joint.name!r} of the machine"
+        if math.degrees(speed) > FASTEST_JOINT_DEG_S:
+            yield ("machine",), f"{named} turns by {math.degrees(speed):.4g} degrees in a second"
+        elif joint.mass_kg > HEAVIEST_LINK_KG:
+            yield ("machine",), f"the link of {named} weighs {joint.mass_kg:g} kg"
+
+
 def _of_silent_blocks(study: Study) -> Doubts:
     """Question that every group is given all feedback because a block says nothing of it."""
     if not (study.protocol.design.groups and study.protocol.feedback):
@@ -298,6 +394,10 @@ def _of_silent_blocks(study: Study) -> Doubts:
 
 def _of_groups(study: Study) -> Doubts:
     protocol, groups = study.protocol, study.protocol.design.groups
+    if "" in groups:
+        yield ("design", "groups"), "a group has no name"
+    if len(groups) == 1:
+        yield ("design", "groups"), f"{next(iter(groups))!r} is the only group"
     if not groups or "planned" not in protocol.participants.model_fields_set:
         return
     planned, place = protocol.participants.planned, ("participants", "planned")
@@ -367,8 +467,112 @@ def _duration(seconds: float) -> str:
     return f"{seconds / 3600:.3g} hours"
 
 
+def _of_what_is_not_used(study: Study) -> Doubts:
+    """Question tasks that nobody does, and tracks that choose nothing."""
+    protocol = study.protocol
+    done = {block.task for _, block in _blocks(study)}
+    for name in protocol.tasks:
+        if name not in done:
+            yield ("tasks", name), f"no session has task {name!r}"
+    tracks = {block.track for _, block in _blocks(study)}
+    for name in protocol.design.tracks:
+        if name not in tracks:
+            yield ("design", "tracks", name), f"no block has track {name!r}"
+
+
+def _of_what_is_not_asked(study: Study) -> Doubts:
+    """Question questionnaires that nobody is asked, and rules that go by them."""
+    protocol = study.protocol
+    asked = {name for _, block in _blocks(study) for name in block.ask}
+    asked |= {
+        name
+        for session in protocol.sessions
+        for step in session.steps
+        for name in step.questionnaires
+    }
+    for name in protocol.questionnaires:
+        if name not in asked:
+            yield ("questionnaires", name), f"no session asks questionnaire {name!r}"
+    for number, rule in enumerate(protocol.stop_rules):
+        if rule.questionnaire not in asked:
+            yield (
+                ("stop_rules", number, "questionnaire"),
+                f"the rule goes by {rule.questionnaire!r}, which no session asks",
+            )
+    scores = [f"{rule.questionnaire}.{rule.score}" for rule in protocol.stop_rules]
+    for number, score in enumerate(scores):
+        if score in scores[:number]:
+            yield ("stop_rules", number, "score"), f"a second rule goes by {score}"
+
+
+def _of_orders_of_steps(study: Study) -> Doubts:
+    """Question sessions that ask for consent too late, or end with a break."""
+    for number, session in enumerate(study.protocol.sessions):
+        kinds = [step.kind for step in session.steps]
+        for at, kind in enumerate(kinds):
+            place: Place = ("sessions", number, "steps", at)
+            if kind == "consent" and any(step.block for step in session.steps[:at]):
+                yield (
+                    place,
+                    f"sessions: step {at + 1} of {session.name!r} asks for consent, after trials",
+                )
+            if kind == "consent" and kind in kinds[:at]:
+                yield place, f"sessions: step {at + 1} of {session.name!r} asks for consent again"
+        if kinds[-1] == "break":
+            at = len(kinds) - 1
+            yield ("sessions", number, "steps", at), f"session {session.name!r} ends with a break"
+
+
+def _of_commas(study: Study) -> Doubts:
+    """Question lists of numbers in which a comma may be meant as the sign of a decimal."""
+    for place, two in study.source.uneven_commas() if study.source else ():
+        yield (
+            place,
+            (
+                f"{key_of(place)} has {two} without a space beside commas with one, which are two "
+                f"numbers; write {two.replace(',', '.')} if one is meant, or else "
+                f"{two.replace(',', ', ')}"
+            ),
+        )
+
+
+def _of_fading(study: Study) -> Doubts:
+    """Question feedback that is to fade over fewer trials than it has parts, or is not there."""
+    for place, block in _blocks(study):
+        if block.fading == (1.0,):
+            continue
+        kind = study.protocol.sessions[int(place[1])].steps[int(place[3])].kind
+        at = (*place, kind, "fading")
+        count = trials_of(block, study.protocol, study.tasks[block.task])[0] / block.repeat
+        if block.feedback in ("none", ()):
+            yield at, "the feedback fades, and there is none"
+        elif count < len(block.fading):
+            yield at, f"the feedback fades in {len(block.fading)} parts, over {count:.0f} trials"
+
+
+def _of_limits(study: Study) -> Doubts:
+    """Question limits of time that fail before they warn, and shares of more than everything."""
+    for key, (warn, fail) in study.protocol.sync:
+        if warn > fail:
+            said = f"sync.{key} warns beyond {warn:g}, and fails beyond {fail:g} already"
+            yield ("sync", key), said
+        elif key in SHARES and fail > 1.0:
+            yield ("sync", key), f"sync.{key} fails beyond {fail:g}, and is a share of 1"
+
+
 def _of_streams(study: Study) -> Doubts:
+    first: dict[tuple[str | None, ...], str] = {}
     for label, need in study.protocol.streams.items():
+        of = (need.type, need.name, need.source_id)
+        if "" in of:
+            yield ("streams", label), f"streams: {label} is asked for by an empty text"
+        if (other := first.setdefault(of, label)) != label:
+            yield ("streams", label), f"streams: {other} and {label} are the same"
+        if need.latency_s is not None and abs(need.latency_s) > LONGEST_LATENCY_S:
+            yield (
+                ("streams", label, "latency_s"),
+                f"streams: {label} has a latency of {need.latency_s:g} s",
+            )
         if need.any_of_type:
             yield (
                 ("streams", label),

@@ -10,24 +10,27 @@ from typing import Any
 
 from labcrane.core.settings import Settings
 from labcrane.errors import ProtocolError
+from labcrane.files.system import is_file
 from labcrane.files.yaml import parse_yaml
+
+YAML = (".yaml", ".yml")
 
 
 def plain_settings(settings: Settings, folder: Path) -> Any:
     """Return settings as JSON holds them, with the study's files named from its ``folder``."""
-    names = {str(path): _name(path, folder) for path in _paths(settings.model_dump())}
+    names = {str(path): _name(path, folder) for path in paths_in(settings.model_dump())}
     return _renamed(settings.model_dump(mode="json"), names)
 
 
 def named_files(every: Iterable[Settings], folder: Path) -> dict[str, dict[str, str | None]]:
     """Return what is in every file that settings name, by its name from ``folder``.
 
-    So are the YAML files that these name under ``use``. ``text`` is None for what is no text;
-    ``sha256`` there is always.
+    So are the YAML files that these name under ``use``, and the meshes under ``mesh``. ``text`` is
+    None for what is no text; ``sha256`` there is always.
     """
     found: dict[str, dict[str, str | None]] = {}
     for settings in every:
-        for named in _paths(settings.model_dump()):
+        for named in paths_in(settings.model_dump()):
             for path in (named, *used(named)):
                 if not (path.is_absolute() and path.is_file()):
                     continue
@@ -42,8 +45,21 @@ def named_files(every: Iterable[Settings], folder: Path) -> dict[str, dict[str, 
 
 
 def used(path: Path) -> list[Path]:
-    """Return the files that a YAML file of the study uses: ``use: parts/car.yaml``, beside it."""
-    if path.suffix not in {".yaml", ".yml"} or not path.is_file():
+    """Return the files that a YAML file of the study uses, and those that these use.
+
+    They are named from beside it: ``use: parts/car.yaml``, ``mesh: boulder.obj``.
+    """
+    found: dict[Path, None] = {}
+    waiting = [path]
+    while waiting:
+        new = [each for each in _used(waiting.pop()) if each not in found]
+        found.update(dict.fromkeys(new))
+        waiting += new
+    return list(found)
+
+
+def _used(path: Path) -> list[Path]:
+    if path.suffix not in YAML or not is_file(path):
         return []
     try:
         data = parse_yaml(path.read_text(encoding="utf-8", errors="replace"), str(path))
@@ -54,7 +70,10 @@ def used(path: Path) -> list[Path]:
 
 def _names(data: object) -> Iterator[str]:
     if isinstance(data, Mapping):
-        if isinstance(name := data.get("use"), str) and name.endswith((".yaml", ".yml")):
+        if isinstance(name := data.get("use"), str) and name.endswith(YAML):
+            yield name
+        mesh = data.get("mesh")
+        if isinstance(name := mesh.get("file") if isinstance(mesh, Mapping) else mesh, str):
             yield name
         for value in data.values():
             yield from _names(value)
@@ -78,15 +97,16 @@ def _name(path: Path, folder: Path) -> str:
     return whole.relative_to(inside).as_posix() if whole.is_relative_to(inside) else str(path)
 
 
-def _paths(value: object) -> Iterator[Path]:
+def paths_in(value: object) -> Iterator[Path]:
+    """Yield every path in settings as plain data."""
     if isinstance(value, Path):
         yield value
     elif isinstance(value, Mapping):
         for item in value.values():
-            yield from _paths(item)
+            yield from paths_in(item)
     elif isinstance(value, list | tuple):
         for item in value:
-            yield from _paths(item)
+            yield from paths_in(item)
 
 
 def _renamed(value: Any, names: Mapping[str, str]) -> Any:

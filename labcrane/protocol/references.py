@@ -4,24 +4,26 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from os.path import normpath
 from pathlib import Path
-from typing import Any
 
-from labcrane.core.references import EVENTS, Covers, Mark, Mentioned, Once, Reference, mentioned
+from labcrane.core.references import EVENTS, Covers, Mentioned, Once, Reference, mentioned
 from labcrane.core.roles import Component, Task
 from labcrane.core.settings import Settings
 from labcrane.errors import LabcraneError, nearest
-from labcrane.files.names import absent
+from labcrane.files.names import absent, outside
 from labcrane.files.system import is_there
 from labcrane.files.yaml import Place, YamlFile
 from labcrane.machines.machine import Machine
 from labcrane.protocol.components import ComponentSpec
+from labcrane.protocol.referenced_files import paths_in, used
 
 Known = frozenset[str] | None
 """The names of a kind; None where a component of the study does not say what it has."""
 
 OWNERS: Mapping[str, str] = {
     "axis": "the input",
+    "axis of the input": "it",
     "button": "the input",
     "joint": "the machine",
     "link": "the machine",
@@ -32,6 +34,13 @@ OWNERS: Mapping[str, str] = {
     "view": "the protocol",
 }
 """Who has the names of a kind, for the message; any other kind is the study's."""
+
+READ_BY_BUILDING = frozenset({"input", "operator", "scheme", "dynamics"})
+"""Keys of components that open the files of their settings when they are built: a check builds
+those that name any. Views and sounds are built by a rehearsal."""
+
+BUILT = frozenset({"tasks", "questionnaires"})
+"""Keys of what a check builds: what building finds is told there."""
 
 
 @dataclass(frozen=True)
@@ -66,11 +75,13 @@ class ReferenceChecker:
         self._tasks = parts.tasks
         self._sections = parts.sections
         self._known: dict[str, Known] = {}
+        self._noted: set[Place] = set()  # files of which something was said
 
     def check(self) -> None:
         """Look up what every component's settings mention, and what they need unmentioned."""
         self._check_sections()
         for place, choice in self._components.items():
+            before = self._source.wrong
             settings = choice.settings
             written = list(mentioned(settings))
             for mention in written:
@@ -80,7 +91,7 @@ class ReferenceChecker:
                 elif isinstance(mention.mark, Reference):
                     self._refers(at, mention, mention.mark, choice)
                 elif place != ("operator",):
-                    self._whole(at, mention.mark, mention.value)
+                    self._whole(at, mention, choice)
             for kind, names in self._needed(place, settings):
                 known = self._names(kind, place) if kind in OWNERS else self._own(choice, kind)
                 said = {mention.value for mention in written if mention.mark == Reference(kind)}
@@ -88,6 +99,25 @@ class ReferenceChecker:
                     if known is not None and name not in known and name not in said:
                         message = f"{_dotted(place)} needs the {kind} {name!r}, and "
                         self._source.problem(place, message + _has(kind, name, known))
+            if place[0] in READ_BY_BUILDING:
+                self._read(place, choice, faulty=self._source.wrong > before)
+
+    def _read(self, place: Place, choice: ComponentSpec, *, faulty: bool) -> None:
+        """Build what names files, so that what is wrong inside of them is found before a run.
+
+        Of what is ``faulty`` anyway only what is said of the files is told, and that once.
+        """
+        named = [key for key, each in choice.settings if any(paths_in(each))]
+        if not named or choice.offer.missing:
+            return
+        try:
+            choice.build(self._machine)
+        except LabcraneError as error:
+            said = getattr(error, "at", ())
+            at = said or named[:1]
+            if (*place, *at) in self._noted or (faulty and said[:1] not in [(n,) for n in named]):
+                return
+            self._source.problem((*place, *at), f"{_dotted((*place, *at))}: {error}")
 
     def _check_sections(self) -> None:
         """Look up the files that the protocol names beside its components."""
@@ -100,13 +130,28 @@ class ReferenceChecker:
         self, at: Place, mention: Mentioned, mark: Reference, choice: ComponentSpec
     ) -> None:
         written = mention.value
-        name = written.name.split(".")[0] if isinstance(written, Path) else mark.bare(written)
-        known = self._holds(mark, choice, at)
-        if known is None or name in known:
+        known = self._holds(mark, mention, choice, at)
+        if known is None:
             return
-        said = name if isinstance(written, Path) else written
-        message = f"{_dotted(at)} is {said!r}, and {_has(mark.kind, name, known)}"
-        self._source.problem(at, message, key=mention.key)
+        if isinstance(written, Path):
+            self._is_the_file(at, mark, written, known)
+        elif (name := mark.bare(written)) not in known:
+            message = f"{_dotted(at)} is {written!r}, and {_has(mark.kind, name, known)}"
+            self._source.problem(at, message, key=mention.key)
+
+    def _is_the_file(self, at: Place, mark: Reference, path: Path, known: frozenset[str]) -> None:
+        """Note a file that is not among those known, which are told by their path or their name."""
+        name = _stem(path)
+        if name in known or normpath(path) in map(normpath, known):
+            return
+        named = {_stem(Path(each)): each for each in known}
+        what = f"{_dotted(at)} is {name!r}, and "
+        if name in named:
+            owner = OWNERS.get(mark.kind, "it")
+            what += f"{owner} has another file of that name, {named[name]}; name the same one"
+        else:
+            what += _has(mark.kind, name, frozenset(named))
+        self._source.problem(at, what)
 
     def beyond_the_operator(self) -> Iterator[tuple[Place, str]]:
         """Yield axes and buttons of the input that the operator who stands in for it has not.
@@ -129,30 +174,58 @@ class ReferenceChecker:
                     if has is not None and name not in has:
                         yield at, name
 
-    def _holds(self, mark: Reference, choice: ComponentSpec, at: Place) -> Known:
+    def _holds(
+        self, mark: Reference, mention: Mentioned, choice: ComponentSpec, at: Place
+    ) -> Known:
         if mark.of:
             view = self._components.get(("views", str(getattr(choice.settings, mark.of, ""))))
             return self._own(view, mark.kind) if view else None  # that there is none is told there
-        return self._own(choice, mark.kind) if mark.own else self._names(mark.kind, at)
+        if mark.own:
+            return self._of_holders(mention, mark.kind, choice)
+        return self._names(mark.kind, at)
+
+    def _of_holders(self, mention: Mentioned, kind: str, choice: ComponentSpec) -> Known:
+        """Return what a component has of a kind: as its innermost settings say."""
+        for holder in reversed(mention.holders[1:]):
+            if isinstance(holder, Settings) and kind in (said := holder.provides(self._machine)):
+                return frozenset(said[kind])
+        return self._own(choice, kind)
 
     def _is_there(self, at: Place, path: Path) -> None:
-        if not is_there(path):
+        """Note a file that is not there, or would not move with the study; so with what it uses."""
+        folder, before = self._source.path.parent, self._source.wrong
+        if why := outside(path, folder):
+            self._source.problem(at, f"{_dotted(at)} is {path.name!r}, and {why}")
+        elif not is_there(path):
             self._source.problem(at, f"{_dotted(at)} is {path.name!r}, and {absent(path)}")
+        else:
+            for each in used(path):
+                if why := outside(each, folder):
+                    what = f"{_dotted(at)} is {path.name!r}, which uses {each.name!r}, and {why}"
+                    self._source.problem(at, what)
+        if self._source.wrong > before:
+            self._noted.add(at)
 
     def _needed(self, place: Place, settings: Settings) -> Iterator[tuple[str, Sequence[str]]]:
         try:
+            if place[0] not in BUILT:
+                settings.provides(self._machine)
             yield from settings.needs(self._machine).items()
         except LabcraneError as error:  # a file that it has to look into
-            self._source.problem(place, str(error))
+            at = getattr(error, "at", ())
+            self._noted.add((*place, *at))
+            self._source.problem((*place, *at), str(error))
 
     def _own(self, choice: ComponentSpec, kind: str) -> Known:
         said = self._said(choice, kind)
         return None if said is None else frozenset(said)
 
-    def _whole(self, at: Place, mark: Mark, value: Any) -> None:
+    def _whole(self, at: Place, mention: Mentioned, choice: ComponentSpec) -> None:
         """Note what a mapping leaves out or has twice."""
+        mark, value = mention.mark, mention.value
         if isinstance(mark, Covers):
-            known = self._names(mark.kind, at) or frozenset()
+            own = self._of_holders(mention, mark.kind, choice) if mark.own else None
+            known = own or self._names(mark.kind, at) or frozenset()
             for name in [name for name in self._ordered(mark.kind, known) if name not in value]:
                 message = f"{_dotted(at)} has nothing for the {mark.kind} {name!r}; it needs one "
                 every = ", ".join(self._ordered(mark.kind, known))
@@ -163,8 +236,10 @@ class ReferenceChecker:
             for key, item in items:
                 name = str(item).removeprefix("-")
                 if name in first:
-                    both = f"{first[name]!r} and {key!r}" if isinstance(key, str) else "two of them"
-                    message = f"{_dotted(at)} has {name!r} for both {both}; give each its own"
+                    message = f"{_dotted(at)} has {name!r} twice; write it once"
+                    if isinstance(key, str):
+                        both = f"both {first[name]!r} and {key!r}"
+                        message = f"{_dotted(at)} has {name!r} for {both}; give each its own"
                     self._source.problem((*at, key), message)
                 first.setdefault(name, key)
 
@@ -184,13 +259,14 @@ class ReferenceChecker:
         if kind == "view":
             views = self._source.data.get("views")
             return frozenset(views if isinstance(views, dict) else ())
-        if kind == "axis":
-            return self._of([(device,)], kind)
+        if kind in {"axis", "axis of the input"}:
+            said = self._of([(device,)], "axis")
+            return None if said is None else frozenset(n for n in said if not _is_status(n))
         if kind == "scene":
             return self._of([("dynamics",)], kind)
         if kind == "button":
             said = self._of([(device,)], kind)
-            return self._of([(device,)], "axis") if said is None else said
+            return self._found("axis", device) if said is None else said
         if kind == "signal":
             given = self._of([("scheme",), ("dynamics",)], kind)
             shown = {c for each in self._tasks.values() for s in each.signals for c in s.columns}
@@ -235,6 +311,15 @@ class ReferenceChecker:
         except LabcraneError:
             return None  # what is wrong with the component is said where it is built or installed
         return None
+
+
+def _is_status(axis: str) -> bool:
+    """Whether a number of an input says that a device is there, which nobody moves or presses."""
+    return axis.rsplit(".", maxsplit=1)[-1] == "connected"
+
+
+def _stem(path: Path) -> str:
+    return path.name.split(".")[0]
 
 
 def _columns(component: Component) -> Iterator[str]:

@@ -9,14 +9,15 @@ from pydantic import (
     NonNegativeInt,
     PositiveFloat,
     PositiveInt,
+    ValidationInfo,
     field_validator,
 )
 
 from labcrane.core.settings import Settings
 from labcrane.errors import ProtocolError, suggestion
 from labcrane.files.complaints import shown
-from labcrane.files.model import AtMost
-from labcrane.files.names import absent
+from labcrane.files.model import AtMost, Usual, was_run
+from labcrane.files.names import absent, outside
 from labcrane.files.units import Unit
 from labcrane.files.yaml import Place, YamlFile, read_text
 from labcrane.protocol.design import Criterion
@@ -66,6 +67,16 @@ class Block(Section):
     until: Criterion | None = None
     """For practice: it ends as soon as this is met."""
 
+    @field_validator("fading")
+    @classmethod
+    def _has_parts(cls, fading: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        if not fading and not was_run(info):
+            raise ValueError(
+                "there is no part in it; write the share of each, as [1, 0.5, 0], or leave fading "
+                "out"
+            )
+        return fading
+
     @property
     def limits(self) -> dict[str, Any]:
         """How many levels of which factor, as written."""
@@ -108,7 +119,7 @@ class Session(Section):
     after_days: tuple[NonNegativeInt, NonNegativeInt] | None = None
     """Earliest and latest day after the session before: ``[1, 3]``."""
 
-    window_s: PositiveFloat | None = None
+    window_s: Annotated[PositiveFloat | None, Usual(10.0, 86_400.0)] = None
     """How long the visit may take, in seconds, as participants are told and rooms are booked:
     ``90 min``. A check asks about a session that is likely to take longer."""
 
@@ -215,6 +226,10 @@ def _instructions(source: YamlFile, place: Place, value: Any) -> dict[str, Any] 
         source.problem((*place, "instructions"), told)
         return None
     path = source.path.parent / value
+    if not source.recorded and (why := outside(path, source.path.parent)):
+        told = f"instructions is {value!r}, and {why}"
+        source.problem((*place, "instructions"), told)
+        return None
     try:
         return {"kind": "instructions", "file": value, "text": read_text(path)}
     except ProtocolError as error:

@@ -1,11 +1,16 @@
 """Streams of others that a protocol asks for, and how right their time must be."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from pydantic import NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+from pydantic import (
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+    model_validator,
+)
 
-from labcrane.core.settings import Settings
+from labcrane.core.settings import Settings, Usual
 from labcrane.streams.sync.report.limits import Limit, Limits
 
 if TYPE_CHECKING:  # a protocol is checked without loading what corrects clocks
@@ -35,20 +40,20 @@ class StreamNeed(Settings):
     required: bool = True
     """Whether a session starts only when it flows."""
 
-    rate_hz: PositiveFloat | None = None
+    rate_hz: Annotated[PositiveFloat | None, Usual(0.1, 50_000.0)] = None
     """Nominal rate that is expected, in samples per second."""
 
-    channels: PositiveInt | None = None
+    channels: Annotated[PositiveInt | None, Usual(1, 2000)] = None
     """Number of channels that is expected."""
 
     counter: str | None = None
     """Label of the channel that counts samples; its gaps are lost samples."""
 
-    latency_s: float | None = None
+    latency_s: Annotated[float | None, Usual(1e-5, 2.0)] = None
     """Fixed latency of the device, in seconds, as measured or stated by its maker; subtracted from
     its times. What the stream's own header states holds by default."""
 
-    min_delay_s: NonNegativeFloat | None = None
+    min_delay_s: Annotated[NonNegativeFloat | None, Usual(1e-5, 2.0)] = None
     """For a device whose samples are stamped when they are sent: the shortest time from sampling to
     stamping, in seconds. It cannot be observed. Without it, stamps are taken to scatter evenly
     around the truth."""
@@ -121,6 +126,10 @@ class StreamNeed(Settings):
             transport_s=self.min_delay_s or 0.0,
             latency_s=stated.latency_s if self.latency_s is None else self.latency_s,
         )
+
+
+SHARES = frozenset({"missing", "late"})
+"""Limits that are fractions of a whole."""
 
 
 class TimeLimits(Settings):

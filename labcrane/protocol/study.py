@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeGuard
 
+from labcrane.analysis.tables.definitions import MEASURES
+from labcrane.core.records import Value
 from labcrane.core.roles import Controller, Dynamics, InputDevice, Questionnaire, Task
 from labcrane.core.settings import Settings
 from labcrane.errors import ProtocolError, nearest
@@ -56,6 +58,8 @@ class Study:
         Where axes and buttons are named that the input has, and the operator has not.
     outdated
         What would be refused of it today, where it is gone on with as it was begun.
+    answers
+        What a simulated participant says, by questionnaire and item; the rest is drawn.
     source
         The protocol's file, which knows the line of everything.
     """
@@ -82,6 +86,7 @@ class Study:
     recorded: bool = False
     beyond_operator: tuple[tuple[Place, str], ...] = ()
     outdated: str = ""
+    answers: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
     source: YamlFile | None = field(default=None, repr=False, compare=False)
 
     @property
@@ -195,6 +200,8 @@ class Checker:
         self._check_stop_rules(asked)
         if self._source.recorded:
             return  # what follows changes nothing of what was run, and was once accepted
+        if len(tasks) == len(self._protocol.tasks):
+            self._check_primary(tasks)
         self._check_names()
         self._check_own_streams()
         if self._protocol.participants.ends_early:
@@ -240,6 +247,20 @@ class Checker:
                     continue
                 self._limits(place, block.limits, task)
                 self._count(place, block, task)
+
+    def _check_primary(self, tasks: Mapping[str, Task]) -> None:
+        """Note primary outcomes that no task and no measure gives."""
+        given = [
+            column
+            for task in tasks.values()
+            for signal in task.results
+            for column in signal.columns
+        ]
+        known = [*dict.fromkeys([*given, *MEASURES])]
+        for number, name in enumerate(self._protocol.design.primary):
+            if name not in known:
+                message = f"there is no outcome {name!r}; {nearest(name, known, 'there is')}"
+                self._source.problem(("design", "primary", number), message)
 
     def _track(self, place: Place, block: Block, task: Task) -> bool:
         """Note what is wrong with a block's track, for its task; return whether all is right."""
@@ -416,6 +437,8 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
             **{("tasks", name): choice for name, choice in choices.items()},
             **{("feedback", name): choice for name, choice in (cues | sounds).items()},
             **{("views", name): choice for name, choice in views.items()},
+            **{("questionnaires", name): choice for name, choice in asked.items()},
+            **{("monitors", name): choice for name, choice in (monitors or {}).items()},
             **{tuple(part.split(".", 1)): choice for part, choice in others.items()},
         }
         there = {place: choice for place, choice in chosen.items() if choice}

@@ -16,8 +16,14 @@ from pydantic import (
 )
 
 from labcrane.core.records import Phase, Value
-from labcrane.core.settings import Settings
+from labcrane.core.settings import Settings, WrongKey
 from labcrane.files.model import AtMost, was_run
+
+ROUNDING = 1e-9
+"""By how much a standard deviation may be off by rounding."""
+
+THRESHOLDS = 61
+"""That QUEST+ takes for possible, evenly from the easiest to the hardest level."""
 
 JUDGED = (Phase.SUCCESS, Phase.FAILURE, Phase.TIMEOUT)
 """How trials end that say something of the participant."""
@@ -141,17 +147,56 @@ class Track(Settings):
             )
         return levels
 
+    @field_validator("quest_plus")
+    @classmethod
+    def _something_is_to_be_learnt(
+        cls, law: QuestPlus | None, info: ValidationInfo
+    ) -> QuestPlus | None:
+        levels = info.data.get("levels")
+        if law is None or law.until_sd is None or levels is None or was_run(info):
+            return law
+        # Of n numbers that are evenly spaced by w: w sqrt((n^2 - 1) / 12).
+        spacing = (max(levels.values()) - min(levels.values())) / (THRESHOLDS - 1)
+        beforehand = spacing * math.sqrt((THRESHOLDS**2 - 1) / 12)
+        if law.until_sd >= beforehand * (1.0 - ROUNDING):
+            raise WrongKey(
+                f"{law.until_sd:g} is reached before the first answer, as the standard deviation "
+                f"of the threshold is {beforehand:.3g} then; write less",
+                at=("until_sd",),
+            )
+        return law
+
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
         if (self.up_down is None) == (self.quest_plus is None):
             there = "both are there" if self.up_down else "neither is there"
             raise ValueError(f"{there}; one of up_down and quest_plus chooses the levels")
         if self.start and self.start not in self.levels:
-            raise ValueError(
-                f"start is {self.start!r}, which is no level; there is {', '.join(self.levels)}"
+            raise WrongKey(
+                f"start is {self.start!r}, which is no level; there is {', '.join(self.levels)}",
+                at=("start",),
             )
         if bool(self.measure) != (self.at_least is not None or self.at_most is not None):
             raise ValueError("a measure has at_least, at_most or both, and they have a measure")
+        return self
+
+    @model_validator(mode="after")
+    def _can_be_met(self, info: ValidationInfo) -> Self:
+        if was_run(info):
+            return self
+        least, most = self.at_least, self.at_most
+        if least is not None and most is not None and least > most:
+            raise ValueError(
+                f"at_least is {least:g} and at_most {most:g}: no trial is a success; write an "
+                "at_most that is larger"
+            )
+        if self.up_down is not None:
+            for key in ("harder_after", "easier_after", "reversals"):
+                if (count := getattr(self.up_down, key)) > self.rounds:
+                    raise ValueError(
+                        f"up_down.{key} is {count}, and there are {self.rounds} rounds; write "
+                        f"{self.rounds} or less, or more rounds"
+                    )
         return self
 
     @property

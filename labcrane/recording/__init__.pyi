@@ -1,23 +1,30 @@
 """The public names of this package, and the modules from which they are imported."""
 
+from .annotations import Annotation, annotate, read_annotations, withdraw
 from .labels import HED_VERSION, LABELS, hed_sidecar, labelled, name_of
 from .participant_file.about import citation
 from .participant_file.reader import Recording, SessionRecord, Stream, open_recording
+from .participant_file.writer import put_seal
 from .xdf.header import Channel, StreamHeader
 from .xdf.writer import XdfWriter
 
 __all__ = [
     "HED_VERSION",
     "LABELS",
+    "Annotation",
     "Channel",
     "Recording",
     "SessionRecord",
     "Stream",
     "StreamHeader",
     "XdfWriter",
+    "annotate",
     "citation",
     "hed_sidecar",
     "labelled",
     "name_of",
     "open_recording",
+    "put_seal",
+    "read_annotations",
+    "withdraw",
 ]

@@ -109,8 +109,13 @@ def _first_of_each(
     """Return the entry points of the first distribution of each name: only that can be imported."""
     first: dict[str, list[tuple[str, EntryPoint]]] = {}
     for name, points in found:
-        first.setdefault(re.sub(r"[-_.]+", "-", name).lower(), points)
+        first.setdefault(one_name(name), points)
     return tuple(point for points in first.values() for point in points)
+
+
+def one_name(project: str) -> str:
+    """Return the one way to write a project's name, by PEP 503."""
+    return re.sub(r"[-_.]+", "-", project).lower()
 
 
 def _information(place: str) -> Iterator[Path]:

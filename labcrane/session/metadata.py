@@ -50,7 +50,22 @@ def context(visit: Visit, plan: SessionPlan, rig: Rig, run: Run) -> dict[str, An
             {"block": block.number, "name": block.name, "trials": len(block.trials)}
             for block in plan.blocks
         ],
+        **_of_tracks(plan),
+        **_of_outcomes(visit.study),
     }
+
+
+def _of_tracks(plan: SessionPlan) -> dict[str, Any]:
+    """Return by which laws levels are chosen; nothing where none are."""
+    tracks = {
+        each.track.name: each.track.described for each in plan.blocks if each.track is not None
+    }
+    return {"tracks": tracks} if tracks else {}
+
+
+def _of_outcomes(study: Study) -> dict[str, Any]:
+    """Return the primary outcomes; nothing where the protocol names none."""
+    return {"primary": list(study.protocol.design.primary)} if study.protocol.design.primary else {}
 
 
 def _of_visit(visit: Visit, plan: SessionPlan) -> dict[str, Any]:

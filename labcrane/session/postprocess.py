@@ -19,7 +19,11 @@ from labcrane.streams.sync.correction import Treatment, correct
 from labcrane.streams.sync.pool import pooled
 from labcrane.streams.sync.raw import RawStream, raw_of, unwrapped
 from labcrane.streams.sync.report.limits import Limits
-from labcrane.streams.sync.report.stream_report import StreamReport, judge_stream
+from labcrane.streams.sync.report.stream_report import (
+    StreamReport,
+    judge_stream,
+    uncorrected_stream,
+)
 from labcrane.streams.sync.report.sync_report import LoopReport, SyncReport, judge_loop, never_came
 from labcrane.streams.sync.resync import columns_of, quality_of, treatment_of
 
@@ -51,11 +55,7 @@ def conclude(group: "h5py.Group") -> SyncReport:
     streams = [_read(one, needs) for one in group.get("streams", {}).values()]
     raws = pooled([one.raw for one in streams], [one.recorded.header.host for one in streams])
     end = _end(group, raws)
-    judged = [
-        found
-        for one, raw in zip(streams, raws, strict=True)
-        if (found := _corrected(one, raw, end, limits)) is not None
-    ]
+    judged = [_corrected(one, raw, end, limits) for one, raw in zip(streams, raws, strict=True)]
     came = {one.label for one in streams}
     missing = {label: need.required for label, need in needs.items() if label not in came}
     report = SyncReport(tuple(judged), _loop(group, context, limits), never_came(missing))
@@ -85,16 +85,16 @@ def _end(group: "h5py.Group", raws: Sequence[RawStream]) -> float | None:
     return max(lasts, default=None)
 
 
-def _corrected(
-    one: _Read, raw: RawStream, end: float | None, limits: Limits
-) -> StreamReport | None:
-    """Write a stream's times, and return how right they are; None where they cannot be had."""
+def _corrected(one: _Read, raw: RawStream, end: float | None, limits: Limits) -> StreamReport:
+    """Write a stream's times, and return how right they are."""
     try:
         treatment = _treatment(one)
         corrected = correct(raw, treatment, end)
-    except LabcraneError as error:  # one stream's clock must not keep a session from its file
-        write_uncorrected(one.group, str(error))
-        return None
+    # One stream's clock must not keep a session from its file; nor may what nobody foresaw of it.
+    except Exception as error:  # noqa: BLE001
+        why = str(error) if isinstance(error, LabcraneError) else f"{error!r}; please report this"
+        write_uncorrected(one.group, why)
+        return uncorrected_stream(one.recorded, why)
     write_time(one.group, columns_of(corrected), quality_of(corrected, treatment))
     required = one.need is None or one.need.required
     return judge_stream(one.recorded, corrected.quality, limits, required=required)

@@ -110,11 +110,13 @@ class QuestionnaireForm:
         """Return every score; NaN where it needs an answer that is missing."""
         return dict(self._questionnaire.score(self._answers))
 
-    def simulated(self, seed: int) -> Iterator[Said]:
-        """Yield the answers of somebody who answers at random, and hand it in."""
+    def simulated(self, seed: int, known: Mapping[str, Value]) -> Iterator[Said]:
+        """Yield the answers of somebody who says what is known, the rest at random; hand it in."""
         dice = random.Random(seed)  # noqa: S311 - nothing secret
         for item in self._items.values():
-            answer = json.dumps({**self._about, "item": item.name, "value": _any(item, dice)})
+            drawn = _any(item, dice)  # always, so that one that is known does not change the others
+            value = known.get(item.name, drawn)
+            answer = json.dumps({**self._about, "item": item.name, "value": value})
             yield self.take(answer, SIMULATION)
         yield self.hand_in(SIMULATION)
 
@@ -197,6 +199,7 @@ class QuestionnaireRun:
         self._name = name
         self._rules = [rule for rule in study.protocol.stop_rules if rule.questionnaire == name]
         self._seed = derive("answers", after.seed if after else plan.seed, step, name)
+        self._known = study.answers.get(name, {})
         self.alarming = False
 
     @property
@@ -208,7 +211,7 @@ class QuestionnaireRun:
         """Yield what is said at its beginning, and a simulated participant's answers."""
         yield self._form.begin()
         if simulated:
-            yield from self._form.simulated(self._seed)
+            yield from self._form.simulated(self._seed, self._known)
 
     def handle(self, request: Answer | Submission, about: Mapping[str, Value]) -> Said:
         """Take an answer, or hand the questionnaire in; return what is said of it.

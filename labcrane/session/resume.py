@@ -16,7 +16,7 @@ from labcrane.core.records import Phase, Trial, Value
 from labcrane.design.counts import TableNumbers, TrialCounts, numbers, spans
 from labcrane.design.plan import Owed, PlannedBlock, PlannedStep, SessionPlan, next_attempt
 from labcrane.design.tracks import LEVEL, PlannedTrack, Response, Standing, check_carried
-from labcrane.errors import ProtocolError
+from labcrane.errors import ProtocolError, RecordingError
 from labcrane.protocol.study import Study
 from labcrane.recording.journal_reader import LoggedEvent, SessionLog, read_journal
 from labcrane.recording.paths import parts
@@ -207,6 +207,8 @@ def progress(journal: Path, joints: Sequence[str]) -> Progress:
     ------
     ProtocolError
         There is no such journal, so there is nothing to go on with.
+    RecordingError
+        An event in it does not say what such an event says: labcrane has not written it.
     """
     found = parts(journal)
     if not found:
@@ -218,7 +220,14 @@ def progress(journal: Path, joints: Sequence[str]) -> Progress:
     time = float(log.time[-1]) if len(log.time) else None
     so_far = Progress(angles=_last_angles(log, joints), time=time)
     for event, closes in _with_closing(log.events):
-        so_far.take(event.name, event.data, closes=closes)
+        try:
+            so_far.take(event.name, event.data, closes=closes)
+        except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+            raise RecordingError(
+                f"{journal}: event {event.name!r} at {event.time:.3f} s does not say what such an "
+                f"event says ({error!r}), so what the session owes is not known; "
+                f"labcrane recover {journal.parent} saves what was recorded"
+            ) from error
     return so_far
 
 
@@ -227,7 +236,7 @@ def _with_closing(events: Sequence[LoggedEvent]) -> Iterator[tuple[LoggedEvent, 
     last_ticks = {
         (event.part, event.tick)
         for event in events
-        if event.name == "session.end" and event.data["reason"] != COMPLETE
+        if event.name == "session.end" and event.data.get("reason") != COMPLETE
     }
     ordered = False
     for event in events:
@@ -337,7 +346,25 @@ def remaining(study: Study, plan: SessionPlan, so_far: Progress, policy: Policy)
                 steps.append(unasked)
         elif step.number not in so_far.steps:
             steps.append(step)
-    return replace(plan, steps=tuple(steps), held=frozenset(so_far.held))
+    ended = tuple(_ended_practices(plan, steps))
+    return replace(plan, steps=ended, held=frozenset(so_far.held))
+
+
+def _ended_practices(plan: SessionPlan, steps: Sequence[PlannedStep]) -> Iterator[PlannedStep]:
+    """Yield steps that are left, where the last round that is left of a practice ends it.
+
+    The rounds behind it are needed no more; without this the next practice would go on with it.
+    """
+    practice: dict[int, int] = {}
+    number = 0
+    for step in plan.steps:
+        if step.block:
+            practice[step.number] = number
+            number += step.block.until is None or step.block.last
+    last = {practice[step.number]: step.number for step in steps if step.block}
+    for step in steps:
+        ends = step.block and step.block.until and last[practice[step.number]] == step.number
+        yield replace(step, block=replace(step.block, last=True)) if step.block and ends else step
 
 
 def _unasked(step: PlannedStep, so_far: Progress) -> PlannedStep:

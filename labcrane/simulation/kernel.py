@@ -4,11 +4,11 @@ import math
 import random
 from typing import Any
 
-import numba
 import numpy as np
 from numba import types
+from numba.extending import typeof_impl
 
-from labcrane.core.compiled import signatures
+from labcrane.core.compiled import as_signed, compile_function, signatures
 from labcrane.core.twin import AXES, MADE, TASK, Places
 from labcrane.types import FloatArray
 
@@ -30,6 +30,7 @@ class Address(types.WrapperAddressProtocol):  # type: ignore[misc, unused-ignore
         result = function.get_compile_result(signature)
         name = result.fndesc.llvm_cfunc_wrapper_name
         self._function, self._signature = function, signature  # kept, so that its code is
+        self.type = types.FunctionType(signature)
         self._address = int(result.library.get_pointer_to_function(name))
 
     def __wrapper_address__(self) -> int:
@@ -39,13 +40,19 @@ class Address(types.WrapperAddressProtocol):  # type: ignore[misc, unused-ignore
         return self._signature
 
 
+@typeof_impl.register(Address)
+def _type_of(address: Address, _context: Any) -> Any:
+    """Return what numba takes it for; numba itself would make a new type at every call."""
+    return address.type
+
+
 def addresses(read: Any, inverse: Any, *ticks: Any) -> tuple[Address, ...]:
     """Return the functions of the operator, of the controller's inverse, and ticks."""
     others = (Address(tick, _OF.tick) for tick in ticks)
     return (Address(read, _OF.read), Address(inverse, _OF.inverse), *others)
 
 
-@numba.njit(_SIGNATURE, cache=True, error_model="numpy")
+@as_signed(_SIGNATURE)
 def advance(
     rows: FloatArray, seen: FloatArray, places: Places, about: FloatArray, kept: FloatArray,
     first: int,
@@ -101,7 +108,7 @@ def advance(
     return made
 
 
-@numba.njit(cache=True, error_model="numpy")
+@compile_function
 def _functions(x: float, out: FloatArray) -> None:
     out[0], out[1], out[2], out[3] = math.sin(x), math.cos(x), math.sinh(x), math.asinh(x)
     out[4], out[5], out[6] = np.cbrt(x), math.sqrt(abs(x)), x * x - x * 0.1 + x / 3.0

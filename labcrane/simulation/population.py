@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from statistics import NormalDist
 from typing import Literal
 
 import numpy as np
@@ -16,9 +17,11 @@ from pydantic import (
     model_validator,
 )
 
+from labcrane.core.items import Item
+from labcrane.core.records import Value
 from labcrane.design.plan import SessionPlan
 from labcrane.design.seeds import derive
-from labcrane.errors import ProtocolError
+from labcrane.errors import ProtocolError, nearest
 from labcrane.files.yaml import YamlFile
 from labcrane.protocol.steps import Section
 from labcrane.protocol.study import Study
@@ -63,6 +66,36 @@ class Uniform(Section):
         return float(random.uniform(self.lowest, self.highest))
 
 
+class Normal(Section):
+    """A bell, cut off where no participant was."""
+
+    mean: FiniteFloat
+    """The mean before it is cut off."""
+
+    sd: PositiveFloat
+    """The standard deviation before it is cut off."""
+
+    lowest: FiniteFloat
+    """The smallest value."""
+
+    highest: FiniteFloat
+    """The largest value."""
+
+    def draw(self, random: np.random.Generator) -> float:
+        """Return one participant's value."""
+        bell = NormalDist(self.mean, self.sd)
+        chance = random.uniform(bell.cdf(self.lowest), bell.cdf(self.highest))
+        # There and back is rounded: by the last digit, a value may be outside.
+        return min(max(bell.inv_cdf(float(chance)), self.lowest), self.highest)
+
+
+class Shares(Section):
+    """One of several choices."""
+
+    shares: dict[str, PositiveFloat] = Field(min_length=1)
+    """How many, or how large a part, give each."""
+
+
 class Population(Section):
     """The participants of a simulated study.
 
@@ -79,6 +112,10 @@ class Population(Section):
 
     groups: dict[str, dict[str, PositiveFloat]] = Field(default_factory=dict)
     """By what a between-subject group's settings are multiplied: the effect that is put in."""
+
+    answers: dict[str, dict[str, Normal | Uniform | Shares]] = Field(default_factory=dict)
+    """How answers are distributed, by questionnaire and item: numbers, or of a choice how many
+    give each. Items that are not named here are answered by chance."""
 
     dropout: float = Field(default=0.0, ge=0.0, le=1.0)
     """Probability that a participant leaves during a session; the later ones are then missing."""
@@ -113,7 +150,18 @@ class Population(Section):
                 f"participant {participant} was drawn with {name} {own[str(name)]:g}, which "
                 f"{choice.name!r} cannot have: {error.errors()[0]['msg']}; narrow its distribution"
             ) from None
-        return replace(study, operator=replace(choice, settings=checked))
+        answers = self.answered(study, participant)
+        return replace(study, operator=replace(choice, settings=checked), answers=answers)
+
+    def answered(self, study: Study, participant: str) -> dict[str, dict[str, Value]]:
+        """Return what a participant answers, by questionnaire and item."""
+        found: dict[str, dict[str, Value]] = {}
+        for name, spreads in self.answers.items():
+            items = {item.name: item for item in study.questionnaires[name].items()}
+            for item, spread in spreads.items():
+                random = _random(study, participant, f"answer {name} {item}")
+                found.setdefault(name, {})[item] = _drawn(items[item], spread, random)
+        return found
 
     def leaves_at(self, study: Study, plan: SessionPlan) -> int | None:
         """Return the trial of the session in which the participant leaves; None for staying."""
@@ -153,6 +201,65 @@ def _check(population: Population, study: Study, source: YamlFile) -> None:
             message = f"there is no group {group!r}; there is {known}"
             source.problem(("groups", group), message, key=True)
         _check_names(factors, study, source, ("groups", group))
+    for name, spreads in population.answers.items():
+        if (asked := study.questionnaires.get(name)) is None:
+            message = f"there is no questionnaire {name!r}; "
+            message += nearest(name, study.questionnaires, "there is")
+            source.problem(("answers", name), message, key=True)
+            continue
+        items = {item.name: item for item in asked.items()}
+        for item, spread in spreads.items():
+            if why := _why_not(name, item, spread, items):
+                source.problem(("answers", name, item), why, key=True)
+
+
+def _why_not(
+    name: str, asked: str, spread: Normal | Uniform | Shares, items: Mapping[str, Item]
+) -> str:
+    """Return why an item cannot be answered so; nothing where it can."""
+    item = items.get(asked)
+    if item is None:
+        return f"{name!r} does not ask {asked!r}; {nearest(asked, items, 'it asks')}"
+    if isinstance(spread, Shares):
+        if item.kind != "choice":
+            return f"{asked!r} is no choice, but {item.takes}; say mean, sd, lowest and highest"
+        unknown = [choice for choice in spread.shares if choice not in item.choices]
+        if unknown:
+            there = ", ".join(item.choices)
+            return f"{asked!r} has no choice {', '.join(unknown)}; it has {there}"
+        return ""
+    if item.kind not in {"scale", "number"}:
+        return f"{asked!r} is no number, but {item.takes}"
+    if not item.lowest <= spread.lowest <= spread.highest <= item.highest:
+        return (
+            f"{asked!r} is from {item.lowest:g} to {item.highest:g}, not from {spread.lowest:g} to "
+            f"{spread.highest:g}"
+        )
+    if isinstance(spread, Normal) and not spread.lowest < spread.mean < spread.highest:
+        return (
+            f"the mean, {spread.mean:g}, is not between lowest, {spread.lowest:g}, and highest, "
+            f"{spread.highest:g}"
+        )
+    for limit in (spread.lowest, spread.highest):
+        steps = (limit - item.lowest) / item.step if item.step else 0.0
+        if not math.isclose(steps, round(steps), abs_tol=1e-9):
+            return f"{asked!r} takes {item.takes}, and {limit:g} is none of them"
+    return ""
+
+
+def _drawn(
+    item: Item,
+    spread: Normal | Uniform | Shares,
+    random: np.random.Generator,
+) -> Value:
+    """Return one participant's answer, on the steps that the item has."""
+    if isinstance(spread, Shares):
+        shares = np.array(list(spread.shares.values()))
+        return list(spread.shares)[int(random.choice(len(shares), p=shares / shares.sum()))]
+    value = spread.draw(random)
+    return (
+        item.lowest + item.step * round((value - item.lowest) / item.step) if item.step else value
+    )
 
 
 def _check_names(

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.errors import ProtocolError
+from labcrane.simulation.share import share_of
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -96,20 +97,23 @@ class Claim:
                 "--margin in the unit of the effect"
             )
 
-    def shown(self, tested: "Tested") -> npt.NDArray[np.bool_]:
-        """Say of each cohort whether its test shows it, shape ``(cohorts,)``."""
+    def p(self, tested: "Tested") -> FloatArray:
+        """Return each cohort's p, shape ``(cohorts,)``: below :data:`ALPHA` it is shown.
+
+        NaN where there was no test. Of two one-sided tests the larger p counts.
+        """
         from scipy.stats import t
 
         with np.errstate(invalid="ignore", divide="ignore"):
-            below = t.cdf((tested.estimate - self.margin) / tested.error, tested.freedom) < ALPHA
+            below = t.cdf((tested.estimate - self.margin) / tested.error, tested.freedom)
             above = t.sf((tested.estimate + abs(self.margin)) / tested.error, tested.freedom)
             match self.kind:
                 case "difference":
                     size = np.abs(tested.estimate) / tested.error
-                    return np.asarray(2.0 * t.sf(size, tested.freedom) < ALPHA)
+                    return np.asarray(2.0 * t.sf(size, tested.freedom))
                 case "equivalence":
-                    return np.asarray(below & (above < ALPHA))
-            return np.asarray(below if self.margin > 0.0 else above < ALPHA)
+                    return np.asarray(np.maximum(below, above))
+            return np.asarray(below if self.margin > 0.0 else above)
 
 
 DIFFERENCE = Claim()
@@ -209,7 +213,8 @@ class Power:
     participants, cohorts
         How many in a cohort, and how many cohorts.
     power, power_low, power_high
-        Share of the cohorts with p below :data:`ALPHA`, and its 95 % Wilson interval.
+        Share of the cohorts with p below :data:`ALPHA`, and its 95 % interval
+        (:func:`labcrane.simulation.share.share_of`).
     null, null_low, null_high
         The same with the labels permuted: how often something is found where nothing is. For
         equivalence and non-inferiority, with an effect as large as the margin.
@@ -265,38 +270,75 @@ def power(
         labels = None if pool.groups is None else pool.groups[drawn]
         permuted, shuffled = _permuted(plain, labels, random)
         added = pool.steps if shuffled is None else pool.steps[shuffled][..., None]
-        null = claim.shown(_tested(permuted + claim.margin * added, shuffled, pool))
+        null = claim.p(_tested(permuted + claim.margin * added, shuffled, pool))
         if effect.size is None:
             tested, true = _tested(plain, labels, pool), _effect_of(pool)
         else:
             tested, true = _tested(permuted + effect.size * added, shuffled, pool), effect.size
-        found = claim.shown(tested)
         if claim.kind != "difference":
             true = 0.0
-        yield summarise(size, found, null, tested.estimate, true)
+        yield summarise(
+            size,
+            Outcomes(claim.p(tested), tested.estimate),
+            Outcomes(null),
+            true,
+            None if fresh else drawn,
+            len(pool.means),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Outcomes:
+    """What tests of cohorts say; shapes ``(cohorts,)``.
+
+    Attributes
+    ----------
+    p
+        NaN where there was no test.
+    estimates
+        The effect in each; nothing where it is not asked for.
+    """
+
+    p: FloatArray
+    estimates: FloatArray | None = None
+
+    @property
+    def found(self) -> npt.NDArray[np.bool_]:
+        """Whether something was shown."""
+        return self.p < ALPHA
+
+    def share(self, drawn: npt.NDArray[np.intp] | None, pool: int) -> tuple[float, float, float]:
+        """Return the share of cohorts in which it was, and its interval."""
+        from scipy.stats import norm
+
+        # No test is as good as one that says nothing; a p that is rounded to 0 has a score, too.
+        score = norm.isf(np.maximum(np.nan_to_num(self.p, nan=1.0), np.finfo(float).tiny) / 2.0)
+        return share_of(self.found, score, drawn, pool)
 
 
 def summarise(
     size: int,
-    found: npt.NDArray[np.bool_],
-    null: npt.NDArray[np.bool_],
-    estimates: FloatArray,
+    plain: Outcomes,
+    null: Outcomes,
     true: float,
+    drawn: npt.NDArray[np.intp] | None,
+    pool: int,
 ) -> Power:
-    """Return the power from what was shown in each cohort, and in each where nothing is.
+    """Return the power from what the tests said of each cohort, and of each where nothing is.
 
     Parameters
     ----------
-    found, null, estimates
-        Shape ``(cohorts,)``.
     true
         The effect that there is; 0 or NaN where nothing is to be said of exaggeration.
+    drawn, pool
+        Who was drawn for each cohort, shape ``(cohorts, size)``, from how many participants; None
+        where nobody is in two cohorts.
     """
-    seen = estimates[found]
     wrong = np.nan, np.nan
-    if true and true == true and found.any():  # noqa: PLR0124 - NaN is not itself
+    if true and true == true and plain.estimates is not None and plain.found.any():  # noqa: PLR0124 - NaN is not itself
+        seen = plain.estimates[plain.found]
         wrong = float(np.abs(seen).mean() / abs(true)), float((seen * true < 0.0).mean())
-    return Power(size, len(found), *_share(found), *_share(null), *wrong)
+    return Power(size, len(plain.p), *plain.share(drawn, pool), *null.share(drawn, pool), *wrong)
 
 
 def _effect_of(pool: Pool) -> float:
@@ -361,10 +403,3 @@ def _tested(means: FloatArray, labels: npt.NDArray[np.intp] | None, pool: Pool) 
         both = squares[0] + squares[1]
         freedom = both**2 / (squares[0] ** 2 / freedoms[0] + squares[1] ** 2 / freedoms[1])
     return Tested(means_of[1] - means_of[0], np.sqrt(both), freedom)
-
-
-def _share(found: npt.NDArray[np.bool_]) -> tuple[float, float, float]:
-    from statsmodels.stats.proportion import proportion_confint
-
-    low, high = proportion_confint(int(found.sum()), len(found), alpha=0.05, method="wilson")
-    return float(found.mean()), float(low), float(high)

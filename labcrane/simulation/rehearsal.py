@@ -10,11 +10,12 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count, islice
 from pathlib import Path
+from traceback import extract_tb
 
 from labcrane.core.clock import ManualClock
 from labcrane.core.records import Event, Frame, Phase, Run, Trial
 from labcrane.core.roles import Cue
-from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan, plan_session
+from labcrane.design.plan import PlannedBlock, PlannedStep, Planner, SessionPlan, plan_session
 from labcrane.design.slots import group_of
 from labcrane.errors import LabcraneError, ProtocolError
 from labcrane.files.pseudonyms import pseudonyms
@@ -85,16 +86,21 @@ def rehearse(study: Study) -> Rehearsed:
     sessions = trials = 0
     for name, slot in _one_of_each_group(study):
         for number in range(1, len(study.protocol.sessions) + 1):
-            whole = plan_session(study, name, number, slot)
+            where = f"rehearsal, session {study.protocol.sessions[number - 1].name!r}"
+            try:
+                whole = plan_session(study, name, number, slot)
+            except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
+                at = study.where(_unplanned(study, name, number, slot))
+                wrong.append(f"{at}: {where}: {_cause(error)}")
+                continue
             plan = replace(whole, steps=tuple(_shortened(whole.steps)))
-            group = f", group {plan.group!r}" if plan.group else ""
-            where = f"rehearsal, session {plan.name!r}{group}"
+            where += f", group {plan.group!r}" if plan.group else ""
             seen = _Examiner(study, plan)
             sessions += 1
             try:
                 _run(study, plan, seen)
-            except LabcraneError as error:
-                wrong.append(f"{study.where(seen.place)}: {where}: {error}")
+            except Exception as error:  # noqa: BLE001 - whatever it is, it is a finding
+                wrong.append(f"{study.where(seen.place)}: {where}: {_cause(error)}")
                 continue
             trials += seen.ended
             for each in seen.questions:
@@ -105,11 +111,44 @@ def rehearse(study: Study) -> Rehearsed:
     return Rehearsed(sessions, trials, tuple(questions.values()))
 
 
+def _cause(error: Exception) -> str:
+    """Return what an error says; of one that is nobody's words, what it is and where it arose."""
+    if isinstance(error, LabcraneError):
+        return str(error)
+    steps = extract_tb(error.__traceback__)
+    at = f" ({Path(steps[-1].filename).name}:{steps[-1].lineno})" if steps else ""
+    said = f"{type(error).__name__}: {error}".removesuffix(": ").replace("\n", " ")
+    return (
+        f"it ends in {said}{at}, which is a fault of labcrane and not of yours; report it, with "
+        "the protocol, and change what stands here"
+    )
+
+
+def _unplanned(study: Study, name: str, number: int, slot: int) -> Place:
+    """Return the step of a session that cannot be planned; the session if it is none of them."""
+    planner = Planner(study, name, number, slot)
+    for at, step in enumerate(study.protocol.sessions[number - 1].steps):
+        try:
+            list(planner.steps(step))
+        except Exception:  # noqa: BLE001 - it was told, and its place is looked for
+            return ("sessions", number - 1, "steps", at)
+    return ("sessions", number - 1)
+
+
 def _build_displays(study: Study) -> None:
     """Build the views and sounds that are installed; to be opened they need people's devices."""
-    for choice in (study.views | study.sounds).values():
-        if not choice.offer.missing:
+    wrong = []
+    shown = {"views": study.views, "feedback": study.sounds}
+    for key, name, choice in ((key, *each) for key, some in shown.items() for each in some.items()):
+        if choice.offer.missing:
+            continue
+        try:
             choice.build(study.machine)
+        except LabcraneError as error:
+            place = (key, name, *getattr(error, "at", ()))
+            wrong.append(f"{study.where(place)}: rehearsal: {error}")
+    if wrong:
+        raise ProtocolError("\n".join(wrong))
 
 
 def _one_of_each_group(study: Study) -> Iterator[tuple[str, int]]:

@@ -23,7 +23,16 @@ from labcrane.analysis.report.outcomes import DISTANCE, SEQUENCE
 from labcrane.analysis.statistics.anova import compare
 from labcrane.analysis.statistics.trends import linear_trend, mixed_model
 from labcrane.errors import ProtocolError
-from labcrane.simulation.power import ALPHA, DIFFERENCE, Claim, Effect, Power, Tested, summarise
+from labcrane.simulation.power import (
+    DIFFERENCE,
+    Claim,
+    Effect,
+    Outcomes,
+    Power,
+    Tested,
+    summarise,
+)
+from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -246,17 +255,21 @@ class Drawer:
             for each in groups
         ]
 
-    def cohort(self, size: int, random: np.random.Generator) -> "pd.DataFrame":
+    def draw(self, size: int, random: np.random.Generator) -> npt.NDArray[np.intp]:
+        """Return the numbers of who is in a cohort, shape ``(size,)``."""
+        groups = len(self._members)
+        return np.concatenate(
+            [
+                np.array(members)[random.integers(len(members), size=(size + number) // groups)]
+                for number, members in enumerate(self._members)
+            ]
+        )
+
+    def cohort(self, drawn: npt.NDArray[np.intp]) -> "pd.DataFrame":
         """Return a cohort's movements; somebody who is drawn twice is two people."""
-        drawn = [
-            self._rows[members[at]]
-            for number, members in enumerate(self._members)
-            for at in random.integers(
-                len(members), size=(size + number) // len(self._members)
-            ).tolist()
-        ]
-        cohort = self._planned.results.take(np.concatenate(drawn)).reset_index(drop=True)
-        numbers = np.repeat(np.arange(len(drawn)), [len(rows) for rows in drawn])
+        rows = [self._rows[at] for at in drawn.tolist()]
+        cohort = self._planned.results.take(np.concatenate(rows)).reset_index(drop=True)
+        numbers = np.repeat(np.arange(len(rows)), [len(own) for own in rows])
         return cohort.assign(participant=numbers)
 
     def permuted(self, cohort: "pd.DataFrame", random: np.random.Generator) -> "pd.DataFrame":
@@ -296,31 +309,39 @@ def power_of_report(
             (size, seed, first, min(first + CHUNK, cohorts)) for first in range(0, cohorts, CHUNK)
         ]
         made = dict(work(partial(_chunk, planned), chunks, workers, scheduler))
-        answers = [each for first in sorted(made) for each in made[first]]
-        plain, null = ([pair[at] for pair in answers] for at in (0, 1))
+        cohorts_made = [each for first in sorted(made) for each in made[first]]
+        plain, null = ([one.answers[at] for one in cohorts_made] for at in (0, 1))
         found = plain if planned.effect.size is None else _shifted(null, planned.effect.size)
         yield summarise(
             size,
-            _shown(found, claim),
-            _shown(_shifted(null, claim.margin) if claim.margin else null, claim),
-            np.array([each.estimate for each in found]),
+            Outcomes(_p(found, claim), np.array([each.estimate for each in found])),
+            Outcomes(_p(_shifted(null, claim.margin) if claim.margin else null, claim)),
             true if claim.kind == "difference" else 0.0,
+            np.stack([one.drawn for one in cohorts_made]),
+            planned.results["participant"].nunique(),
         )
 
 
-def _chunk(
-    planned: Planned, order: tuple[int, int, int, int]
-) -> tuple[int, list[tuple[Answer, Answer]]]:
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """A cohort that was tested: who was drawn, and what the test says of it and of nothing."""
+
+    drawn: npt.NDArray[np.intp]
+    answers: tuple[Answer, Answer]
+
+
+def _chunk(planned: Planned, order: tuple[int, int, int, int]) -> tuple[int, list[Tried]]:
     """Test some cohorts, as they are and with nothing to be found; a worker's function."""
     size, seed, first, last = order
     drawer = Drawer(planned)
-    answers = []
+    tried = []
     for number in range(first, last):
         random = np.random.default_rng([seed, size, number])
-        cohort = drawer.cohort(size, random)
+        drawn = drawer.draw(size, random)
+        cohort = drawer.cohort(drawn)
         mixed = drawer.permuted(cohort, random)
-        answers.append((ask(planned, cohort), ask(planned, mixed)))
-    return first, answers
+        tried.append(Tried(drawn, (ask(planned, cohort), ask(planned, mixed))))
+    return first, tried
 
 
 def _shifted(answers: Sequence[Answer], size: float) -> list[Answer]:
@@ -335,9 +356,10 @@ def _shifted(answers: Sequence[Answer], size: float) -> list[Answer]:
     return moved
 
 
-def _shown(answers: Sequence[Answer], claim: Claim) -> npt.NDArray[np.bool_]:
+def _p(answers: Sequence[Answer], claim: Claim) -> FloatArray:
     if claim.kind == "difference":
-        return np.array([each.p < ALPHA for each in answers])
+        return np.array([each.p for each in answers])
     columns = ("estimate", "error", "freedom")
-    tested = Tested(*(np.array([getattr(each, name) for each in answers]) for name in columns))
-    return claim.shown(tested)
+    return claim.p(
+        Tested(*(np.array([getattr(each, name) for each in answers]) for name in columns))
+    )

@@ -10,6 +10,9 @@ FEWEST = 4
 MOST = 2000
 """Participants: the search ends here."""
 
+FARTHEST = 4
+"""How many times the cohort that is needed is looked at for the far end of its interval."""
+
 
 @dataclass(frozen=True, slots=True)
 class SampleSize:
@@ -23,7 +26,8 @@ class SampleSize:
         The smallest cohort whose power is the goal or more.
     low, high
         The smallest cohorts at which the upper and the lower end of the power's 95 % interval are:
-        what more cohorts could move it to.
+        what a larger pool and more cohorts could move it to. None where the lower end is below it
+        even in cohorts :data:`FARTHEST` times as large.
     found
         The power with as many.
     """
@@ -31,7 +35,7 @@ class SampleSize:
     goal: float
     participants: int
     low: int
-    high: int
+    high: int | None
     found: Power
 
 
@@ -76,15 +80,12 @@ def smallest_cohort(power_of: Callable[[int], Power], goal: float) -> SampleSize
             known[size] = power_of(size)
         return known[size]
 
-    def smallest(end: str) -> int:
+    def smallest(end: str, most: int) -> int | None:
         enough = FEWEST
         while getattr(at(enough), end) < goal:
-            if enough >= MOST:
-                raise ProtocolError(
-                    f"{MOST} participants have a power of {at(MOST).power:.2f}, below {goal:g}: "
-                    "the effect is too small for any study; look at --effect, or at the population"
-                )
-            enough = min(2 * enough, MOST)
+            if enough >= most:
+                return None
+            enough = min(2 * enough, most)
         too_few = enough // 2 if enough > FEWEST else FEWEST - 1
         while enough - too_few > 1:
             middle = (enough + too_few) // 2
@@ -93,9 +94,19 @@ def smallest_cohort(power_of: Callable[[int], Power], goal: float) -> SampleSize
             )
         return enough
 
-    found = smallest("power")
-    ends = sorted((smallest("power_high"), found, smallest("power_low")))
-    return SampleSize(goal, found, ends[0], ends[-1], at(found))
+    found = smallest("power", MOST)
+    if found is None:
+        raise ProtocolError(
+            f"{MOST} participants have a power of {at(MOST).power:.2f}, below {goal:g}: "
+            "the effect is too small for any study; look at --effect, or at the population"
+        )
+    low, high = smallest("power_high", found), smallest("power_low", FARTHEST * found)
+    return SampleSize(goal, found, min(low or found, found), high and max(high, found), at(found))
+
+
+def far_end(size: SampleSize) -> str:
+    """Return the upper end of the interval of a size, in words."""
+    return f"more than {FARTHEST * size.participants}" if size.high is None else f"{size.high}"
 
 
 def paragraph(
@@ -135,7 +146,8 @@ def paragraph(
         found = each.found
         sentences.append(
             f"For a power of {100 * each.goal:g} %, {each.participants} participants are needed "
-            f"({each.low} to {each.high} by the 95 % interval of {found.cohorts} cohorts; with "
+            f"({each.low} to {far_end(each)} by the 95 % interval, which is of {found.cohorts} "
+            f"cohorts and of the {pool} participants they were drawn from; with "
             f"{each.participants} the power is {100 * found.power:.1f} %, 95 % interval "
             f"{100 * found.power_low:.1f} to {100 * found.power_high:.1f} %)."
         )

@@ -1,17 +1,27 @@
 """Thresholds of simulated people whose threshold is known: how well a track finds them."""
 
+import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from labcrane.core.records import PlannedTrial
+from labcrane.design.seeds import derive
 from labcrane.design.tracks import PlannedTrack, standing
 from labcrane.design.up_down import settles_at
 from labcrane.errors import ProtocolError
+from labcrane.protocol.tracks import Track
 
 if TYPE_CHECKING:
     import pandas as pd
+
+OPERATORS = 1000
+"""By whom a recorded track is judged."""
+
+STEEPNESS = (0.5, 1.0, 2.0)
+"""Spreads by which a staircase, which says none itself, is judged: in mean steps of its levels."""
 
 LEAST = 20
 """Operators from whom bias and spread are told."""
@@ -120,7 +130,6 @@ def observe(track: PlannedTrack, people: Sequence[Ability], seed: int) -> "pd.Da
     import pandas as pd
 
     random, settings = np.random.default_rng(seed), track.settings
-    counted = sum(each.counted for each in next(iter(track.rounds.values())))
     up_down = settings.up_down
     sought = None if up_down is None else settles_at(up_down)
     rows = []
@@ -131,7 +140,9 @@ def observe(track: PlannedTrack, people: Sequence[Ability], seed: int) -> "pd.Da
             if where.level is None:
                 break
             chance = person.success(settings.levels[where.level])
-            told += [(where.level, bool(hit)) for hit in random.uniform(size=counted) < chance]
+            told += [
+                (where.level, bool(hit)) for hit in random.uniform(size=track.counted) < chance
+            ]
             where = standing(settings, (), told)
         truth = person.threshold if sought is None else person.level_of(sought)
         rows.append(
@@ -177,3 +188,33 @@ def paragraph(found: Sequence[Quality]) -> str:
         "The simulated operators are a model; the numbers hold for people as far as they do."
     )
     return " ".join(sentences)
+
+
+def judged(name: str, described: str) -> "pd.DataFrame":
+    """Return how well a recorded track finds thresholds; a row for each spread of a staircase.
+
+    Parameters
+    ----------
+    described
+        What a recording says of it, :attr:`labcrane.design.tracks.PlannedTrack.described` as JSON.
+    """
+    import pandas as pd
+
+    about = json.loads(described)
+    settings = Track.model_validate(about["settings"], context={"recorded": True})
+    trial = PlannedTrial({}, expected_s=0.0)
+    rounds = dict.fromkeys(settings.levels, (trial,) * int(about["counted"]))
+    track = PlannedTrack(name, settings, 1, int(about["counted"]) * settings.rounds, rounds)
+    numbers = sorted(settings.levels.values())
+    step = (numbers[-1] - numbers[0]) / (len(numbers) - 1)
+    believed = [()] if settings.quest_plus else [(share * step,) for share in STEEPNESS]
+    seed = derive("tracks", name, described)
+    rows = []
+    for spreads in believed:
+        people = observe(track, abilities(track, OPERATORS, spreads, seed), seed + 1)
+        try:
+            row = asdict(quality(track, people))
+        except ProtocolError as error:
+            row = {"track": name, "by": settings.by, "operators": OPERATORS, "why not": str(error)}
+        rows.append({**row, "steepness": spreads[0] if spreads else "believed"})
+    return pd.DataFrame(rows)

@@ -73,13 +73,15 @@ class Triggers:
             began = time.perf_counter()
             echoes = line.trigger.send(wanted, began)
             sent, fault = time.perf_counter(), line.trigger.fault
-            # One event a tick: what was sent together was sent at one time.
-            data: dict[str, Value] = {"codes": " ".join(map(str, wanted))}
-            if wanted and fault is None:
-                line.waiting.extend((code, began) for code in wanted)
-                self._write(SENT, frame.tick.due, line, {**data, "delay_s": sent - frame.tick.due})
-            elif wanted:
-                self._write(UNSENT, frame.tick.due, line, {**data, "why": fault})
+            if wanted:
+                # One event a tick: what was sent together was sent at one time.
+                data: dict[str, Value] = {"codes": " ".join(map(str, wanted))}
+                if fault is None:
+                    line.waiting.extend((code, began) for code in wanted)
+                    data["delay_s"] = sent - frame.tick.due
+                else:
+                    data["why"] = fault
+                self._write(SENT if fault is None else UNSENT, frame.tick.due, line, data)
             self._take(line, echoes)
             self._look(line, frame)
 

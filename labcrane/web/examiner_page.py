@@ -5,7 +5,7 @@ from typing import Any
 from labcrane.session.commands import Order
 from labcrane.web.door.access import SUPERVISOR
 from labcrane.web.form import ConsentCard, Form
-from labcrane.web.page import PRIMARY, PageContext, keep_drafts, speak
+from labcrane.web.page import PRIMARY, PageContext, keep_drafts, see_through, speak
 from labcrane.web.panels import Cameras, Reports
 from labcrane.web.participant_page import STYLE as FORM_STYLE
 from labcrane.web.room.snapshot import Snapshot
@@ -45,6 +45,7 @@ def supervisor_page(context: PageContext) -> None:
     ui.add_css(FORM_STYLE)
     speak("en")
     keep_drafts()
+    see_through()
     snapshot = Snapshot(context, context.earlier)
 
     def give(order: str, text: str) -> str:

@@ -38,6 +38,8 @@ class Live:
         The unit of each column.
     moved
         Columns whose value has changed since the first frame.
+    trouble
+        Why the newest frames could not be taken up; empty when they were.
     age_s
         How old the newest frame was when it came, in seconds.
     """
@@ -46,6 +48,7 @@ class Live:
         self.newest: dict[str, float] = {}
         self.units: dict[str, str] = {}
         self.moved: set[str] = set()
+        self.trouble = ""
         self.age_s: float | None = None
         self._came: float | None = None
         self._bands: deque[tuple[float, float]] = deque(maxlen=BANDS)
@@ -92,10 +95,20 @@ class Live:
         while True:
             samples, stamps = frames.pull()
             if stamps:
-                self._take(list(self.units), samples)
+                self.hear(samples)
                 self._came = time.monotonic()
                 self.age_s = pylsl.local_clock() - stamps[-1]
             time.sleep(PAUSE_S)
+
+    def hear(self, samples: Sequence[Sequence[float]]) -> None:
+        """Take up frames, oldest first; what they cannot be taken up for is said on the page."""
+        try:
+            self._take(list(self.units), samples)
+        # Whatever it is: a thread that dies of it would leave a page that stands still.
+        except Exception as error:  # noqa: BLE001
+            self.trouble = f"{type(error).__name__}: {error}"
+        else:
+            self.trouble = ""
 
     def _described(self, info: "pylsl.StreamInfo") -> None:
         units = {}

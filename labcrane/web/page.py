@@ -25,6 +25,7 @@ def _nothing() -> None:
 
 
 DRAFTS = Path(__file__).with_name("drafts.js")
+SEE_THROUGH = Path(__file__).with_name("see_through.js")
 
 PRIMARY = "#0d47a1"
 """The pages' colour for what has the focus, 8.6 to 1 on white; the usual one is too faint."""
@@ -104,6 +105,13 @@ def keep_drafts() -> None:
     from nicegui import ui  # noqa: PLC0415
 
     ui.add_head_html(f"<script>{DRAFTS.read_text(encoding='utf-8')}</script>")
+
+
+def see_through() -> None:
+    """Have nothing hidden on the page that is being built by what can be seen through."""
+    from nicegui import ui  # noqa: PLC0415
+
+    ui.add_head_html(f"<script>{SEE_THROUGH.read_text(encoding='utf-8')}</script>")
 
 
 def _address() -> str:

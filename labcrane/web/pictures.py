@@ -45,6 +45,7 @@ class Pictures:
     def __init__(self, source: str, cameras: Mapping[str, tuple[str, ...]]) -> None:
         self.cameras = cameras
         self._newest: dict[tuple[str, str], Shot] = {}
+        self._unread: dict[str, str] = {}
         self._stop = threading.Event()
         self._threads = [
             threading.Thread(
@@ -70,21 +71,28 @@ class Pictures:
 
         shot = self._newest.get((view, camera))
         if shot is None:
-            return None, "no picture yet"
+            return None, self._unread.get(view, "no picture yet")
         now = pylsl.local_clock()
         if now - shot.made > STALE_S:
-            return None, f"no picture for {now - shot.made:.0f} s"
+            why = self._unread.get(view, "")
+            return None, " · ".join(filter(None, [f"no picture for {now - shot.made:.0f} s", why]))
         return shot, " · ".join(filter(None, [f"{now - shot.due:.1f} s old", shot.legend]))
 
     def _pull(self, view: str, wanted: str) -> None:
         pictures = NewestSample({"source_id": wanted}, buffer_s=KEPT_S)
         while not self._stop.wait(PAUSE_S):
             for (text,), stamp in zip(*pictures.pull(), strict=True):
-                sample = json.loads(text)
-                self._newest[view, sample["camera"]] = Shot(
-                    f"data:image/png;base64,{sample['png']}",
-                    sample["legend"],
-                    sample["due"],
-                    stamp,
-                )
+                self.hear(view, text, stamp)
         pictures.close()
+
+    def hear(self, view: str, text: str, stamp: float) -> None:
+        """Take up a picture of a view; one that cannot be read is said in its place."""
+        try:
+            sample = json.loads(text)
+            source = f"data:image/png;base64,{sample['png']}"
+            shot = Shot(source, str(sample["legend"]), float(sample["due"]), stamp)
+            self._newest[view, str(sample["camera"])] = shot
+        except (ValueError, TypeError, LookupError) as error:
+            self._unread[view] = f"a picture cannot be read: {error!r}"
+        else:
+            self._unread.pop(view, None)

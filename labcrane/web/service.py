@@ -157,7 +157,9 @@ def serve(order: PageConfig, parent: Parent) -> None:
     _routes(app, context, lambda browsers: parent.tell(Opened(browsers)))
     build_pages(app, MISSED)
     secure = order.certificate is not None
-    gate = Gate(app, order.keys, lambda page: parent.tell(Used(page)), denials, secure=secure)
+    gate = Gate(
+        app, order.keys, lambda page: parent.tell(Used(page)), denials, order.port, secure=secure
+    )
     config = uvicorn.Config(
         Guard(gate, order.host, order.port, denials, secure=secure),
         host=order.host,

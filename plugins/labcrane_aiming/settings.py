@@ -82,13 +82,23 @@ class AimingSettings(Settings):
         return {"button": [self.trigger]} if self.end == "trigger" else {}
 
     def doubts(self, machine: Machine) -> Mapping[str, str]:
-        needed = shortest_s(self, machine)
-        if self.limit_s >= needed:
-            return {}
-        return {
-            "limit_s": f"is {self.limit_s:g} s, and at full speed the farthest movement takes more "
-            f"than {needed:.2g} s"
-        }
+        needed, found = shortest_s(self, machine), {}
+        if self.limit_s < needed:
+            found["limit_s"] = (
+                f"is {self.limit_s:g} s, and at full speed the farthest movement takes more than "
+                f"{needed:.2g} s"
+            )
+        for key, held_s, never in (
+            ("onset_hold_s", self.onset_hold_s, "no movement has an onset or a reaction time"),
+            ("rest_s", self.rest_s, "no rest ends a movement"),
+        ):
+            if held_s >= self.limit_s:
+                found[key] = f"is {held_s:g} s, and a movement may take {self.limit_s:g} s: {never}"
+        fastest = fastest_m_s(machine)
+        for key, speed in (("onset_speed", self.onset_speed), ("rest_speed", self.rest_speed)):
+            if speed >= fastest:
+                found[key] = f"is {speed:g} m/s, and the tip never reaches {fastest:.2g} m/s"
+        return found
 
     @field_validator("distances")
     @classmethod
@@ -119,8 +129,13 @@ def shortest_s(settings: AimingSettings, machine: Machine) -> float:
     No point of the machine turns about a joint faster than the joint does, at the length of all
     that is beyond it; so the tip is never faster than the sum over the joints.
     """
+    way = max(settings.distances) - settings.width / 2
+    rest = settings.rest_s if settings.end != "trigger" else 0.0
+    return way / fastest_m_s(machine) + rest
+
+
+def fastest_m_s(machine: Machine) -> float:
+    """Return a speed in m/s that the tip never reaches, all joints at full speed."""
     lengths = [math.hypot(joint.a, joint.d) for joint in machine.joints]
     beyond = [sum(lengths[at:]) for at in range(len(lengths))]
-    fastest = sum(speed * arm for speed, arm in zip(machine.speeds, beyond, strict=True))
-    way = max(settings.distances) - settings.width / 2
-    return way / fastest + (settings.rest_s if settings.end != "trigger" else 0.0)
+    return float(sum(speed * arm for speed, arm in zip(machine.speeds, beyond, strict=True)))

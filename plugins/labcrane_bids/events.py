@@ -11,6 +11,10 @@ REPEAT = "repeat"
 """Tells apart events of one name at one moment: HED joins the tags of a moment, and refuses what is
 said twice."""
 
+MARK = "annotation"
+"""What somebody marked afterwards: a row of that type, and a column of its text where there is
+any."""
+
 COLUMNS = ("trial", "attempt", "block", "outcome", "pair", "direction")
 """What of an event's data becomes a column of its own."""
 
@@ -20,7 +24,8 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
 
     ``trial_type`` is the event's plain name and ``label`` says block and condition too. A trial's
     start lasts until its end; everything else is a moment. ``response_time`` is the time from the
-    trial's start to the movement's onset.
+    trial's start to the movement's onset. What somebody marked afterwards is an ``annotation`` with
+    its text.
     """
     import pandas as pd
 
@@ -43,7 +48,13 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
             }
             | {column: data.get(column) for column in COLUMNS}
         )
-    table = pd.DataFrame(rows)
+    marks = session.annotations
+    rows += [
+        {"onset": time - zero, "duration": until - time, "trial_type": MARK, "label": MARK,
+         MARK: " ".join(text.split())}
+        for time, until, text in zip(marks["time"], marks["until"], marks["text"], strict=True)
+    ]  # fmt: skip
+    table = pd.DataFrame(rows).sort_values("onset", kind="stable", ignore_index=True)
     again = table.groupby(["onset", "trial_type"]).cumcount() + 1
     table[REPEAT] = again.where(again > 1)
     for name in ("trial", "attempt", "block", REPEAT):
@@ -55,7 +66,9 @@ def event_description(table: "pd.DataFrame", context: dict[str, Any]) -> dict[st
     """Return the sidecar: every column, and the levels of trial_type with their HED tags."""
     types = hed_sidecar(table["trial_type"])
     hed = {name: f"{tags.removesuffix(')')}, {{{REPEAT}}})" for name, tags in types["HED"].items()}
+    marked = {MARK: {"Description": "what somebody wrote into the recording afterwards"}}
     return {
+        **(marked if MARK in table else {}),
         "onset": {"Description": "from the first sample of motion", "Units": "s"},
         "duration": {"Description": "of a trial; 0 for a moment", "Units": "s"},
         "trial_type": {**types, "HED": hed},

@@ -1,10 +1,12 @@
 """Settings of exports as BIDS."""
 
 from pathlib import Path
+from typing import Annotated
 
 from pydantic import NonNegativeFloat, PositiveInt
 
 from labcrane import Settings
+from labcrane.core import Usual
 
 
 class BidsSettings(Settings):
@@ -43,5 +45,5 @@ class BidsSettings(Settings):
     eeg_unit: str = ""
     """Unit of channels of EEG whose source states none, as in ``microvolts``."""
 
-    power_line_hz: NonNegativeFloat = 0.0
+    power_line_hz: Annotated[NonNegativeFloat, Usual(15.0, 500.0)] = 0.0
     """Frequency of the mains where EEG was recorded; 0 where it is not known."""

@@ -1,6 +1,7 @@
 """Settings of a panel on a CAN bus."""
 
 import re
+from difflib import get_close_matches
 from importlib.util import find_spec
 from typing import Annotated
 
@@ -14,12 +15,17 @@ from pydantic import (
 )
 
 from labcrane import Machine, Settings
-from labcrane.core import JointName, Names, Once, Reference, StudyPath, was_run
+from labcrane.core import JointName, Names, Once, Reference, StudyPath, WrongKey, was_run
 
 Node = Annotated[int, Field(ge=0, le=253)]
 """Source address on the bus; 254 and 255 are no node."""
 
-BUS = r"^[a-z_]+:.+$"
+BUS = r"^[a-z0-9_]+:.+$"
+
+FAMILIAR = frozenset(
+    {"slcan", "socketcan", "socketcand", "pcan", "kvaser", "vector", "virtual", "udp_multicast"}
+)
+"""Interfaces for which python-can need not be asked, which takes long to load."""
 
 Valve = Annotated[int, Field(ge=1, le=15)]
 """Number of an auxiliary valve; 0 is "power beyond" and moves no joint."""
@@ -73,14 +79,16 @@ class ValveMap(Settings):
     def _names_need_a_map(self) -> "ValveMap":
         for joint, valve in self.valves.items():
             if isinstance(valve, str) and self.map is None:
-                raise ValueError(
+                raise WrongKey(
                     f"valves has {joint}: {valve!r}, which only a DBC file explains; give map, or "
-                    "the valve's number"
+                    "the valve's number",
+                    at=("valves", joint),
                 )
             if isinstance(valve, int) and self.map is not None:
-                raise ValueError(
+                raise WrongKey(
                     f"valves has {joint}: {valve}, a number, beside a DBC map; write message and "
-                    "signal: Levers.Boom"
+                    "signal: Levers.Boom",
+                    at=("valves", joint),
                 )
         return self
 
@@ -115,12 +123,34 @@ class CanSettings(ValveMap):
                 f"{bus!r} is no bus; write interface:channel, as slcan:/dev/ttyACM0 or "
                 "socketcan:can0"
             )
+        interface, _, channel = bus.partition(":")
+        if why := _unknown(interface):
+            raise ValueError(f"{bus!r}: {why}")
+        if interface == "socketcan" and not re.fullmatch(r"[^/\s]{1,15}", channel):
+            raise ValueError(
+                f"{channel!r} is no network interface; write its name, as socketcan:can0, or for a "
+                "serial adapter slcan:/dev/ttyACM0"
+            )
         port = bus.partition("@")[2].partition(":")[2]
         if bus.startswith("socketcand:") and port and not port.isdecimal():
             raise ValueError(
                 f"{port!r} is no port; write socketcand:channel@host:port, or leave the port out"
             )
         return bus
+
+
+def _unknown(interface: str) -> str:
+    """Return why python-can has no such interface; nothing where it has, or is not installed."""
+    if interface in FAMILIAR or not find_spec("can"):
+        return ""
+    from can.interfaces import VALID_INTERFACES  # noqa: PLC0415 - few are none of the familiar ones
+
+    if interface in VALID_INTERFACES:
+        return ""
+    close = get_close_matches(interface, VALID_INTERFACES, n=1)
+    meant = f"did you mean {close[0]!r}? " if close else ""
+    every = ", ".join(sorted(VALID_INTERFACES))
+    return f"python-can has no interface {interface!r}; {meant}it has {every}"
 
 
 class ReplaySettings(ValveMap):

@@ -85,6 +85,7 @@ class Matlab(Exporter):
             "rate_hz": float(session.attrs["rate_hz"]),
             "started": str(session.attrs.get("started", "")),
             "events": columns(events),
+            "annotations": columns(session.annotations),
         }
         if self._settings.streams:
             names = fields(list(session.streams))

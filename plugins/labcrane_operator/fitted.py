@@ -21,6 +21,8 @@ WHY_NOT: Mapping[str, str] = {
     "inside": "the task's end rule hides it",
     "still_m_s": "the task's end rule hides it",
     "press_s": "of no consequence for a movement",
+    "axes": "the study's devices say which there are",
+    "button": "the study's devices say which there is",
 }
 """Why a setting has no value from a recording; it keeps its default."""
 

@@ -9,27 +9,39 @@ from labcrane import FloatArray, Frame, InputDevice, Run, Signal, Tick, Trial
 from labcrane.core import Layout, Phase, Places, Twin, Value
 from labcrane_operator.aimer import STILL, Aimer
 from labcrane_operator.noise import BLOCK, Noise
-from labcrane_operator.settings import STICK, OperatorSettings
+from labcrane_operator.settings import CONNECTED, STICK, OperatorSettings
 
 RUNNING = Phase.RUNNING  # Python 3.11 takes long to find it there in every tick; 3.12 does not
 
 
+def _signals(settings: OperatorSettings) -> tuple[Signal, ...]:
+    """Return what it has: two joysticks, or the axes that it is told."""
+    if not settings.axes:
+        return (Signal("left", "1", STICK), Signal("right", "1", STICK))
+    button = (settings.button,) if settings.button else ()
+    return tuple(Signal(name, "1") for name in (*settings.axes, *button, CONNECTED))
+
+
 class SimulatedOperator(InputDevice):
-    """Hands on a dual joystick that take the tip to the task's target.
+    """Hands on a dual joystick, or on other axes, that take the tip to the task's target.
 
     They see the frame before, like a person, and steer through ``run.inverse`` as the scheme needs.
     Time is counted in ticks of the trial that were not paused, so a pause only shifts the plan.
-    At rest inside the target they press the trigger of the right stick once, for tasks that end
-    a movement by it.
+    At rest inside the target they press the trigger of the right stick, or the button, once, for
+    tasks that end a movement by it.
     """
-
-    signals = (Signal("left", "1", STICK), Signal("right", "1", STICK))
 
     def __init__(self, settings: OperatorSettings) -> None:
         self._settings = settings
+        self.signals = _signals(settings)
         axes = Layout("the operator", self.signals)
-        self._left, self._right = axes.index("left.connected"), axes.index("right.connected")
-        self._trigger = axes.index("right.trigger")
+        if settings.axes:
+            self._left = self._right = axes.index(CONNECTED)
+            # Without a button it presses what is pressed anyway.
+            self._trigger = axes.index(settings.button or CONNECTED)
+        else:
+            self._left, self._right = axes.index("left.connected"), axes.index("right.connected")
+            self._trigger = axes.index("right.trigger")
         self._out = np.zeros(axes.size)
         self._asked = np.zeros(3)
         self._rest = np.zeros(axes.size)

@@ -28,9 +28,13 @@ class RecordedInput(InputDevice):
     def __init__(self, settings: RecordedSettings) -> None:
         self._settings = settings
         try:
-            record = open_recording(settings.file).session(settings.session)
+            recording = open_recording(settings.file)
         except RecordingError as error:
-            raise ProtocolError(str(error)) from error
+            raise ProtocolError(str(error), at=("file",)) from error
+        try:
+            record = recording.session(settings.session)
+        except RecordingError as error:
+            raise ProtocolError(str(error), at=("session",)) from error
         recorded = record.streams["input"]
         self.signals = signals_of(tuple(map(str, recorded.data)), recorded.units)
         self._axes: FloatArray = recorded.data.to_numpy(np.float64)

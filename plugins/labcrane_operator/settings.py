@@ -1,11 +1,22 @@
 """Settings of simulated operators. Every default is invented, none is fitted to people."""
 
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import (
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+    field_validator,
+    model_validator,
+)
 
 from labcrane import Machine, Settings
-from labcrane.core import Names
+from labcrane.core import ButtonName, InputAxis, Names, Once, Usual, WrongKey
+
+CONNECTED = "operator.connected"
+"""Axis that says that it is there, where it has no joysticks."""
 
 STICK = ("x", "y", "twist", "slider", "trigger", "connected")
 
@@ -41,7 +52,7 @@ class OperatorSettings(Settings):
     learning_rate: NonNegativeFloat = 0.1
     """How fast that wears off, per trial: the gain falls with exp(-rate · trials)."""
 
-    pace_sd: NonNegativeFloat = 0.0
+    pace_sd: Annotated[NonNegativeFloat, Usual(0.001, 3.0)] = 0.0
     """Standard deviation over participants of the logarithm of their durations; drawn from the
     participant's seed."""
 
@@ -72,9 +83,40 @@ class OperatorSettings(Settings):
     """Tip speed that is taken for rest, in m/s; also the smallest speed that is steered."""
 
     press_s: PositiveFloat = 0.1
-    """How long the trigger of the right stick is pressed at rest inside the target, in seconds."""
+    """How long the trigger of the right stick, or ``button``, is pressed at rest inside the target,
+    in seconds."""
+
+    axes: Annotated[tuple[InputAxis, ...], Once()] = ()
+    """Axes of the input that it stands in for, where those are not of two joysticks:
+    ``[keyboard.slew, keyboard.boom]``. Without it, it has what two joysticks have."""
+
+    button: ButtonName | None = None
+    """The button that it presses, where ``axes`` says what it has; none by default."""
+
+    @field_validator("axes")
+    @classmethod
+    def _have_no_sign(cls, axes: tuple[str, ...]) -> tuple[str, ...]:
+        if turned := [axis for axis in axes if axis.startswith("-")]:
+            raise ValueError(
+                f"{turned[0]!r} is turned round, which only a scheme's map says; write "
+                f"{turned[0][1:]}"
+            )
+        return axes
+
+    @model_validator(mode="after")
+    def _button_is_beside_axes(self) -> "OperatorSettings":
+        if self.button is not None and not self.axes:
+            raise WrongKey(
+                "button is there without axes, and two joysticks have their triggers; name axes "
+                "as well, or leave button out",
+                at=("button",),
+            )
+        return self
 
     def provides(self, machine: Machine) -> Names:
+        if self.axes:
+            button = [self.button] if self.button else []
+            return {"axis": [*self.axes, *button, CONNECTED], "button": button}
         sides = ("left", "right")
         return {
             "axis": [f"{side}.{part}" for side in sides for part in STICK],

@@ -18,10 +18,10 @@ class Free(Questionnaire):
         self.scores = tuple(
             Score(
                 score,
-                sum(self._items[name].lowest for name in names),
-                sum(self._items[name].highest for name in names),
+                sum(self._items[name].lowest for name in names if name in self._items),
+                sum(self._items[name].highest for name in names if name in self._items),
             )
-            for score, names in settings.sums.items()
+            for score, names in settings.sums.items()  # a name of nothing is told by the check
         )
 
     def items(self) -> Sequence[Item]:

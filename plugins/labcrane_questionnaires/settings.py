@@ -1,14 +1,32 @@
 """Settings of the questionnaires."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
-from labcrane import ProtocolError, Settings
-from labcrane.core import Item, StudyPath, read_yaml
+from labcrane import Machine, ProtocolError, Settings
+from labcrane.core import (
+    Item,
+    Names,
+    Once,
+    Reference,
+    StudyPath,
+    WrongKey,
+    outside,
+    read_yaml,
+    was_run,
+)
 
 NAME = r"^[a-z][a-z0-9_]*$"
+
+
+STEP_TOLERANCE = 1e-6
+
+
+def _twice(names: Sequence[str]) -> list[str]:
+    return [each for each in names if names.count(each) > 1]
 
 
 class LanguageSettings(Settings):
@@ -51,7 +69,7 @@ class DemographicsSettings(RatingSettings):
     @field_validator("ask")
     @classmethod
     def _each_is_one(cls, ask: tuple[Asked, ...]) -> tuple[Asked, ...]:
-        if twice := [each for each in ask if ask.count(each) > 1]:
+        if twice := _twice(ask):
             raise ValueError(f"{twice[0]!r} is there twice; write each once")
         return ask
 
@@ -106,11 +124,16 @@ class LabTextSettings(Settings):
 
 def _lab_file(name: str, info: ValidationInfo) -> Any:
     """Return what a YAML file beside the protocol holds."""
-    path = (info.context or {}).get("folder", Path()) / name
+    folder: Path = (info.context or {}).get("folder", Path())
+    path = folder / name
+    if not was_run(info) and info.context and (why := outside(path, folder)):
+        raise WrongKey(why, at=("file",))
     try:
         return read_yaml(path)
     except ProtocolError as error:
-        raise ValueError(f"the lab's file {str(path)!r} cannot be read: {error}") from None
+        raise WrongKey(
+            f"the lab's file {str(path)!r} cannot be read: {error}", at=("file",)
+        ) from None
 
 
 class Question(Settings):
@@ -146,16 +169,45 @@ class Question(Settings):
     required: bool = True
     """Whether it has to be answered, or declined, before the questionnaire is handed in."""
 
+    @field_validator("choices")
+    @classmethod
+    def _each_is_another(cls, choices: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+        if (twice := _twice(choices)) and not was_run(info):
+            raise ValueError(f"{twice[0]!r} is there twice; write each once")
+        return choices
+
     @model_validator(mode="after")
-    def _can_be_answered(self) -> "Question":
+    def _can_be_answered(self, info: ValidationInfo) -> "Question":
         if self.kind == "choice" and not self.choices:
             raise ValueError(f"question {self.name!r} is a choice and has no choices; list them")
+        if not was_run(info) and self.kind != "choice" and self.choices:
+            raise ValueError(
+                f"question {self.name!r} has choices, and its kind is {self.kind!r}; write kind: "
+                "choice, or leave them out"
+            )
         if not self.lowest < self.highest:
             raise ValueError(
                 f"question {self.name!r} must rise, but goes from {self.lowest:g} to "
                 f"{self.highest:g}; write a highest above the lowest"
             )
         return self
+
+    def doubt(self) -> str:
+        """Return what hardly anybody means by it; nothing mostly."""
+        if self.kind == "choice" and len(self.choices) == 1:
+            return "has one choice"
+        if self.kind not in {"scale", "number"}:
+            words = [key for key in ("left", "right") if getattr(self, key)]
+            return f"has {' and '.join(words)}, which only a scale shows" if words else ""
+        if self.step:
+            steps = (self.highest - self.lowest) / self.step
+            if abs(steps - round(steps)) > STEP_TOLERANCE:
+                last = self.lowest + int(steps) * self.step
+                return (
+                    f"goes from {self.lowest:g} to {self.highest:g} in steps of {self.step:g}, so "
+                    f"that {last:g} is the most that can be answered"
+                )
+        return ""
 
     def item(self) -> Item:
         """Return it as the item it is."""
@@ -165,6 +217,10 @@ class Question(Settings):
 def _or_in_the_file(schema: dict[str, Any]) -> None:
     """Let a protocol write the file alone."""
     schema["anyOf"] = [{"required": schema.pop("required")}, {"required": ["file"]}]
+
+
+Number = Annotated[str, Reference("question with numbers", own=True)]
+"""A question that is answered with a number."""
 
 
 class FreeSettings(Settings):
@@ -185,7 +241,9 @@ class FreeSettings(Settings):
     questions: tuple[Question, ...] = Field(min_length=1)
     """What is asked, in order."""
 
-    sums: dict[str, tuple[str, ...]] = Field(default_factory=dict)
+    sums: dict[str, Annotated[tuple[Number, ...], Field(min_length=1), Once()]] = Field(
+        default_factory=dict
+    )
     """Scores: the names of the questions whose answers are added, by the score's name."""
 
     @model_validator(mode="before")
@@ -209,23 +267,14 @@ class FreeSettings(Settings):
     @classmethod
     def _differ(cls, questions: tuple[Question, ...]) -> tuple[Question, ...]:
         names = [question.name for question in questions]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
+        if twice := sorted(set(_twice(names))):
             raise ValueError(f"{', '.join(twice)} is the name of two questions; rename one")
         return questions
 
-    @field_validator("sums")
-    @classmethod
-    def _sums_add_numbers(
-        cls, sums: dict[str, tuple[str, ...]], info: ValidationInfo
-    ) -> dict[str, tuple[str, ...]]:
-        if "questions" not in info.data:
-            return sums  # what is wrong with them is told
-        known = {each.name for each in info.data["questions"] if each.kind in {"scale", "number"}}
-        for score, names in sums.items():
-            if wrong := [name for name in names if name not in known]:
-                raise ValueError(
-                    f"sum {score!r} adds {', '.join(wrong)}; the questions with numbers are "
-                    f"{', '.join(sorted(known)) or 'none'}"
-                )
-        return sums
+    def provides(self, machine: Machine) -> Names:
+        numbers = [each.name for each in self.questions if each.kind in {"scale", "number"}]
+        return {"question with numbers": numbers}
+
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        doubts = ((at, each.doubt()) for at, each in enumerate(self.questions, start=1))
+        return {f"questions.{at}": doubt for at, doubt in doubts if doubt}

@@ -59,11 +59,12 @@ class Scenario(Task):
                 self._scenes[_name(path)] = load_scene(path)
             except ProtocolError as error:
                 raise ProtocolError(str(error), at=("scenes", at)) from error
-        for name, scene in self._scenes.items():
+        for at, (name, scene) in enumerate(self._scenes.items()):
             if scene.start_deg is not None and len(scene.start_deg) != len(machine.joints):
                 raise ProtocolError(
                     f"scene {name!r}: start_deg has {len(scene.start_deg)} angles; the machine has "
-                    f"{len(machine.joints)} joints ({', '.join(machine.names)})"
+                    f"{len(machine.joints)} joints ({', '.join(machine.names)})",
+                    at=("scenes", at),
                 )
         self._values: FloatArray = np.zeros(6 + len(KINDS))
 

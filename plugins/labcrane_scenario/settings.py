@@ -1,9 +1,11 @@
 """Settings of scenarios and of those who run them without a person."""
 
+from typing import Annotated
+
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
 from labcrane import Machine, Settings
-from labcrane.core import AxisName, ButtonName, JointName, Names, SceneFile
+from labcrane.core import ButtonName, InputAxis, JointName, Names, SceneFile, Usual
 
 EVENTS = (
     "goal.reached", "mistakes.too_many", "deformity.found", "drop", "overload", "contact.object",
@@ -23,7 +25,7 @@ class ScenarioSettings(Settings):
     """More mistakes than this of one kind end the run, with a completion flag of 0, unless the
     supervisor overrides it."""
 
-    limit_s: PositiveFloat | None = None
+    limit_s: Annotated[PositiveFloat | None, Usual(5.0, 4 * 3600.0)] = None
     """Time after which a run ends, in seconds; each scene's own by default."""
 
     release: float = Field(default=0.8, gt=0.0, le=1.0)
@@ -52,7 +54,7 @@ class ScenarioSettings(Settings):
 class ErrorSettings(Settings):
     """How a simulated operator errs. All is drawn from the participant's and the trial's seed."""
 
-    bumps_per_min: NonNegativeFloat = 0.0
+    bumps_per_min: Annotated[NonNegativeFloat, Usual(0.001, 100.0)] = 0.0
     """How often it bumps into something, in a minute of movement: it lets the arm sink."""
 
     bump_s: PositiveFloat = 1.0
@@ -67,7 +69,7 @@ class ErrorSettings(Settings):
     over_grip_s: PositiveFloat = 3.0
     """For how long it presses on then, in seconds."""
 
-    fatigue_per_min: NonNegativeFloat = 0.0
+    fatigue_per_min: Annotated[NonNegativeFloat, Usual(1e-5, 1.0)] = 0.0
     """Share of its speed that is lost in a minute of the session, and by which it errs more often:
     after t minutes it has exp(-fatigue t) of its speed, and 1 / that of its rates."""
 
@@ -90,7 +92,7 @@ class OperatorSettings(Settings):
     signal: float = Field(default=0.5, gt=0.0, le=1.0)
     """Share of full signal with which the jaws are moved."""
 
-    axes: dict[JointName, AxisName] = Field(default={})
+    axes: dict[JointName, InputAxis] = Field(default={})
     """Axes of the input that it stands for, by the joint that each moves (``{jaws: -right.x}``),
     with a minus where the scheme has one. A joint left out has its own axis: ``valve.jaws``."""
 

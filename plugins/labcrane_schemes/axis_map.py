@@ -31,6 +31,10 @@ def find_axes(axes: Layout, order: Sequence[str], wanted: Mapping[str, str]) -> 
     found: dict[int, str] = {}
     result = []
     for key in order:
+        if key not in wanted:
+            raise ProtocolError(
+                f"map has no axis for {key!r}; it needs one for each of {', '.join(order)}"
+            )
         try:
             index, sign = find_axis(axes, wanted[key])
         except ProtocolError as error:

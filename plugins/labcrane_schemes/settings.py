@@ -1,14 +1,22 @@
 """Settings of the schemes."""
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from labcrane import Settings
-from labcrane.core import AxisName, ButtonName, Covers, JointName, Once, Unit
+from labcrane import Machine, Settings
+from labcrane.core import AxisName, ButtonName, Covers, JointName, Names, Once, Reference, Unit
 
 DIRECTIONS = {"base": ("x", "y", "z"), "arm": ("radial", "tangential", "vertical")}
 """What the stick moves the tip along, for each ``frame``."""
+
+
+Direction = Annotated[str, Reference("direction of the frame", own=True)]
+"""A direction in which the tip is moved."""
+
+
+LARGEST_DEAD_ZONE = 0.5
 
 
 class HandlingSettings(Settings):
@@ -24,6 +32,20 @@ class HandlingSettings(Settings):
     soft_stop_deg: NonNegativeFloat = 5.0
     """Distance from a joint limit, in degrees, over which the joint is slowed to a stop."""
 
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        found = {}
+        if self.dead_zone > LARGEST_DEAD_ZONE:
+            found["dead_zone"] = (
+                f"is {self.dead_zone:g}, so that a stick moves nothing over most of its way"
+            )
+        widths = [highest - lowest for lowest, highest in (j.range_deg for j in machine.joints)]
+        if 2 * self.soft_stop_deg >= min(widths):
+            found["soft_stop_deg"] = (
+                f"is {self.soft_stop_deg:g} degrees at either end, and a joint turns by "
+                f"{min(widths):g} in all, so that it is never at full speed"
+            )
+        return found
+
 
 class JointVelocitySettings(HandlingSettings):
     """Each axis turns one joint."""
@@ -38,7 +60,7 @@ class JointVelocitySettings(HandlingSettings):
 class EndEffectorSettings(HandlingSettings):
     """Each axis moves the tip along one direction."""
 
-    map: Annotated[dict[str, AxisName], Once()]
+    map: Annotated[dict[Direction, AxisName], Covers("direction of the frame", own=True), Once()]
     """Which axis moves the tip along which direction: x, y and z of the base frame, or radial,
     tangential and vertical as seen from the slew axis (see ``frame``)."""
 
@@ -59,15 +81,8 @@ class EndEffectorSettings(HandlingSettings):
     threshold_m: PositiveFloat = 0.5
     """Smallest singular value of the planar Jacobian, in metres, below which damping begins."""
 
-    @model_validator(mode="after")
-    def _map_fits_frame(self) -> "EndEffectorSettings":
-        wanted = DIRECTIONS[self.frame]
-        if set(self.map) != set(wanted):
-            raise ValueError(
-                f"with frame {self.frame!r}, map needs an axis for each of {', '.join(wanted)}, "
-                f"but names {', '.join(self.map) or 'nothing'}"
-            )
-        return self
+    def provides(self, machine: Machine) -> Names:
+        return {"direction of the frame": DIRECTIONS[self.frame]}
 
 
 class SwitchableSettings(Settings):
@@ -84,3 +99,11 @@ class SwitchableSettings(Settings):
 
     start: Literal["joint_velocity", "end_effector"] = "joint_velocity"
     """The scheme in which every trial begins."""
+
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        either = {"joint_velocity": self.joint_velocity, "end_effector": self.end_effector}
+        return {
+            f"{name}.{key}": text
+            for name, settings in either.items()
+            for key, text in settings.doubts(machine).items()
+        }

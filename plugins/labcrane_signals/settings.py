@@ -4,7 +4,8 @@ from typing import Literal
 
 from pydantic import PositiveFloat
 
-from labcrane import Settings
+from labcrane import Machine, Settings
+from labcrane.core import Names
 
 
 class ElectrodeSettings(Settings):
@@ -19,6 +20,9 @@ class ElectrodeSettings(Settings):
 
 class EegSettings(ElectrodeSettings):
     """Whether each electrode of an EEG is alive: flat, railing, hum, disconnected, bridged."""
+
+    def provides(self, machine: Machine) -> Names:
+        return {"stream type": ("EEG",)}
 
 
 class EcgSettings(ElectrodeSettings):
@@ -37,6 +41,9 @@ class EmgSettings(ElectrodeSettings):
 
 class GazeSettings(Settings):
     """Whether an eye tracker sees the eyes: gaze lost, pupil implausible, wrong unit."""
+
+    def provides(self, machine: Machine) -> Names:
+        return {"stream type": ("Gaze",)}
 
     confidence: PositiveFloat = 0.3
     """Confidence below which a sample shows no gaze, 0 to 1."""

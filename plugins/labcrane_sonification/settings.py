@@ -1,13 +1,18 @@
 """Settings of the tone."""
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
 from labcrane import Machine, Settings
-from labcrane.core import Names, Unit
+from labcrane.core import Names, Unit, WrongKey
 
 MOST_OVERTONES = 15
+LOWEST_HZ, HIGHEST_HZ = 40.0, 10_000.0
+"""Between which fundamentals grown-ups hear a sine from any loudspeaker."""
+
+FEWEST_SAMPLES, MOST_SAMPLES = 8000, 192_000
 
 
 class SonificationSettings(Settings):
@@ -61,11 +66,34 @@ class SonificationSettings(Settings):
     def provides(self, machine: Machine) -> Names:
         return {"object": ()}
 
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        found = {}
+        few, many = min(self.pitch_hz), max(self.pitch_hz)
+        highest = many * (1 + max(self.overtones))
+        if few < LOWEST_HZ or many > HIGHEST_HZ:
+            found["pitch_hz"] = f"is {few:g} to {many:g} Hz, which not everybody hears"
+        elif few == many and self.overtones[0] == self.overtones[1]:
+            found["pitch_hz"] = f"is {few:g} Hz at every distance, so that nothing is heard of it"
+        elif highest > self.rate_hz / 2:
+            found["overtones"] = (
+                f"reach {highest:g} Hz, and {self.rate_hz} samples a second hold half their "
+                "number, so that others are heard instead"
+            )
+        if not any(self.level):
+            found["level"] = "is 0 at every distance: nothing is heard"
+        if not FEWEST_SAMPLES <= self.rate_hz <= MOST_SAMPLES:
+            found["rate_hz"] = f"is {self.rate_hz}, which few sound cards play"
+        return found
+
     @model_validator(mode="after")
     def _levels_and_overtones_are_possible(self) -> "SonificationSettings":
         if not all(0.0 <= level <= 1.0 for level in self.level):
-            raise ValueError(f"level must be 0 to 1, but is {self.level[0]:g}, {self.level[1]:g}")
+            raise WrongKey(
+                f"level must be 0 to 1, but is {self.level[0]:g}, {self.level[1]:g}", at=("level",)
+            )
         if not all(0 <= count <= MOST_OVERTONES for count in self.overtones):
             few, many = self.overtones
-            raise ValueError(f"overtones must be 0 to {MOST_OVERTONES}, but are {few}, {many}")
+            raise WrongKey(
+                f"overtones must be 0 to {MOST_OVERTONES}, but are {few}, {many}", at=("overtones",)
+            )
         return self

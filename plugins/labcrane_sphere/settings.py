@@ -1,11 +1,14 @@
 """Settings of the sphere."""
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from labcrane import Machine, Settings
-from labcrane.core import Names, Unit
+from labcrane.core import Names, Unit, WrongKey
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class SphereSettings(Settings):
@@ -38,7 +41,7 @@ class SphereSettings(Settings):
     darkest: NonNegativeFloat = Field(default=0.25, lt=1.0)
     """Smallest brightness, 1 being the full colour."""
 
-    colour: tuple[float, float, float] = (0.15, 0.75, 1.0)
+    colour: tuple[Share, Share, Share] = (0.15, 0.75, 1.0)
     """Red, green and blue at full brightness, each 0 to 1."""
 
     opacity: float = Field(default=0.45, gt=0.0, le=1.0)
@@ -50,10 +53,19 @@ class SphereSettings(Settings):
     def provides(self, machine: Machine) -> Names:
         return {"object": ["sphere"]}
 
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        if self.largest < self.far:
+            return {}
+        return {
+            "largest": f"is {self.largest:g} m, and so the sphere reaches from the target to "
+            f"a tip that is far, {self.far:g} m away"
+        }
+
     @model_validator(mode="after")
     def _sizes_rise(self) -> "SphereSettings":
         if self.smallest > self.largest:
-            raise ValueError(
-                f"smallest is {self.smallest:g} m and largest {self.largest:g} m; exchange them"
+            raise WrongKey(
+                f"smallest is {self.smallest:g} m and largest {self.largest:g} m; exchange them",
+                at=("smallest",),
             )
         return self

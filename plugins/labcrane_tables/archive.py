@@ -129,15 +129,24 @@ def _hide_computers(path: Path) -> None:
     import h5py
     import numpy as np
 
-    def hide(name: str, node: Any) -> None:
+    from labcrane.recording import put_seal
+
+    hidden: dict[str, bytes] = {}
+
+    def look(name: str, node: Any) -> None:
         if isinstance(node, h5py.Dataset) and name.endswith("/header"):
             text = node[()]
-            hidden = HOST.sub(lambda found: found[1] + b"-" * len(found[2]) + found[3], text)
-            if hidden != text:
-                node[()] = np.bytes_(hidden)
+            without = HOST.sub(lambda found: found[1] + b"-" * len(found[2]) + found[3], text)
+            if without != text:
+                hidden[name] = without
 
-    with h5py.File(path, "r+") as file:
-        file.visititems(hide)
+    with h5py.File(path, "r") as file:
+        file.visititems(look)
+    if hidden:
+        with h5py.File(path, "r+") as file:
+            for name, text in hidden.items():
+                file[name][()] = np.bytes_(text)
+        put_seal(path)
 
 
 def _files(folder: Path) -> list[Path]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from labcrane.analysis import (
     Exporter,
     Participant,
+    annotations_of,
     answers_of,
     beside_trials,
     codebook_of,
@@ -36,6 +37,7 @@ class Tables(Exporter):
     ``participants``     one row per participant
     ``trials``           one row per movement: condition, results, measures
     ``events``           one row per event
+    ``annotations``      one row per mark that people made afterwards, where there is one
     ``questionnaires``   one row per answer
     ``scores``           one row per score of a questionnaire
     ``streams/``         one file per participant, session and stream, one row per tick
@@ -52,7 +54,7 @@ class Tables(Exporter):
         import pandas as pd
 
         (folder / "streams").mkdir()
-        people, trials, codebooks, answers, scores = [], [], [], [], []
+        people, trials, codebooks, answers, scores, marks = [], [], [], [], [], []
         events = _Growing(folder / "events")
         for participant in participants:
             people.append(_person(participant))
@@ -60,11 +62,14 @@ class Tables(Exporter):
             trials.append(snake(measures))
             codebooks.append(codebook_of(participant, measures))
             answers.append(answers_of(participant))
+            marks.append(annotations_of(participant))
             scores.append(scores_of(participant))
             for number, session in participant.sessions():
                 events.add(_events(participant, number, session))
                 self._streams(participant, number, session, folder / "streams")
         events.close()
+        if any(map(len, marks)):
+            write_csv(joined(marks), folder / "annotations.csv")
         for name, tables in (("trials", trials), ("questionnaires", answers), ("scores", scores)):
             everything = joined(tables)
             write_csv(everything, folder / f"{name}.csv")

@@ -1,12 +1,13 @@
 """Settings of lines by which other devices are told of events."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, NonNegativeFloat, PositiveInt, field_validator
 
-from labcrane import Settings
-from labcrane.core import EventName
+from labcrane import Machine, Settings
+from labcrane.core import EventName, Names
 
 Code = Annotated[int, Field(ge=1, le=255)]
 
@@ -22,11 +23,20 @@ class LineSettings(Settings):
     """How long a code stays on the line, in seconds, at least: it is taken off in a tick. 0 leaves
     that to the device."""
 
+    def doubts(self, machine: Machine) -> Mapping[str, str]:
+        first: dict[int, str] = {}
+        for event, code in (self.codes or {}).items():
+            if (other := first.setdefault(code, event)) != event:
+                return {
+                    "codes": f"has {code} for {other} and for {event}, which nobody tells apart"
+                }
+        return {}
+
 
 class SerialSettings(LineSettings):
     """Settings of a serial port whose device shows each byte on its lines."""
 
-    port: str
+    port: Annotated[str, Field(min_length=1)]
     """Name of the port: ``/dev/ttyUSB0``, ``COM3``."""
 
     baud: PositiveInt = 115_200
@@ -35,6 +45,9 @@ class SerialSettings(LineSettings):
     echo: bool = False
     """Whether the device sends back what it shows, byte by byte: each echo is recorded with its
     delay."""
+
+    def provides(self, machine: Machine) -> Names:
+        return {"port": (self.port,)}
 
 
 class BoxSettings(SerialSettings):
@@ -63,3 +76,6 @@ class ParallelSettings(LineSettings):
 
     port: Path = Path("/dev/parport0")
     """The port's file: ``modprobe ppdev`` makes it, and the group ``lp`` may open it."""
+
+    def provides(self, machine: Machine) -> Names:
+        return {"port": (str(self.port),)}

@@ -241,11 +241,23 @@ class Keeper:
         self._stop = threading.Event()
         self._corner, self._tries = place[0], 0
         self.lost = 0
+        self._failure: Exception | None = None
         if self._names:
             threading.Thread(target=self._watch, name="monitors", daemon=True).start()
 
     def keep(self, output: Any) -> None:
-        """Move the window if monitors have gone or come since the last time."""
+        """Move the window if monitors have gone or come since the last time.
+
+        Raises
+        ------
+        DeviceError
+            The desktop can no longer be asked which there are.
+        """
+        if self._failure is not None:
+            raise DeviceError(
+                f"the monitors are watched no more: {self._failure!r}; the view is "
+                "started again, and asks anew"
+            ) from self._failure
         there = self._seen
         if not there:
             return
@@ -271,5 +283,8 @@ class Keeper:
         self._stop.set()
 
     def _watch(self) -> None:
-        while not self._stop.wait(LOOK_S):
-            self.look()
+        try:
+            while not self._stop.wait(LOOK_S):
+                self.look()
+        except Exception as error:  # noqa: BLE001 - raised where the picture is made
+            self._failure = error

@@ -1,6 +1,7 @@
 """Settings of a view."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from string import ascii_lowercase, digits
 from typing import Annotated, Literal
 
@@ -9,6 +10,8 @@ from pydantic import (
     NonNegativeFloat,
     NonNegativeInt,
     PositiveFloat,
+    ValidationInfo,
+    field_validator,
     model_validator,
 )
 from pydantic import PositiveInt as Pixels
@@ -19,11 +22,15 @@ from labcrane.core import (
     EventName,
     LinkName,
     Names,
+    Once,
     Preset,
     Reference,
     SceneObject,
     StudyPath,
     Unit,
+    Usual,
+    WrongKey,
+    was_run,
 )
 
 Triple = tuple[float, float, float]
@@ -56,14 +63,16 @@ class CameraSettings(Settings):
     depth_m: tuple[PositiveFloat, PositiveFloat] = (0.5, 20.0)
     """Near and far end of a depth picture, in metres along the line of sight."""
 
-    rate_hz: PositiveFloat | None = None
+    rate_hz: Annotated[PositiveFloat | None, Usual(1.0, 500.0)] = None
     """Pictures per second of the session's time; as many as the window shows by default."""
 
-    delay_s: NonNegativeFloat = 0.0
+    delay_s: Annotated[NonNegativeFloat, Usual(0.001, 5.0)] = 0.0
     """How long ago what it shows happened, in seconds, beside the window's own delay."""
 
     @model_validator(mode="after")
-    def _depth_rises(self) -> "CameraSettings":
+    def _depth_rises(self, info: ValidationInfo) -> "CameraSettings":
+        if self.look == self.eye and not was_run(info):
+            raise ValueError("look is where its eye is; write a point that it looks at")
         if self.look == "targets" and self.on is not None:
             raise ValueError(
                 f"a camera that rides on {self.on!r} cannot hold the targets in its picture; write "
@@ -100,6 +109,14 @@ KEYS = (
 Key = Annotated[str, Reference("key", own=True)]
 """A key of the keyboard."""
 
+LONGEST_DELAY_S = 10.0
+SHORTEST_HINT_S = 0.5
+FEWEST_PICTURES_HZ = 5.0
+FARTHEST_VIEWING_M = 10.0
+FEWEST_ARCMIN, MOST_ARCMIN = 5.0, 180.0
+
+FONTS = (".ttf", ".otf", ".ttc", ".pfb", ".pfa", ".woff", ".fon")
+
 ENTERING = ("target.entered",)
 """Events that tell whether the tip is where it should be."""
 
@@ -107,7 +124,7 @@ ENTERING = ("target.entered",)
 class PatchSettings(Settings):
     """A square in a corner for a photodiode: it changes between black and white."""
 
-    on: tuple[EventName, ...] = ("trial.start", "trial.end")
+    on: Annotated[tuple[EventName, ...], Field(min_length=1), Once()] = ("trial.start", "trial.end")
     """Events at each of which it changes."""
 
     corner: Literal["bottom_left", "bottom_right", "top_left", "top_right"] = "bottom_left"
@@ -120,7 +137,7 @@ class PatchSettings(Settings):
 class SupervisorSettings(Settings):
     """Which pictures the supervisor's page shows."""
 
-    cameras: tuple[CameraName, ...] = ()
+    cameras: Annotated[tuple[CameraName, ...], Once()] = ()
     """Names of the cameras; all by default."""
 
     rate_hz: float = Field(default=4.0, ge=1.0, le=10.0)
@@ -160,14 +177,14 @@ class ViewSettings(Settings):
     """The monitor to fill: its name (``HDMI-1``), or its number, counted from 0; a window by
     default."""
 
-    screens: tuple[Screen, ...] = ()
+    screens: Annotated[tuple[Screen, ...], Once()] = ()
     """Monitors to fill with one wide picture, from left to right, instead of ``screen``."""
 
-    bezel_mm: NonNegativeFloat = 0.0
+    bezel_mm: Annotated[NonNegativeFloat, Usual(0.1, 300.0)] = 0.0
     """What lies between the pictures of two of ``screens``, in millimetres: as much of the wide
     picture is behind their frames, so that what moves across goes on straight."""
 
-    screen_mm: PositiveFloat | None = None
+    screen_mm: Annotated[PositiveFloat | None, Usual(50.0, 10_000.0)] = None
     """Width of one monitor's visible picture, in millimetres; as the monitor says by default."""
 
     flip: Literal["none", "horizontal", "vertical"] = "none"
@@ -179,7 +196,7 @@ class ViewSettings(Settings):
     seen_by: Literal["operator", "examiner"] = "operator"
     """Who looks at it. What tells the operator how far the task's goal is belongs to the design."""
 
-    hud: tuple[HudLine, ...] | None = None
+    hud: Annotated[tuple[HudLine, ...], Once()] | None = None
     """Lines of text in the corner; block and trial by default, and for the examiner the distance to
     the target as well. ``load`` is how hard each joint works, if the machine says."""
 
@@ -211,13 +228,13 @@ class ViewSettings(Settings):
     to it, lines on the ground a metre apart. Every group sees them: views have the same settings in
     all of them."""
 
-    delay_s: NonNegativeFloat = 0.0
+    delay_s: Annotated[NonNegativeFloat, Usual(0.001, 5.0)] = 0.0
     """How long ago what is shown happened: a teleoperator's delay, in seconds."""
 
-    rate_hz: PositiveFloat | None = None
+    rate_hz: Annotated[PositiveFloat | None, Usual(1.0, 500.0)] = None
     """Most pictures per second; as many as the monitor shows by default."""
 
-    keys: tuple[Key, ...] = ()
+    keys: Annotated[tuple[Key, ...], Once()] = ()
     """Keys whose state is sent while the window has the focus, for the input ``keyboard``: letters,
     digits, ``arrow_left``, ``space``, ``lshift`` ..."""
 
@@ -227,7 +244,7 @@ class ViewSettings(Settings):
     patch: PatchSettings | None = None
     """Square for a photodiode; none by default."""
 
-    areas: tuple[SceneObject, ...] = ("tip", "target", "other", "sphere")
+    areas: Annotated[tuple[SceneObject, ...], Once()] = ("tip", "target", "other", "sphere")
     """What has a box for eye tracking: tip, targets, shapes of cues; links, the grapple and things
     by name, around what is drawn of them, wherever it moves."""
 
@@ -245,16 +262,27 @@ class ViewSettings(Settings):
     renderer: Literal["auto", "software"] = "auto"
     """``software`` draws without any graphics driver, and without shadows."""
 
+    @field_validator("font")
+    @classmethod
+    def _is_a_font(cls, font: Path | None, info: ValidationInfo) -> Path | None:
+        if font is not None and font.suffix.lower() not in FONTS and not was_run(info):
+            raise ValueError(f"{font.name!r} is no font file; give one, as .ttf or .otf")
+        return font
+
     @model_validator(mode="after")
     def _screens_and_text_fit(self) -> "ViewSettings":
         if self.screens and self.screen is not None:
-            raise ValueError("screen and screens are both there; write one of them")
+            raise WrongKey("screen and screens are both there; write one of them", at=("screen",))
         if self.screens and self.beside:
-            raise ValueError(
-                "screens shows one wide picture, and beside asks for several; leave one out"
+            raise WrongKey(
+                "screens shows one wide picture, and beside asks for several; leave one out",
+                at=("beside",),
             )
         if self.text_arcmin is not None and self.viewing_m is None:
-            raise ValueError("text_arcmin needs viewing_m, the distance from the eye to the screen")
+            raise WrongKey(
+                "text_arcmin needs viewing_m, the distance from the eye to the screen; write it",
+                at=("text_arcmin",),
+            )
         return self
 
     @property
@@ -267,6 +295,7 @@ class ViewSettings(Settings):
             "camera": [camera.name for camera in self.cameras],
             "object": ("tip",),
             "key": KEYS,
+            "screen": [str(screen) for screen in self.all_screens],
             "key of that view": self.keys,
         }
 
@@ -280,6 +309,18 @@ class ViewSettings(Settings):
             )
         if max(self.size) > MOST_PIXELS:
             found["size"] = f"is {self.size[0]} by {self.size[1]} pixels, more than any screen has"
+        if self.patch is not None and self.patch.size > min(self.size):
+            found["patch.size"] = f"is {self.patch.size} pixels, and {min(self.size)} are there"
+        if self.delay_s > LONGEST_DELAY_S:
+            found["delay_s"] = f"is {self.delay_s:g} s: nobody steers by a picture so late"
+        if self.rate_hz is not None and self.rate_hz < FEWEST_PICTURES_HZ:
+            found["rate_hz"] = f"is {self.rate_hz:g} Hz: a movement is seen to jump"
+        if self.viewing_m is not None and self.viewing_m > FARTHEST_VIEWING_M:
+            found["viewing_m"] = f"is {self.viewing_m:g} m from the eye to the screen"
+        if self.text_arcmin is not None and not FEWEST_ARCMIN <= self.text_arcmin <= MOST_ARCMIN:
+            found["text_arcmin"] = f"is {self.text_arcmin:g} minutes of arc, and 16 to 22 are usual"
+        if self.hint_s < SHORTEST_HINT_S:
+            found["hint_s"] = f"is {self.hint_s:g} s, in which nobody reads a hint"
         return found
 
     @property

@@ -22,6 +22,7 @@ from labcrane.recording import (
 START = "session.start"
 
 NAMES, JSON = "labcrane.names", "labcrane.markers"
+MARKS = "labcrane.annotations"
 
 SIDECAR = "labcrane_labels.json"
 
@@ -37,7 +38,7 @@ class MergedXdf(Exporter):
     are three streams of markers: ``labcrane.names`` to epoch by (``trial_start``),
     ``labcrane.labels`` with block and condition (``trial_start/block=learning/side=left``), and
     ``labcrane.markers`` with all that is known of each, as JSON. What the names mean, also in HED,
-    is in ``labcrane_labels.json``.
+    is in ``labcrane_labels.json``. Marks that people made afterwards are ``labcrane.annotations``.
 
     Every stream's clock offset is 0, so that nobody corrects twice. A stream whose clock could not
     be corrected keeps its own time, and says so under ``desc/labcrane``.
@@ -80,7 +81,22 @@ def write_session(writer: XdfWriter, session: SessionRecord) -> set[str]:
         if time:
             writer.write_offset(number, time[0], 0.0)
         writer.write_texts(number, time, [(text,) for text in samples])
+    _write_marks(writer, session)
     return set(names)
+
+
+def _write_marks(writer: XdfWriter, session: SessionRecord) -> None:
+    """Write what people marked afterwards, where there is any: the text, and for how long."""
+    marks = session.annotations
+    if marks.empty:
+        return
+    channels = (Channel("text", "none", "Annotation"), Channel("duration", "s", "Duration"))
+    number = writer.add_stream(StreamHeader(MARKS, "Markers", channels, "string"))
+    time = marks["time"].tolist()
+    writer.write_offset(number, time[0], 0.0)
+    lengths = (marks["until"] - marks["time"]).tolist()
+    rows = [(text, f"{each:g}") for text, each in zip(marks["text"], lengths, strict=True)]
+    writer.write_texts(number, time, rows)
 
 
 def _write_stream(writer: XdfWriter, name: str, stream: Stream, rate_hz: float) -> None:

@@ -249,6 +249,19 @@ def test_totals_are_values_for_pandas_with_formulas_beside_them_and_a_csv_twin(
     assert not any("formula" in name for name in twin)
     means = pd.read_excel(tmp_path / "evaluation.xlsx", sheet_name="Summary")
     assert means["percent"].item() == pytest.approx(sheet["percent"].mean())
+    trend = pd.read_excel(tmp_path / "evaluation.xlsx", sheet_name="Trend")
+    assert trend["R001"].item() == pytest.approx(sheet["percent"].mean())
+
+
+@pytest.mark.parametrize("name", ["book", "book.csv", "book.xls"])
+def test_a_workbook_under_another_name_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    record(tmp_path / "data", "R001", the_vectors())
+    assert main(["score", str(tmp_path / "data"), "--out", str(tmp_path / name)]) == 1
+    said = " ".join(capsys.readouterr().err.split())
+    assert "is no name of a workbook; give one that ends in .xlsx" in said
+    assert [each.name for each in tmp_path.iterdir()] == ["data"]
 
 
 def test_what_was_judged_after_a_test_is_in_the_trial_table_and_counts(tmp_path: Path) -> None:
@@ -315,15 +328,25 @@ def test_libreoffice_opens_the_workbook_and_its_totals_are_ours(
     assert len(rows) == len(tests) == 8
     for test, row in zip(tests, rows, strict=True):
         cells = dict(zip(head, row, strict=True))
-        for name in ("raw", "percent"):
-            assert float(cells[name]) == pytest.approx(getattr(test.indicator, name), abs=1e-3)
-        assert float(cells["objective"]) == pytest.approx(test.indicator.objective, abs=1e-3)
+        for name in ("objective", "subjective", "raw", "percent"):
+            ours = pytest.approx(getattr(test.indicator, name), abs=1e-3)
+            assert float(cells[name]) == ours
+            assert float(cells[f"{name} (formula)"]) == ours
     head, *rows = converted(book, 1)
     assert [row[0] for row in rows] == ["R001", "R002"]
     mean = sum(test.indicator.percent for test in tests[6:]) / 2
     assert float(rows[1][3]) == pytest.approx(mean, abs=1e-3)
     # Lost to objects: 10 and 5 points; to time: 20 (1 - 50/80) = 7.5 and 4.4.
     assert rows[1][4].startswith("practise objects")
+    head, *rows = converted(book, 3)
+    assert head == ["session", "R001", "R002", "R001 (formula)", "R002 (formula)"]
+    first = sum(test.indicator.percent for test in tests[:6]) / 6
+    by_session = [[first, tests[6].indicator.percent], [None, tests[7].indicator.percent]]
+    for session, row, means in zip((1, 2), rows, by_session, strict=True):
+        assert float(row[0]) == session
+        for cells in (row[1:3], row[3:5]):
+            for cell, mean in zip(cells, means, strict=True):
+                assert cell == "" if mean is None else float(cell) == pytest.approx(mean, abs=1e-3)
 
 
 def test_who_was_excluded_is_not_scored_and_is_named(

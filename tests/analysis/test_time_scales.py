@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from labcrane.analysis.statistics.time_scales import quantities, summary
+from labcrane.analysis.statistics.time_scales import quantities, summary, taken_away
 
 PEOPLE, PHASES, PLACES = 9, 3, 6
 PAIRS = {"near": -0.7, "far": 1.9}
@@ -81,3 +81,61 @@ def test_a_groups_mean_interval_and_test_are_those_of_its_people(
                 mine = row[["mean", "ci_low", "ci_high", "t", "p"]].astype(float)
                 np.testing.assert_allclose(mine, wanted, rtol=1e-7, atol=1e-9)
                 assert row["n"] == who.sum()
+
+
+def unbalanced(seed: int) -> pd.DataFrame:
+    """Return movements of few people, with pairs in drawn orders, and a fifth of them missing."""
+    draw = np.random.default_rng(seed)
+    people, pairs = 5, 8
+    adds = dict(zip("abcdefgh", draw.uniform(-2.0, 2.0, pairs), strict=True))
+    rows = [
+        {
+            "participant": f"P{person:03}",
+            "group": "none",
+            "phase": f"{phase} session",
+            "place": place,
+            "pair": pair,
+            "movement_time": 9.0 - 0.4 * place - phase + adds[pair] + draw.normal(0.0, 0.3),
+        }
+        for person in range(people)
+        for phase in (1, 2)
+        for place, pair in enumerate(draw.permutation(list(adds)), start=1)
+        for _ in range(4)
+    ]
+    return pd.DataFrame(rows).sample(frac=0.8, random_state=seed)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_of_unbalanced_pairs_what_statsmodels_finds_that_they_add_is_taken_away(seed: int) -> None:
+    formula = pytest.importorskip("statsmodels.formula.api")
+    movements = unbalanced(seed)
+    keys = ["participant", "phase", "place", "pair"]
+    cells = movements.groupby(keys)["movement_time"].mean().reset_index()
+    model = formula.ols("movement_time ~ C(pair, Sum) + participant + phase:C(place)", cells).fit()
+    kinds = sorted(cells["pair"].unique())
+    adds = {each: model.params[f"C(pair, Sum)[S.{each}]"] for each in kinds[:-1]}
+    adds[kinds[-1]] = -sum(adds.values())
+    mine = taken_away(movements, "movement_time")
+    wanted = movements["movement_time"] - movements["pair"].map(adds)
+    np.testing.assert_allclose(mine, wanted, rtol=1e-9, atol=1e-9)
+    # Means of pairs alone take learning away with them.
+    alone = movements.groupby(["participant", "pair"])["movement_time"].mean()
+    alone = movements["pair"].map(alone.groupby(level=1).mean())
+    assert np.ptp(movements["movement_time"] - alone + alone.mean() - wanted) > 0.05
+
+
+def test_learning_is_found_whole_though_few_people_had_pairs_in_orders_that_favour_it() -> None:
+    slopes = []
+    for seed in range(30):
+        found = quantities(unbalanced(100 + seed), "movement_time")
+        slopes.append(found.loc[found["quantity"] == "slope", "value"].mean())
+    error = np.std(slopes, ddof=1) / np.sqrt(len(slopes))
+    assert error < 0.02
+    assert np.mean(slopes) == pytest.approx(-0.4, abs=4.0 * error)
+
+
+def test_pairs_that_came_in_one_order_for_all_cannot_be_told_from_positions() -> None:
+    movements = unbalanced(1)
+    same = movements.assign(pair=movements["place"].map(dict(enumerate("abcdefgh", start=1))))
+    mine = taken_away(same, "movement_time")
+    np.testing.assert_array_equal(mine, same["movement_time"])

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from needs import needs
-from rehearsal import ScriptedConsole, a_study
+from rehearsal import DiesError, DiesInTrial, ScriptedConsole, a_study
 from simple_crane import CRANE
 
 from labcrane import ProtocolError, open_recording
@@ -49,26 +49,6 @@ STAIRS = ADAPTIVE.replace("LIMIT", "7.0")
 QUEST = STAIRS.replace(
     "up_down: {harder_after: 2, reversals: 3, leave_out: 0}", "quest_plus: {spreads: [0.5, 1]}"
 )
-
-
-class DiesError(Exception):
-    """Stands for a process that is gone."""
-
-
-class DiesInTrial(ScriptedConsole):
-    """Ends everything in the middle of a trial, as a killed process does."""
-
-    def __init__(self, trial: int, ticks: int = 5) -> None:
-        super().__init__()
-        self._trial, self._left = trial, ticks
-
-    def commands(self):
-        running = [e for e in self.told if e.name == "trial.start"]
-        if running and running[-1].data["trial"] == self._trial:
-            self._left -= 1
-        if self._left == 0:
-            raise DiesError
-        return []
 
 
 def visit(folder: Path, text: str, session: int = 1, **options) -> Visit:
@@ -135,7 +115,7 @@ def test_a_killed_session_goes_on_as_if_it_had_not_been(
     """Whatever the operator does otherwise then, each level follows from the record."""
     where = visit(tmp_path, text)
     with pytest.raises(DiesError):
-        record(where, DiesInTrial(dies_in))
+        record(where, DiesInTrial(dies_in, ticks=5))
     before = [
         (each.level, bool(each.success))
         for each in progress(where.journal, where.study.machine.names).responses.values()
@@ -158,7 +138,7 @@ def test_a_block_that_is_redone_begins_anew(tmp_path: Path) -> None:
     text = STAIRS + "on_fault: {session_died: redo_block}\n"
     where = visit(tmp_path, text)
     with pytest.raises(DiesError):
-        record(where, DiesInTrial(8))
+        record(where, DiesInTrial(8, ticks=5))
     path = run(visit(tmp_path, text, resumed=True), ScriptedConsole())
     trials = open_recording(path).session(1).trials
     again = trials[trials["attempt"] == 2]
@@ -191,7 +171,7 @@ def test_the_next_session_goes_on_from_the_last_and_both_replay_to_the_bit(
 def test_a_killed_second_session_carries_what_it_began_with(tmp_path: Path) -> None:
     run(visit(tmp_path, STAIRS), ScriptedConsole())
     with pytest.raises(DiesError):
-        record(visit(tmp_path, STAIRS, session=2), DiesInTrial(5))
+        record(visit(tmp_path, STAIRS, session=2), DiesInTrial(5, ticks=5))
     path = run(visit(tmp_path, STAIRS, session=2, resumed=True), ScriptedConsole())
     told = [(level, bool(success)) for _, level, success in levels_of(path)]
     context = open_recording(path).session(2).context

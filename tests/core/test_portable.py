@@ -53,6 +53,10 @@ TWINS = {
         "os.sched_getaffinity", "os.sched_param", "os.sched_setaffinity", "os.sched_setscheduler",
         "resource",
     ),  # MMCSS on Windows; elsewhere it is refused
+    "labcrane/recording/annotations.py": ("os.geteuid",),  # Windows' folders have no such owner
+    "labcrane/recording/participant_file/verification.py": (
+        "os.posix_fadvise",
+    ),  # elsewhere the memory's copy of a file is read
     "labcrane/streams/recorder/own_clock.py": (
         "time.CLOCK_MONOTONIC", "time.CLOCK_MONOTONIC_RAW", "time.clock_gettime",
     ),  # elsewhere there is no clock that nothing turns, and none is logged

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rehearsal import SHORT, ScriptedConsole, a_study
+from rehearsal import SHORT, DiesError, DiesInTrial, ScriptedConsole, a_study
 
 from labcrane import ProtocolError, open_recording
 from labcrane.design.plan import plan_session
@@ -21,26 +21,6 @@ TWO_BLOCKS = SHORT.replace(
 )
 
 
-class DiesError(Exception):
-    """Stands for a process that is gone."""
-
-
-class DiesInTrial(ScriptedConsole):
-    """Ends everything in the middle of a trial, as a killed process does."""
-
-    def __init__(self, trial: int, ticks: int = 100) -> None:
-        super().__init__()
-        self._trial, self._left = trial, ticks
-
-    def commands(self):
-        running = [e for e in self.told if e.name == "trial.start"]
-        if running and running[-1].data["trial"] == self._trial:
-            self._left -= 1
-        if self._left == 0:
-            raise DiesError
-        return []
-
-
 @pytest.fixture
 def visit(tmp_path: Path) -> Visit:
     study = a_study(tmp_path, TWO_BLOCKS)
@@ -51,7 +31,7 @@ def visit(tmp_path: Path) -> Visit:
 def died(visit: Visit) -> Visit:
     """A session that died in trial 5, the second of its second block."""
     with pytest.raises(DiesError):
-        record(visit, DiesInTrial(5))
+        record(visit, DiesInTrial(5, ticks=100))
     return visit
 
 

@@ -153,8 +153,8 @@ def test_an_axis_that_the_device_does_not_have_is_told(complaint) -> None:
     told = complaint(("slew: left.x", "slew: left.z"))
     assert told == [
         "10:15: scheme.map.slew is 'left.z', and there is no such axis; did you mean 'left.y'? "
-        "the input has left.connected, left.slider, left.trigger, left.twist, left.x, left.y, "
-        "right.connected, right.slider, right.trigger, right.twist, right.x, right.y"
+        "the input has left.slider, left.trigger, left.twist, left.x, left.y, "
+        "right.slider, right.trigger, right.twist, right.x, right.y"
     ]
 
 

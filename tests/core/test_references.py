@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import pytest
 from ruamel.yaml import YAML
 
+import labcrane
 from labcrane import ProtocolError, Settings
 from labcrane.core import ButtonName, Covers, JointName, Layout, Once
 from labcrane.core.references import EVENTS, Mentioned, Reference, mentioned
@@ -63,7 +64,7 @@ def told(tmp_path: Path, registry: Registry):
         ("retrieval", "proportional: [base]", "proportional: [foo]", "17:18: dynamics.proportional[1] is 'foo', and there is no such joint; the machine has arm, base, boom, jaws"),
         ("retrieval", "boom: 3", "bom: 3", "11:72: input.valves.bom is 'bom', and there is no such joint; did you mean 'boom'?"),
         ("retrieval", "boom: 3, ", "", "13:9: scheme needs the axis 'valve.boom', and there is no such axis"),
-        ("retrieval", "fov_deg: 60}", "fov_deg: 60, on: bom}", "38:90: views.operator.camera.on is 'bom', and there is no such link; did you mean 'boom'?"),
+        ("retrieval", "fov_deg: 66}", "fov_deg: 66, on: bom}", "38:91: views.operator.camera.on is 'bom', and there is no such link; did you mean 'boom'?"),
         ("aiming", "end: rest_inside", "trigger: left.knob", "20:85: tasks.aiming.trigger is 'left.knob', and there is no such button;"),
         ("aiming", "end: rest_inside", "trigger: left.x", "20:85: tasks.aiming.trigger is 'left.x', and there is no such button; the input has left.trigger, right.trigger"),
         ("retrieval", "find_axis: float.base", "find_axis: valve.base", "32:16: tasks.retrieval.find_axis is 'valve.base', and there is no such button; did you mean 'float.base'?"),
@@ -74,7 +75,7 @@ def told(tmp_path: Path, registry: Registry):
         ("aiming", "camera: cab", "font: arial.ttf", "27:31: views.operator.font is 'arial.ttf', and there is no such file;"),
         ("aiming", "camera: cab", "keys: [a, lft]", "27:35: views.operator.keys[2] is 'lft', and there is no such key; did you mean 'lshift'?"),
         ("aiming", "input: {use: dual_joystick}", "input: {use: keyboard, view: operator, axes: {slew: [a, d]}}", "11:54: input.axes.slew[1] is 'a', and there is no such key of that view; it has none"),
-        ("retrieval", "look: [1.0, ", "look: [true, ", "38:56: views.operator.camera.look[1]: true is no number; write one"),
+        ("retrieval", "look: [0.8, ", "look: [true, ", "38:56: views.operator.camera.look[1]: true is no number; write one"),
         ("aiming", "camera: cab", "areas: [targt]", "27:33: views.operator.areas[1] is 'targt', and there is no such object; did you mean 'target'?"),
         ("aiming", "camera: cab", "patch: {on: [trial.strat]}", "27:38: views.operator.patch.on[1] is 'trial.strat', and there is no such event; did you mean 'trial.start'?"),
         ("aiming", "camera: cab", "supervisor: {cameras: [moon]}", "27:48: views.operator.supervisor.cameras[1] is 'moon', and there is no such camera;"),
@@ -84,9 +85,15 @@ def told(tmp_path: Path, registry: Registry):
         ("aiming", "width: 0.5", "width: 2", "20:57: tasks.aiming.width: a circle 2 m wide"),
         ("aiming", "[2, 3, 4, 6]", "[1,5, 2,5, 4]", "20:36: tasks.aiming.distances: 5 m is there twice; write each distance once, and decimals with a point: [1.5, 2.5, 4]"),
         ("aiming", "[2, 3, 4, 6]", "2 m", "20:36: tasks.aiming.distances is '2 m'; it must be a list: [.., ..]"),
-        ("aiming", "feedback: group", "feedback: grup", "38:41: sessions[1].steps[2].block.feedback is 'grup'; it must be 'all', 'none' or 'group', or a list: [.., ..]"),
-        ("aiming", "on_fault", "  - {name: acquisition, steps: [consent]}\non_fault", "40:12: two sessions are called 'acquisition'; give each a name of its own"),
+        ("aiming", "feedback: group", "feedback: grup", "39:41: sessions[1].steps[2].block.feedback is 'grup'; it must be 'all', 'none' or 'group', or a list: [.., ..]"),
+        ("aiming", "on_fault", "  - {name: acquisition, steps: [consent]}\non_fault", "41:12: two sessions are called 'acquisition'; give each a name of its own"),
         ("aiming", "pattern: 'P\\d{3}'", "pattern: 'P\\d{3}$1'", "7:25: participants.pattern 'P\\d{3}$1' is matched by nobody; "),
+        ("aiming", "use: joint_velocity\n  map: {slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}", "use: end_effector\n  map: {x: left.x, y: left.y, up: right.y}", "14:31: scheme.map.up is 'up', and there is no such direction of the frame; it has x, y, z"),
+        ("aiming", "use: joint_velocity\n  map: {slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}", "use: end_effector\n  map: {x: left.x, y: left.y}", "14:8: scheme.map has nothing for the direction of the frame 'z'; it needs one for each of x, y, z"),
+        ("retrieval", "model: arm.dmd.yaml\n  prop", "model: avc.dbc\n  prop", "16:10: "),
+        ("retrieval", "jaws: {grip_n: 60", "jaws: {joint: boom, grip_n: 60", "18:17: the jaws' joint 'boom' must be the machine's last and have length 0, but the last is 'jaws'"),
+        ("retrieval", "proportional: [base]", "proportional: [base, base]", "17:24: dynamics.proportional has 'base' twice; write it once"),
+        ("aiming", "pattern: 'P\\d{3}'", 'pattern: "P\\d{3}"', "7:28: this is no YAML: a backslash in double quotation marks begins a sign of its own; write single ones: 'P\\d{3}'"),
         ("aiming", "  map:", "\tmap:", "14:1: there is a tab, which YAML does not take for indentation; write spaces"),
     ],
 )  # fmt: skip
@@ -141,6 +148,163 @@ def test_a_wrong_name_of_a_robots_file_is_told_where_the_protocol_has_it(
 
 NEAR = "[0.1], width: 0.02, centre: [0.2, 0, 0.1]"
 """Circles in reach of an arm for a table."""
+
+
+OWN = (
+    "questionnaires: {q: {use: free, title: Q, questions: [{name: a, text: A, %s}], %s}}\non_fault"
+)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("use: sphere", "use: sphere, colour: [40, 190, 255]", "feedback.ball.colour[1] is 40; it must be less than or equal to 1"),
+        ("camera: cab}", "camera: {eye: [1, 2, 3], look: [1, 2, 3]}}", "look is where its eye is; write a point"),
+        ("camera: cab}", "font: protocol.yaml}", "views.operator.font: 'protocol.yaml' is no font file;"),
+        ("camera: cab}", "patch: {on: []}}", "views.operator.patch.on is []; it needs at least 1"),
+        ("camera: cab}", "patch: {on: [trial.end, trial.end]}}", "views.operator.patch.on has 'trial.end' twice; write it once"),
+        ("camera: cab}", "areas: [tip, tip]}", "views.operator.areas has 'tip' twice; write it once"),
+        ("camera: cab}", "screens: [1, 1]}", "views.operator.screens has '1' twice; write it once"),
+        ("camera: cab}", "hud: [block, block]}", "views.operator.hud has 'block' twice; write it once"),
+        ("on_fault", "page: {host: '127.0.0.1:80'}\non_fault", "page.host: '127.0.0.1:80' is no address; "),
+        ("on_fault", "page: {host: http://lab}\non_fault", "page.host: 'http://lab' is no address; "),
+        ("on_fault", "page: {colour: blue}\non_fault", "page.colour is 'blue'; it must be red, green and blue in hexadecimal,"),
+        ("on_fault", OWN % ("kind: choice, choices: [x, y, x]", ""), "'x' is there twice; write each once"),
+        ("on_fault", OWN % ("choices: [x, y]", ""), "has choices, and its kind is 'scale'; write kind: choice, or leave"),
+        ("on_fault", OWN % ("step: 1", "sums: {s: [b]}"), "questionnaires.q.sums.s[1] is 'b', and there is no such question with numbers; it has a"),
+        ("on_fault", OWN % ("kind: text", "sums: {s: [a]}"), "is 'a', and there is no such question with numbers; it has none"),
+        ("on_fault", OWN % ("step: 1", "sums: {s: [a, a]}"), "questionnaires.q.sums.s has 'a' twice; write it once"),
+        ("on_fault", OWN % ("step: 1", "sums: {s: []}"), "questionnaires.q.sums.s is []; it needs at least 1"),
+        ("on_fault", "operator: {use: simulated_operator, axes: [-left.x]}\non_fault", "'-left.x' is turned round, which only a scheme's map says"),
+        ("on_fault", "operator: {use: simulated_operator, button: left.trigger}\non_fault", "button is there without axes"),
+        ("on_fault", "operator: {use: simulated_operator, axes: [left.w]}\non_fault", "operator.axes[1] is 'left.w', and there is no such axis of the input; did you mean 'left.y'?"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_told_in_its_line(told, old: str, new: str, said: str) -> None:
+    assert old in AIMING
+    line = AIMING[: AIMING.index(old)].count("\n") + 1
+    lines = told("aiming", AIMING.replace(old, new, 1))
+    assert [each for each in lines if each.startswith(f"{line}:") and said in each], lines
+    assert {each.split(":")[0] for each in lines} == {str(line)}, lines
+
+
+def test_a_crane_that_has_no_scenes_is_told_with_the_task_that_needs_one(told) -> None:
+    arm = RETRIEVAL[RETRIEVAL.index("  use: dmd_arm") : RETRIEVAL.index("tasks:")]
+    text = RETRIEVAL.replace(arm, "  use: kinematic_crane\n\n")
+    lines = told("retrieval", text.replace("*scenes", "[scenes/carry.yaml]", 1))
+    said = "tasks.retrieval.scenes[1] is 'carry', and there is no such scene; the dynamics has none"
+    assert [line for line in lines if line.endswith(said)], lines
+
+
+def test_a_scene_of_another_folder_is_told_from_that_of_the_dynamics(told, tmp_path: Path) -> None:
+    assert told("retrieval", RETRIEVAL) == []
+    (tmp_path / "retrieval" / "other").mkdir()
+    scene = tmp_path / "retrieval" / "scenes" / "carry.yaml"
+    shutil.copytree(scene.parent, tmp_path / "retrieval" / "other" / "scenes")
+    (line,) = told("retrieval", RETRIEVAL.replace("*scenes", "[other/scenes/carry.yaml]"))
+    assert line.endswith(
+        f"tasks.retrieval.scenes[1] is 'carry', and the dynamics has another file of that name, "
+        f"{scene}; name the same one"
+    )
+    assert told("retrieval", RETRIEVAL.replace("*scenes", "[scenes/../scenes/carry.yaml]")) == []
+
+
+PLUGIN = """
+from typing import Annotated
+
+from labcrane import Questionnaire, Settings, SignalMonitor, hookimpl, offer
+from labcrane.core import Covers, EventName, Item, Reference
+
+labcrane_api = 1
+
+class Part(Settings):
+    words: Annotated[dict[Annotated[str, Reference("word", own=True)], int], Covers("word", own=True)]
+    def provides(self, machine):
+        return {"word": ("yes", "no")}
+
+class WhenSettings(Settings):
+    on: EventName = "trial.end"
+    part: Part | None = None
+    def provides(self, machine):
+        return {"word": ("outer",)}
+
+class When(Questionnaire):
+    title, rights = "When", "ours"
+    def items(self):
+        return [Item("a", "A?")]
+    def score(self, answers):
+        return {}
+
+class Look(SignalMonitor):
+    def knows(self, stream): return False
+    def begin(self, stream): pass
+    def look(self, times, samples): return ()
+
+@hookimpl
+def labcrane_questionnaires():
+    return [offer("when", WhenSettings, lambda settings, machine: When())]
+
+@hookimpl
+def labcrane_monitors():
+    return [offer("when_seen", WhenSettings, lambda settings, machine: Look())]
+"""
+
+
+@pytest.mark.parametrize(("key", "use"), [("questionnaires", "when"), ("monitors", "when_seen")])
+@pytest.mark.parametrize(
+    ("written", "said"),
+    [
+        ("on: trial.end", ""),
+        ("on: trial.ent", "{}.q.on is 'trial.ent', and there is no such event; did you mean 'trial.end'?"),
+        ("part: {words: {yes: 1, no: 2}}", ""),
+        ("part: {words: {yes: 1, 'no': 2, outer: 3}}", "{}.q.part.words.outer is 'outer', and there is no such word; it has no, yes"),
+        ("part: {words: {yes: 1}}", "{}.q.part.words has nothing for the word 'no'; it needs one for each of no, yes"),
+    ],
+)  # fmt: skip
+def test_types_of_a_plugin_of_the_study_are_looked_up_wherever_it_is_used(
+    tmp_path: Path, key: str, use: str, written: str, said: str
+) -> None:
+    folder = tmp_path / "study"
+    shutil.copytree(PROTOCOLS / "aiming", folder)
+    (folder / "plugins").mkdir()
+    (folder / "plugins" / "when.py").write_text(PLUGIN, encoding="utf-8")
+    path = folder / "protocol.yaml"
+    new = f"{key}: {{q: {{use: {use}, {written}}}}}\non_fault"
+    path.write_text(AIMING.replace("on_fault", new, 1), encoding="utf-8")
+    registry = discover(study=path)
+    if not said:
+        load(path, registry)
+        return
+    with pytest.raises(ProtocolError) as refused:
+        load(path, registry)
+    assert said.format(key) in str(refused.value)
+
+
+def test_the_scheme_that_the_scaffold_writes_has_its_axes_looked_up(
+    tmp_path: Path,
+) -> None:
+    template = Path(labcrane.__file__).parent / "registry" / "templates" / "scheme" / "my_module.py"
+    folder = tmp_path / "study"
+    shutil.copytree(PROTOCOLS / "aiming", folder)
+    (folder / "plugins").mkdir()
+    (folder / "plugins" / "mine.py").write_text(template.read_text(encoding="utf-8"))
+    path = folder / "protocol.yaml"
+    old = AIMING[AIMING.index("scheme:") : AIMING.index("dynamics:")]
+    registry = None
+    for axes, said in (
+        ("left.x, right.y, left.y, right.x", ""),
+        ("left.x, right.y, left.y, right.z", "scheme.axes[4] is 'right.z', and there is no such axis; did you"),
+        ("left.x, left.y, left.y, right.x", "scheme.axes has 'left.y' twice; write it once"),
+    ):  # fmt: skip
+        new = f"scheme: {{use: my_part, axes: [{axes}]}}\n"
+        path.write_text(AIMING.replace(old, new, 1), encoding="utf-8")
+        registry = registry or discover(study=path)
+        if not said:
+            load(path, registry)
+            continue
+        with pytest.raises(ProtocolError) as refused:
+            load(path, registry)
+        assert said in str(refused.value)
 
 
 def test_a_session_without_steps_is_told(told) -> None:
@@ -223,6 +387,7 @@ def test_a_marked_name_is_found_however_deep_it_stands_and_a_default_is_left_out
 INPUTS: Mapping[str, dict[str, Any]] = {
     "dual_joystick": {},
     "simulated_operator": {},
+    "simulated_operator with axes": {"axes": ["keyboard.a", "keyboard.b"], "button": "keyboard.c"},
     "scenario_operator": {},
     "gateway": {},
     "keyboard": {"view": "v", "axes": {"slew": ["a", "d"]}},
@@ -232,7 +397,7 @@ INPUTS: Mapping[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("name", INPUTS)
 def test_an_input_declares_the_axes_that_it_has(registry: Registry, name: str) -> None:
-    offer = registry.find(InputDevice, name)
+    offer = registry.find(InputDevice, name.split(maxsplit=1)[0])
     machine = load_machine(str(PROTOCOLS / "retrieval" / "ied_arm.yaml"), PROTOCOLS)
     settings = offer.settings.model_validate(INPUTS[name])
     built = offer.build(settings, machine)

@@ -3,9 +3,9 @@
 import copy
 import json
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
-from jsonschema import Draft202012Validator
 from needs import needs
 from ruamel.yaml import YAML
 
@@ -15,12 +15,17 @@ from labcrane.protocol.study import load
 from labcrane.registry.hookspecs import ROLES
 from labcrane.registry.registry import discover
 
+if TYPE_CHECKING:
+    from jsonschema import Draft202012Validator
+
 ROOT = Path(__file__).parents[2]
 PROTOCOLS = sorted((ROOT / "protocols").glob("*/protocol.yaml"))
 
 
 @pytest.fixture(scope="module")
-def schema() -> Draft202012Validator:
+def schema() -> "Draft202012Validator":
+    from jsonschema import Draft202012Validator  # loads for a second and a half, grammars and all
+
     made = protocol_schema(discover())
     Draft202012Validator.check_schema(made)
     return Draft202012Validator(made)
@@ -31,7 +36,7 @@ def written(path: Path) -> dict:
 
 
 @pytest.mark.parametrize("path", PROTOCOLS, ids=lambda path: path.parent.name)
-def test_bundled_protocols_validate(path: Path, schema: Draft202012Validator) -> None:
+def test_bundled_protocols_validate(path: Path, schema: "Draft202012Validator") -> None:
     load(path, discover())  # labcrane itself agrees
     assert [error.message for error in schema.iter_errors(written(path))] == []
 
@@ -49,7 +54,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("mistake", WRONG)
-def test_a_mistake_does_not_validate(mistake: str, schema: Draft202012Validator) -> None:
+def test_a_mistake_does_not_validate(mistake: str, schema: "Draft202012Validator") -> None:
     place, value, message = WRONG[mistake]
     protocol = copy.deepcopy(written(ROOT / "protocols" / "aiming" / "protocol.yaml"))
     node = protocol
@@ -89,7 +94,7 @@ def test_show_tells_settings_with_units_and_defaults_signals_and_an_example(
 
 @needs("pybullet")
 def test_every_offer_can_be_shown_and_its_example_is_what_a_protocol_takes(
-    schema: Draft202012Validator, capsys: pytest.CaptureFixture[str]
+    schema: "Draft202012Validator", capsys: pytest.CaptureFixture[str]
 ) -> None:
     for offers in discover().offers.values():
         for name in offers:

@@ -391,6 +391,26 @@ def play(stops: type[Stops], sequences: int) -> None:
 
 
 def test_whatever_stops_a_session_it_owes_what_is_left_and_no_more(stops: type[Stops]) -> None:
+    play(stops, 60)
+
+
+def test_a_practice_that_was_enough_does_not_stand_for_the_next_one(stops: type[Stops]) -> None:
+    """Its last rounds are not needed; the session that goes on has none of them to end it."""
+    one = stops()
+    once, thrice = (1, 1), (1, 3)
+    one.plan(
+        steps=[block("practice", 2, (), once), block("practice", 2, ("rating",), thrice),
+               block("practice", 2, (), once)],
+        people=True,
+    )  # fmt: skip
+    for after in (16, 7, 6):
+        one.stopped(after=after, policy=None, seed=1, stop="kill")
+    assert [step.number for step in one.owed.steps] == [3, 5], "a rating, and the next one"
+    one.teardown()
+
+
+@pytest.mark.long
+def test_two_hundred_and_fifty_sequences_of_stops_owe_what_is_left(stops: type[Stops]) -> None:
     play(stops, 250)
 
 

@@ -246,3 +246,29 @@ def test_a_round_under_way_keeps_its_level(tmp_path: Path) -> None:
     kept = track.choose(block.trials[4], begun)
     assert kept.planned.condition["track_level"] == "3m_far_left"
     assert kept.planned.condition["distance"] == 3.0
+
+
+def test_no_table_of_quest_plus_is_made_at_a_choice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever plans a session makes it: in the loop it would take as long as a tick."""
+    from labcrane.design import quest_plus
+    from labcrane.design.plan import plan_session
+
+    quest_plus.grid.cache_clear()
+    path = tmp_path / "protocol.yaml"
+    path.write_text(HEAD.replace("up_down: {}", "quest_plus: {spreads: [0.5, 1]}"))
+    (block,) = plan_session(load(path, discover()), "P001", 1).blocks
+    made = quest_plus.grid.cache_info().misses
+    assert made == 1
+
+    def refuse(*_: object) -> None:
+        raise AssertionError("a table is made in the loop")
+
+    monkeypatch.setattr(quest_plus.Grid, "__init__", refuse)
+    chosen = block.track.choose(block.trials[0], {})
+    assert chosen.planned.condition["track_level"] in block.track.settings.levels
+    told = {2: Response("reach", "1m_far_left", success=True)}
+    assert block.track.choose(block.trials[3], told).number == 4
+    assert block.track.stands(told).responses == 1
+    assert quest_plus.grid.cache_info().misses == made

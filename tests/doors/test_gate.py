@@ -9,11 +9,13 @@ from labcrane.web.door.access import SCOPE, Gate, Keys
 class Door:
     """A gate before a page that says who may see it, and what the gate has said."""
 
-    def __init__(self, *, secure: bool = False) -> None:
+    def __init__(self, port: int = 8080, *, secure: bool = False) -> None:
         self.keys = Keys()
         self.used: list[str] = []
         self.denied: list[str] = []
-        self.gate = Gate(_page, self.keys, self.used.append, self.denied.append, secure=secure)
+        self.gate = Gate(
+            _page, self.keys, self.used.append, self.denied.append, port, secure=secure
+        )
 
     def ask(self, path: str, token: str = "", cookie: bytes = b"") -> tuple[int, dict, bytes]:
         """Return status, headers and body of the answer."""
@@ -66,7 +68,22 @@ def test_a_token_is_exchanged_once_for_a_cookie_that_opens_its_page_and_no_other
 
 def test_a_cookie_that_cannot_be_read_does_not_cost_the_others() -> None:
     door = Door()
-    ours = f"labcrane-participant={door.keys.cookies['participant']}".encode()
-    for others in (b"a b=1", b"=", b"x=\xff\xfe", b'"', b"labcrane-supervisor="):
+    ours = f"labcrane-participant-8080={door.keys.cookies['participant']}".encode()
+    for others in (b"a b=1", b"=", b"x=\xff\xfe", b'"', b"labcrane-supervisor-8080="):
         assert door.ask("/participant", cookie=others + b"; " + ours) == (200, {}, b"participant")
         assert door.ask("/participant", cookie=others)[0] == 403
+
+
+def test_what_is_served_at_another_port_takes_nobody_s_right_to_see_the_first() -> None:
+    """A browser keeps one jar of cookies for all ports of a host, by their names."""
+    doors, jar = (Door(8080), Door(8081)), {}
+    for door in doors:
+        _, headers, _ = door.ask("/supervisor", door.keys.tokens["supervisor"])
+        name, _, value = headers[b"set-cookie"].partition(b";")[0].partition(b"=")
+        jar[name] = value
+    cookies = b"; ".join(b"=".join(pair) for pair in jar.items())
+    for door in doors:
+        assert door.ask("/supervisor", cookie=cookies) == (200, {}, b"supervisor")
+        assert door.ask("/participant", cookie=cookies)[0] == 403
+    swapped = cookies.replace(b"-8080=", b"-x=").replace(b"-8081=", b"-8080=")
+    assert doors[0].ask("/supervisor", cookie=swapped)[0] == 403, "one's secret opens no other"

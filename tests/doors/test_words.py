@@ -55,7 +55,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Study:
     return a_study(tmp_path_factory.mktemp("study"), head + QUESTIONS)
 
 
-@pytest.mark.parametrize("text", HOSTILE)
+@pytest.mark.parametrize("text", HOSTILE, ids=lambda text: ascii(text[:30]))
 @pytest.mark.parametrize("order", PEOPLE)
 def test_no_words_can_raise_in_the_loop(study: Study, order: Order, text: str) -> None:
     script = {2: [Command(order, text, "participant")], 4: [Command(Order.END)]}

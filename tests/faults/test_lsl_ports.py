@@ -15,8 +15,8 @@ from labcrane.streams.search import PORTS
 NETWORK = ["unshare", "-rn"]
 BEGINS_S = 15.0
 HERE = Path(__file__).parent
-OUTLETS = {"session or page": 7, "feedback.process": 2, "recorder.process": 0}
-"""Streams that one process of a kind sends: the session 6, and the gateway's flow."""
+OUTLETS = {"session or page": 8, "feedback.process": 2, "recorder.process": 0}
+"""Streams that one process of a kind sends: the session 7, and the gateway's flow."""
 
 needs_network = needs("networks")
 

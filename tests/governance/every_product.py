@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import h5py
+import pandas as pd
 from governance.kept_people import killed_at
 from governed import GOVERNED, TODAY, Lab
 from needs import GRAPHICS, missing
@@ -22,6 +23,7 @@ from labcrane.analysis.indicator_settings import IndicatorSettings
 from labcrane.analysis.operator_tests import OperatorTest
 from labcrane.analysis.report.workbook import write_workbook
 from labcrane.cli.app import main
+from labcrane.cli.commands import simulate
 from labcrane.participants import recovery
 from labcrane.participants.folders import Places
 from labcrane.participants.products import product, written_about
@@ -37,8 +39,13 @@ VIEW = "views: {operator: {use: view, renderer: software, size: [160, 90]}}\n"
 EXPORTS = ("tables", "psychds", "matlab", "bids", "xdf", "zip", "lerobot", "robomimic")
 
 
+RUN: set[str] = set()
+"""Commands that were run to make everything."""
+
+
 def command(*words: object) -> None:
     assert main([str(word) for word in words]) == 0, words
+    RUN.add(str(words[0]) if words[0] != "feedback" else f"{words[0]} {words[1]}")
 
 
 def everything(folder: Path) -> Lab:
@@ -56,6 +63,11 @@ def everything(folder: Path) -> Lab:
         asked = ("--set", "license=CC0-1.0") if exporter == "zip" else ()
         command("export", data, "--to", exporter, "--out", out, *asked)
     command("report", data, "--out", elsewhere / "report")
+    command("plan", lab.protocol, "--export", elsewhere / "plan.csv")
+    # One movement is too few for labcrane power --recordings, which writes in this way.
+    of_three = pd.DataFrame({"participant": PEOPLE, "movement_time": [1.0, 2.0, 3.0]})
+    with simulate._written(elsewhere / "power", data, of_three) as to:
+        of_three.to_csv(to / "movements.csv", index=False)
     for name in PEOPLE:
         recording = data / name / f"{name}.h5"
         # Too short a session for labcrane operator fit, which writes in this way.

@@ -1,15 +1,17 @@
 """What was installed when a study was approved is part of the approval."""
 
 import sys
+from importlib.metadata import distributions
 from pathlib import Path
 
 import pytest
 from governed import GOVERNED, TODAY, Lab, edit
 
 from labcrane.approval.decision import amend
-from labcrane.approval.environment import changes, environment, fingerprint_of
+from labcrane.approval.environment import _environment, changes, environment, fingerprint_of
 from labcrane.approval.lock import read_lock
 from labcrane.errors import ProtocolError
+from labcrane.registry.entry_points import one_name
 from labcrane.registry.registry import discover
 from labcrane.session.eligibility import check_eligibility
 
@@ -48,6 +50,26 @@ def test_everything_that_is_installed_is_in_the_lock_by_version_and_files(lab: L
     assert {"numpy", "h5py", "pandas", "pydantic"} <= locked["packages"].keys()
     assert len(locked["packages"]["numpy"]["sha256"]) == 64
     assert check_eligibility(lab.visit("P001")).otherwise_installed == ()
+
+
+def test_names_and_versions_are_those_that_the_standard_library_reads(tmp_path: Path) -> None:
+    for number, text in enumerate((
+        "metadata-version: 2.1\nVERSION:  1.0rc1 \nNAME: Wire.Rope_2\n\nName: other\nVersion: 9\n",
+        "Metadata-Version: 2.1\nName: hook\nVersion: 1\nName: second\nVersion: 2\n",
+        "Metadata-Version: 2.1\nSummary: no name\n\nName: sheave\nVersion: 3\n",
+    )):  # fmt: skip
+        about = tmp_path / f"p{number}-1.dist-info"
+        about.mkdir()
+        (about / "METADATA").write_text(text, encoding="utf-8")
+    path = [str(tmp_path), *sys.path]
+    expected: dict[str, str] = {}
+    for each in distributions(path=path):
+        if each.metadata.get("Name"):
+            expected.setdefault(one_name(each.metadata["Name"]), each.metadata["Version"])
+    found = _environment(tuple(path))["packages"]
+    assert {name: one["version"] for name, one in found.items()} == expected
+    assert expected["wire-rope-2"] == "1.0rc1 "
+    assert "sheave" not in found
 
 
 def test_what_an_interrupted_installer_left_behind_is_no_package_and_stops_nobody(

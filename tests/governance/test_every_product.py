@@ -1,4 +1,7 @@
-"""Every product of every command, for people whose names overlap: one is erased, or relabelled."""
+"""Every product of every command, for people whose names overlap: one is erased, or relabelled.
+
+Making them takes longer than anything else in this folder, so the tests of them are long ones.
+"""
 
 import subprocess
 from pathlib import Path
@@ -6,7 +9,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from governance.every_product import (
+    EXPORTS,
     PEOPLE,
+    RUN,
     Snapshot,
     everything,
     files,
@@ -18,10 +23,12 @@ from governance.kept_people import REASON
 from governed import TODAY, Lab
 from needs import GRAPHICS, missing, needs
 
-from labcrane.cli.app import main
+from labcrane.analysis import Exporter
+from labcrane.cli.app import COMPLETING, commands, main
 from labcrane.participants import recovery
 from labcrane.participants.register import read
 from labcrane.participants.whereabouts import whereabouts
+from labcrane.registry.registry import discover
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +57,9 @@ def erased(lab: Lab, name: str, before: dict[str, dict[str, str]]) -> None:
     assert (lab.places.exports / "psychds" / "dataset_description.json").is_file()
     assert list((elsewhere / "report").rglob("*")) == []
     assert not (lab.places.root / "evaluation.xlsx").exists()
+    assert list((elsewhere / "power").rglob("*")) == []
+    planned = pd.read_csv(elsewhere / "plan.csv")["participant"]
+    assert list(planned) == [each for each in ("P001", "P002", "P003", "P004") if each != name]
     if not any(map(missing, GRAPHICS)):  # nothing in a picture says whose movement it shows
         seen = [root_of(lab) / "elsewhere" / f"seen{number}" for number in range(len(PEOPLE))]
         assert [bool(list(each.glob("*.png"))) for each in seen] == [n != name for n in PEOPLE]
@@ -69,9 +79,8 @@ def says_name(path: Path, name: str) -> bool:
     return bool(words & set(re.split(r"[^A-Za-z0-9-]+", path.name)))
 
 
-@pytest.mark.parametrize(
-    "name", [PEOPLE[0], *(pytest.param(name, marks=pytest.mark.long) for name in PEOPLE[1:])]
-)
+@pytest.mark.long
+@pytest.mark.parametrize("name", PEOPLE)
 def test_nothing_of_an_erased_person_is_left_and_nothing_of_others_is_touched(
     made: Snapshot, name: str
 ) -> None:
@@ -83,9 +92,10 @@ def test_nothing_of_an_erased_person_is_left_and_nothing_of_others_is_touched(
     erased(lab, name, before)
     assert done.mentions == []
     assert done.reach.owed == []
-    assert len(done.reach.again) == 2  # report and workbook
+    assert len(done.reach.again) == 3  # report, workbook and power
 
 
+@pytest.mark.long
 @needs("Rscript")
 def test_the_shared_files_that_stay_work(made: Snapshot) -> None:
     lab = made.put_back()
@@ -148,6 +158,7 @@ def relabelled(lab: Lab, before: dict[str, dict[str, str]]) -> None:
     assert (tables / "read.R").is_file()
 
 
+@pytest.mark.long
 def test_after_relabelling_the_old_name_is_nowhere_but_on_record(made: Snapshot) -> None:
     lab = made.put_back()
     before = {other: own(root_of(lab), other) for other in PEOPLE}
@@ -170,6 +181,7 @@ def test_a_relabelling_killed_at_random_writes_is_finished_by_the_next_call(
     assert killed >= 2
 
 
+@pytest.mark.long
 def test_where_lists_every_file_that_holds_a_person(
     made: Snapshot, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -189,6 +201,73 @@ def test_where_lists_every_file_that_holds_a_person(
     assert each.state == "tombstone: was erased"
 
 
+BY_OTHER_MEANS = {"score", "operator fit", "power"}
+"""They need more than one short session: what they write with is called by itself."""
+
+IN_THE_DATA_FOLDER = {
+    "run", "resume", "consent", "exclude", "note", "waive", "recover", "resync", "erase", "relabel",
+}  # fmt: skip
+"""They write recordings and the register, which is where erasing begins."""
+
+OF_NOBODY = {
+    "demo", "simulate", "tracks", "compare-engines", "doctor", "approve", "amend", "methods",
+    "bundle", "schema", "new-plugin", "streams", "record", "gateway can", "dmd fit", "dmd plot",
+    "dmd record", "dmd validate",
+}  # fmt: skip
+"""They write of simulated operators, a computer, a machine or a protocol, and no pseudonym."""
+
+LOOKS = {
+    "check": "{lab}/study.yaml",
+    "plan": "{lab}/study.yaml --participant P001",
+    "participants": "--data {lab}/data",
+    "deviations": "--data {lab}/data",
+    "where": "P001 --data {lab}/data",
+    "plugins show": "aiming",
+}
+"""They show what there is, and end: with what they are called here."""
+
+PAGES = {"study", "view", "language-server"}
+"""They show what there is until they are stopped."""
+
+
+def commands_there_are(monkeypatch: pytest.MonkeyPatch) -> set[str]:
+    from typer.main import get_command
+
+    def ends(command: object, words: tuple[str, ...] = ()) -> set[str]:
+        inside = getattr(command, "commands", None)
+        if inside is None:
+            return {" ".join(words)}
+        return {end for name, one in inside.items() for end in ends(one, (*words, name))}
+
+    monkeypatch.setenv(COMPLETING, "complete_bash")  # then groups of plugins are filled, too
+    found = ends(get_command(commands([])))
+    monkeypatch.delenv(COMPLETING)
+    return found
+
+
+@pytest.mark.long
+def test_every_command_and_exporter_is_among_those_whose_products_are_erased(
+    made: Snapshot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever adds one has to say here what it writes of people, or let it be tried."""
+    tried = RUN | BY_OTHER_MEANS | ({"feedback preview"} if any(map(missing, GRAPHICS)) else set())
+    known = [tried, IN_THE_DATA_FOLDER, OF_NOBODY, set(LOOKS) - tried, PAGES]
+    assert commands_there_are(monkeypatch) == set().union(*known)
+    assert sum(map(len, known)) == len(set().union(*known))
+    assert set(discover().offers[Exporter]) == set(EXPORTS)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", LOOKS)
+def test_a_command_that_only_looks_writes_nothing(made: Snapshot, name: str) -> None:
+    lab = made.put_back()
+    before = files(root_of(lab))
+    words = LOOKS[name].format(lab=lab.folder).split()
+    assert main([*name.split(), *words]) == 0
+    assert files(root_of(lab)) == before
+
+
+@pytest.mark.long
 @needs("fork")
 def test_a_product_whose_writer_is_killed_is_known_and_erased(made: Snapshot) -> None:
     import os
@@ -214,6 +293,7 @@ def test_a_product_whose_writer_is_killed_is_known_and_erased(made: Snapshot) ->
     assert not list(out.rglob("*.csv"))
 
 
+@pytest.mark.long
 def test_an_empty_mount_point_is_not_taken_for_the_disk(made: Snapshot) -> None:
     lab = made.put_back()
     disk = root_of(lab) / "elsewhere" / "tables"
@@ -234,6 +314,7 @@ def test_an_empty_mount_point_is_not_taken_for_the_disk(made: Snapshot) -> None:
     assert read(lab.places).owed == []
 
 
+@pytest.mark.long
 def test_files_of_others_in_the_same_folder_stay(made: Snapshot) -> None:
     lab = made.put_back()
     report = root_of(lab) / "elsewhere" / "report"

@@ -99,7 +99,7 @@ def test_a_file_that_would_not_move_with_the_study_is_not_approved(rescue: Lab) 
     (rescue.folder / "forms" / "ssq.yaml").rename(rescue.folder.parent / "ssq.yaml")
     edit(rescue.protocol, "forms/ssq.yaml", "../ssq.yaml")
     with pytest.raises(
-        ProtocolError, match=r"questionnaires\.ssq names .*ssq\.yaml, which is not in the folder of"
+        ProtocolError, match=r"questionnaires\.ssq\.file: .*ssq\.yaml is not in the folder of"
     ):
         rescue.approve()
 

@@ -122,8 +122,9 @@ def test_a_session_out_of_its_window_is_refused_and_can_be_waived(tmp_path: Path
     with pytest.raises(ProtocolError, match="P001 has not run session 1; session 2 comes after it"):
         check_eligibility(lab.visit("P001", 2))
     lab.run("P001")
-    first, last = TODAY + timedelta(1), TODAY + timedelta(3)
-    for day in (TODAY, last + timedelta(1)):
+    begun = date.fromisoformat(read(lab.places).participants["P001"].sessions[0].date)
+    first, last = begun + timedelta(1), begun + timedelta(3)
+    for day in (begun, last + timedelta(1)):
         with pytest.raises(
             ProtocolError,
             match=f"session 2 of participant P001 is due {first} to {last}, 1 to 3 days after "

@@ -13,6 +13,8 @@ from labcrane import ProtocolError
 from labcrane.participants import recovery as unfinished
 from labcrane.participants.deviations import all_deviations
 from labcrane.participants.register import read
+from labcrane.participants.whereabouts import whereabouts
+from labcrane.recording.annotations import annotate
 from labcrane.recording.journal_reader import read_journal
 from labcrane.recording.xdf.reader import read_xdf
 
@@ -68,6 +70,28 @@ def test_relabelling_changes_the_number_and_keeps_everything_else(lab: Lab) -> N
     assert log.context["participant"] == "P008"
     assert log.context["formerly"] == "P007"
     assert read_xdf(lab.places.raw("P008") / "ses-01_run.xdf").whole
+
+
+def test_marks_go_along_with_the_right_number_and_are_erased_with_it(lab: Lab) -> None:
+    file = lab.places.raw("P007") / "P007.h5"
+    time = labcrane.open_recording(file).session(1).streams["state"].time
+    annotate(file, 1, float(time[5]), "P007 looked away; not as P0071 did")
+    before = labcrane.open_recording(file).session(1).annotations
+    unfinished.move(lab.places, store_of(lab))
+    stored = store_of(lab) / "rehearsal" / "P007" / "ses-01_annotations.jsonl"
+    assert stored.is_file()
+    unfinished.correct(lab.places, "P007", "P008", "typed wrongly", TODAY)
+    folder = lab.places.raw("P008")
+    after = labcrane.open_recording(folder / "P008.h5").session(1).annotations
+    assert after["text"].tolist() == ["P008 looked away; not as P0071 did"]
+    assert after[["time", "until", "written"]].equals(before[["time", "until", "written"]])
+    assert not stored.exists()
+    assert (store_of(lab) / "rehearsal" / "P008" / stored.name).is_file()
+    assert str(folder) in {each.where for each in whereabouts(lab.places, "P008")}
+    unfinished.erase(lab.places, "P008", "withdrew consent", TODAY)
+    left = [path for root in (lab.places.root, store_of(lab))
+            for path in root.rglob("*annotations*")]  # fmt: skip
+    assert left == []
 
 
 def test_a_relabelled_file_is_what_recover_would_make_of_its_journals(lab: Lab) -> None:

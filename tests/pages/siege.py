@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 
+import psutil
 from pages.room import Room
 from pages.test_rights import ask, socket_request
 
@@ -29,24 +30,42 @@ class Siege:
         Status of each of the examiner's notes, in order.
     delays
         How long each of them took, in seconds.
+    spent
+        How long the pages' process computed meanwhile, in seconds: what a note would have waited
+        for on a computer that nobody else keeps busy.
     """
 
     answers: dict[str, list[bytes]] = field(default_factory=dict)
     notes: list[int] = field(default_factory=list)
     delays: list[float] = field(default_factory=list)
+    spent: list[float] = field(default_factory=list)
 
 
-def attack(room: Room, cookie: str, guest: str, seconds: float, notes_s: float = 0.2) -> Siege:
+def attack(
+    room: Room, cookie: str, guest: str, seconds: float, notes_s: float = 0.2, denied: int = 0
+) -> Siege:
     """Attack for some seconds: denied, huge and allowed requests, slow readers, sockets, messages.
 
-    ``guest`` is the cookie of somebody who may see a page, and asks for it without an end.
+    Parameters
+    ----------
+    guest
+        The cookie of somebody who may see a page, and asks for it without an end.
+    denied
+        So many refusals there must be, however long that takes: on a busy computer an attack is
+        slow as well.
     """
-    siege = Siege()
+    siege, pages = Siege(), room.process("pages")
+    assert pages is not None
     head = f"Host: {HOST}:{room.port}\r\n"
     huge = f"POST /orders/note HTTP/1.1\r\n{head}Cookie: {cookie}\r\nContent-Length: 226000000"
     allowed = f"GET /participant HTTP/1.1\r\n{head}Cookie: {guest}\r\nConnection: close\r\n\r\n"
-    denied = f"GET /supervisor HTTP/1.1\r\n{head}\r\n"
-    kinds = {"denied": denied, "also denied": denied, "huge": f"{huge}\r\n\r\n", "allowed": allowed}
+    forbidden = f"GET /supervisor HTTP/1.1\r\n{head}\r\n"
+    kinds = {
+        "denied": forbidden,
+        "also denied": forbidden,
+        "huge": f"{huge}\r\n\r\n",
+        "allowed": allowed,
+    }
     over = threading.Event()
     with ExitStack() as stack:
         for at, (kind, request) in enumerate(kinds.items()):
@@ -63,14 +82,20 @@ def attack(room: Room, cookie: str, guest: str, seconds: float, notes_s: float =
             with contextlib.suppress(OSError):
                 reader.sendall(allowed.encode())  # and never reads
         ends = time.monotonic() + seconds
-        while time.monotonic() < ends:
-            began = time.monotonic()
+        while time.monotonic() < ends or len(siege.answers["denied"]) < denied:
+            began, computed = time.monotonic(), processor_s(pages)
             note = f"note {len(siege.notes)}"
             siege.notes.append(ask(room, "POST", "/orders/note", cookie, note)[0])
             siege.delays.append(time.monotonic() - began)
+            siege.spent.append(processor_s(pages) - computed)
             time.sleep(notes_s)
         over.set()
     return siege
+
+
+def processor_s(process: psutil.Process) -> float:
+    times = process.cpu_times()
+    return float(times.user + times.system)
 
 
 @contextmanager

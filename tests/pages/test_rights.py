@@ -104,7 +104,7 @@ def visited(tmp_path_factory: pytest.TempPathFactory):
                 room, "POST", f"/orders/{quote(word)}", supervisor, "x"
             )
         with socket.create_connection(("127.0.0.1", room.port)) as link:
-            link.sendall(socket_request(room, "labcrane-supervisor=guess"))
+            link.sendall(socket_request(room, f"labcrane-supervisor-{room.port}=guess"))
             answers["a socket without token"] = (int(link.recv(64).split()[1]), "", "")
         # Last: of so many refusals a second the record has a few and the number of the others.
         opened = let_loose(room, supervisor)

@@ -1,10 +1,12 @@
 """The control room, from events to what is shown: states, lamp, buttons, sliders, sentences."""
 
+import json
 import random
 import re
 import threading
 from pathlib import Path
 
+import pylsl
 import pytest
 from governed import TODAY, Lab
 
@@ -17,11 +19,15 @@ from labcrane.streams.recorder.candidates import answered
 from labcrane.testing import ch8
 from labcrane.web import handle
 from labcrane.web.examiner_page import KEYS
+from labcrane.web.live import Live
+from labcrane.web.pictures import Pictures
+from labcrane.web.room import shown
 from labcrane.web.room.bars import groups
 from labcrane.web.room.buttons import answers, buttons
 from labcrane.web.room.condition import STATES, Lamp, lamp_of, state_of
 from labcrane.web.room.earlier import FEWEST, Earlier, read_behind
 from labcrane.web.room.sentences import KINDS, SAID, sentence
+from labcrane.web.room.shown import ShownShapes
 from labcrane.web.room.sliders import sliders
 from labcrane.web.room.snapshot import clock
 from labcrane.web.service import Opened, PageConfig
@@ -101,6 +107,50 @@ def test_the_lamp_names_what_is_lost_until_it_is_back() -> None:
     assert "cable" in lamp.remedy
     back = (*lost, ("input.back", {}), ("pause.end", {"by": "input"}))
     assert lamp_of(after(*back), Punctual(), PERIOD_S) == Lamp("ok", "all is well")
+
+
+def test_what_a_session_sends_and_cannot_be_drawn_is_said_and_the_next_one_is_drawn_again() -> None:
+    shapes = ShownShapes({})
+    taken, situated = [], []
+    shapes.take = taken.append
+    shapes.situate = situated.append
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(shown, "read_run", lambda text: text)
+        patched.setattr(shown, "situation_of", lambda said: said)
+        scene = shapes.hear(json.dumps({"scene": 1, "situation": 2}), "")
+        assert (taken, situated, shapes.trouble) == (["1"], [2], "")
+        for bad in ("{", "[]", json.dumps({"scene": 3})):
+            assert shapes.hear(bad, scene) == scene
+            said = shapes.trouble
+            assert said
+            lamp = lamp_of(after(*BEGUN["running"]), Punctual(), PERIOD_S, said)
+            assert lamp.level == "warn"
+            assert said in lamp.reason
+        assert shapes.hear(json.dumps({"scene": 4, "situation": 5}), scene) == "4"
+    assert (taken[-1], situated[-1], shapes.trouble) == ("4", 5, "")
+
+
+def test_frames_without_their_columns_are_said_and_the_next_ones_are_taken_up() -> None:
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(Live, "_pull", lambda self: None)
+        live = Live("nobody")
+    live.hear([(1.0, 2.0)])
+    assert live.trouble.startswith("ValueError")
+    live.units = {"due": "s", "woke": "s"}
+    live.hear([(1.0, 1.002)])
+    assert (live.trouble, live.newest["woke"]) == ("", 1.002)
+
+
+def test_a_picture_that_cannot_be_read_is_said_in_its_place_and_the_next_one_is_shown() -> None:
+    pictures = Pictures("nobody", {})
+    for text in ("{", "[]", '{"camera": "a"}'):
+        pictures.hear("operator", text, 0.0)
+        assert pictures.of("operator", "a")[1].startswith("a picture cannot be read: ")
+    now = pylsl.local_clock()
+    good = {"camera": "a", "png": "AA", "legend": "m", "due": now}
+    pictures.hear("operator", json.dumps(good), now)
+    shot, said = pictures.of("operator", "a")
+    assert (shot.source, said) == ("data:image/png;base64,AA", "0.0 s old · m")
 
 
 def test_the_lamp_names_every_trigger_that_is_lost() -> None:

@@ -96,16 +96,17 @@ def test_every_session_has_its_quality_and_every_person_consent_and_deviations(l
 
 
 def test_consent_to_an_earlier_text_and_none_at_all_stand_out(lab: Lab, tmp_path: Path) -> None:
-    copy = Lab(tmp_path, TWICE)
+    copy = Lab(tmp_path, TWICE + "participants: {pattern: 'VP-[0-9]{3}'}\n")
     copy.protocol = copy.protocol.rename(copy.folder / "protocol.yaml")
     copy.approve()
-    copy.run("P001")
-    copy.run("P002")
+    for name in ("VP-001", "VP-002", "VP-003"):
+        copy.run(name)
     with changed(copy.places) as register:
-        register.participants["P001"].consent[0].version = "0123456789ab"
-        register.participants["P002"].consent = []
+        register.participants["VP-001"].consent[0].version = "0123456789ab"
+        register.participants["VP-002"].consent = []
+        del register.participants["VP-003"]
     levels = {person.name: person.consent_level for person in overview(copy).people}
-    assert levels == {"P001": "warn", "P002": "bad"}
+    assert levels == {"VP-001": "warn", "VP-002": "bad", "VP-003": "bad"}
 
 
 def test_groups_are_counted_by_their_slots(lab: Lab) -> None:

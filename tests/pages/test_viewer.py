@@ -13,6 +13,7 @@ from pages.looks import check
 from pages.room import shown, text
 from selenium import webdriver
 from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
 from simple_crane import FORM
 
 from labcrane import open_recording
@@ -22,6 +23,8 @@ from labcrane.machines.kinematics import link_frames
 from labcrane.registry.registry import discover
 from labcrane.web.room.shown import ShownShapes
 from labcrane.web.viewer.film import POINTS, STEPS, WINDOW_SAMPLES, Film
+from labcrane.web.viewer.glances import Glances
+from labcrane.web.viewer.marks import Marks
 from labcrane.web.viewer.opened import opened
 
 STUDY = (
@@ -47,6 +50,116 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def film(file: Path) -> Film:
     return Film(open_recording(file).session(1), file.stem)
+
+
+AREAS = ("main.tip", "main.target", "main.far")
+
+
+@pytest.fixture(scope="module")
+def gazed(file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same session with eyes at 200 Hz and a view's areas at 60 Hz, in a place of its own."""
+    import h5py
+
+    from labcrane.recording.participant_file.columns import write_attributes, write_numbers
+
+    folder = tmp_path_factory.mktemp("gazed") / file.parent.name
+    shutil.copytree(file.parent, folder)
+    draw, path = np.random.default_rng(23), folder / file.name
+
+    def write(session: h5py.Group, name: str, kind: str, rate_hz: float, columns: dict) -> None:
+        stream = session.create_group(f"streams/{name}")
+        write_attributes(stream, {"name": name, "type": kind, "rate_hz": rate_hz})
+        for column in ("time_raw", "time"):
+            write_numbers(stream, column, columns["time"], "s")
+        data = stream.create_group("data")
+        for at, (label, values) in enumerate(columns.items()):
+            if label != "time":
+                write_numbers(data, f"c{at}", values, "px")
+                write_attributes(data[f"c{at}"], {"position": at, "name": label})
+
+    with h5py.File(path, "r+") as opened_file:
+        session = opened_file["ses-01"]
+        begin, end = session["time"][0], session["time"][-1]
+        shown_s = np.arange(begin + 0.5, end, 1 / 60)
+        boxes = {"time": shown_s}
+        for name in AREAS:
+            left, top = draw.uniform(0, 900, len(shown_s)), draw.uniform(0, 500, len(shown_s))
+            sides = (left, top, left + draw.uniform(50, 600), top + draw.uniform(50, 400))
+            gone = draw.random(len(shown_s)) < 0.1
+            for side, values in zip(("left", "top", "right", "bottom"), sides, strict=True):
+                boxes[f"{name}.{side}"] = np.where(gone, np.nan, values)
+        write(session, "labcrane.feedback.operator.areas", "Feedback", 0.0, boxes)
+        time_s = np.arange(begin, end, 1 / 200)
+        time_s = time_s[(time_s < begin + 8.0) | (time_s > begin + 10.0)]
+        x, y = draw.uniform(0, 1280, len(time_s)), draw.uniform(0, 800, len(time_s))
+        x[draw.random(len(x)) < 0.05] = np.nan
+        write(session, "eyes", "Gaze", 200.0, {"time": time_s, "gaze_x": x, "gaze_y": y})
+    return path
+
+
+def test_a_glance_has_the_areas_of_the_newest_picture_and_the_smallest_one_that_is_looked_at(
+    gazed: Path,
+) -> None:
+    record = open_recording(gazed).session(1)
+    film = Film(record, "gazed")
+    eyes, pictures = record.streams["eyes"], record.streams["labcrane.feedback.operator.areas"]
+    assert film.glances.known
+    looked = set()
+    for at in [0.2, 9.0, *moments(film.length, 600)]:
+        now = film.start + at
+        glance = film.glances.at(at)
+        rows = pictures.data[pictures.time <= now + 1e-9]
+        wanted = {}
+        for name in AREAS if len(rows) else ():
+            box = rows.iloc[-1][[f"{name}.{s}" for s in ("left", "top", "right", "bottom")]]
+            if np.isfinite(box.to_numpy(float)).all():
+                wanted[name] = tuple(box)
+        assert glance.areas == wanted
+        during = (eyes.time > now - 0.5) & (eyes.time <= now + 1e-9)
+        trail = eyes.data[["gaze_x", "gaze_y"]].to_numpy()[during]
+        assert abs(len(glance.trail) - len(trail)) <= 1, "a sample at the very edge"
+        if not len(trail):
+            assert glance.looked == ""
+            continue
+        x, y = trail[-1]
+        inside = [
+            ((box[2] - box[0]) * (box[3] - box[1]), name)
+            for name, box in wanted.items()
+            if box[0] <= x <= box[2] and box[1] <= y <= box[3]
+        ]
+        assert glance.looked == (min(inside)[1] if inside else "")
+        looked.add(glance.looked)
+    assert looked == {"", *AREAS}
+    lane = film.glances.lane(7.5, 10.5)
+    assert set(lane[105:245]) == {""}, "nothing is looked at while the eyes are not recorded"
+    assert any(lane)
+
+
+def test_gaze_that_is_named_by_area_needs_no_picture_and_a_session_without_gaze_shows_none(
+    film: Film,
+) -> None:
+    assert film.glances.known is False
+
+    class Eyes:
+        """A gaze stream that names areas by numbers; a blink is NaN."""
+
+        def __init__(self) -> None:
+            self.attrs, self.name, self.units = {"type": "Gaze"}, "eyes", {"aoi": ""}
+            self.time = np.arange(0.0, 4.0, 0.01)
+
+        def column(self, name: str, first: int, last: int) -> np.ndarray:
+            areas = np.where(self.time < 1, 0.0, np.where(self.time < 2, 2.0, np.nan))
+            return areas[first:last]
+
+    class Recorded:
+        """A session with nothing but eyes."""
+
+        def __init__(self) -> None:
+            self.streams = {"eyes": Eyes()}
+
+    glances = Glances(Recorded(), -1.0)
+    assert glances.known
+    assert [glances.at(at).looked for at in (1.5, 2.5, 3.5, 9.0)] == ["", "2", "", ""]
 
 
 def moments(length: float, count: int = 100) -> list[float]:
@@ -214,6 +327,30 @@ def test_a_damaged_participant_file_is_shown_from_its_journals(
         opened(damaged, 1, tmp_path / "other", said.append)
 
 
+def test_marks_of_a_copy_are_refused_on_the_page_with_why_and_those_of_a_place_are_kept(
+    file: Path, tmp_path: Path
+) -> None:
+    folder = copied(file, tmp_path)
+    placed = folder / file.name
+    shutil.copy(file, placed)
+    record = open_recording(placed).session(1)
+    marks = Marks(Film(record, "placed", (placed, 1)))
+    assert marks.shown()["marks"] == []
+    told = marks.asked({"t": 1.25, "to": 2.5, "text": "here"})
+    assert (told["markSaid"], [(one["t"], one["to"]) for one in told["marks"]]) == (
+        "kept",
+        [(1.25, 2.5)],
+    )
+    away = tmp_path / file.name
+    shutil.copy(file, away)
+    told = Marks(Film(record, "away", (away, 1))).asked({"t": 1.0, "to": 1.0, "text": "x"})
+    assert told["markSaid"].startswith(f"not kept: {away} is not in its place")
+    for rubbish in ({}, {"t": "x", "to": 1, "text": "x"}, {"withdraw": None}, {"withdraw": 9}):
+        assert marks.asked(rubbish)["markSaid"].startswith("not kept: ")
+    assert Marks(Film(record, "nowhere")).asked({"t": 1.0})["marking"] is False
+    assert record.annotations["text"].tolist() == ["here"]
+
+
 def test_two_trials_are_shown_from_their_starts_side_by_side(file: Path, film: Film) -> None:
     table = open_recording(file).session(1).trials.set_index("trial")
     one, other = table.index[:2]
@@ -255,6 +392,17 @@ const canvas = document.getElementById('spectrum-0');
 const pixels = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
 return pixels.filter((v, n) => n % 4 === 0 && v > 64).length;
 """
+SHAPES = """
+return [...document.querySelectorAll('.nicegui-scene')].map(element => {
+    const found = [];
+    window['scene_' + element.id].traverse(o => {
+        if (o.name && !o.name.startsWith('body ') && o.material)
+            found.push([o.name, o.visible, o.position.toArray(), o.material.color.getHex(),
+                        o.material.opacity, o.material.transparent && o.material.depthWrite]);
+    });
+    return JSON.stringify(found.sort());
+});
+"""
 GO = """
 const field = document.getElementById('second');
 field.value = arguments[0];
@@ -264,8 +412,9 @@ field.dispatchEvent(new Event('change'));
 
 @pytest.mark.long
 def test_the_page_shows_the_recorded_pose_at_any_time(
-    file: Path, browser: webdriver.Chrome
+    gazed: Path, browser: webdriver.Chrome
 ) -> None:
+    file = gazed
     record = open_recording(file).session(1)
     film = Film(record, file.stem)
     words = [sys.executable, "-m", "labcrane", "view", str(file), "--beside", str(file)]
@@ -280,6 +429,14 @@ def test_the_page_shows_the_recorded_pose_at_any_time(
         wait_for(lambda: "dB" in text(browser, "heard-0"))
         assert browser.execute_script(PAINTED) > 100
         check(browser, "viewer with a spectrogram")
+        assert len(set(browser.execute_script(SHAPES))) == 1, "one file shows alike in both places"
+        browser.execute_script(GO, 4.0)
+        heights = film.curve("state", "tip.position.z", 0.0, film.length)
+        step = int(POINTS * 4.0 / film.length)
+        low, high = heights["low"][step], heights["high"][step]
+        wait_for(lambda: near(text(browser, "value-2"), low, high))
+        mark_and_take_back(browser, file, film)
+        look_at_areas(browser, film)
         machine, times = film.machine, moments(film.length)
         angles = record.streams["state"].data[[f"joint.angle.{n}" for n in machine.names]]
         for at in times:
@@ -292,6 +449,53 @@ def test_the_page_shows_the_recorded_pose_at_any_time(
         viewer.terminate()
         viewer.wait(30)
         viewer.stdout.close()
+
+
+def near(said: str, low: float, high: float) -> bool:
+    """Whether a reading has the lowest and the highest value of a step, to four digits."""
+    found = [float(word) for word in said.split() if word[-1].isdigit()]
+    return bool(found) and [min(found), max(found)] == pytest.approx([low, high], rel=6e-4)
+
+
+def look_at_areas(browser: webdriver.Chrome, film: Film) -> None:
+    """See that the areas of the picture, and the one that is looked at, are drawn as recorded."""
+    drawn = "return [...document.querySelectorAll('#gaze rect')].map(r => [r.textContent.trim(), "
+    drawn += "r.x.baseVal.value, r.y.baseVal.value, r.classList.contains('looked')])"
+    wait_for(lambda: browser.find_elements(By.CSS_SELECTOR, ".view-lane rect"))
+    for at in moments(film.length, 10):
+        glance = film.glances.at(at)
+        browser.execute_script(GO, at)
+        wanted = [
+            [name, pytest.approx(box[0], abs=0.01), pytest.approx(box[1], abs=0.01),
+             name == glance.looked]
+            for name, box in glance.areas.items()
+        ]  # fmt: skip
+        wait_for(lambda wanted=wanted: browser.execute_script(drawn) == wanted)
+        assert text(browser, "looked").startswith(glance.looked or "no area")
+
+
+def mark_and_take_back(browser: webdriver.Chrome, file: Path, film: Film) -> None:
+    """Mark a stretch and a moment by keyboard and buttons, take one back; all is in the record."""
+    record = open_recording(file).session(1)
+    browser.execute_script(GO, 2.0)
+    browser.find_element(By.ID, "mark-from").click()
+    browser.execute_script(GO, 3.5)
+    browser.find_element(By.TAG_NAME, "body").send_keys("m")
+    browser.switch_to.active_element.send_keys("looked away", Keys.ENTER)
+    wait_for(lambda: text(browser, "mark-said") == "kept")
+    (mark,) = record.annotations.itertuples()
+    assert (mark.time, mark.until) == pytest.approx((film.start + 2.0, film.start + 3.5), abs=1e-6)
+    assert mark.text == "looked away"
+    browser.find_element(By.ID, "mark-text").send_keys("a slip")
+    browser.find_element(By.ID, "mark-add").click()
+    wait_for(lambda: "a slip" in text(browser, "marks"))
+    assert record.annotations["time"].tolist()[1] == pytest.approx(film.start + 3.5, abs=1e-6)
+    assert len(browser.find_elements(By.CLASS_NAME, "view-mark")) == 2
+    check(browser, "viewer with marks")
+    browser.find_element(By.CSS_SELECTOR, "[aria-label='Take back: a slip']").click()
+    wait_for(lambda: "taken back" in text(browser, "mark-said"))
+    assert "a slip" not in text(browser, "marks")
+    assert record.annotations["text"].tolist() == ["looked away"]
 
 
 def reached(browser: webdriver.Chrome, link: str) -> bool:

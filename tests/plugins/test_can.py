@@ -1,5 +1,6 @@
 """A panel on a CAN bus: frames, time-outs, unplugging, replay, and what is no command."""
 
+import re
 import time
 from pathlib import Path
 
@@ -31,6 +32,28 @@ class TestCanPanel(InputContract):  # "can"
     @pytest.fixture
     def device(self) -> InputDevice:
         return CanPanel(CanSettings(bus="virtual:contract", valves=VALVES), ch8())
+
+
+@pytest.mark.parametrize(
+    ("bus", "said"),
+    [
+        ("slcam:/dev/ttyACM0", "python-can has no interface 'slcam'; did you mean 'slcan'? it has"),
+        ("tty:/dev/ttyACM0", "python-can has no interface 'tty'; it has canalystii,"),
+        (
+            "socketcan:/dev/can0",
+            "'/dev/can0' is no network interface; write its name, as",
+        ),
+        ("socketcan:a_much_too_long_name", "is no network interface"),
+    ],
+)
+def test_a_bus_that_python_can_does_not_know_is_refused(bus: str, said: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(said)):
+        CanSettings(bus=bus, valves=VALVES)
+
+
+@pytest.mark.parametrize("interface", sorted(can.VALID_INTERFACES))
+def test_every_bus_of_python_can_can_be_named(interface: str) -> None:
+    assert CanSettings(bus=f"{interface}:can0", valves=VALVES).bus.startswith(interface)
 
 
 class TestCommands(CommandContract):

@@ -1,6 +1,5 @@
 """A panel process on the other side of a pty: straight into a session, and through the gateway."""
 
-import shutil
 import signal
 import subprocess
 import sys
@@ -10,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cranes import needs_bullet
+from dmd_arms import with_files
 from rehearsal import NoLog, ScriptedConsole
 
 from labcrane.core.clock import SystemClock
@@ -26,23 +26,21 @@ pytestmark = needs_bullet
 
 RATE_HZ = 240
 
-RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"
-
 PROTOCOL = """\
 labcrane: 1
 study: panel
 title: A panel on a pty
 rate_hz: 240
-machine: {machine}
+machine: ied_arm.yaml
 input: {input}
 scheme: {{use: valve}}
 dynamics:
   use: dmd_arm
-  model: {folder}/arm.dmd.yaml
+  model: arm.dmd.yaml
   proportional: [base]
   jaws: {{}}
-  scenes: [{scene}]
-tasks: {{reach: {{use: scenario, scenes: [{scene}], limit_s: 600}}}}
+  scenes: [scenes/touch.yaml]
+tasks: {{reach: {{use: scenario, scenes: [scenes/touch.yaml], limit_s: 600}}}}
 sessions: [{{name: only, steps: [{{block: {{task: reach}}}}]}}]
 """
 
@@ -125,10 +123,8 @@ class PanelConsole(ScriptedConsole):
 
 def session(folder: Path, controls: str, panel: Panel) -> list:
     """Run a session in real time; return when ticks woke, commands, pauses and events."""
-    scene = RETRIEVAL / "scenes" / "touch.yaml"
-    text = PROTOCOL.format(input=controls, folder=RETRIEVAL, machine="ied_arm.yaml", scene=scene)
-    (folder / "study.yaml").write_text(text, encoding="utf-8")
-    shutil.copy(RETRIEVAL / "ied_arm.yaml", folder)
+    text = PROTOCOL.format(input=controls)
+    (with_files(folder) / "study.yaml").write_text(text, encoding="utf-8")
     study = load(folder / "study.yaml", discover())
     plan = plan_session(study, "P001", 1)
     rig = Rig.build(study, simulated=False)

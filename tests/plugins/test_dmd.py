@@ -317,7 +317,7 @@ def test_the_commands_leave_model_tables_and_figures(tmp_path: Path, capsys) -> 
     }
     assert (tmp_path / "arm.png").read_bytes().startswith(b"\x89PNG")
     assert main(["dmd", "validate", str(tmp_path / "no.yaml"), str(FOLDER)]) == 2
-    assert "cannot be read" in capsys.readouterr().err
+    assert "does not exist; check its name" in capsys.readouterr().err
     with pytest.raises(RecordingError, match=r"arm.yaml cannot be written: No such file or"):
         save(labcrane_dmd.load(Path(arm)), tmp_path / "no folder" / "arm.yaml")
 

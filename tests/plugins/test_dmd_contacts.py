@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cranes import needs_bullet
+from dmd_arms import with_files
 from rehearsal import Rehearsal, rehearse
 
 from labcrane import FloatArray, Frame, InputDevice, Run, Signal, Tick
@@ -28,17 +29,17 @@ STUDY = """\
 labcrane: 1
 study: contacts
 title: Pushes
-machine: {folder}/ied_arm.yaml
-input: {{use: gateway}}
-operator: {{use: scenario_operator}}
-scheme: {{use: valve}}
+machine: ied_arm.yaml
+input: {use: gateway}
+operator: {use: scenario_operator}
+scheme: {use: valve}
 dynamics:
   use: dmd_arm
-  model: {folder}/arm.dmd.yaml
+  model: arm.dmd.yaml
   proportional: [base]
   scenes: [scene.yaml]
-tasks: {{push: {{use: scenario, scenes: [scene.yaml], mistakes: 4}}}}
-sessions: [{{name: only, steps: [{{block: {{task: push}}}}]}}]
+tasks: {push: {use: scenario, scenes: [scene.yaml], mistakes: 4}}
+sessions: [{name: only, steps: [{block: {task: push}}]}]
 """
 SCENE = """\
 labcrane_scene: 1
@@ -135,7 +136,7 @@ def run_of(
     (folder / "scene.yaml").write_text(
         SCENE.format(things=things, start=start_at(height)), encoding="utf-8"
     )
-    (folder / "study.yaml").write_text(STUDY.format(folder=RETRIEVAL), encoding="utf-8")
+    (with_files(folder) / "study.yaml").write_text(STUDY, encoding="utf-8")
     study = load(folder / "study.yaml", discover())
     return rehearse(study, orders, rig=replace(Rig.build(study, simulated=True), input=hand))
 

@@ -10,6 +10,7 @@ import numpy as np
 import pylsl
 import pytest
 from cranes import needs_bullet
+from dmd_arms import with_files
 from gone_stream import goes_once
 from rehearsal import NoLog, ScriptedConsole
 
@@ -27,7 +28,6 @@ from labcrane_gateway.settings import GatewaySettings
 from labcrane_gateway.station import Station
 
 TESTS = Path(__file__).parents[1]
-RETRIEVAL = TESTS.parent / "protocols" / "retrieval"
 
 
 class TestStation(InputContract):  # "gateway"
@@ -41,24 +41,21 @@ labcrane: 1
 study: gateway
 title: A gateway
 machine: ied_arm.yaml
-input: {{use: gateway}}
-scheme: {{use: valve}}
+input: {use: gateway}
+scheme: {use: valve}
 dynamics:
   use: dmd_arm
-  model: {0}/arm.dmd.yaml
+  model: arm.dmd.yaml
   proportional: [base]
-  scenes: [{0}/scenes/touch.yaml]
-tasks: {{reach: {{use: scenario, scenes: [{0}/scenes/touch.yaml]}}}}
-sessions: [{{name: only, steps: [{{block: {{task: reach}}}}]}}]
+  scenes: [scenes/touch.yaml]
+tasks: {reach: {use: scenario, scenes: [scenes/touch.yaml]}}
+sessions: [{name: only, steps: [{block: {task: reach}}]}]
 """
 
 
 @needs_bullet
 def test_a_program_written_from_the_documentation_drives_the_arm(tmp_path: Path) -> None:
-    (tmp_path / "study.yaml").write_text(STUDY.format(RETRIEVAL), encoding="utf-8")
-    (tmp_path / "ied_arm.yaml").write_text(
-        (RETRIEVAL / "ied_arm.yaml").read_text(encoding="utf-8"), encoding="utf-8"
-    )
+    (with_files(tmp_path) / "study.yaml").write_text(STUDY, encoding="utf-8")
     study = load(tmp_path / "study.yaml", discover())
     plan = plan_session(study, "P001", 1)
     rig = Rig.build(study, simulated=False)

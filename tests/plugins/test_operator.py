@@ -1,16 +1,19 @@
 """The simulated operator in the closed loop: real schemes, a crane integrated exactly."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 from ideal_crane import IdealCrane
 from operator_loop import DISTANCES, RADIUS, SCHEMES, Loop, ends
+from rehearsal import SHORT, a_study, rehearse
 
 from labcrane import InputDevice, Trial
 from labcrane.core import Phase, PlannedTrial
 from labcrane.machines import ACTUATOR_PRESETS
 from labcrane.machines.library import load_machine
+from labcrane.protocol.questions import questions
 from labcrane.testing import RATE_HZ, InputContract, ch8
 from labcrane_operator import labcrane_inputs
 from labcrane_operator.aimer import Aimer
@@ -45,6 +48,42 @@ class TestSimulatedOperator(InputContract):
     def device(self) -> InputDevice:
         offer = {offer.name: offer for offer in labcrane_inputs()}["simulated_operator"]
         return offer.build(OperatorSettings(), ch8())
+
+
+class TestSimulatedOperatorOnOtherAxes(InputContract):
+    @pytest.fixture
+    def device(self) -> InputDevice:
+        offer = {offer.name: offer for offer in labcrane_inputs()}["simulated_operator"]
+        settings = OperatorSettings(axes=("keyboard.a", "keyboard.b"), button="keyboard.c")
+        return offer.build(settings, ch8())
+
+
+JOINTS = {"slew": "left.x", "elbow": "left.y", "wrist": "right.x", "shoulder": "-right.y"}
+KEYS = "{use: keyboard, view: front, axes: {a: [a, d], b: [s, w], c: [j, l], e: [k, i], t: [g, f]}}"
+VIEW = "views: {front: {use: view, keys: [a, d, s, w, j, l, k, i, g, f]}}\nsessions:"
+
+
+@pytest.mark.parametrize("end", ["rest_inside", "trigger"])
+def test_hands_on_a_keyboard_move_as_those_on_two_joysticks(tmp_path: Path, end: str) -> None:
+    sticks = SHORT.replace("movements: 2", f"movements: 2, end: {end}")
+    keys = sticks.replace("input: {use: dual_joystick}", f"input: {KEYS}")
+    keys = keys.replace("sessions:", VIEW).replace(
+        f"end: {end}", f"end: {end}, trigger: keyboard.t"
+    )
+    names = dict(zip(JOINTS.values(), ("a", "b", "c", "-e"), strict=True))
+    for axis, name in names.items():
+        keys = keys.replace(axis, f"-keyboard.{name[1:]}" if name[0] == "-" else f"keyboard.{name}")
+    assert [each.key for each in questions(a_study(tmp_path, keys))][:1] == ["operator"]
+    operator = "{use: simulated_operator, axes: [keyboard.a, keyboard.b, keyboard.c, keyboard.e]"
+    keys = keys.replace("machine:", f"operator: {operator}, button: keyboard.t}}\nmachine:")
+    study = a_study(tmp_path, keys)
+    assert questions(study) == ()
+    moved = [
+        [frame.state.tobytes() for frame in rehearse(each).frames]
+        for each in (a_study(tmp_path, sticks), study)
+    ]
+    assert len(moved[0]) > 500
+    assert moved[0] == moved[1]
 
 
 # --- the parts

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import ValidationError
 from scheme_setups import (
     ARM,
     JOINTS,
@@ -258,8 +257,10 @@ def test_an_axis_that_would_move_two_joints_is_refused() -> None:
 
 
 def test_directions_must_fit_the_frame() -> None:
-    with pytest.raises(ValidationError, match="axis for each of radial, tangential, vertical"):
-        end_effector(frame="arm")
+    scheme = EndEffector(end_effector(frame="arm"), ch8())
+    said = "has no axis for 'radial'; it needs one for each of radial, tangential, vertical"
+    with pytest.raises(ProtocolError, match=said):
+        scheme.open(make_run(ch8(), command=scheme.signals))
 
 
 def test_holding_pitch_needs_four_joints() -> None:

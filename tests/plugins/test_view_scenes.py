@@ -198,3 +198,18 @@ def test_the_context_says_what_the_trials_seed_has_placed(study: Study, run: Run
     assert event.name == "scene.placed"
     now = situation_after(SessionState(), event)
     assert read_placed(situation_of(json.loads(json.dumps(asdict(now)))).scene) == things
+
+
+@pytest.mark.parametrize("name", [name for name in SCENES if name != "reach_through"])
+@pytest.mark.parametrize("seed", range(3))
+def test_all_that_stands_in_a_scene_is_within_a_narrow_picture_of_the_mast(
+    name: str, seed: int, study: Study
+) -> None:
+    camera = study.choices["views.operator"].settings.camera
+    width, height = 600, 450
+    mast = Projection(np.array(camera.eye), np.array(camera.look), camera.fov_deg, 0, width, height)
+    for thing in place_objects(load_scene(RETRIEVAL / "scenes" / f"{name}.yaml"), seed):
+        for part in thing.parts:
+            box = mast.points(corners(part, thing.position, thing.yaw))
+            shares = np.array(box) / [width, height, width, height]
+            assert 0.03 < shares.min() < shares.max() < 0.97, (thing.name, part.name)

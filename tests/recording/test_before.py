@@ -27,6 +27,8 @@ OF_THE_COMPUTER = {"versions", "sync"}
 ADDED = {"done", "owed", "circle_to_circle", "between_circles"}
 """What events say since, beside all that they said: whether a step was done, what is owed, and at
 the end of an aiming movement, the times between circles."""
+ADDED_SETTINGS = {"axes": [], "button": None}
+"""What the simulated operator can be told since, and what that is where it is not."""
 ABOUT_THE_FILE = {"README", "dataset_description", "CITATION"}
 """What every participant file says of itself since."""
 ADDED_COLUMNS = {
@@ -133,6 +135,8 @@ def test_the_same_seed_writes_the_same_events(before: Path, now: Path) -> None:
     assert len(kept) > 25
     units = again["trial_units"]
     again["trial_units"] = {name: units[name] for name in units if name not in ADDED}
+    operator = again["components"]["input"]["settings"]
+    assert {name: operator.pop(name) for name in ADDED_SETTINGS} == ADDED_SETTINGS
     assert {name: again[name] for name in kept} == {name: start[name] for name in kept}
     assert len(new) == len(old)
     assert not [unlike(*pair) for pair in zip(old, new, strict=True) if unlike(*pair)]

@@ -24,6 +24,7 @@ from labcrane.recording.participant_file.stream_group import write_time, write_u
 from labcrane.recording.participant_file.writer import consolidate
 from labcrane.recording.xdf.header import Channel, StreamHeader
 from labcrane.recording.xdf.writer import XdfWriter
+from labcrane.session import postprocess
 
 EEG = StreamHeader(
     "EEG / 1",
@@ -124,6 +125,22 @@ def test_a_clock_that_cannot_be_corrected_costs_no_session(folder: Path) -> None
     eeg = open_recording(folder / "P001.h5").session(1).streams["EEG _ 1"]
     assert eeg.attrs["uncorrected"] == "no probes for EEG / 1"
     np.testing.assert_array_equal(eeg.time, eeg.time_raw)
+
+
+def test_what_nobody_foresaw_of_a_clock_costs_no_session_and_is_in_the_report(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise IndexError("of a device that nobody has seen")
+
+    monkeypatch.setattr(postprocess, "correct", fail)
+    (done,) = recover(folder, lambda group: postprocess.conclude(group) and None)
+    assert done.problem == ""
+    session = open_recording(folder / "P001.h5").session(1)
+    assert "that nobody has seen" in session.streams["EEG _ 1"].attrs["uncorrected"]
+    np.testing.assert_array_equal(session.streams["EEG _ 1"].data["Fz"], np.arange(1000.0))
+    assert session.sync_report["verdict"] == "FAIL"
+    assert "could not be corrected: IndexError('of a device" in json.dumps(session.sync_report)
 
 
 def test_a_session_of_streams_alone_is_a_session(folder: Path) -> None:

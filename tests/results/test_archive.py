@@ -15,7 +15,7 @@ from needs import needs
 from rehearsal import SHORT, ScriptedConsole, a_study
 from ruamel.yaml import YAML
 
-from labcrane import ProtocolError
+from labcrane import ProtocolError, RecordingError, open_recording
 from labcrane.analysis.cohort import Cohort, find_cohort
 from labcrane.cli.app import main
 from labcrane.participants.personal_data import personal_in
@@ -152,6 +152,12 @@ def test_names_of_computers_are_taken_out_of_the_recordings(
     with zipfile.ZipFile(archive) as packed:
         given = packed.read("recordings/P001.h5")
     assert b"annas-laptop" not in given
+    copy.write_bytes(given)
+    (sound,) = find_cohort(tmp_path / "data").included
+    assert sound.recording.sessions == [1]
+    copy.write_bytes(given.replace(b"-" * 12, b"annas-laptop"))
+    with pytest.raises(RecordingError, match="its bytes are not those that were written"):
+        open_recording(copy)
     with h5py.File(io.BytesIO(given)) as file:
         hidden = file["ses-01/streams/BrainAmp/header"][()]
     assert hidden == named.replace(b"annas-laptop", b"-" * 12)

@@ -7,9 +7,10 @@ import pytest
 
 from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.gaze import Looks, gaze_measures, looks
-from labcrane.analysis.measures import MEASURES, MeasureSettings, measure_session, measures_of
+from labcrane.analysis.measures import MeasureSettings, measure_session, measures_of
 from labcrane.analysis.movements import cut, groups, machine_of
 from labcrane.analysis.sticks import reversals
+from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.testing.exporters import MOVEMENT_S, a_participant
 
 

@@ -126,7 +126,7 @@ def test_looks_are_an_outcome_that_is_tested_and_put_into_words(seed: int) -> No
     counts = pd.DataFrame({"trials": [32], "time_outs": [0], "others": [0]})
     results = Results("", nothing, nothing, nothing, nothing, tests, nothing, counts, factors)
     said = paragraphs(results, STYLES["html"])[-1]
-    verb = "differed" if p < 0.05 else "did not differ"
+    verb = "differed" if p < 0.05 else "did not detectably differ"
     begin = f"How long grapple was looked at during movements {verb} over distance"
     assert said.startswith(f"{begin}, F(1, 7) = {t**2:.2f}, p ")
 

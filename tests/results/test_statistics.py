@@ -144,6 +144,87 @@ def test_two_participants_are_not_tested(movements: pd.DataFrame) -> None:
     assert trend_table(two).empty
 
 
+PRIMARIES = """
+suppressMessages(library(lme4))
+d <- read.csv(commandArgs(TRUE)[1])
+say <- function(key, ...) cat(key, sprintf("%.17g", c(...)), sep = "|", fill = 10000)
+dvs <- c("movement_time", "absolute_error", "circle_to_circle")
+p <- sapply(dvs, function(dv) {
+  m <- aggregate(d[[dv]], list(who = d$participant, at = d$sequence), mean)
+  t.test(sapply(split(m, m$who), function(x) coef(lm(x ~ at, x))[2]))$p.value
+})
+say("paper", p.adjust(p[c("circle_to_circle", "absolute_error")], "holm"))
+say("one", p.adjust(p["circle_to_circle"], "holm")); say("all", p.adjust(p, "holm"))
+d$s <- d$sequence - mean(d$sequence); d$b <- d$difficulty - mean(d$difficulty)
+mm <- lmer(log(circle_to_circle) ~ s + b + far_side + (1 + s | participant), d, REML = TRUE,
+           control = lmerControl(optCtrl = list(ftol_abs = 1e-12, xtol_abs = 1e-12)))
+say("fixed", fixef(mm)); say("se", sqrt(diag(as.matrix(vcov(mm)))))
+"""
+
+
+@pytest.fixture(scope="module")
+def with_dwell(movements: pd.DataFrame) -> pd.DataFrame:
+    """The same, with reaction and dwell before each movement."""
+    dice = np.random.default_rng(20)
+    before = 0.3 * np.exp(dice.normal(0.0, 0.3, len(movements)))
+    return movements.assign(circle_to_circle=movements["movement_time"] + before)
+
+
+@pytest.fixture(scope="module")
+def primaries(
+    with_dwell: pd.DataFrame, tmp_path_factory: pytest.TempPathFactory
+) -> dict[str, list[str]]:
+    path: Path = tmp_path_factory.mktemp("primaries") / "movements.csv"
+    with_dwell.to_csv(path, index=False)
+    return table(r(PRIMARIES, path))
+
+
+@needs_r
+@pytest.mark.parametrize(
+    ("name", "primary"),
+    [
+        ("paper", ("circle_to_circle", "absolute_error")),
+        ("one", ("circle_to_circle",)),
+        ("all", ()),
+    ],
+)
+def test_trends_are_corrected_over_the_outcomes_that_the_study_calls_primary(
+    with_dwell: pd.DataFrame, primaries: dict[str, list[str]], name: str, primary: tuple[str, ...]
+) -> None:
+    whole = with_factors(with_dwell)
+    trends = outcomes.trend_table(whole, factors_of(whole), primary).set_index("measure")
+    assert set(trends.index) == set(outcomes.USUAL)  # the others are tested, uncorrected
+    asked = list(primary or outcomes.USUAL)
+    theirs = np.array(primaries[name], float)
+    np.testing.assert_allclose(trends.loc[asked, "p_holm"], theirs, rtol=1e-6)
+    assert trends.drop(index=asked)["p_holm"].isna().all()
+
+
+@needs_r
+def test_the_mixed_model_of_the_time_from_circle_to_circle_is_that_of_lme4(
+    with_dwell: pd.DataFrame, primaries: dict[str, list[str]]
+) -> None:
+    model = mixed_model(with_dwell, "circle_to_circle")
+    assert model is not None
+    named = ["Intercept", "sequence", "difficulty", "far_side[T.right]"]
+    terms = model.terms.set_index("term").loc[named]
+    np.testing.assert_allclose(terms["estimate"], np.array(primaries["fixed"], float), rtol=1e-3)
+    np.testing.assert_allclose(terms["se"], np.array(primaries["se"], float), rtol=5e-3)
+
+
+def test_an_outcome_of_another_kind_is_tested_where_the_study_calls_it_primary(
+    with_dwell: pd.DataFrame,
+) -> None:
+    rows = with_dwell.assign(sparc=-with_dwell["movement_time"])
+    whole = with_factors(rows)
+    factors = factors_of(whole)
+    for make in (outcomes.anova_table, outcomes.trend_table, outcomes.contrast_table):
+        own = make(whole, factors, ("sparc",)).groupby("measure")
+        mirrored, plain = own.get_group("sparc"), own.get_group("movement_time")
+        np.testing.assert_allclose(mirrored["p"], plain["p"], rtol=1e-9)
+        assert "sparc" not in set(make(whole, factors)["measure"])
+
+
 def test_a_test_that_was_not_made_is_not_corrected_for() -> None:
     assert holm([0.02, math.nan]) == pytest.approx([0.02, math.nan], nan_ok=True)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cranes import needs_bullet
+from dmd_arms import with_files
 from ruamel.yaml import YAML
 
 from labcrane import RecordingError
@@ -35,23 +36,22 @@ design:
 sessions:
   - {{name: one, steps: [{{block: {{task: aiming}}}}]}}
 """
-RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"
 ANOTHER_TASK = """\
 labcrane: 1
 study: another
 title: Touch something
-participants: {{pattern: 'P\\d{{3}}', planned: 1}}
+participants: {pattern: 'P\\d{3}', planned: 1}
 machine: ied_arm.yaml
-input: {{use: gateway}}
-operator: {{use: scenario_operator}}
-scheme: {{use: valve}}
+input: {use: gateway}
+operator: {use: scenario_operator}
+scheme: {use: valve}
 dynamics:
   use: dmd_arm
-  model: {0}/arm.dmd.yaml
+  model: arm.dmd.yaml
   proportional: [base]
-  scenes: [{0}/scenes/touch.yaml]
-tasks: {{reach: {{use: scenario, scenes: [{0}/scenes/touch.yaml], limit_s: 1}}}}
-sessions: [{{name: only, steps: [{{block: {{task: reach}}}}]}}]
+  scenes: [scenes/touch.yaml]
+tasks: {reach: {use: scenario, scenes: [scenes/touch.yaml], limit_s: 1}}
+sessions: [{name: only, steps: [{block: {task: reach}}]}]
 """
 WENT_IN = {
     "reaction_s": 0.5,
@@ -178,9 +178,8 @@ def test_a_session_without_counted_movements_is_refused(
 def test_another_task_than_aiming_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "ied_arm.yaml").write_text((RETRIEVAL / "ied_arm.yaml").read_text())
-    path = tmp_path / "protocol.yaml"
-    path.write_text(ANOTHER_TASK.format(RETRIEVAL))
+    path = with_files(tmp_path) / "protocol.yaml"
+    path.write_text(ANOTHER_TASK)
     assert main(["simulate", str(path), "--out", str(tmp_path / "data")]) == 0
     assert main(["operator", "fit", str(of(tmp_path / "data"))]) == 1
     assert "so it is not of the task 'aiming'; an operator" in capsys.readouterr().err

@@ -3,9 +3,13 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
+from scipy.stats import truncnorm
 from simple_crane import CRANE
 
+from labcrane.analysis.cohort import find_cohort
+from labcrane.analysis.questionnaires import answers_of
 from labcrane.cli.app import main
 from labcrane.design.plan import plan_session
 from labcrane.errors import ProtocolError
@@ -14,6 +18,7 @@ from labcrane.registry.registry import discover
 from labcrane.simulation.population import Lognormal, Population, read_population
 
 COUNT = 2000
+CRANE_PILOT = Path(__file__).parents[2] / "protocols" / "crane_pilot"
 STUDY = (
     """\
 labcrane: 1
@@ -133,3 +138,100 @@ def test_a_value_that_no_operator_can_have_is_refused(
     assert "participant P001 was drawn with lapse_rate 2." in said
     assert "which 'simulated_operator' cannot have" in said
     assert "narrow its distribution" in said
+
+
+PERSON = "questionnaires: {person: {use: demographics, ask: [age, gender, handedness, gaming]}}\n"
+
+
+@pytest.fixture
+def asking(tmp_path: Path) -> Study:
+    path = tmp_path / "asking.yaml"
+    path.write_text(STUDY.replace("design:\n", PERSON + "design:\n"))
+    return load(path, discover())
+
+
+def test_answers_are_drawn_from_the_distributions_that_are_written(asking: Study) -> None:
+    age = {"mean": 24.19, "sd": 4.31, "lowest": 18.0, "highest": 35.0}
+    person = {"age": age, "gender": {"shares": {"male": 20.0, "female": 16.0}}}
+    person["gaming"] = {"lowest": 1.5, "highest": 2.5}
+    population = Population.model_validate({"labcrane_cohort": 1, "answers": {"person": person}})
+    said = [population.study_of(asking, name).answers["person"] for name in names()]
+    assert all(set(one) == set(person) for one in said)
+    ages = np.array([one["age"] for one in said])
+    assert (ages.min(), ages.max()) == (18.0, 35.0)
+    assert (ages == np.round(ages)).all()
+    # A bell cut off at both ends, by scipy; rounding to years moves neither by a tenth.
+    low, high = (18.0 - 24.19) / 4.31, (35.0 - 24.19) / 4.31
+    bell = truncnorm(low, high, loc=24.19, scale=4.31)
+    assert ages.mean() == pytest.approx(bell.mean(), abs=0.1 + 4 * bell.std() / np.sqrt(COUNT))
+    assert ages.std() == pytest.approx(bell.std(), abs=0.1 + 4 * bell.std() / np.sqrt(2 * COUNT))
+    men = np.mean([one["gender"] == "male" for one in said])
+    assert men == pytest.approx(20 / 36, abs=4 * np.sqrt(20 / 36 * 16 / 36 / COUNT))
+    hours = np.array([one["gaming"] for one in said])
+    assert 1.5 <= hours.min() < 1.55
+    assert 2.45 < hours.max() <= 2.5
+
+
+@pytest.mark.parametrize(
+    ("answers", "message"),
+    [
+        ("{persn: {}}", "there is no questionnaire 'persn'; did you mean 'person'"),
+        ("{person: {aeg: {lowest: 18, highest: 35}}}", "'person' does not ask 'aeg'; did you mean"),
+        (
+            "{person: {gender: {shares: {men: 20}}}}",
+            "'gender' has no choice men; it has female, male, other",
+        ),
+        (
+            "{person: {age: {shares: {male: 20}}}}",
+            "'age' is no choice, but 16 to 99 in steps of 1; say mean",
+        ),
+        ("{person: {gender: {lowest: 1, highest: 2}}}", "'gender' is no number, but one of female"),
+        ("{person: {age: {lowest: 10, highest: 35}}}", "'age' is from 16 to 99, not from 10 to 35"),
+        ("{person: {age: {lowest: 18.5, highest: 35}}}", "and 18.5 is none of them"),
+        (
+            "{person: {age: {mean: 60, sd: 1, lowest: 18, highest: 35}}}",
+            "the mean, 60, is not between lowest, 18, and highest, 35",
+        ),
+    ],
+)
+def test_answers_that_nobody_could_give_are_refused_with_what_there_is(
+    asking: Study, tmp_path: Path, answers: str, message: str
+) -> None:
+    path = tmp_path / "cohort.yaml"
+    path.write_text(f"labcrane_cohort: 1\nanswers: {answers}\n")
+    with pytest.raises(ProtocolError) as caught:
+        read_population(path, asking)
+    assert message in str(caught.value)
+    assert "cohort.yaml:2:" in str(caught.value)
+
+
+def test_the_simulated_people_of_the_crane_study_are_those_of_the_paper() -> None:
+    """Who answers is in the recordings: 18 to 35 years old, and both genders, others none."""
+    study = load(CRANE_PILOT / "protocol.yaml", discover())
+    population = read_population(CRANE_PILOT / "cohort.yaml", study)
+    said = [population.study_of(study, name).answers["person"] for name in names()[:36]]
+    assert all(18.0 <= one["age"] <= 35.0 for one in said)
+    assert {one["gender"] for one in said} == {"male", "female"}
+
+
+def test_answers_of_the_cohort_stand_in_the_recording_and_change_no_others(
+    asking: Study, tmp_path: Path
+) -> None:
+    step = "steps: [{block"
+    asking.path.write_text(
+        asking.path.read_text().replace(step, "steps: [{questionnaire: person}, {block")
+    )
+    cohort = tmp_path / "cohort.yaml"
+    said = []
+    for number, text in enumerate(["", "answers: {person: {age: {lowest: 20, highest: 20}}}\n"]):
+        cohort.write_text("labcrane_cohort: 1\n" + text)
+        out = tmp_path / f"data{number}"
+        words = ["simulate", str(asking.path), "--participants", "1", "--out", str(out)]
+        assert main([*words, "--cohort", str(cohort)]) == 0
+        answers = answers_of(find_cohort(out, ["simulated"]).included[0]).set_index("item")
+        said.append(answers)
+    assert said[1].loc["age", "value"] == 20.0
+    for item in ("gender", "handedness", "gaming"):
+        pd.testing.assert_series_equal(
+            said[0].loc[item, ["value", "text"]], said[1].loc[item, ["value", "text"]]
+        )

@@ -1,17 +1,22 @@
 """The power of planned tests, against the power that theory gives them."""
 
+from collections.abc import Callable
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import norm
 from statsmodels.stats.power import TTestIndPower, TTestPower
+from statsmodels.stats.proportion import proportion_confint
 
+from labcrane.analysis.report.figures import power_curve
 from labcrane.cli.app import main
 from labcrane.errors import ProtocolError
 from labcrane.simulation.power import Claim, Effect, Pool, make_pool, power, read_effect
 from labcrane.simulation.sample_size import paragraph, sample_size
+from labcrane.simulation.share import share_of
 
 SIZES = (8, 16, 32)
 COHORTS = 2000
@@ -160,10 +165,71 @@ def test_the_intervals_of_power_hold_the_power_as_often_as_they_say() -> None:
     assert 0.93 <= inside / repetitions <= 0.97
 
 
+def pool_of_groups(effect: float, participants: int, seed: int) -> Pool:
+    """Return numbers of two groups with a standard deviation of 1."""
+    labels = np.arange(participants) % 2
+    values = np.random.default_rng(seed).normal(effect * labels, 1.0)
+    return Pool(values[:, None], np.ones(1), np.array([-0.5, 0.5]), labels, ())
+
+
+@pytest.mark.parametrize(
+    ("make", "participants", "effect"),
+    [
+        (normal_pool, 150, 0.4),
+        (normal_pool, 250, 0.55),
+        (normal_pool, 250, 0.65),
+        (pool_of_groups, 200, 0.8),
+        (pool_of_groups, 300, 1.0),
+    ],
+)
+def test_the_intervals_hold_the_power_where_cohorts_share_the_chance_of_a_pool(
+    make: Callable[[float, int, int], Pool], participants: int, effect: float
+) -> None:
+    size, cohorts, repetitions = 36, 400, 300
+    true = (
+        TTestPower().power(effect, size, 0.05)
+        if make is normal_pool
+        else TTestIndPower().power(effect, size / 2, 0.05)
+    )
+    inside, by_drawing_alone = 0, 0
+    for repetition in range(repetitions):
+        pool = make(effect, participants, repetition)
+        (found,) = power(pool, ONE, [size], cohorts, seed=repetition)
+        inside += found.power_low <= true <= found.power_high
+        low, high = proportion_confint(round(found.power * cohorts), cohorts, method="wilson")
+        by_drawing_alone += low <= true <= high
+    # 300 repetitions of an interval that holds 95 % are within 93 to 97 in nine of ten cases.
+    assert 0.92 <= inside / repetitions <= 0.98
+    assert by_drawing_alone / repetitions < 0.6, "the pool's chance is not what is tried here"
+
+
+def test_the_far_end_of_a_sample_size_is_open_where_the_pool_is_too_small() -> None:
+    found = sample_size(normal_pool(0.5, 30, 5), ONE, 0.8, 500, seed=3)
+    assert found.high is None
+    text = paragraph("movement_time~half", Claim(), 30, [found])
+    assert f"({found.low} to more than {4 * found.participants} by the 95 % interval" in text
+
+
 def exact(pool: Pool, goal: float) -> int:
     numbers = pool.means @ pool.weights
     size = float(numbers.mean() / numbers.std())
     return next(n for n in range(4, 1000) if TTestPower().power(size, n, 0.05) >= goal)
+
+
+@pytest.mark.parametrize("cohorts", [7, 9, 20, 100, 1000])
+@pytest.mark.parametrize("found", [0, 1])
+def test_a_share_of_none_or_all_lies_in_its_interval_and_can_be_drawn(
+    cohorts: int, found: int
+) -> None:
+    share, low, high = share_of(np.full(cohorts, found == 1))
+    assert low <= share <= high
+    # Wilson's bounds with none, and with all, in closed form.
+    quantile = norm.ppf(0.975) ** 2
+    far = quantile / (cohorts + quantile)
+    assert (low, high) == pytest.approx((1.0 - far, 1.0) if found else (0.0, far), abs=1e-12)
+    row = {"power": share, "power_low": low, "power_high": high}
+    nothing = {"null": share, "null_low": low, "null_high": high}
+    power_curve(pd.DataFrame([{"participants": 36, **row, **nothing}]), "nobody")
 
 
 @pytest.mark.parametrize("goal", [0.8, 0.9])
@@ -237,7 +303,8 @@ def test_the_paragraph_says_sizes_intervals_and_what_was_tested() -> None:
     found = sample_size(normal_pool(0.5, 4000, 5), ONE, 0.8, 500, seed=3)
     text = paragraph("movement_time~half", Claim(), 4000, [found])
     assert f"For a power of 80 %, {found.participants} participants are needed" in text
-    assert f"({found.low} to {found.high} by the 95 % interval of 500 cohorts" in text
+    assert f"({found.low} to {found.high} by the 95 % interval, which is of 500 cohorts" in text
+    assert "and of the 4000 participants they were drawn from" in text
     assert "movement_time~half was tested" in text
     assert "overstated by a factor of 1." in text
 

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from scipy.stats import ttest_1samp, ttest_ind
 from simple_crane import CRANE
+from statsmodels.stats.power import TTestIndPower
 
 from labcrane.analysis.cohort import find_cohort
 from labcrane.analysis.measures import measures_of
@@ -73,7 +74,7 @@ def drawn(planned: Planned, size: int, seed: int) -> Iterator[tuple[pd.DataFrame
     drawer = Drawer(planned)
     for number in range(COHORTS):
         random = np.random.default_rng([seed, size, number])
-        cohort = drawer.cohort(size, random)
+        cohort = drawer.cohort(drawer.draw(size, random))
         yield cohort, drawer.permuted(cohort, random)
 
 
@@ -99,6 +100,22 @@ def test_a_contrast_of_groups_finds_what_scipys_t_test_finds_in_each_cohort() ->
     seen = [np.diff([each.mean() for each in in_groups(plain)])[0] for plain, _ in cohorts]
     shown = np.abs([each for each, test in zip(seen, tests, strict=True) if test.pvalue < 0.05])
     assert found.type_m == pytest.approx(shown.mean() / (other.mean() - one.mean()))
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(3600)
+def test_the_intervals_of_the_reports_tests_hold_the_power_as_often_as_they_say() -> None:
+    repetitions, inside = 300, 0
+    # Means of 8 movements: a standard deviation of 1 over people, and of 1/8 of it within them.
+    size = 0.9 / np.sqrt(1.0 + 1.0 / 8.0)
+    true = TTestIndPower().power(size, 12, 0.05)
+    for repetition in range(repetitions):
+        table = movements(people=120, difference=0.9, seed=repetition)
+        planned = plan_test("contrast", OF_GROUPS, table, NOTHING)
+        (found,) = power_of_report(planned, [24], COHORTS, seed=repetition)
+        inside += found.power_low <= true <= found.power_high
+    # So few cohorts cannot tell the pool's chance from the drawing's: they claim a little less.
+    assert 0.92 <= inside / repetitions <= 0.99
 
 
 def test_what_is_put_in_is_added_to_the_second_group() -> None:

@@ -126,7 +126,9 @@ def test_the_command_tells_bias_and_spread_and_is_the_same_again(
         (STUDY, ["--spread", "0"], "--spread 0 is no spread; give numbers above 0"),
         (STUDY.replace(", track: quest", "").replace(", track: stairs", ""), [], "has a track"),
         (
-            STUDY.replace("rounds: 12", "rounds: 1").replace("rounds: 30", "rounds: 1"),
+            STUDY.replace("rounds: 12", "rounds: 2")
+            .replace("rounds: 30", "rounds: 2")
+            .replace("up_down: {}", "up_down: {reversals: 2}"),
             ["--spread", "1"],
             "'stairs' has an estimate of 0 of 50 operators, and bias needs 20",
         ),

@@ -212,12 +212,42 @@ def test_an_xdf_file_of_labrecorder_is_corrected_and_certified(
     assert main(["resync", str(path)]) == 0
     said = capsys.readouterr().out
     assert "EEG: pyxdf's times are" in said
+    words = " ".join(said.split())
+    assert "nothing shows whose clock their stamps are of" in words
+    assert "how long its clock probes took was not recorded; 1 ms was assumed" in words
+    assert "PASS" not in words
     assert path.read_bytes() == before
     with h5py.File(tmp_path / "others_resync.h5") as file:
         for name, true in times.items():
             error = np.abs(file[f"{name}/time"][:] - true)
             assert (error <= file[f"{name}/time_error"][:]).all()
             assert np.quantile(error, 0.95) < 1.5e-4
+
+
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.98, 1.0])
+def test_a_way_that_takes_long_in_one_direction_alone_is_in_the_uncertainty(
+    share: float, random: np.random.Generator
+) -> None:
+    """Nobody can see it: half of the shortest round trip is the most that it hides."""
+    times, clock, way = regular(random, 250.0), Clock(random), float(random.uniform(1e-3, 5e-3))
+    shown = probes(clock, times[0], times[-1], random, way=way, share=share)[:, :3]
+    corrected = correct(clock(times), probes=shown, arrivals=times + 2e-4, rate_hz=250.0)
+    error = np.abs(corrected.time - times)
+    assert np.median(error) > 0.9 * way
+    assert (error <= corrected.error).mean() >= 0.95
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_the_last_chunk_may_be_a_part_of_one(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    size = int(random.integers(2, 65))
+    count = 40 * size + int(random.integers(1, size))
+    times = 100.0 + np.arange(count) / 250.0
+    clock = SourceClock(ppm=50.0)
+    came = times[np.minimum((np.arange(count) // size + 1) * size, count) - 1] + 0.001
+    shown = probe(clock, 100.1, times[-1], random, every=1.0)[:, :3]
+    found = correct(clock(times), probes=shown, arrivals=came, rate_hz=250.0)
+    assert (np.abs(found.time - times) <= found.error).mean() >= 0.95
 
 
 def test_what_of_an_xdf_file_could_not_be_read_is_told(

@@ -12,7 +12,10 @@ from labcrane.core.findings import Verdict
 from labcrane.errors import RecordingError
 from labcrane.recording.foreign_streams import Note, RecordedStream
 from labcrane.recording.xdf.header import Channel, StreamHeader
+from labcrane.streams.sync.correction import Treatment, correct
 from labcrane.streams.sync.quality import Quality
+from labcrane.streams.sync.raw import LOCAL, RawStream
+from labcrane.streams.sync.report.certificate import Fault
 from labcrane.streams.sync.report.limits import Limit, Limits
 from labcrane.streams.sync.report.stream_report import judge_stream
 from labcrane.streams.sync.report.sync_report import COLUMNS, SyncReport, judge_loop, never_came
@@ -45,6 +48,21 @@ def test_a_stream_in_order_passes():
     assert (report.verdict, report.findings, report.samples) == (Verdict.PASS, (), 30_000)
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_a_buffer_that_shrinks_is_told(seed: int) -> None:
+    draw = np.random.default_rng(seed)
+    times = 100.0 + np.arange(30_000) / 500.0
+    times[: int(draw.integers(5_000, 25_000))] += draw.uniform(0.02, 0.045)
+    raw = source(SourceClock(), np.maximum.accumulate(times), draw)
+    stream = replace(recorded(), time_raw=SourceClock()(times), arrivals=raw.arrivals)
+    (found,) = (each for each in judged(stream).findings if "were shifted" in each.text)
+    assert found.verdict is Verdict.WARN
+    assert "or its delay changed" in found.text
+    corrected = resync(stream)
+    assert np.all(np.diff(corrected.time) > 0.0)
+    assert np.diff(corrected.uneven).min() < -0.01
+
+
 @pytest.mark.parametrize(
     ("change", "verdict", "text"),
     [
@@ -57,6 +75,10 @@ def test_a_stream_in_order_passes():
         ({"gaps": 2, "longest_gap_s": 0.4}, Verdict.WARN, "2 gaps, the longest 0.400 s"),
         ({"lag_s": -1.7e9}, Verdict.FAIL, "its stamps lie -1700000000.000 s before"),
         ({"dropped": 3}, Verdict.WARN, "3 samples are missing"),
+        ({"backward": 8}, Verdict.WARN, "8 samples are placed before one that came earlier"),
+        ({"grid_s": 1e-3}, Verdict.WARN, "its stamps are cut to 1 ms"),
+        ({"grid_s": 1 / 64}, Verdict.WARN, "its stamps are cut to 15.625 ms"),
+        ({"silent_s": 9.0}, Verdict.FAIL, "it died: no sample came in the last 9 s"),
         ({"unsure": 12}, Verdict.WARN, "12 samples are near a step"),
         ({"unprobed": 7}, Verdict.FAIL, "7 samples are of a clock that was never probed"),
         ({"rtt_p50_s": math.nan}, Verdict.FAIL, "never probed"),
@@ -69,6 +91,27 @@ def test_each_shortcoming_is_named_with_what_to_do(change, verdict, text):
     (finding,) = report.findings
     assert text in finding.text
     assert len(finding.advice) > 10
+
+
+def test_an_irregular_stream_died_when_its_program_answers_no_more() -> None:
+    """One whose program goes on is silent, which says nothing."""
+    random = np.random.default_rng(5)
+    times = 100.0 + np.sort(random.uniform(0.0, 120.0, 300))
+    raw = source(SourceClock(ppm=40.0), times, random)
+    own = raw.probes[raw.probes[:, LOCAL] < 160.0]
+    early = int(np.searchsorted(times, 158.0))
+    stamps, arrivals = raw.stamps[:early], raw.arrivals[raw.arrivals[:, 0] <= early]
+    dead, alive = (RawStream.of(stamps, probes, arrivals) for probes in (own, raw.probes))
+    beside = replace(alive, own_probes=own)  # another program of its computer answers
+    silent = [correct(one, Treatment(), 220.0).quality.silent_s for one in (dead, beside, alive)]
+    assert 40.0 < silent[0] < 62.0
+    assert 40.0 < silent[1] < 62.0
+    assert silent[2] < 5.0
+    header = StreamHeader("Marks", "Markers", (Channel("mark", ""),), rate_hz=0.0, source_id="m-1")
+    quality = correct(dead, Treatment(), 220.0).quality
+    report = judge_stream(replace(recorded(), header=header), quality, Limits())
+    assert Fault.DIED in report.faults
+    assert any("no sample came and no probe was answered" in one.text for one in report.findings)
 
 
 def test_samples_that_a_sources_counter_left_out_are_judged():

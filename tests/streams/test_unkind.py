@@ -6,15 +6,28 @@ import numpy as np
 import pytest
 from streams.unkind_score import Score, coverage, draw, misnamed, score, shortcomings, worse_rows
 from streams.unkinder import ALL as ROWS
+from streams.unkinder import quiet_at_last
 
-from labcrane.streams.sync.report.certificate import Fault
+from labcrane.streams.sync.correction import correct
+from labcrane.streams.sync.offset import fit
+from labcrane.streams.sync.report.certificate import Fault, faults
 
 QUICK = (
     "the receiver's clock, a little off",
     "a clock ahead of the probed one",
     "a clock behind the probed one",
     "a clock that drifts away",
+    "a pause that the counter does not show",
+    "markers stamped with the flip to come",
+    "the same, on our own computer",
     "stamps that stand still",
+    "stamps cut to a coarse unit",
+    "a camera that takes longer in the dark",
+    "a clock behind by less than a millisecond",
+    "markers of which some are lost",
+    "markers out of order",
+    "markers that stall and come in bursts",
+    "markers whose program died",
     "60 Hz, single samples lost",
     "markers, wander and step",
     "rate changes at once",
@@ -22,6 +35,13 @@ QUICK = (
     "stalls and bursts",
     "chunks stamped when sent, under load",
     "the same, and samples lost",
+    "even samples stamped when a serial port is read",
+    "even samples stamped by polls of a bus",
+    "even samples stamped when a radio has its turn",
+    "a buffer that grows",
+    "a buffer that grows, a counter",
+    "a buffer that shrinks",
+    "chunks stamped by a wrong rate",
 )
 
 
@@ -51,6 +71,46 @@ def test_every_unkind_device_is_as_right_as_it_is_said_to_be(row: str) -> None:
     for one in scores(row, 2):
         assert shortcomings(one) == [], one
         assert one.named == one.present
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_sampler_that_is_uneven_keeps_its_stamps(seed: int) -> None:
+    """A camera's evened times were off by seconds."""
+    drawn = draw("a camera that takes longer in the dark", seed)
+    corrected = correct(drawn.raw, drawn.treatment)
+    assert np.array_equal(corrected.time, corrected.uneven)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_unit_of_our_own_clock_is_in_the_error(seed: int) -> None:
+    """Round trips are none or one unit, and our readings are half of it early."""
+    random = np.random.default_rng(seed)
+    at = 1000.0 + np.cumsum(random.uniform(1.0, 2.0, 200))
+    half = random.uniform(2e-5, 4e-4)
+    sent, back = (np.floor(1e3 * when) / 1e3 for when in (at - half, at + half))
+    probes = np.column_stack([at, (sent + back) / 2.0 - at, back - sent])
+    offset, error = fit(probes, 0.0).with_error(at)
+    assert (np.abs(offset) <= error).mean() >= 0.95
+
+
+@pytest.mark.parametrize("one_way", [-1.0, 1.0])
+def test_what_the_shortest_round_trip_hides_is_in_the_error(one_way: float) -> None:
+    """All of each round trip may lie on one way, and then the offset is wrong by half of it."""
+    at = 1000.0 + np.arange(0.0, 200.0, 2.0)
+    trip = 4e-4
+    probes = np.column_stack([at, np.full(len(at), one_way * trip / 2.0), np.full(len(at), trip)])
+    offset, error = fit(probes, 0.0).with_error(at)
+    assert np.abs(offset).min() > 0.49 * trip
+    assert (np.abs(offset) <= error).all()
+
+
+def test_markers_whose_program_goes_on_did_not_die() -> None:
+    for seed in range(10):
+        drawn = quiet_at_last(np.random.default_rng(seed))
+        assert drawn.end is not None
+        assert drawn.end - drawn.truth[-1] > 100.0
+        named = faults(correct(drawn.raw, drawn.treatment, drawn.end).quality, 0.0)
+        assert named == {Fault.LOST}
 
 
 def test_every_fault_that_a_report_can_name_is_drawn_and_its_names_are_counted() -> None:
@@ -109,7 +169,11 @@ def test_a_device_is_worse_by_its_mean_or_by_the_worst_of_twenty_draws() -> None
 @pytest.mark.soak
 @pytest.mark.timeout(1800)
 def test_fifty_draws_of_each_hold_what_the_report_promises() -> None:
-    """Seeds nobody has seen: what fails says which it was."""
+    """Seeds nobody has seen: what fails says which it was.
+
+    What is stated at 95 % may be off in a draw now and then: it is asked of a device's draws
+    together. Everything else holds in each draw.
+    """
     first = int(np.random.SeedSequence().generate_state(1)[0])
     found = {row: scores(row, 50, first) for row in ROWS}
     every = [one for each in found.values() for one in each]
@@ -118,8 +182,15 @@ def test_fifty_draws_of_each_hold_what_the_report_promises() -> None:
         for row, each in found.items()
         for k, one in enumerate(each)
         for what in shortcomings(one)
+        if not what.startswith(("not covered", "uncertainty wider"))
     ]
     assert not beyond
+    assert {row: coverage(each) for row, each in found.items() if coverage(each) < 0.95} == {}
+    widths = {
+        row: float(np.median([one.width - one.lag for one in each if one.clean] or [0.0]))
+        for row, each in found.items()
+    }
+    assert {row: width for row, width in widths.items() if width > 0.3} == {}
     assert not worse_rows(every)
     assert coverage(every) >= 0.99
     assert all(

@@ -17,9 +17,10 @@ class Drawn:
     ``hidden_s`` is by how much the two ways of all probes differ for good, halved: with the same
     probes nobody can know it. ``apart_ms`` limits the error beside it. ``chance`` is whether what
     holds up either way differs all along: then any correction is off by chance, and which of two is
-    better can be told of many draws, not of one.
+    better can be told of many draws, not of one. So it is where stamps are half a unit early.
     ``lag_s`` is how long its samples are under way: arrivals cannot tell that from a clock that is
     behind, and the uncertainty must say so.
+    ``grid_s`` is what its stamps are cut to: whether they are half of it early, nothing tells.
     ``perhaps`` is what may be named or not: a step of a millisecond, say, is a slew as well.
     """
 
@@ -35,6 +36,7 @@ class Drawn:
     apart_ms: float = np.inf
     chance: bool = False
     lag_s: float = 0.0
+    grid_s: float = 0.0
 
 
 @dataclass
@@ -369,7 +371,7 @@ def coarse(random):
     """Stamps of a clock that counts milliseconds, on a grid that is none of theirs."""
     clock = Clock(random)
     times = regular(random, 128.0)
-    drawn = received(random, clock, times, 128.0, faults=frozenset({Fault.NOISY}))
+    drawn = received(random, clock, times, 128.0, faults=frozenset({Fault.COARSE}), grid_s=1e-3)
     stamps = np.round(drawn.raw.stamps, 3)
     return replace(drawn, raw=RawStream.of(stamps, drawn.raw.probes, drawn.raw.arrivals))
 

@@ -1,7 +1,7 @@
 """More unkind devices: what no report asked for, and faults that come together."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -10,6 +10,7 @@ from streams.unkind import (
     START,
     Clock,
     Drawn,
+    in_chunks,
     received,
     regular,
 )
@@ -296,6 +297,35 @@ def receivers_nearby(random):
     return replace(drawn, raw=RawStream.of(times, drawn.raw.probes, drawn.raw.arrivals))
 
 
+def paused(random):
+    """A device that pauses, keeps its buffer and counts on: nothing is lost."""
+    times = regular(random, 250.0)
+    at = int(random.uniform(0.2, 0.8) * len(times))
+    times[at:] += a_little_off(random, 1.5, 600.0)
+    return received(
+        random, Clock(random), times, 250.0, index=np.arange(float(len(times))),
+        faults=frozenset({Fault.INTERRUPTED}),
+    )  # fmt: skip
+
+
+AHEAD_S = 0.055
+"""What is stamped ahead by less may be markers of what is to come."""
+
+
+def stamped_ahead(random, *, remote):
+    """Markers stamped with the flip to come, as displays tell it before they are pushed."""
+    clock = Clock(random)
+    if not remote:
+        clock.offset, clock.ppm, clock.changes = 0.0, 0.0, []
+    times = START + np.sort(random.uniform(0.0, random.uniform(150, 400), 500))
+    lead = random.uniform(0.005, 0.016)
+    early = lead - random.uniform(0.0, 0.004) * random.random(len(times))
+    return received(
+        random, clock, times, 0.0, sent=np.maximum.accumulate(times - early),
+        faults=frozenset({Fault.AHEAD}), clean=False,
+    )  # fmt: skip
+
+
 def foreign_nearby(random, *, side):
     """Stamps of a clock that is ahead of the probed one, or behind it as if samples were late."""
     times, rate = announced(random)
@@ -303,7 +333,10 @@ def foreign_nearby(random, *, side):
     drawn = received(random, Clock(random), times, rate, clean=False)
     raw = RawStream.of(drawn.raw.stamps + side * off, drawn.raw.probes, drawn.raw.arrivals)
     if side > 0:
-        return replace(drawn, raw=raw, faults=frozenset({Fault.FOREIGN}))
+        # Markers that are stamped ahead of their push look alike, while it is by little.
+        both = frozenset({Fault.FOREIGN, Fault.AHEAD} if not rate and off < AHEAD_S else ())
+        fault = frozenset() if both else frozenset({Fault.FOREIGN})
+        return replace(drawn, raw=raw, faults=fault, perhaps=both)
     slow = frozenset({Fault.SLOW})
     return replace(drawn, raw=raw, faults=slow if off > 0.05 else frozenset(), perhaps=frozenset())
 
@@ -328,6 +361,187 @@ def frozen(random):
         stamps[at:stop] = stamps[at]
     raw = RawStream.of(stamps, drawn.raw.probes, drawn.raw.arrivals)
     return replace(drawn, raw=raw, faults=frozenset({Fault.FROZEN}), clean=False)
+
+
+def cut(random):
+    """Stamps of a clock that counts coarse units, and tells the last that is full."""
+    grid = float(random.choice([1 / 64, 0.01, 1e-3, 1e-4]))
+    times, rate = announced(random)
+    clock = Clock(random)
+    clock.ppm = random.choice([-1, 1]) * random.uniform(60.0, 200.0)  # else none of 250 Hz is cut
+    drawn = received(random, clock, times, rate, faults=frozenset({Fault.COARSE}), clean=False)
+    since = random.choice([0.0, random.uniform(0.0, 1e4)])  # its program may count from its start
+    stamps = np.floor((drawn.raw.stamps - since) / grid) * grid + since
+    # Of some samples within one unit the stamps stand still.
+    perhaps = frozenset({Fault.FROZEN, Fault.LATE_STAMPS, Fault.SLOW})
+    raw = RawStream.of(stamps, drawn.raw.probes, drawn.raw.arrivals)
+    return replace(drawn, raw=raw, grid_s=grid, perhaps=perhaps, chance=True)
+
+
+def camera(random):
+    """A camera that takes longer in the dark, at once or slowly; its stamps may be cut, too."""
+    fast, slow = 1.0 / 30.0, random.uniform(1.2, 2.5) / 30.0
+    steps = []
+    turns = float(np.exp(random.uniform(np.log(1.0), np.log(60.0))))
+    if random.random() < 0.3:
+        phase = 2 * np.pi * np.arange(8000) * fast / turns
+        steps = list(fast + (slow - fast) * (0.5 + 0.5 * np.sin(phase)))
+    while len(steps) < 8000:
+        for period in (fast, slow):
+            steps += [period] * max(int(turns * random.uniform(0.5, 1.5) / period), 1)
+    times = START + np.cumsum(steps[: int(random.uniform(4000, 8000))])
+    either = frozenset({Fault.WRONG_RATE, Fault.CHANGED_RATE, Fault.LOST})
+    drawn = received(random, Clock(random), times, 30.0, perhaps=either)
+    if random.random() < 0.5:
+        return drawn
+    stamps = np.floor(drawn.raw.stamps * 1e3) / 1e3
+    raw = RawStream.of(stamps, drawn.raw.probes, drawn.raw.arrivals)
+    coarse = frozenset({Fault.COARSE})
+    return replace(drawn, raw=raw, faults=coarse, clean=False, grid_s=1e-3)
+
+
+def just_behind(random):
+    """Stamps of a clock that is behind the probed one by less than what most programs need."""
+    times, rate = announced(random)
+    drawn = received(random, Clock(random), times, rate, clean=False)
+    off = random.uniform(5e-5, 1e-3)
+    return replace(
+        drawn, raw=RawStream.of(drawn.raw.stamps - off, drawn.raw.probes, drawn.raw.arrivals)
+    )
+
+
+def uneven(random, *, wrong):
+    """Samples that come when they will, and the fault that an even stream would have, too."""
+    times = START + np.sort(random.uniform(0.0, random.uniform(200, 500), 900))
+    sent, end, index = times.copy(), float(times[-1]) + random.uniform(0.5, 3.0), None
+    if wrong is Fault.LOST:
+        kept = random.random(len(times)) > random.uniform(0.002, 0.05)
+        kept[100] = False
+        index, times, sent = np.arange(900.0)[kept], times[kept], sent[kept]
+    elif wrong is Fault.DISORDERED:
+        near = 10 + np.flatnonzero(np.diff(times[10:890]) < 0.3)
+        for k in random.choice(near, int(random.integers(3, 40))):
+            times[[k, k + 1]] = times[[k + 1, k]]
+        sent = np.maximum.accumulate(times)
+    elif wrong is Fault.STALLED:
+        for _ in range(int(random.integers(5, 20))):
+            at, length = random.uniform(times[0] + 5, times[-1] - 20), random.uniform(2.5, 6.0)
+            held = (times >= at) & (times < at + length)
+            sent[held] = np.maximum(sent[held], at + length)
+    elif wrong is Fault.DIED:
+        times = times[: int(900 * random.uniform(0.2, 0.8))]
+        sent = times.copy()
+    return received(
+        random, Clock(random), times, 0.0, sent=sent, index=index, end=end,
+        faults=frozenset({wrong}), lag_s=0.3 / len(times),  # the soonest of a few waits for a pull
+    )  # fmt: skip
+
+
+def quiet_at_last(random):
+    """Markers that end, of a program that goes on: it answers probes, and did not die."""
+    drawn = uneven(random, wrong=Fault.LOST)
+    clock_end = drawn.raw.probes[-1, 3]
+    many = drawn.raw.probes
+    later = many + np.array([1.0, 0.0, 0.0, 1.0]) * (clock_end - many[0, 3] + 1.5)
+    # Goes on as its clock usually does.
+    slope = np.polyfit(many[:, 0] - many[0, 0], many[:, 1], 1)[0]
+    later[:, 1] = many[:, 1] + slope * (later[:, 0] - many[:, 0])
+    raw = replace(drawn.raw, probes=np.concatenate([many, later]))
+    return replace(drawn, raw=raw, end=float(later[-1, 3] + 1.0))
+
+
+def on_receipt(random, wait):
+    """Even samples, each stamped when it is received; the mean of the delays is known.
+
+    They wait as a ``wait`` lets them: for a program, for a poll of a bus, for a radio's turn.
+    """
+    rate = float(random.choice(wait.rates_hz))
+    times = regular(random, rate, 150.0, 350.0)
+    stamped = wait(times, random)
+    mean = float(np.mean(stamped - times))
+    counted = np.arange(float(len(times))) if random.random() < 0.3 else None
+    return received(
+        random, Clock(random), times, rate, stamped=stamped, sent=stamped, index=counted,
+        treatment=Treatment(rate, latency_s=mean), faults=frozenset({Fault.LATE_STAMPS}),
+        clean=False, chance=True,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Wait:
+    """How samples of a device wait: at which rates it may sample, and until when they wait."""
+
+    rates_hz: tuple[float, ...]
+    until: Callable
+
+    def __call__(self, times, random):
+        return self.until(times, random)
+
+
+def serial(times, random):
+    delay = 0.002 + random.exponential(random.uniform(5e-4, 3e-3), len(times))
+    read = 3e-5 * np.arange(len(times))  # one after the other
+    return np.maximum.accumulate(times + delay - read) + read
+
+
+def polls(times, random, *, intervals, after):
+    interval = random.choice(intervals)
+    phase = random.uniform(0.0, interval)
+    turn = np.ceil((times - phase) / interval) * interval + phase
+    read = 1e-5 * (after > 0.0) * np.arange(len(times))  # one after the other
+    return np.maximum.accumulate(turn + random.uniform(0.0, after, len(times)) - read) + read
+
+
+SERIAL = Wait((125.0, 250.0, 500.0), serial)
+USB = Wait((60.0, 90.0, 120.0), partial(polls, intervals=(0.004, 0.008, 0.016), after=1e-4))
+RADIO = Wait(
+    (50.0, 100.0, 128.0), partial(polls, intervals=(0.0075, 0.015, 0.03, 0.0486, 0.06), after=0.0)
+)
+
+
+def a_buffer_changes(random, *, counted, grows):
+    """From some sample on all are stamped later by some time, or sooner; none is lost."""
+    times = regular(random, 250.0)
+    most = 0.2 if grows else 0.045
+    at, by = int(len(times) * random.uniform(0.2, 0.7)), random.uniform(0.02, most)
+    delay = np.where((np.arange(len(times)) >= at) == grows, by, 0.0)
+    sent = np.maximum.accumulate(times + delay)
+    index = np.arange(float(len(times))) if counted else None
+    if not counted and abs(250.0 * by - round(250.0 * by)) < 0.02:  # as if so many were lost
+        return a_buffer_changes(random, counted=counted, grows=grows)
+    return received(
+        random, Clock(random), times, 250.0, stamped=times + delay, sent=sent, index=index,
+        faults=frozenset({Fault.SHIFTED}), clean=False,
+    )  # fmt: skip
+
+
+def by_a_wrong_rate(random):
+    """Chunks of which the last sample is stamped right, the others by a rate that is not theirs."""
+    told = 250.0
+    off = float(np.exp(random.uniform(np.log(5e-4), np.log(1e-2))))
+    size = int(random.integers(10, 250))
+    times = regular(random, told * (1 + random.choice([-1, 1]) * off))
+    times = times[: len(times) // size * size]
+    last = times.reshape(-1, size)[:, -1]
+    stamped = (last[:, None] + (np.arange(size) - (size - 1)) / told).ravel()
+    # What is off by less is told as it is.
+    return received(
+        random, Clock(random), times, told, stamped=stamped, sent=np.repeat(last, size),
+        clean=False, chance=True,
+        perhaps=frozenset({Fault.WRONG_RATE, Fault.LATE_STAMPS, Fault.NOISY}),
+    )  # fmt: skip
+
+
+def last_of_a_chunk(random):
+    """Chunks of the right rate whose last sample is stamped a little late."""
+    size = int(random.integers(5, 60))
+    times = regular(random, 250.0)
+    usual = random.uniform(1e-4, 2e-3)
+    times, stamped, sent = in_chunks(times, random, 250.0, size, 0.0, usual)
+    return received(
+        random, Clock(random), times, 250.0, stamped=stamped, sent=sent,
+        clean=False, chance=True, faults=frozenset({Fault.LATE_STAMPS}),
+    )  # fmt: skip
 
 
 STEPPED = frozenset({Fault.STEPPED})
@@ -355,8 +569,27 @@ MORE: dict[str, Callable] = {
     "the receiver's clock, a little off": receivers_nearby,
     "a clock ahead of the probed one": partial(foreign_nearby, side=1.0),
     "a clock behind the probed one": partial(foreign_nearby, side=-1.0),
+    "a pause that the counter does not show": paused,
+    "markers stamped with the flip to come": partial(stamped_ahead, remote=True),
+    "the same, on our own computer": partial(stamped_ahead, remote=False),
     "a clock that drifts away": foreign_drifting,
     "stamps that stand still": frozen,
+    "stamps cut to a coarse unit": cut,
+    "a camera that takes longer in the dark": camera,
+    "a clock behind by less than a millisecond": just_behind,
+    "markers of which some are lost": partial(uneven, wrong=Fault.LOST),
+    "markers out of order": partial(uneven, wrong=Fault.DISORDERED),
+    "markers that stall and come in bursts": partial(uneven, wrong=Fault.STALLED),
+    "markers whose program died": partial(uneven, wrong=Fault.DIED),
+    "even samples stamped when a serial port is read": partial(on_receipt, wait=SERIAL),
+    "even samples stamped by polls of a bus": partial(on_receipt, wait=USB),
+    "even samples stamped when a radio has its turn": partial(on_receipt, wait=RADIO),
+    "a buffer that grows": partial(a_buffer_changes, counted=False, grows=True),
+    "a buffer that grows, a counter": partial(a_buffer_changes, counted=True, grows=True),
+    "a buffer that shrinks": partial(a_buffer_changes, counted=False, grows=False),
+    "a buffer that shrinks, a counter": partial(a_buffer_changes, counted=True, grows=False),
+    "chunks stamped by a wrong rate": by_a_wrong_rate,
+    "chunks whose last stamp is late": last_of_a_chunk,
     "seconds only": brief,
     "two hours, wandering": long,
     "steady, clean probes": clean_probes,

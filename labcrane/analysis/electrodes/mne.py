@@ -44,7 +44,8 @@ def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") ->
     Samples are as they were recorded. Each event is at the sample that was taken when it happened,
     by the corrected clock; those outside of the recording are left out. Annotations are called by
     labels (docs/markers.md): ``mne.events_from_annotations`` and ``epochs["trial_start"]`` find
-    all that begin so. Where samples are missing is ``BAD_gap``.
+    all that begin so. Where samples are missing is ``BAD_gap``. What people marked afterwards is
+    ``annotation/`` and its text; a mark whose text begins with ``BAD`` stays as it is.
 
     Parameters
     ----------
@@ -78,16 +79,26 @@ def to_mne(session: SessionRecord, stream: str | None = None, unit: str = "") ->
     raw.set_meas_date(started + timedelta(seconds=float(signal.time[0] - zero)))
     onsets, labels = events_at(session, signal)
     gaps = signal.gaps.astype(np.float64)
+    marks = session.annotations
+    marks = marks.assign(at=signal.at(marks["time"].to_numpy(float))).dropna(subset="at")
+    lengths = (marks["until"] - marks["time"]).to_numpy(float)
     raw.set_annotations(
         mne.Annotations(
-            np.concatenate([onsets, gaps]) / signal.rate_hz,
-            np.concatenate([np.zeros(len(onsets)), np.full(len(gaps), 1.0 / signal.rate_hz)]),
-            [*labels, *[GAP] * len(gaps)],
+            np.concatenate([onsets, gaps, marks["at"].to_numpy(float)]) / signal.rate_hz,
+            np.concatenate(
+                [np.zeros(len(onsets)), np.full(len(gaps), 1.0 / signal.rate_hz), lengths]
+            ),
+            [*labels, *[GAP] * len(gaps), *map(_marked, marks["text"])],
             orig_time=raw.info["meas_date"],
         ),
         verbose="error",
     )
     return raw
+
+
+def _marked(text: str) -> str:
+    """Return what a mark is called; MNE leaves out epochs that go over one that begins with BAD."""
+    return text if text.upper().startswith("BAD") else f"annotation/{text}"
 
 
 def events_at(session: SessionRecord, signal: Sampled) -> tuple[Any, list[str]]:

@@ -113,7 +113,7 @@ def _effect(
 ) -> str:
     """Return ``differed over distance (2 m: 3.21 s, 6 m: 5.40 s; F(1, 35) = 90.1, p < .001)``."""
     name = str(row["factor"]).removesuffix(ADJUSTED)
-    said = "differed over" if row["p_gg"] < LEVEL else "did not differ over"
+    said = "differed over" if row["p_gg"] < LEVEL else "did not detectably differ over"
     cells = counted.groupby([column, "participant"])[measure].mean().dropna()
     means = cells.groupby(level=0).mean()
     if name == SEQUENCE and len(means) > 2:  # noqa: PLR2004 - the first and the last are enough

@@ -13,11 +13,8 @@ from labcrane.analysis.statistics.trends import holm, linear_trend
 if TYPE_CHECKING:
     import pandas as pd
 
-PRIMARY = ("movement_time", "absolute_error")
-"""What is tested first; their trends share one Holm correction."""
-
-ALSO = ("circle_to_circle",)
-"""What is tested beside, where it was recorded."""
+USUAL = ("movement_time", "absolute_error", "circle_to_circle")
+"""What is tested of every study that recorded it, beside the protocol's primary outcomes."""
 
 ADJUSTED = " with pairs' means taken away"
 """Behind the name of an effect of positions, where pairs come in another order for everybody."""
@@ -25,15 +22,18 @@ ADJUSTED = " with pairs' means taken away"
 SEQUENCE, DISTANCE, SIDE = "sequence", "distance", "far_side"
 
 
-def measures_in(results: "pd.DataFrame") -> list[str]:
-    """Return the outcomes that there are."""
-    return [name for name in (*PRIMARY, *ALSO) if name in results and results[name].notna().any()]
+def measures_in(results: "pd.DataFrame", primary: Sequence[str] = ()) -> list[str]:
+    """Return the outcomes that there are, the primary ones first."""
+    names = dict.fromkeys([*primary, *USUAL])
+    return [name for name in names if name in results and results[name].notna().any()]
 
 
-def anova_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
+def anova_table(
+    results: "pd.DataFrame", factors: Factors, primary: Sequence[str] = ()
+) -> "pd.DataFrame":
     """Return every test of every outcome over positions, distances, sides, phases and groups."""
     found: list[Anova] = []
-    for measure in measures_in(results):
+    for measure in measures_in(results, primary):
         own: dict[str, Anova] = {}
         for test in tests(results, measure, factors):
             name = named(test, factors)
@@ -83,7 +83,9 @@ def _of_places(tests: Sequence[Anova], suffix: str) -> Iterator[Anova]:
             yield replace(test, factor=test.factor + suffix)
 
 
-def practice_table(everything: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
+def practice_table(
+    everything: "pd.DataFrame", factors: Factors, primary: Sequence[str] = ()
+) -> "pd.DataFrame":
     """Return the tests of practice against what counts; empty where there was none."""
     import pandas as pd
 
@@ -93,19 +95,21 @@ def practice_table(everything: "pd.DataFrame", factors: Factors) -> "pd.DataFram
     done["practice"] = done["practice"].astype(float).map({0.0: "counted", 1.0: "practice"})
     tests = [
         test
-        for measure in measures_in(done)
+        for measure in measures_in(done, primary)
         for test in analyse(done, measure, ["practice"], factors.between)
     ]
     return _frame(tests)
 
 
-def contrast_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
+def contrast_table(
+    results: "pd.DataFrame", factors: Factors, primary: Sequence[str] = ()
+) -> "pd.DataFrame":
     """Return differences of groups, of phases, and of groups in each phase, after Holm."""
     import pandas as pd
 
     between, phases = factors.between, factors.over_phases
     found: list[Contrast] = []
-    for measure in measures_in(results):
+    for measure in measures_in(results, primary):
         found += compare(results, measure, GROUP, phases, between)
         found += compare(results, measure, PHASE, phases, between)
         if phases:
@@ -115,26 +119,32 @@ def contrast_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
     return pd.DataFrame(rows)
 
 
-def trend_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
-    """Return the linear trends over positions in each phase; both primary measures share Holm."""
+def trend_table(
+    results: "pd.DataFrame", factors: Factors, primary: Sequence[str] = ()
+) -> "pd.DataFrame":
+    """Return the linear trends over positions in each phase; of primary outcomes, all share Holm.
+
+    Where none is said to be primary, every outcome is one.
+    """
     import pandas as pd
 
+    measures = measures_in(results, primary)
     found = []
-    for measure in measures_in(results):
+    for measure in measures:
         for phase in factors.phases:
             own = results[results[PHASE] == phase].assign(sequence=lambda t: t[PLACE])
             trend = linear_trend(own, measure)
             if trend is not None:
                 found.append((phase, trend))
-    primary = [trend.p for _, trend in found if trend.measure in PRIMARY]
-    corrected = iter(holm(primary))
+    corrected = set(primary or measures)
+    p_holm = iter(holm([trend.p for _, trend in found if trend.measure in corrected]))
     rows = [
         {
             **asdict(trend),
             factors.kind: phase,
             "slope_low": trend.slope_ci[0],
             "slope_high": trend.slope_ci[1],
-            "p_holm": next(corrected) if trend.measure in PRIMARY else float("nan"),
+            "p_holm": next(p_holm) if trend.measure in corrected else float("nan"),
         }
         for phase, trend in found
     ]
@@ -142,13 +152,13 @@ def trend_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
 
 
 def time_scale_tables(
-    results: "pd.DataFrame", factors: Factors
+    results: "pd.DataFrame", factors: Factors, primary: Sequence[str] = ()
 ) -> "tuple[pd.DataFrame, pd.DataFrame]":
     """Return the summary of learning within and from phase to phase, and tests between groups."""
     import pandas as pd
 
     tables, tests = [], []
-    for measure in measures_in(results):
+    for measure in measures_in(results, primary):
         found = quantities(results, measure)
         tables.append(summary(found, measure))
         if not factors.between:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from labcrane.analysis.cohort import Cohort, Participant, Status
-from labcrane.analysis.measures import DEFAULTS, MEASURES, MeasureSettings, measures_of
+from labcrane.analysis.measures import DEFAULTS, MeasureSettings, measures_of
 from labcrane.analysis.parallel import work
 from labcrane.analysis.quality import exclusions, is_result, loop_quality, sync_quality
 from labcrane.analysis.questionnaires import answers_of, scores_of
@@ -21,13 +21,16 @@ from labcrane.analysis.report.factors import (
     with_factors,
 )
 from labcrane.analysis.report.html import Page
-from labcrane.analysis.report.outcomes import PRIMARY, measures_in
+from labcrane.analysis.report.outcomes import measures_in
 from labcrane.analysis.report.sample import in_words, sample
+from labcrane.analysis.report.thresholds import Judge, add_thresholds, thresholds_of
 from labcrane.analysis.report.words import STYLES, Results, paragraphs
 from labcrane.analysis.statistics.fitts import throughput
 from labcrane.analysis.statistics.learning import learning_curves
 from labcrane.analysis.statistics.time_outs import time_outs
 from labcrane.analysis.statistics.trends import mixed_model
+from labcrane.analysis.tables.annotations import annotations_of
+from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.errors import LabcraneError
 from labcrane.recording.participant_file.writer import DAMAGED
 
@@ -46,6 +49,7 @@ def write_report(
     workers: int = 1,
     scheduler: str | None = None,
     unprobed: Sequence[str] = (),
+    judge: Judge | None = None,
 ) -> Path:
     """Write the report of a cohort into ``folder``; return the page to open.
 
@@ -62,6 +66,8 @@ def write_report(
         Who does it; see :func:`labcrane.analysis.parallel.work`.
     unprobed
         Streams whose clock was never probed, which are used all the same, in words.
+    judge
+        Says how well a recorded track finds thresholds; without it nobody says so.
     """
     import pandas as pd
 
@@ -79,7 +85,7 @@ def write_report(
         if progress is not None:
             progress(len(found), len(cohort.included))
     in_order = [found[participant.name] for participant in cohort.included]
-    movements, loops, syncs, answers, scores = zip(*in_order, strict=True)
+    movements, loops, syncs, answers, scores, thresholds = zip(*in_order, strict=True)
     everything = pd.concat(movements, ignore_index=True)
     page = Page(_title(cohort.included[0]), folder / "report.html", folder)
     _stamp(page, [participant.status for participant in cohort.included])
@@ -93,7 +99,9 @@ def write_report(
     page.table("sample", about)
     results = None
     if _is_aiming(everything[is_result(everything)]):
-        results = _study(page, everything, _joined(scores), groups, in_words(about))
+        primary = _primary(cohort)
+        results = _study(page, everything, _joined(scores), groups, in_words(about), primary)
+    add_thresholds(page, _joined(thresholds), judge)
     page.heading("Loop and clocks")
     quality = pd.concat(loops, ignore_index=True), pd.concat(syncs, ignore_index=True)
     page.table("loop_quality", quality[0])
@@ -127,8 +135,8 @@ def _one(
 ) -> "tuple[str, str, *tuple[pd.DataFrame, ...]]":
     """Write one participant's page; return name and tables.
 
-    These are movements, quality of loop and of clocks, answers and scores. The second of what is
-    returned is why the data cannot be used, and then the tables are empty.
+    These are movements, quality of loop and of clocks, answers, scores and thresholds. The second
+    of what is returned is why the data cannot be used, and then the tables are empty.
     """
     import pandas as pd
 
@@ -136,17 +144,23 @@ def _one(
         own = measures_of(participant, settings)
         if GROUP not in own:  # trials say it where the study has groups
             own.insert(0, GROUP, str(participant.context.get("group", "")))
-        asked = (answers_of(participant), scores_of(participant))
+        asked = (answers_of(participant), scores_of(participant), thresholds_of(participant))
         loop, sync = loop_quality(participant), sync_quality(participant)
         _participant_page(participant, own, loop, sync, folder)
     except (LabcraneError, *DAMAGED) as error:  # one recording never stops a cohort
         nothing = pd.DataFrame()
-        return participant.name, _words(error), *([nothing] * 5)
+        return participant.name, _words(error), *([nothing] * 6)
     return participant.name, "", own, loop, sync, *asked
 
 
 def _words(error: Exception) -> str:
     return str(error) if isinstance(error, LabcraneError) else f"cannot be measured: {error!r}"
+
+
+def _primary(cohort: Cohort) -> list[str]:
+    """Return what any of the recordings calls a primary outcome, in that order."""
+    named = [person.context.get("primary", ()) for person in cohort.included]
+    return list(dict.fromkeys(str(name) for names in named for name in names))
 
 
 def _title(participant: Participant) -> str:
@@ -183,6 +197,7 @@ def _study(
     scores: "pd.DataFrame",
     groups: dict[str, str],
     about: str,
+    primary: Sequence[str],
 ) -> Results:
     """Add what is only known of all together, and return what was found."""
     everything = with_factors(everything)
@@ -196,8 +211,8 @@ def _study(
         "in the median (Kaplan and Meier) a time-out takes longer than it was allowed to."
     )
     page.table("time_outs", counts)
-    _movements(page, running(results, factors))
-    said = _statistics(page, everything, results, factors)
+    _movements(page, running(results, factors), measures_in(results, primary))
+    said = _statistics(page, everything, results, factors, primary)
     looked = _gaze(page, results, factors)
     tests = outcomes.score_tests(scores, groups)
     if len(scores):
@@ -217,21 +232,22 @@ def _in_words(page: Page, results: Results) -> None:
         page.text(f"results.{name}", "\n\n".join(paragraphs(results, STYLES[name])) + "\n")
 
 
-def _movements(page: Page, results: "pd.DataFrame") -> None:
+def _movements(page: Page, results: "pd.DataFrame", measures: Sequence[str]) -> None:
     import pandas as pd
 
     page.heading("Movement time and accuracy")
-    for measure in measures_in(results):
+    for measure in measures:
         page.draw(figures.by_sequence(results, measure))
     page.draw(figures.by_distance(results))
     page.table("errors", _errors(results))
     page.heading("Learning curves")
     in_phase = results.assign(sequence=results[PLACE])
-    curves = pd.concat([learning_curves(in_phase, measure) for measure in PRIMARY])
+    curves = pd.concat([learning_curves(in_phase, measure) for measure in measures])
     if len(curves):
         unknown = int((curves["identified"] == "no").sum())
         page.say(f"In {unknown} of {len(curves)} fits the asymptote cannot be told from the data.")
-        page.draw(figures.learning(results, curves, "movement_time"))
+        for measure in measures:
+            page.draw(figures.learning(results, curves, measure))
     page.heading("Fitts' law and throughput")
     page.draw(figures.fitts(results))
     page.draw(figures.throughputs(throughput(results)))
@@ -254,7 +270,11 @@ def _errors(results: "pd.DataFrame") -> "pd.DataFrame":
 
 
 def _statistics(
-    page: Page, everything: "pd.DataFrame", results: "pd.DataFrame", factors: Factors
+    page: Page,
+    everything: "pd.DataFrame",
+    results: "pd.DataFrame",
+    factors: Factors,
+    primary: Sequence[str],
 ) -> "tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame, pd.DataFrame]":
     """Add the tests; return those of effects, contrasts, trends and time scales."""
     page.heading("Statistics")
@@ -264,10 +284,12 @@ def _statistics(
         f"between participants: {', '.join(factors.groups) or 'none'}. A sequence begins anew with "
         "each session or block."
     )
-    anovas = outcomes.anova_table(results, factors)
-    contrasts = outcomes.contrast_table(results, factors)
-    trends = outcomes.trend_table(results, factors)
-    scales, scales_by_group = outcomes.time_scale_tables(results, factors)
+    measures = measures_in(results, primary)
+    page.say(_of_primary(primary, measures))
+    anovas = outcomes.anova_table(results, factors, primary)
+    contrasts = outcomes.contrast_table(results, factors, primary)
+    trends = outcomes.trend_table(results, factors, primary)
+    scales, scales_by_group = outcomes.time_scale_tables(results, factors, primary)
     if anovas.empty:
         page.say("Tests need three or more participants with a value in every cell.")
         return anovas, contrasts, trends, scales
@@ -281,18 +303,27 @@ def _statistics(
     if len(contrasts):
         page.say("Differences two by two; p_holm is corrected within a factor, at one level.")
         page.table("contrasts", contrasts)
-    page.say("Linear trends over the sequence; p_holm is corrected for the two primary measures.")
+    page.say("Linear trends over the sequence; p_holm is corrected over those of primary outcomes.")
     page.table("trends", trends)
     page.say("Two time scales: within a session or block, and from one to the next.")
     page.table("time_scales", scales)
     if len(scales_by_group):
         page.table("time_scales_by_group", scales_by_group)
-    if len(practised := outcomes.practice_table(everything, factors)):
+    if len(practised := outcomes.practice_table(everything, factors, primary)):
         page.say("Practice against what counts.")
         page.table("practice", practised)
-    for measure in PRIMARY:
+    for measure in measures:
         _mixed(page, results.assign(sequence=results[PLACE]), measure)
     return anovas, contrasts, trends, scales
+
+
+def _of_primary(primary: Sequence[str], measures: Sequence[str]) -> str:
+    """Return in words which outcomes are primary, and which of them were not recorded."""
+    if not primary:
+        return f"The protocol names no primary outcomes: {', '.join(measures)} count as such."
+    said = f"Primary outcomes, as the protocol names them: {', '.join(primary)}."
+    missing = [name for name in primary if name not in measures]
+    return f"{said} Without a value in any movement: {', '.join(missing)}." if missing else said
 
 
 def _gaze(page: Page, results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
@@ -365,6 +396,10 @@ def _participant_page(
         page.table("movements", results[["trial", "sequence", "distance", *SHOWN]])
     page.heading("Exclusions")
     page.table("excluded_movements", exclusions(own))
+    if len(marks := annotations_of(participant)):
+        page.heading("Marks")
+        page.say("What people marked in the recordings afterwards; times are from the first frame.")
+        page.table("annotations", marks.drop(columns=["participant", "time", "until"]))
     page.heading("Loop and clocks")
     page.table("loop_quality", loop)
     _syncs(page, sync)

@@ -173,9 +173,9 @@ def _effect(row: Mapping[str, Any], style: Style) -> str:
     where = f" {style.plain(rest)}" if rest else ""
     if ":" in effect:
         names = style.plain(" and ".join(effect.split(":")))
-        said = "there was an interaction" if found else "there was no interaction"
+        said = "there was an interaction" if found else "no interaction was found"
         return f"{said} of {names}{where}, {f_test(row, style)}"
-    said = "differed" if found else "did not differ"
+    said = "differed" if found else "did not detectably differ"
     return f"{said} over {style.plain(effect)}{where}, {f_test(row, style)}"
 
 

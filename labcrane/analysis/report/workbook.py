@@ -145,20 +145,30 @@ def _trend(book: "Workbook", tests: Sequence[OperatorTest]) -> None:
     sheet = book.create_sheet("Trend")
     operators = list(dict.fromkeys(test.operator for test in tests))
     sessions = sorted({test.session for test in tests})
-    done = {(test.operator, test.session) for test in tests}
+    percents: dict[tuple[str, int], list[float]] = {}
+    for test in tests:
+        percents.setdefault((test.operator, test.session), []).append(test.indicator.percent)
 
-    def mean(operator: str, column: int, row: int) -> Cell:
-        if (operator, sessions[row - 2]) not in done:
+    def mean(operator: str, session: int) -> Cell:
+        own = percents.get((operator, session))
+        return None if own is None else _number(fmean(own))
+
+    def formula(operator: str, column: int, row: int) -> Cell:
+        if (operator, sessions[row - 2]) not in percents:
             return None
         name = f"{_letters(column)}$1"
         by = f"{_column('operator')},{name},{_column('session')},$A{row}"
         return f"=AVERAGEIFS({_column('percent (formula)')},{by})"
 
     rows = (
-        (session, *(mean(name, at, row) for at, name in enumerate(operators, start=2)))
+        (
+            session,
+            *(mean(name, session) for name in operators),
+            *(formula(name, at, row) for at, name in enumerate(operators, start=2)),
+        )
         for row, session in enumerate(sessions, start=2)
     )
-    _fill(sheet, ("session", *operators), rows)
+    _fill(sheet, ("session", *operators, *(f"{name} (formula)" for name in operators)), rows)
     chart = LineChart()
     chart.title, chart.y_axis.title, chart.x_axis.title = "Indicator", "percent", "session"
     chart.x_axis.delete = chart.y_axis.delete = False
@@ -168,7 +178,7 @@ def _trend(book: "Workbook", tests: Sequence[OperatorTest]) -> None:
         titles_from_data=True,
     )
     chart.set_categories(Reference(sheet, min_col=1, min_row=2, max_row=last))
-    sheet.add_chart(chart, f"{_letters(len(operators) + 3)}2")
+    sheet.add_chart(chart, f"{_letters(2 * len(operators) + 3)}2")
 
 
 def _used(tests: Sequence[OperatorTest]) -> Iterator[tuple[Cell, ...]]:

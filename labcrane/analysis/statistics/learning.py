@@ -148,7 +148,7 @@ def learning_curves(movements: "pd.DataFrame", measure: str) -> "pd.DataFrame":
     rows: list[dict[str, object]] = []
     by = ["participant", *(name for name in ("phase",) if name in movements)]
     for key, own in movements.groupby(by):
-        means = own.groupby("sequence")[measure].mean()
+        means = own.groupby("sequence")[measure].mean().dropna()
         n = means.index.to_numpy(float)
         fits = [fit_curve(curve, n, means.to_numpy(float)) for curve in CURVES]
         found = [fit for fit in fits if fit is not None]

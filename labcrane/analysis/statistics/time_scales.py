@@ -1,6 +1,6 @@
 """Two time scales of learning: within sessions or blocks, and from one to the next."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,16 +21,45 @@ QUANTITIES = {
 
 
 def taken_away(movements: "pd.DataFrame", measure: str) -> "pd.Series[float]":
-    """Return a measure with the mean of each pair of targets taken away, and the whole mean added.
+    """Return a measure with what each pair of targets adds taken away.
 
-    Positions can then be compared though pairs come in another order for everybody. A pair's mean
-    is over participants' means.
+    Positions can then be compared though pairs come in another order for everybody. What a pair
+    adds is its coefficient in least squares beside participant and position (in each phase), over
+    their cells' means, and is 0 on average over pairs: means of pairs alone would take learning
+    away with them wherever a pair came late more often than others. Where pairs cannot be told from
+    positions and people, as when they come in one order for all, nothing is taken away.
+
+    Parameters
+    ----------
+    movements
+        With ``participant``, ``pair`` or ``distance``, and where there are some ``phase`` and
+        ``place``.
     """
     pair = next((name for name in ("pair", "distance") if name in movements), None)
     if pair is None:
         return movements[measure].astype(float)
-    means = movements.groupby(["participant", pair])[measure].mean().groupby(level=1).mean()
-    return movements[measure] - movements[pair].map(means) + float(means.mean())
+    where = [name for name in ("phase", "place") if name in movements]
+    cells = movements.groupby(["participant", *where, pair])[measure].mean().dropna().reset_index()
+    places = cells.groupby(where).ngroup().to_numpy() if where else np.zeros(len(cells), int)
+    pairs, kinds = cells[pair].factorize(sort=True)
+    beside = np.hstack([_dummies(cells["participant"].factorize()[0]), _dummies(places)])
+    # One column less than pairs: their coefficients add up to 0.
+    of_pairs = _dummies(pairs)
+    of_pairs = of_pairs[:, :-1] - of_pairs[:, -1:]
+    design = np.hstack([of_pairs, beside])
+    rank = np.linalg.matrix_rank
+    if not of_pairs.size or rank(design) < rank(beside) + of_pairs.shape[1]:
+        return movements[measure].astype(float)
+    found = np.linalg.lstsq(design, cells[measure].to_numpy(float), rcond=None)[0]
+    added = found[: of_pairs.shape[1]]
+    adds = dict(zip(kinds, [*added, -added.sum()], strict=True))
+    return movements[measure] - movements[pair].map(adds).astype(float)
+
+
+def _dummies(labels: "np.typing.NDArray[np.integer[Any]]") -> "np.typing.NDArray[np.float64]":
+    """Return a column for each label, with 1 in its rows."""
+    own: np.typing.NDArray[np.float64] = np.eye(int(labels.max(initial=-1)) + 1)[labels]
+    return own
 
 
 def quantities(movements: "pd.DataFrame", measure: str) -> "pd.DataFrame":

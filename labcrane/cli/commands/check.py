@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labcrane.cli.options import AsJson, ProtocolPath
+from labcrane.cli.options import AsJson, DataBeside, ProtocolPath, data_folder
 from labcrane.cli.output import out
 from labcrane.errors import LabcraneError
 
@@ -94,13 +94,16 @@ def plan(
     export: Annotated[
         Path | None, typer.Option(help="write the whole allocation into this CSV file as well")
     ] = None,
+    data: DataBeside = None,
     as_json: AsJson = False,
 ) -> None:
     """Show blocks, each participant's order, and how long a session is likely to take."""
+    from labcrane.cli.commands.approval import today
     from labcrane.design.allocation import allocate, as_csv, balance
     from labcrane.design.plan import plan_session
     from labcrane.files.atomic import SHARED_FILE, write_text
     from labcrane.files.pseudonyms import pseudonyms
+    from labcrane.participants.products import product
     from labcrane.protocol.effective import written_quantities
     from labcrane.protocol.questions import key_of
     from labcrane.protocol.study import load
@@ -115,7 +118,9 @@ def plan(
     ]
     allotments = allocate(study, dict.fromkeys(names))
     if export:
-        write_text(export, as_csv(allotments), SHARED_FILE)
+        where, place = data_folder(data, protocol), export.resolve()
+        with product(where, "plan", place.parent, names, today()) as made:
+            write_text(made.folder / place.name, as_csv(allotments), SHARED_FILE)
     if as_json:
         typer.echo(json.dumps([_row(each) for session in plans for each in session], indent=1))
         return

@@ -182,6 +182,7 @@ def report(
     from labcrane.analysis.parallel import usual_workers
     from labcrane.analysis.quality import check_probed
     from labcrane.analysis.report.report import write_report
+    from labcrane.simulation.track_cohort import judged
 
     cohort = cohort_of(data.resolve() if scheduler else data, include)
     unknown = check_probed(cohort.included, accept=accept_unprobed)
@@ -202,6 +203,7 @@ def report(
             workers=workers or usual_workers(len(cohort.included)),
             scheduler=scheduler,
             unprobed=unknown,
+            judge=judged,
         )
     out.print(f"report: {folder / page.name}", markup=False)
     _tell_left_out(cohort)
@@ -296,6 +298,7 @@ def view(
 
     if missing := not_installed({"nicegui": LAB}):
         raise PluginError(f"the viewer {missing}")
+    from labcrane.recording.paths import participant_path
     from labcrane.web.door.serving import HOST
     from labcrane.web.handle import free_port
     from labcrane.web.viewer.film import Film
@@ -312,7 +315,11 @@ def view(
     paths = [recording, *([beside or recording] if beside or beside_trial is not None else [])]
     with TemporaryDirectory(prefix="labcrane-view-") as scratch:
         films = [
-            Film(opened(path, session, Path(scratch) / str(number), say), path.stem)
+            Film(
+                opened(path, session, Path(scratch) / str(number), say),
+                path.stem,
+                (participant_path(path) if path.is_dir() else path, session),
+            )
             for number, path in enumerate(paths)
         ]
         if trial is not None:

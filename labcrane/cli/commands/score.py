@@ -8,6 +8,7 @@ import typer
 from labcrane.cli.commands.approval import today
 from labcrane.cli.commands.results import LEFT_OUT, cohort_of
 from labcrane.cli.output import out
+from labcrane.errors import LabcraneError
 
 if TYPE_CHECKING:
     from labcrane.analysis.indicator_settings import IndicatorSettings
@@ -35,6 +36,12 @@ def score(
     from labcrane.analysis.report.workbook import advice, write_csv, write_workbook
     from labcrane.participants.products import product
 
+    path = into or folder / "evaluation.xlsx"
+    if path.suffix != ".xlsx":
+        raise LabcraneError(
+            f"--out {path} is no name of a workbook; give one that ends in .xlsx, its tests are "
+            "written beside it as .csv"
+        )
     # Operators are scored while they are still in training.
     cohort = cohort_of(folder, [HALF_FINISHED, *(include or ())])
     left_out: list[str] = []
@@ -44,7 +51,6 @@ def score(
         out.print(f"left out: {name} {why}", markup=False)
 
     tests = operator_tests(cohort, _settings(settings) if settings else None, leave_out)
-    path = into or folder / "evaluation.xlsx"
     names = [person.name for person in cohort.included]
     with product(folder, "score", path.resolve().parent, names, today(), whole=True) as made:
         write_workbook(tests, made.folder / path.name)

@@ -1,5 +1,6 @@
 """Commands that rehearse a study without people: simulate, power and tracks."""
 
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,7 +18,7 @@ from labcrane.cli.options import ProtocolPath, stay_on_this_computer
 from labcrane.cli.output import out
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     import pandas as pd
 
@@ -94,6 +95,10 @@ def _orders(
     return [SimulationJob(protocol.resolve(), of, place, name) for name in names]
 
 
+POOL_TIMES = 5
+"""How many times the largest cohort are simulated to draw from."""
+
+
 def power(
     protocol: ProtocolPath,
     folder: Annotated[Path, typer.Option("--out", help="for the pool, the table and the plot")],
@@ -106,7 +111,8 @@ def power(
         typer.Option(help="t, or one of the report's tests: anova, contrast, trend or mixed"),
     ] = "t",
     pool: Annotated[
-        int | None, typer.Option(help="participants to draw cohorts from; twice the largest", min=3)
+        int | None,
+        typer.Option(help="participants to draw cohorts from; five times the largest", min=3),
     ] = None,
     recordings: Annotated[
         Path | None,
@@ -137,7 +143,6 @@ def power(
     """
     from labcrane.analysis.quality import is_result
     from labcrane.errors import ProtocolError
-    from labcrane.files.atomic import make_folder
     from labcrane.files.pseudonyms import pseudonyms
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
@@ -155,35 +160,52 @@ def power(
     if recordings is not None:
         everything = _recorded(recordings, include, workers, scheduler)
     else:
-        count = pool or 2 * max(sizes)
+        count = pool or POOL_TIMES * max(sizes)
         if resimulate is not None:
             count, cohorts = resimulate * max(sizes), resimulate
         names = pseudonyms(study.protocol.participants.pattern, count)
         everything = _simulated(
             protocol, folder / "pool", names, cohort, study, tested, workers, scheduler
         )
-    make_folder(folder)
-    by = _Drawn(study.protocol.study, sizes, cohorts, to_show, recordings is not None)
-    if kind is not None:
-        everything.to_csv(folder / "movements.csv", index=False)
-        _power_of_report(folder, everything, tested, effect, kind, goals, by, workers, scheduler)
+    by = _Drawn(study.protocol.study, sizes, cohorts, to_show, recordings is not None, folder)
+    with _written(folder, recordings, everything) as to:
+        if kind is not None:
+            everything.to_csv(to / "movements.csv", index=False)
+            _power_of_report(to, everything, tested, effect, kind, goals, by, workers, scheduler)
+            return
+        movements = everything[is_result(everything)]
+        movements.to_csv(to / "movements.csv", index=False)
+        _print_power(to, by, movements, tested, fresh=resimulate is not None)
+        if goals:
+            _search(to, by, movements, effect, goals)
+
+
+@contextmanager
+def _written(folder: Path, recordings: Path | None, movements: "pd.DataFrame") -> "Iterator[Path]":
+    """Hand out the folder to write into; what is drawn from recordings is people's, and kept."""
+    from labcrane.cli.commands.approval import today
+    from labcrane.files.atomic import make_folder
+    from labcrane.participants.products import product
+
+    if recordings is None:
+        make_folder(folder)
+        yield folder
         return
-    movements = everything[is_result(everything)]
-    movements.to_csv(folder / "movements.csv", index=False)
-    _print_power(folder, by, movements, tested, fresh=resimulate is not None)
-    if goals:
-        _search(folder, by, movements, effect, goals)
+    names = sorted(map(str, movements["participant"].unique()))
+    with product(recordings, "power", folder, names, today(), whole=True) as made:
+        yield made.folder
 
 
 @dataclass(frozen=True)
 class _Drawn:
-    """How cohorts are drawn, and what is to be shown of them."""
+    """How cohorts are drawn, what is to be shown of them, and where the files are in the end."""
 
     study: str
     sizes: "Sequence[int]"
     cohorts: int
     claim: "Claim"
     recorded: bool
+    shown: Path
 
 
 def _kind(test: str) -> "Kind | None":
@@ -276,7 +298,7 @@ def _power_of_report(
         )
         _print_sizes(searched)
         write_text(folder / "sample_size.md", text + "\n")
-        out.print(f"for the ethics application: {folder / 'sample_size.md'}", markup=False)
+        out.print(f"for the ethics application: {by.shown / 'sample_size.md'}", markup=False)
 
 
 def _claim(kind: str, margin: float) -> "Claim":
@@ -314,15 +336,15 @@ def _search(
     _print_sizes(found)
     text = paragraph(effect, by.claim, len(pool.means), found, recorded=by.recorded)
     write_text(folder / "sample_size.md", text + "\n")
-    out.print(f"for the ethics application: {folder / 'sample_size.md'}", markup=False)
+    out.print(f"for the ethics application: {by.shown / 'sample_size.md'}", markup=False)
 
 
 def _print_sizes(found: "Sequence[SampleSize]") -> None:
+    from labcrane.simulation.sample_size import far_end
+
     for each in found:
-        out.print(
-            f"power {each.goal:g}: {each.participants} participants ({each.low} to {each.high})",
-            markup=False,
-        )
+        ends = f"{each.low} to {far_end(each)}"
+        out.print(f"power {each.goal:g}: {each.participants} participants ({ends})", markup=False)
 
 
 def _sizes(text: str) -> list[int]:
@@ -410,7 +432,7 @@ def _write_power(folder: Path, found: "Sequence[Power]", by: _Drawn) -> None:
     whose = "drawn from recordings" if by.recorded else "simulated operators"
     power_curve(curve, whose).savefig(folder / "power.png", dpi=150)
     stamp = "DRAWN FROM RECORDINGS" if by.recorded else "SIMULATED"
-    out.print(f"{stamp}: {folder / 'power.csv'}, power.png, movements.csv", markup=False)
+    out.print(f"{stamp}: {by.shown / 'power.csv'}, power.png, movements.csv", markup=False)
 
 
 def tracks(

@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 import struct
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 from labcrane.errors import RecordingError
 from labcrane.limits import LIMITS
+from labcrane.recording.participant_file.seal import check_seal
 
 if TYPE_CHECKING:
     import h5py
@@ -31,8 +33,33 @@ _HEAP_HEAD = 16
 _HEAP_SIZE = struct.Struct("<Q")
 _HEAP_OBJECT = struct.Struct("<H6xQ")
 
+TEXT_ATTRIBUTE = re.compile(rb"[\x19\x29\x39\x49]...\x10\0\0\0", re.DOTALL)
+"""Where the type of an attribute begins that is a text: 16 bytes, which say where it lies."""
+
+_TEXT_TYPE = bytes.fromhex("10000000 01000000 00000800 00000000")
+"""What follows it: a type of one byte. Half of it may be damaged too."""
+
+_ONE_VALUE = bytes.fromhex("01000000 00000000")
+"""What follows that in an attribute, and in nothing else: one value, whose length is next. One byte
+of it may be damaged; of the type of a column, which others may write so, more bytes are unlike."""
+
+_TEXT_LENGTH = struct.Struct("<I")
+
+MOST_TEXT = 1 << 20
+"""Bytes of a text that is an attribute: labcrane writes none beyond 60,000."""
+
 WINDOW = 1 << 22
 """Bytes that are looked through at once."""
+
+_TYPE_HEAD = 8
+
+_TEXT_BYTES = 16
+"""Of a text of a length of its own: how long it is, in which heap, and where in it."""
+
+_BEGINNING = re.compile(re.escape(HEAP) + b"|" + TEXT_ATTRIBUTE.pattern, re.DOTALL)
+
+_LENGTH_AT = _TYPE_HEAD + len(_TEXT_TYPE) + len(_ONE_VALUE)
+_LONGEST = _LENGTH_AT + _TEXT_LENGTH.size
 
 _Span = tuple[int, int]
 _Known = tuple[str, int, int, int]
@@ -62,46 +89,64 @@ def check_containment(file: "h5py.File", path: Path) -> None:
     _contained[known] = None
 
 
-def check_heaps(file: "h5py.File", path: Path) -> None:
-    """Look at the heaps of texts before HDF5 does: it reads a free space of 0 bytes for ever.
+def check_texts(file: "h5py.File", path: Path) -> None:
+    """Look at what HDF5 believes of texts before it does.
 
-    libhdf5 1.14 advances by the size that an object of a heap (``GCOL``) states, and has no way
-    out of a loop when that is 0 (H5HGcache.c). Needed for as long as a version does so. Opening a
-    file and asking where its columns lie reads no heap. Between the columns lies what has to be
-    looked through: of an hour's file a thousandth.
+    libhdf5 1.14 advances through a heap of texts (``GCOL``) by the size that an object of it
+    states, and has no way out of a loop when that is 0 (H5HGcache.c). It also takes as much memory
+    as a text says it is long, up to 4 GB, and fills it with zeros, before it looks whether the
+    text is there (H5T__conv_vlen). Both are so in 2.0; needed for as long as a version does so.
+    Opening a file and asking where its columns lie reads no text. Between the columns lies what
+    has to be looked through: of an hour's file a thousandth.
 
     Raises
     ------
     RecordingError
-        A heap is damaged.
+        A heap has no end, a text is longer than labcrane writes it, or the file is not as it was
+        written.
     """
     status = path.stat()
     if _known(path, status) in _contained:
         return
+    spans = unpacked(file, status.st_size)
     with path.open("rb") as data:
-        for span in _outside(_columns_in(file), status.st_size):
-            for at in _heaps(data, *span):
-                if not _heap_ends(data, at, status.st_size):
+        check_seal(data, path, status.st_size, spans)
+        for span in spans:
+            for at, begin in _found(data, *span):
+                if begin.startswith(HEAP):
+                    wrong = not _heap_ends(data, at, status.st_size)
+                    what = f"the heap of texts at byte {at} has no end"
+                else:
+                    length = _attribute_length(begin)
+                    wrong = length > MOST_TEXT
+                    what = f"the text at byte {at} says it is {length} bytes long"
+                if wrong:
                     raise RecordingError(
-                        f"{path} is damaged: the heap of texts at byte {at} has no end; "
-                        f"labcrane recover {path.parent} makes it anew of the journals, if they "
-                        "are there"
+                        f"{path} is damaged: {what}; move it away, and labcrane recover "
+                        f"{path.parent} makes it anew of the journals, if they are there"
                     )
 
 
+def unpacked(file: "h5py.File", size: int) -> list[_Span]:
+    """Return the stretches of a file of ``size`` bytes that no packed column takes."""
+    return _outside(_columns_in(file), size)
+
+
 def _columns_in(file: "h5py.File") -> list[_Span]:
-    """Return where chunks of columns lie; nothing when one cannot be as large as it says."""
+    """Return where packed chunks lie; nothing when one cannot be as large as it says."""
     import h5py  # noqa: PLC0415
 
     spans: list[_Span] = []
     sizes: list[bool] = []
 
     def look(_: str, node: "h5py.HLObject") -> None:
-        if not isinstance(node, h5py.Dataset) or node.chunks is None:
+        if not isinstance(node, h5py.Dataset) or node.compression != "gzip":
             return
         most = math.prod(node.chunks) * int(node.dtype.itemsize)
 
         def add(chunk: "h5py.h5d.StoreInfo") -> None:
+            if chunk.filter_mask:  # what packing would make larger is left as it is, without a sum
+                return
             spans.append((chunk.byte_offset, chunk.byte_offset + chunk.size))
             sizes.append(chunk.size <= most + most // 100 + 64)
 
@@ -122,19 +167,39 @@ def _outside(spans: list[_Span], size: int) -> list[_Span]:
     return [(start, stop) for start, stop in gaps if start < stop]
 
 
-def _heaps(data: BinaryIO, start: int, stop: int) -> Iterator[int]:
-    """Yield where heaps begin in a stretch of a file."""
+def _found(data: BinaryIO, start: int, stop: int) -> Iterator[tuple[int, bytes]]:
+    """Yield where heaps and texts begin in a stretch of a file, and how."""
     while start < stop:
         data.seek(start)
-        window = data.read(min(stop - start + len(HEAP), WINDOW))
-        at = window.find(HEAP)
-        while at >= 0:
-            if start + at < stop:
-                yield start + at
-            at = window.find(HEAP, at + 1)
-        if len(window) < len(HEAP):
+        window = data.read(min(stop - start + _LONGEST, WINDOW))
+        last = start + len(window) >= stop
+        for match in _BEGINNING.finditer(window):
+            at = match.start()
+            # What begins near the end of a window is found again, whole, in the next one.
+            if start + at < stop and (last or at + _LONGEST <= len(window)):
+                yield start + at, window[at : at + _LONGEST]
+        if last:
             return
-        start += max(len(window) - len(HEAP) + 1, 1)
+        start += len(window) - _LONGEST + 1
+
+
+def _attribute_length(begin: bytes) -> int:
+    """Return how many bytes a text takes by what is said of it; 0 if it is none."""
+    if len(begin) < _LONGEST:
+        return 0
+    space_at = _LENGTH_AT - len(_ONE_VALUE)
+    kind, space = begin[_TYPE_HEAD:space_at], begin[space_at:_LENGTH_AT]
+    if _alike(kind, _TEXT_TYPE) < len(_TEXT_TYPE) // 2:
+        return 0
+    if _alike(space, _ONE_VALUE) < len(_ONE_VALUE) - 1:
+        return 0
+    (width,) = _TEXT_LENGTH.unpack_from(kind, 4)
+    (length,) = _TEXT_LENGTH.unpack_from(begin, _LENGTH_AT)
+    return int(length * max(width, 1))
+
+
+def _alike(some: bytes, others: bytes) -> int:
+    return sum(a == b for a, b in zip(some, others, strict=True))
 
 
 def _heap_ends(file: BinaryIO, start: int, length: int) -> bool:
@@ -204,6 +269,21 @@ class _Walk:
             raise self._refused(
                 where, f"says it holds {size} values of {width} bytes in {packed} bytes"
             )
+        if dataset.dtype.kind == "O" and dataset.chunks is None and size:
+            self._texts(dataset, where, size)
+
+    def _texts(self, dataset: "h5py.Dataset", where: str, size: int) -> None:
+        """Look at the lengths of an older file's texts; where they are packed, gzip adds a sum."""
+        at = dataset.id.get_offset()
+        if at is None:
+            return
+        with self._path.open("rb") as data:
+            data.seek(at)
+            said = data.read(_TEXT_BYTES * size)
+        for start in range(0, len(said) - _TEXT_LENGTH.size + 1, _TEXT_BYTES):
+            (length,) = _TEXT_LENGTH.unpack_from(said, start)
+            if length > self._size:
+                raise self._refused(where, f"says it holds a text of {length} bytes")
 
     def _refused(self, where: str, what: str) -> RecordingError:
         return RecordingError(

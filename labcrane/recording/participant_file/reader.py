@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.errors import RecordingError
+from labcrane.recording.annotations import COLUMNS, read_annotations
 from labcrane.recording.journal import GROUPS
 from labcrane.recording.participant_file.columns import CHUNK, holds_texts, text_of, texts_of
 from labcrane.recording.participant_file.session_group import SYNC_REPORT
@@ -308,6 +309,28 @@ class SessionRecord:
             table["data"] = [_mapping(text) for text in table["data"]]
             return pd.DataFrame(table)
 
+    @property
+    def annotations(self) -> "pd.DataFrame":
+        """One row per mark that people made afterwards: time, until, text and written.
+
+        Times are in seconds on the session's clock. They are read anew each time, from the file
+        beside the participant file (:mod:`labcrane.recording.annotations`): a participant file
+        that was copied elsewhere alone has none.
+        """
+        import pandas as pd  # noqa: PLC0415
+
+        number = int(self._group.removeprefix("ses-"))
+        marks = read_annotations(self._path.parent, number)
+        return pd.DataFrame(
+            {
+                name: pd.Series(
+                    [getattr(mark, name) for mark in marks],
+                    dtype=float if name in {"time", "until"} else object,
+                )
+                for name in COLUMNS
+            }
+        )
+
     @cached_property
     def trials(self) -> "pd.DataFrame":
         """One row per counted trial: its condition and its results."""
@@ -418,9 +441,9 @@ def _mapping(text: str) -> dict[str, Any]:
 
 
 def _attributes(node: "h5py.HLObject") -> dict[str, Any]:
-    """Return attributes as numbers and texts."""
+    """Return attributes as numbers and texts; what others added is returned as h5py reads it."""
     return {
-        name: value if isinstance(value, str) else float(value)
+        name: float(value) if isinstance(value, np.number | np.bool_) else value
         for name, value in node.attrs.items()
     }
 

@@ -10,7 +10,9 @@ import numpy as np
 from labcrane.recording.foreign_streams import OWN_CLOCK_CHANNELS, Note, RecordedStream
 from labcrane.recording.participant_file.columns import text_of, texts_of
 from labcrane.recording.participant_file.reader import open_recording
-from labcrane.recording.participant_file.writer import Conclude, opened, renewed
+from labcrane.recording.participant_file.stream_group import TIME_COLUMNS
+from labcrane.recording.participant_file.verification import bring_to_disk
+from labcrane.recording.participant_file.writer import Conclude, check_copied, opened, renewed
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.types import FloatArray
 
@@ -33,21 +35,32 @@ def recorrect(path: Path, conclude: Conclude) -> dict[int, list[str]]:
 
     open_recording(path)  # which says what to do when there is none
     done: dict[int, list[str]] = {}
-    with (
-        renewed(path, f"labcrane resync {path}") as beside,
-        opened(path) as old,
-        h5py.File(beside, "w") as new,
-    ):
-        for name in old:
-            old.copy(name, new)
-        for name, value in old.attrs.items():
-            new.attrs[name] = value
-        for name in new:
-            if match := re.fullmatch(r"ses-(\d+)", name):
-                group = new[name]
-                conclude(group)
-                done[int(match[1])] = list(group.get("streams", {}))
+    with renewed(path, f"labcrane resync {path}") as beside, opened(path) as old:
+        with h5py.File(beside, "w") as new:
+            for name in old:
+                old.copy(name, new)
+            for name, value in old.attrs.items():
+                new.attrs[name] = value
+            for name in new:
+                if match := re.fullmatch(r"ses-(\d+)", name):
+                    group = new[name]
+                    conclude(group)
+                    done[int(match[1])] = list(group.get("streams", {}))
+        bring_to_disk(beside)
+        with opened(beside) as new:
+            check_copied(new, old, _corrected)
     return done
+
+
+_TIMES = "|".join(TIME_COLUMNS)
+_CORRECTED = re.compile(
+    rf"ses-\d+/(sync_report|streams/[^/]+(@uncorrected|/({_TIMES}|earlier)([/@].*)?))"
+)
+
+
+def _corrected(name: str) -> bool:
+    """Whether a node, or an attribute, is what a correction writes."""
+    return _CORRECTED.fullmatch(name) is not None
 
 
 def read_stream(group: "h5py.Group") -> RecordedStream:

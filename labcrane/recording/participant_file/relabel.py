@@ -10,8 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from labcrane.errors import RecordingError
 from labcrane.recording.journal import START
 from labcrane.recording.participant_file.columns import (
@@ -21,7 +19,10 @@ from labcrane.recording.participant_file.columns import (
     write_text,
     write_texts,
 )
+from labcrane.recording.participant_file.verification import bring_to_disk, unlike
+from labcrane.recording.participant_file.writer import put_seal
 from labcrane.recording.xdf.checksums import CHECK_NAME
+from labcrane.recording.xdf.header import StreamHeader
 from labcrane.recording.xdf.reader import XdfFile, XdfStream, read_xdf
 from labcrane.recording.xdf.writer import XdfWriter
 
@@ -62,12 +63,19 @@ def relabel_journal(source: Path, target: Path, old: str, new: str) -> None:
     with XdfWriter(target) as writer:
         for stream in _own(file):
             _write_stream(writer, stream, rename, old)
+    bring_to_disk(target)
     for before, after in zip(_own(file), _own(read_xdf(target)), strict=True):
-        same = np.array_equal(before.stamps, after.stamps, equal_nan=True)
-        if not (same and before.data.tobytes() == after.data.tobytes()):
+        same = (
+            before.stamps.tobytes() == after.stamps.tobytes()
+            and before.data.tobytes() == after.data.tobytes()
+            and before.offsets.tobytes() == after.offsets.tobytes()
+            and _renamed_header(before.header, rename) == after.header
+            and [
+                tuple(_with_record(rename(text), old) for text in row) for row in before.texts
+            ] == [tuple(row) for row in after.texts]
+        )  # fmt: skip
+        if not same:
             raise RecordingError(f"{target} does not read as {source} does; check the disk")
-        if len(before.texts) != len(after.texts):
-            raise RecordingError(f"{target} has lost events of {source}; check the disk")
 
 
 def _own(file: XdfFile) -> list[XdfStream]:
@@ -76,9 +84,7 @@ def _own(file: XdfFile) -> list[XdfStream]:
 
 
 def _write_stream(writer: XdfWriter, stream: XdfStream, rename: Rename, old: str) -> None:
-    header = stream.header
-    text = None if header.text is None else rename(header.text)
-    header = replace(header, source_id=rename(header.source_id), text=text)
+    header = _renamed_header(stream.header, rename)
     number = writer.add_stream(header)
     for start in range(0, len(stream.stamps), SAMPLES):
         part = slice(start, start + SAMPLES)
@@ -91,6 +97,11 @@ def _write_stream(writer: XdfWriter, stream: XdfStream, rename: Rename, old: str
             writer.write_samples(number, stream.stamps[part], stream.data[part])
     for when, offset in stream.offsets.tolist():
         writer.write_offset(number, when, offset)
+
+
+def _renamed_header(header: StreamHeader, rename: Rename) -> StreamHeader:
+    text = None if header.text is None else rename(header.text)
+    return replace(header, source_id=rename(header.source_id), text=text)
 
 
 def _with_record(text: str, old: str) -> str:
@@ -133,8 +144,24 @@ def relabel_participant_file(
                 journals = session["journals"]
                 for number, name in enumerate(texts_of(journals["name"])):
                     journals["size"][number] = sizes.get(name, journals["size"][number])
+        put_seal(target)
+        bring_to_disk(target)
+        with h5py.File(source, "r") as before, h5py.File(target, "r") as after:
+            lost = next(unlike(before, after, _made_anew, renaming(old, new)), None)
     except (OSError, KeyError, ValueError) as error:
         raise RecordingError(f"cannot relabel {source}: {error}; it is as it was") from error
+    if lost is not None:
+        raise RecordingError(
+            f"{lost} of {target} is not what {source} holds, which is as it was; check the disk"
+        )
+
+
+_ANEW = re.compile(rf"ses-[^/]+/(context|journals/size)(@.*)?|(ses-[^/]+)?@{FORMERLY}")
+
+
+def _made_anew(name: str) -> bool:
+    """Whether a node, or an attribute, says something else after a relabelling."""
+    return _ANEW.fullmatch(name) is not None
 
 
 def _formerly(node: "h5py.HLObject", old: str) -> str:

@@ -17,6 +17,7 @@ from labcrane.recording.participant_file.columns import (
     write_values,
 )
 from labcrane.recording.participant_file.questionnaires import write_questionnaires
+from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import h5py
@@ -30,13 +31,22 @@ COUNTED = "counted"
 
 def write_session(group: "h5py.Group", log: SessionLog, journals: Sequence[JournalState]) -> None:
     """Write frames, events, trials and the context of a session into its group."""
+    write_tables(group, log, journals)
+    _write_frames(group, log)
+    for name, values in event_columns(log, group).items():
+        if isinstance(values, np.ndarray):
+            write_numbers(group, f"events/{name}", values, "s" if name == "time" else "1")
+        else:
+            write_texts(group, f"events/{name}", values)
+
+
+def write_tables(group: "h5py.Group", log: SessionLog, journals: Sequence[JournalState]) -> None:
+    """Write what follows from a session's events: its context, trials and answers."""
     context = log.context
     write_attributes(group, attributes(context))
     write_text(group, "protocol", str(context.get("protocol", "")))
     write_text(group, "context", json.dumps(dict(context), ensure_ascii=False))
     _write_journals(group.create_group("journals"), journals)
-    _write_frames(group, log)
-    _write_events(group.create_group("events"), log)
     _write_trials(group.create_group("trials"), log)
     write_questionnaires(group.create_group("questionnaires"), log)
 
@@ -72,16 +82,19 @@ def _write_frames(group: "h5py.Group", log: SessionLog) -> None:
         write_attributes(group[path], {"position": number})
 
 
-def _write_events(group: "h5py.Group", log: SessionLog) -> None:
+def event_columns(
+    log: SessionLog, session: "h5py.Group"
+) -> Mapping[str, FloatArray | Sequence[str]]:
+    """Return the columns of a session's events, whose trials follow from its written frames."""
     events = log.events
-    write_numbers(group, "time", np.array([event.time for event in events]), "s")
-    write_numbers(group, "tick", np.array([event.tick for event in events]), "1")
-    write_numbers(group, "part", np.array([float(event.part) for event in events]), "1")
-    write_numbers(group, "trial", np.array(_trials_of(log, group.parent)), "1")
-    write_texts(group, "name", [event.name for event in events])
-    write_texts(
-        group, "data", [json.dumps(dict(event.data), ensure_ascii=False) for event in events]
-    )
+    return {
+        "time": np.array([event.time for event in events]),
+        "tick": np.array([event.tick for event in events]),
+        "part": np.array([float(event.part) for event in events]),
+        "trial": np.array(_trials_of(log, session)),
+        "name": [event.name for event in events],
+        "data": [json.dumps(dict(event.data), ensure_ascii=False) for event in events],
+    }
 
 
 def _trials_of(log: SessionLog, session: "h5py.Group") -> list[float]:

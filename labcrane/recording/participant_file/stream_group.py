@@ -1,7 +1,7 @@
 """Groups of the streams of others in a session of a participant file, written."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import reduce
 from typing import TYPE_CHECKING
 
@@ -42,6 +42,13 @@ def write_streams(group: "h5py.Group", streams: Sequence[RecordedStream]) -> Non
     names = node_names([stream.header.name for stream in streams])
     for (_, safe), stream in zip(names, streams, strict=True):
         _write_stream(all_streams.create_group(safe), stream)
+    write_own_clock(group, streams)
+
+
+def write_own_clock(group: "h5py.Group", streams: Sequence[RecordedStream]) -> None:
+    """Write what the session's recorders logged of their own clock."""
+    if not streams:
+        return
     clocks = reduce(both_clocks, (stream.own_clock for stream in streams))
     for column, channel in enumerate(OWN_CLOCK_CHANNELS if len(clocks) else ()):
         write_numbers(group, f"own_clock/{channel.label}", clocks[:, column], channel.unit)
@@ -49,21 +56,52 @@ def write_streams(group: "h5py.Group", streams: Sequence[RecordedStream]) -> Non
 
 def _write_stream(group: "h5py.Group", stream: RecordedStream) -> None:
     header = stream.header
-    write_attributes(
-        group,
-        {
-            "name": header.name,
-            "type": header.type,
-            "source_id": header.source_id,
-            "rate_hz": float(header.rate_hz),
-            "format": header.format,
-        },
-    )
+    write_attributes(group, stream_attributes(stream))
     write_text(group, "header", header.xml)
-    write_numbers(group, "time_raw", stream.time_raw, "s")
-    write_numbers(group, "starts", np.array(stream.starts, np.float64), "1")
-    _write_beside(group, stream)
-    _write_data(group.create_group("data"), stream)
+    group.create_group("data")
+    for name, values, unit in stream_columns(stream):
+        if isinstance(values, np.ndarray):
+            write_numbers(group, name, values, unit)
+        else:
+            write_texts(group, name, values)
+    for number, (label, safe) in enumerate(node_names(list(header.labels))):
+        write_attributes(group[f"data/{safe}"], {"name": label, "position": number})
+
+
+def stream_attributes(stream: RecordedStream) -> dict[str, str | float]:
+    """Return what of a stream's header stands at its group."""
+    header = stream.header
+    return {
+        "name": header.name,
+        "type": header.type,
+        "source_id": header.source_id,
+        "rate_hz": float(header.rate_hz),
+        "format": header.format,
+    }
+
+
+def stream_columns(
+    stream: RecordedStream,
+) -> Iterator[tuple[str, FloatArray | Sequence[str], str]]:
+    """Yield name, values and unit of each column of a stream, as its recorder had them."""
+    yield "time_raw", stream.time_raw, "s"
+    yield "starts", np.array(stream.starts, np.float64), "1"
+    for number, channel in enumerate(PROBE_CHANNELS):
+        yield f"clock/{channel.label}", stream.probes[:, number], "s"
+    yield "arrival/count", stream.arrivals[:, 0], "1"
+    yield "arrival/time", stream.arrivals[:, 1], "s"
+    yield "notes/time", np.array([note.time for note in stream.notes]), "s"
+    told = [json.dumps(dict(note.data), ensure_ascii=False) for note in stream.notes]
+    yield "notes/data", told, ""
+    if len(stream.offsets):
+        yield "offsets/time", stream.offsets[:, 0], "s"
+        yield "offsets/value", stream.offsets[:, 1], "s"
+    names = node_names(list(stream.header.labels))
+    for number, ((_, safe), channel) in enumerate(zip(names, stream.header.channels, strict=True)):
+        if stream.header.dtype is None:
+            yield f"data/{safe}", [row[number] for row in stream.texts], ""
+        else:
+            yield f"data/{safe}", stream.data[:, number].astype(np.float64), channel.unit
 
 
 def write_time(
@@ -112,31 +150,3 @@ def _put_aside(group: "h5py.Group", time: FloatArray | None) -> None:
     for name in TIME_COLUMNS:
         if name in group:
             del group[name]
-
-
-def _write_beside(group: "h5py.Group", stream: RecordedStream) -> None:
-    for number, channel in enumerate(PROBE_CHANNELS):
-        write_numbers(group, f"clock/{channel.label}", stream.probes[:, number], "s")
-    write_numbers(group, "arrival/count", stream.arrivals[:, 0], "1")
-    write_numbers(group, "arrival/time", stream.arrivals[:, 1], "s")
-    write_numbers(group, "notes/time", np.array([note.time for note in stream.notes]), "s")
-    write_texts(
-        group,
-        "notes/data",
-        [json.dumps(dict(note.data), ensure_ascii=False) for note in stream.notes],
-    )
-    if len(stream.offsets):
-        write_numbers(group, "offsets/time", stream.offsets[:, 0], "s")
-        write_numbers(group, "offsets/value", stream.offsets[:, 1], "s")
-
-
-def _write_data(group: "h5py.Group", stream: RecordedStream) -> None:
-    names = node_names(list(stream.header.labels))
-    for number, ((label, safe), channel) in enumerate(
-        zip(names, stream.header.channels, strict=True)
-    ):
-        if stream.header.dtype is None:
-            write_texts(group, safe, [row[number] for row in stream.texts])
-        else:
-            write_numbers(group, safe, stream.data[:, number].astype(np.float64), channel.unit)
-        write_attributes(group[safe], {"name": label, "position": number})

@@ -11,21 +11,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from labcrane.errors import RecordingError
 from labcrane.files.atomic import replacing
 from labcrane.files.lock import alone_in
 from labcrane.recording.foreign_streams import RecordedStream, read_streams
 from labcrane.recording.journal_reader import JournalState, SessionLog, read_journal
 from labcrane.recording.participant_file.about import ABOUT, write_about
-from labcrane.recording.participant_file.columns import CHUNK, node_names, write_attributes
-from labcrane.recording.participant_file.containment import check_containment, check_heaps
+from labcrane.recording.participant_file.columns import write_attributes
+from labcrane.recording.participant_file.containment import check_containment, check_texts, unpacked
+from labcrane.recording.participant_file.seal import seal
 from labcrane.recording.participant_file.session_group import write_session
 from labcrane.recording.participant_file.signal_faults import write_signal_faults
 from labcrane.recording.participant_file.stream_group import write_streams
+from labcrane.recording.participant_file.verification import (
+    bring_to_disk,
+    unlike,
+    unlike_journals,
+)
 from labcrane.recording.paths import parts, session_of
-from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import h5py
@@ -142,6 +145,7 @@ def renewed(path: Path, again: str) -> Iterator[Path]:
     with alone_in(path.parent), replacing(path) as beside:
         try:
             yield beside
+            put_seal(beside)
         except DAMAGED as error:  # h5py's, and of an old file that is damaged
             raise RecordingError(
                 f"cannot write {path}: {_reason(error)}; it is as it was, and so are the journals: "
@@ -151,6 +155,8 @@ def renewed(path: Path, again: str) -> Iterator[Path]:
 
 def _reason(error: Exception) -> str:
     """Return why HDF5 failed, in the system's words if there are any in its own."""
+    if isinstance(error, KeyError):
+        return f"an event, or the old file, has no {error}, which it should have"
     found = re.search(r"error message = '([^']+)'", str(error))
     return found[1] if found else str(error)
 
@@ -207,6 +213,18 @@ def _write(beside: Path, path: Path, session: _Session, conclude: Conclude | Non
         write_about(new, context)
 
 
+def put_seal(path: Path) -> None:
+    """Seal a participant file that is written: what changes later by itself is then found.
+
+    Whoever changes a copy with HDF5 takes its seal away, and calls this when it is as it shall be.
+    """
+    import h5py  # noqa: PLC0415
+
+    with h5py.File(path, "r") as file:
+        spans = unpacked(file, path.stat().st_size)
+    seal(path, spans)
+
+
 @contextmanager
 def opened(path: Path, *, cached: bool = True) -> Iterator["h5py.File"]:
     """Open a participant file for reading.
@@ -228,7 +246,7 @@ def opened(path: Path, *, cached: bool = True) -> Iterator["h5py.File"]:
     except (OSError, RuntimeError, ValueError) as error:  # ValueError: no name of a file
         raise RecordingError(f"cannot read {path}: {error}") from error
     with file:
-        check_heaps(file, path)
+        check_texts(file, path)
         if file.attrs.get("format") != FORMAT:
             raise RecordingError(
                 f"{path} is an HDF5 file, but not a participant file of labcrane; give the .h5 "
@@ -260,8 +278,8 @@ def reading(path: Path, *, cached: bool = True) -> Iterator["h5py.File"]:
     # h5py, numpy, pandas and json raise what they like of damaged files.
     except (*DAMAGED, MemoryError) as error:
         raise RecordingError(
-            f"{path} is damaged: {error!r}; labcrane recover {path.parent} makes it "
-            "anew of the journals, if they are there"
+            f"{path} is damaged: {error!r}; move it away, and labcrane recover {path.parent} "
+            "makes it anew of the journals, if they are there"
         ) from error
 
 
@@ -279,54 +297,38 @@ def _refuse_less(path: Path, old: "h5py.File", session: _Session) -> None:
 
 
 def _verify(beside: Path, path: Path, session: _Session) -> None:
-    """Read the new file again, and compare it with the journals and with the old file."""
+    """Read the new file again, and compare all of it with the journals and with the old file."""
+    bring_to_disk(beside)
     with opened(beside) as new:
         group = new[session.group]
-        expected = {"time": session.log.time}
-        expected["events/time"] = np.array([event.time for event in session.log.events])
-        names = node_names([stream.header.name for stream in session.streams])
-        for (_, name), stream in zip(names, session.streams, strict=True):
-            expected[f"streams/{name}/time_raw"] = stream.time_raw
-        for name, values in expected.items():
-            if not _holds(group[name], values):
-                raise RecordingError(
-                    f"{session.group}/{name} of {beside} is not what the journals hold; "
-                    f"{path} is left as it is: check the disk"
-                )
-        for column in session.log.columns:
-            held = group[f"{column.group}/{column.label.replace('.', '/')}"]
-            if held.shape != session.log.time.shape:
-                raise RecordingError(
-                    f"{held.name} of {beside} has lost samples; {path} is left as it is: check the "
-                    "disk"
-                )
+        wrong = unlike_journals(group, session.log, session.streams, session.journals)
+        for name in wrong:
+            raise RecordingError(
+                f"{session.group}/{name} of {beside} is not what the journals hold; "
+                f"{path} is left as it is: check the disk"
+            )
         if path.exists():
-            _compare(new, path, session.group)
+            anew = {session.group, *ABOUT}
+            with opened(path) as old:
+                check_copied(new, old, lambda name: re.split("[/@]", name)[0] in anew)
 
 
-def _holds(dataset: "h5py.Dataset", values: FloatArray) -> bool:
-    """Whether a column holds just these values; compared in pieces, for memory's sake."""
-    return dataset.shape == values.shape and all(
-        np.array_equal(dataset[at : at + CHUNK], values[at : at + CHUNK], equal_nan=True)
-        for at in range(0, len(values), CHUNK)
-    )
+def check_copied(new: "h5py.File", old: "h5py.File", leave: Callable[[str], bool]) -> None:
+    """Compare what was copied with the file that is to be replaced.
 
+    Parameters
+    ----------
+    leave
+        Which groups and columns of the new file are others, by their names; and attributes, as
+        ``group@name``.
 
-def _compare(new: "h5py.File", path: Path, but: str) -> None:
-    """Compare the sessions that were copied with those of the old file."""
-    with opened(path) as old:
-        for name in (name for name in old if name != but and name not in ABOUT):
-            if _inventory(old[name]) != _inventory(new[name]):
-                raise RecordingError(
-                    f"session {name} was not copied whole; {path} is left as it is: check the disk"
-                )
-
-
-def _inventory(group: "h5py.Group") -> list[tuple[str, object, str]]:
-    nodes: list[tuple[str, object, str]] = []
-    group.visititems(
-        lambda name, node: nodes.append(
-            (name, getattr(node, "shape", None), str(getattr(node, "dtype", "")))
+    Raises
+    ------
+    RecordingError
+        Something of the old file would be lost, or changed.
+    """
+    for name in unlike(old, new, leave):
+        raise RecordingError(
+            f"{name or 'its attributes'} of {old.filename} was not copied as it is; the file is "
+            "left as it is: check the disk"
         )
-    )
-    return nodes

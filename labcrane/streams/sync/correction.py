@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.errors import RecordingError
-from labcrane.streams.sync.dejitter import Dejitter, even, follow_sample_clock, left_open
+from labcrane.streams.sync.dejitter import Dejitter, even, even_line, follow_sample_clock, left_open
 from labcrane.streams.sync.epochs import epochs
 from labcrane.streams.sync.own_clock import OwnClock
 from labcrane.streams.sync.placement import Placement, place
@@ -37,7 +37,8 @@ from labcrane.streams.sync.quality import (
     worst_second,
 )
 from labcrane.streams.sync.raw import REMOTE, RTT, RawStream
-from labcrane.streams.sync.sampling import RATE_CHANGE, Sampling, examine
+from labcrane.streams.sync.sampling import RATE_CHANGE, Sampling, examine, examine_irregular
+from labcrane.streams.sync.stamping.shifts import DELAY_S
 from labcrane.types import FloatArray
 
 
@@ -75,10 +76,14 @@ class Treatment:
 
 PAUSE_S = 0.5
 
+BACK_S = 0.001
+"""By more than this a sample is placed before one that came earlier."""
+
 ENOUGH = 2000
 """So many samples tell a rate well enough to see it change from one clock to the next."""
 
-_Sampled = tuple[Segment, Sampling]
+_Followed = tuple[FloatArray, FloatArray]
+_Sampled = tuple[Segment, Sampling, _Followed | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,31 +152,48 @@ def _correct(raw: RawStream, treatment: Treatment, end: float | None) -> Correct
         return Corrected(nothing, nothing, nothing, quality=Quality(**_trips(raw)))
     regular = treatment.rate_hz > 0.0
     placed = place(raw, epochs(raw, regular=regular), regular=regular)
-    sampled = _examined(raw, placed) if regular else []
+    sampled = _examined(raw, placed, regular=regular)
     time, error = _evened(raw, placed, sampled, treatment)
     shift = treatment.transport_s + treatment.latency_s
-    quality = _summed(raw, placed, sampled, (time, error), end)
+    quality = _summed(raw, placed, sampled, (time, error, end), regular=regular)
     return Corrected(time - shift, error, placed.time - shift, placed.segments, quality)
 
 
-def _examined(raw: RawStream, placed: Placement) -> list[_Sampled]:
-    """Return how each clock's samples were sampled."""
+def _examined(raw: RawStream, placed: Placement, *, regular: bool) -> list[_Sampled]:
+    """Return how each clock's samples were sampled, and their even times where these help."""
     arrival, times = raw.arrival(), placed.time
     if placed.frozen:  # what stood still says nothing of how samples were taken
         own = np.flatnonzero(np.r_[True, np.diff(raw.stamps) != 0.0])
         times = np.interp(np.arange(len(times)), own, times[own])
-    found = []
+    found: list[_Sampled] = []
     for segment in placed.segments:
         part = slice(segment.start, segment.stop)
         if segment.basis is not Basis.NOTHING:
-            sampling = examine(
+            seen = (
                 raw.stamps[part],
                 times[part],
                 None if arrival is None else arrival[part],
                 None if raw.index is None else raw.index[part],
             )
-            found.append((segment, sampling))
+            probed = segment.basis is Basis.PROBES
+            sampling = examine(*seen, probed=probed) if regular else examine_irregular(*seen)
+            followed = None
+            if sampling.steady:
+                followed = _followed(times[part], sampling)
+                sampling = sampling.judged_by(times[part] - followed[0])
+            found.append((segment, sampling, followed if sampling.steady else None))
     return found
+
+
+def _followed(time: FloatArray, sampling: Sampling) -> _Followed:
+    """Return even times and their error; those that polls stamped lie on one straight line.
+
+    A phase that slides along the grid of polls is none of the sampler's.
+    """
+    if sampling.received is None or not sampling.received.polled:
+        return follow_sample_clock(time, sampling.index)
+    line = even_line(time, sampling.index)
+    return line, np.full(len(time), sampling.received.strayed_s)
 
 
 def _evened(
@@ -181,21 +203,28 @@ def _evened(
     time, error = placed.time.copy(), placed.error.copy()
     way = treatment.way
     declared = treatment.transport_s != 0.0 or treatment.latency_s != 0.0
-    for segment, sampling in sampled:
+    for segment, sampling, followed in sampled:
         part = slice(segment.start, segment.stop)
-        if way is Dejitter.AUTO and sampling.steady and segment.basis is Basis.PROBES:
-            time[part], doubt = follow_sample_clock(placed.time[part], sampling.index)
+        # Nothing tells cut stamps from rounded ones, and so whether they are half a unit early.
+        error[part] += sampling.grid_s / 2.0
+        if sampling.shifted is not None:
+            count = segment.stop - segment.start
+            error[part] += sampling.shifted.late(count)
+            if way is Dejitter.AUTO and segment.basis is Basis.PROBES:
+                time[part] -= sampling.shifted.late(count, DELAY_S)
+        if way is Dejitter.AUTO and followed is not None and segment.basis is Basis.PROBES:
+            time[part], doubt = followed
             error[part] += doubt
             if sampling.uncounted:
                 error[part] += sampling.noise_s / 2.0
-            if sampling.late_stamps and not declared:
+            if sampling.received is not None or (sampling.late_stamps and not declared):
                 error[part] += sampling.noise_s
         elif way in {Dejitter.LEAST_SQUARES, Dejitter.ENVELOPE}:
             index = sampling.index if raw.index is None else raw.index[part]
             time[part] = even(placed.time[part], index, way)
             error[part] += sampling.noise_s / 4.0 + left_open(placed.time[part], time[part], way)
         else:
-            error[part] += sampling.noise_s
+            error[part] += sampling.noise_s + sampling.grid_s / 2.0
     return time, error
 
 
@@ -224,11 +253,12 @@ def _summed(
     raw: RawStream,
     placed: Placement,
     sampled: list[_Sampled],
-    result: tuple[FloatArray, FloatArray],
-    end: float | None,
+    result: tuple[FloatArray, FloatArray, float | None],
+    *,
+    regular: bool,
 ) -> Quality:
-    """Sum up how right the corrected times are."""
-    time, error = result
+    """Sum up how right the corrected times are, of a recording that ended when it is known."""
+    time, error, end = result
     segments, curves = placed.segments, placed.curves
     longest = max(segments, key=lambda part: part.stop - part.start)
     probed = longest.basis is Basis.PROBES
@@ -236,6 +266,8 @@ def _summed(
     known = [curve.probes[:, REMOTE] for curve in curves]
     finite = placed.time[np.isfinite(placed.time)]
     last = float(finite.max()) if len(finite) else np.nan
+    if not regular:
+        last = max(last, raw.answers_until())
     return Quality(
         hidden_s=max((curve.least_rtt / 2.0 for curve in curves), default=np.nan),
         drift_ppm=longest.drift_ppm if probed else np.nan,
@@ -252,10 +284,18 @@ def _summed(
         unprobed=sum(s.stop - s.start for s in segments if s.basis is not Basis.PROBES),
         whose=placed.whose,
         frozen=placed.frozen,
+        ahead_s=placed.ahead_s,
         **_trips(raw),
+        backward=_backward(time) if regular else 0,
         **_errors(time, error, placed.time),
-        **_flow(placed, sampled),
+        **_flow(placed, sampled, regular=regular),
     )
+
+
+def _backward(time: FloatArray) -> int:
+    """Return how many samples are placed before one that came earlier, by more than rounding."""
+    known = time[np.isfinite(time)]
+    return int(np.count_nonzero(np.maximum.accumulate(known) - known > BACK_S))
 
 
 def _errors(time: FloatArray, error: FloatArray, uneven: FloatArray) -> dict[str, Any]:
@@ -276,30 +316,36 @@ def _errors(time: FloatArray, error: FloatArray, uneven: FloatArray) -> dict[str
     }
 
 
-def _flow(placed: Placement, sampled: list[_Sampled]) -> dict[str, Any]:
+def _flow(placed: Placement, sampled: list[_Sampled], *, regular: bool) -> dict[str, Any]:
     """Return what the segments' sampling says together."""
-    if not sampled:
+    each = [sampling for _, sampling, _ in sampled]
+    shifts = [one.shifted.by_s for one in each if one.shifted is not None]
+    told = {
+        "dropped": sum(one.missing for one in each),
+        "disordered": sum(one.disordered for one in each),
+        "stalls": sum(one.stalls for one in each),
+        "longest_stall_s": max((one.longest_stall_s for one in each), default=0.0),
+        "shifts": sum(len(one) for one in shifts),
+        "shift_s": max((float(np.abs(one).max()) for one in shifts if len(one)), default=0.0),
+        "grid_s": max((one.grid_s for one in each), default=0.0),
+    }
+    if not regular or not sampled:
         known = placed.time[np.isfinite(placed.time)]
         span = float(np.ptp(known)) if len(known) else 0.0
-        return {"rate_hz": (len(known) - 1) / span if span > 0.0 else np.nan}
-    each = [sampling for _, sampling in sampled]
-    _, most = max(sampled, key=lambda pair: pair[0].stop - pair[0].start)
+        return told | {"rate_hz": (len(known) - 1) / span if span > 0.0 else np.nan}
+    _, most, _ = max(sampled, key=lambda one: one[0].stop - one[0].start)
     first, last = _rates(each)
     pauses = [
         float(placed.time[after.start] - placed.time[before.stop - 1])
         for before, after in itertools.pairwise(placed.segments)
     ]
     pauses = [pause for pause in pauses if pause > PAUSE_S]
-    return {
+    return told | {
         "rate_hz": 1.0 / most.period,
         "first_rate_hz": first,
         "last_rate_hz": last,
         "gaps": sum(one.gaps for one in each) + len(pauses),
         "longest_gap_s": max([*(one.longest_gap_s for one in each), *pauses]),
-        "dropped": sum(one.missing for one in each),
-        "disordered": sum(one.disordered for one in each),
-        "stalls": sum(one.stalls for one in each),
-        "longest_stall_s": max(one.longest_stall_s for one in each),
         "noise_s": most.noise_s,
         "late_stamps": int(most.late_stamps),
     }

@@ -95,6 +95,11 @@ def follow_sample_clock(times: FloatArray, index: FloatArray) -> tuple[FloatArra
     return due + offset, SURE_OF_ALL * deviation
 
 
+def even_line(times: FloatArray, index: FloatArray) -> FloatArray:
+    """Return the straight line through times, by least squares, shape ``(n,)``."""
+    return np.asarray(_least_squares(times, index)(index))
+
+
 def runs(times: FloatArray, index: FloatArray) -> list[tuple[int, int]]:
     """Return the ranges without a gap: nothing is known of how many samples a gap swallowed."""
     if len(times) < 2:  # noqa: PLR2004

@@ -22,6 +22,10 @@ ONE_WAY = 0.15
 CONGESTED_S = 1e-3
 LONG = 5
 
+COARSE_S = (1.0 / 64.0, 0.01, 1e-3, 1e-4)
+ENOUGH, NEARLY = 8, 1e-3
+"""So many round trips of whole units of a clock, and so nearly whole, are no chance."""
+
 CLEARLY = 7.0
 """Log of the odds, a thousand to one, from which on the sampler is taken to be the steadier."""
 
@@ -69,7 +73,8 @@ class OffsetCurve:
         )[::2]
         held_up = ONE_WAY * np.interp(times, self.probes[:, REMOTE], around)
         stray = np.interp(times, self.probes[:, REMOTE], self._outside())
-        return offset, SURE * deviation + self.least_rtt / 2.0 + held_up + stray
+        hidden = self.least_rtt / 2.0 + _own_unit(self.probes[:, RTT])
+        return offset, SURE * deviation + hidden + held_up + stray
 
     def _outside(self) -> FloatArray:
         """Return by how much the curve is where no ways of its probes could lie, shape ``(n,)``."""
@@ -134,6 +139,16 @@ class OffsetCurve:
             if stop - start >= LONG:
                 total += float(self.probes[stop - 1, REMOTE] - self.probes[start, REMOTE])
         return total
+
+
+def _own_unit(trips: FloatArray) -> float:
+    """Return what our own clock counts in, if round trips are few whole units of it; else 0."""
+    for unit in COARSE_S:
+        parts = trips / unit
+        whole = np.round(parts)
+        if len(trips) >= ENOUGH and np.ptp(whole) > 0.0 and (np.abs(parts - whole) < NEARLY).all():
+            return unit
+    return 0.0
 
 
 def fit(

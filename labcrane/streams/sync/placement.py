@@ -4,11 +4,13 @@ import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
 from labcrane.streams.sync.epochs import Epoch
 from labcrane.streams.sync.offset import SURE, OffsetCurve, fit
 from labcrane.streams.sync.quality import Basis, Segment
 from labcrane.streams.sync.raw import REMOTE, RawStream
+from labcrane.streams.sync.sampling import coarse_unit
 from labcrane.streams.sync.smoother import smooth
 from labcrane.streams.sync.steady_sampler import SteadySampler
 from labcrane.types import FloatArray
@@ -31,11 +33,20 @@ LATE_S = 0.05
 SOONER_S = 0.0005
 """Beyond what probes leave open, no stamp of the probed clock is so long after its arrival."""
 
+AHEAD_S = 0.05
+"""Markers are stamped with what is to come by no more: three frames of a slow display."""
+
 USUAL_LAG_S = 0.0005
 """Nothing needs longer from one program to the next, unless something holds it up."""
 
 SHORT_LAG_S = 0.0002
 """Most of these lags are shorter than this."""
+
+LAG_BLUR_S = 0.00005
+"""So near each other are the two bounds of a lag, at most, that arrivals are to show."""
+
+ONE_IN = 1000
+"""Of so many pulls, one may tell of the lag what chance did."""
 
 SOON = 0.02
 FOREIGN_S = 1.0
@@ -70,6 +81,8 @@ class Placement:
         "foreign"; empty where they are.
     frozen
         Samples that have the stamp of the one before, though others have their own.
+    ahead_s
+        By how much irregular samples came before they happened, by their stamps; 0 if none did.
     """
 
     time: FloatArray
@@ -79,6 +92,7 @@ class Placement:
     least_lag: float = np.nan
     whose: str = ""
     frozen: int = 0
+    ahead_s: float = 0.0
 
 
 _Piece = tuple[int, int, Epoch, OffsetCurve | None]
@@ -89,23 +103,40 @@ def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> Placement
     curves = _curves(raw, stretches, regular=regular)
     arrival = raw.arrival()
     least = _least_lag(raw.stamps, arrival, stretches, curves, regular=regular)
-    whose = ""
+    whose, ahead = "", 0.0
     if arrival is not None and np.isfinite(least):
         hidden = max(curve.least_rtt / 2.0 for curve in curves if curve is not None)
         whose = _stamped_by(raw.stamps, arrival, (least, hidden), regular=regular)
-    time, error, segments = _placed(raw, stretches, curves, (least, whose), regular=regular)
+    known = raw, arrival, stretches
+    time, error, segments = _placed(known, curves, least, whose, regular=regular)
     if arrival is not None and np.isfinite(least) and not whose:
-        lags = _lags(time, error, arrival, regular=regular)
+        lags = _lags(time, error, arrival, coarse_unit(raw.stamps), regular=regular)
         if lags is None:
             whose = "foreign"
-            time, error, segments = _placed(raw, stretches, curves, (least, whose), regular=regular)
+            time, error, segments = _placed(known, curves, least, whose, regular=regular)
         else:
-            error = np.maximum(error, lags)
+            ahead = 0.0 if regular else _ahead(arrival - time, error)
+            error = np.maximum(error + ahead, lags)
     if whose:
         curves = [None] * len(stretches)
     probed = tuple(curve for curve in curves if curve is not None)
     frozen = _hold_frozen(raw.stamps, time, error) if regular else 0
-    return Placement(time, error, segments, probed, least, whose, frozen)
+    return Placement(time, error, segments, probed, least, whose, frozen, ahead)
+
+
+def _ahead(lag: FloatArray, error: FloatArray) -> float:
+    """Return by how much irregular samples came before they happened, by their stamps.
+
+    A program that knows when a picture will be shown may stamp it so. A clock that is ahead of the
+    probed one looks alike: the uncertainty holds both.
+    """
+    if not _came_early(lag, error):
+        return 0.0
+    return float(-lag.min()) + SHORT_LAG_S + 2.0 * PULL_S / len(lag)
+
+
+def _came_early(lag: FloatArray, error: FloatArray) -> bool:
+    return int(np.count_nonzero(lag + error < -SOONER_S)) >= max(2, 0.02 * len(lag))
 
 
 def _hold_frozen(stamps: FloatArray, time: FloatArray, error: FloatArray) -> int:
@@ -115,31 +146,30 @@ def _hold_frozen(stamps: FloatArray, time: FloatArray, error: FloatArray) -> int
         return 0
     starts = np.r_[0, np.flatnonzero(~same) + 1]
     stops = np.r_[starts[1:], len(stamps)]
-    for start, stop in zip(starts, stops, strict=True):
-        if stop - start > 1:
-            after = time[min(stop, len(time) - 1)] - time[start]
-            before = time[start] - time[max(start - 1, 0)]
-            error[start:stop] += max(abs(after), abs(before))
+    several = stops - starts > 1
+    for start, stop in zip(starts[several], stops[several], strict=True):
+        after = time[min(stop, len(time) - 1)] - time[start]
+        before = time[start] - time[max(start - 1, 0)]
+        error[start:stop] += max(abs(after), abs(before))
     return int(np.count_nonzero(same))
 
 
 def _placed(
-    raw: RawStream,
-    stretches: list[Epoch],
+    known: tuple[RawStream, FloatArray | None, list[Epoch]],
     curves: list[OffsetCurve | None],
-    lag_and_whose: tuple[float, str],
+    least: float,
+    whose: str,
     *,
     regular: bool,
 ) -> tuple[FloatArray, FloatArray, tuple[Segment, ...]]:
     """Return times, errors and segments, where it is known whose clock the stamps are of."""
-    least, whose = lag_and_whose
-    arrival = raw.arrival()
+    raw, arrival, stretches = known
     if whose:
         least, curves = 0.0, [None] * len(stretches)
     time, error = np.full((2, len(raw.stamps)), np.nan)
     pieces = _pieces(raw, arrival, stretches, curves, (least, time, error, whose), regular=regular)
-    known = arrival is not None
-    segments = tuple(_segment(*piece, known=known) for piece in _joined(pieces))
+    arrived = arrival is not None
+    segments = tuple(_segment(*piece, known=arrived) for piece in _joined(pieces))
     _blur_steps(segments, error)
     return time, error, segments
 
@@ -216,52 +246,116 @@ def _stamped_by(
 
 
 def _lags(
-    time: FloatArray, error: FloatArray, arrival: FloatArray, *, regular: bool
+    time: FloatArray, error: FloatArray, arrival: FloatArray, unit: float, *, regular: bool
 ) -> FloatArray | None:
     """Return by how much arrivals allow the stamps to be off, shape ``(n,)``, in seconds.
 
     A stamp may be too early by as long as its samples took at least, be it on their way or by a
     clock that is behind. None where they came before they were taken, or ever later: then the
-    stamps are of another clock than that which was probed.
+    stamps are of another clock than that which was probed. ``unit`` is what they may be cut to.
     """
-    lag = arrival - time
     starts = np.r_[0, np.flatnonzero(np.diff(arrival)) + 1]
-    least = np.minimum.reduceat(lag, starts)
-    sizes = np.diff(starts)
-    unit = max(int(np.gcd.reduce(sizes)), 1) if regular and len(sizes) else 1
-    before = np.r_[arrival[starts[:-1]] - time[starts[1:] + unit - 1], np.nan]
-    if regular:
-        block = np.floor((arrival[starts] - arrival[0]) / LAG_BLOCK_S)
-    else:
-        early = int(np.count_nonzero(lag + error < -SOONER_S))
-        if early >= max(2, 0.02 * len(lag)):
-            return None
-        block = np.floor(starts / LAG_BLOCK)
-    parts = np.split(np.arange(len(starts)), np.flatnonzero(np.diff(block)) + 1)
-    if len(parts) > 1 and len(parts[-1]) < len(parts[-2]) / 2:
-        parts[-2:] = [np.concatenate(parts[-2:])]
-    allowed = np.minimum.reduceat(lag + error, starts)
-    high = np.array([_quantile(least[part], SOON if regular else 0.0) for part in parts])
-    if regular:
-        impossible = [_quantile(allowed[part], SOON) < -SOONER_S for part in parts]
-        if np.mean(impossible) > 0.2:  # noqa: PLR2004
-            return None
-        # The next sample had not come by then: it tells a lag from pulls that wait for a sample.
-        low = np.array([_quantile(before[part], 0.9) for part in parts])
-    else:
-        low = high - PULL_S / 10.0
-        sure = error <= 2.0 * np.nanmedian(error)  # none near a step
-        high[low <= USUAL_LAG_S] = lag[sure].min(initial=np.inf)
+    parts = _parts((arrival[starts] - arrival[0]) / LAG_BLOCK_S if regular else starts / LAG_BLOCK)
+    found = (_even_lags if regular else _uneven_lags)(time, error, arrival, starts, parts)
+    if found is None:
+        return None
+    high, low, shown = found
     middle = np.array([float(arrival[starts[part]].mean()) for part in parts])
-    if _drifts(middle, high, low, _scatter(time) if regular else 0.0):
+    if _drifts(middle, high, low, (_scatter(time) if regular else 0.0) + unit):
         return None
     usual = (high <= USUAL_LAG_S) | (low <= USUAL_LAG_S) & regular
-    late = np.where(usual, np.minimum(high, SHORT_LAG_S), high)
+    late = np.where(usual, np.minimum(np.maximum(high, SHORT_LAG_S), shown), high)
     late = np.maximum(late, SHORT_LAG_S - high)
     around = np.pad(late, 1, mode="edge")
     late = np.maximum(late, np.maximum(around[:-2], around[2:]))
     counts = np.diff([*(int(starts[part[0]]) for part in parts), len(time)])
     return np.asarray(np.nan_to_num(np.repeat(late, counts), posinf=0.0))
+
+
+def _parts(blocks: FloatArray) -> list[npt.NDArray[np.intp]]:
+    """Return the pulls by block: where each began is given, counted in blocks."""
+    parts = np.split(np.arange(len(blocks)), np.flatnonzero(np.diff(np.floor(blocks))) + 1)
+    if len(parts) > 1 and len(parts[-1]) < len(parts[-2]) / 2:
+        parts[-2:] = [np.concatenate(parts[-2:])]
+    return parts
+
+
+_Lags = tuple[FloatArray, FloatArray, float]
+"""The least lag of each block of pulls, one that it is not below, and that of all as shown."""
+
+
+def _even_lags(
+    time: FloatArray,
+    error: FloatArray,
+    arrival: FloatArray,
+    starts: npt.NDArray[np.intp],
+    parts: list[npt.NDArray[np.intp]],
+) -> _Lags | None:
+    """Return the lags of a stream whose next sample is due at a known time."""
+    lag = arrival - time
+    allowed = np.minimum.reduceat(lag + error, starts)
+    impossible = [_quantile(allowed[part], SOON) < -SOONER_S for part in parts]
+    if np.mean(impossible) > 0.2:  # noqa: PLR2004
+        return None
+    least = np.minimum.reduceat(lag, starts)
+    # The next sample had not come by then: it tells a lag from pulls that wait for a sample.
+    unit = max(int(np.gcd.reduce(np.diff(starts))), 1) if len(starts) > 1 else 1
+    soonest = np.minimum(starts[1:] + unit - 1, len(time) - 1)  # the last pull may be a part of one
+    before = np.r_[arrival[starts[:-1]] - time[soonest], np.nan]
+    high = np.array([_quantile(least[part], SOON) for part in parts])
+    low = np.array([_quantile(before[part], 0.9) for part in parts])
+    return high, low, _shown(least, before, LAG_BLUR_S, _scatter(time))
+
+
+def _uneven_lags(
+    time: FloatArray,
+    error: FloatArray,
+    arrival: FloatArray,
+    starts: npt.NDArray[np.intp],
+    parts: list[npt.NDArray[np.intp]],
+) -> _Lags | None:
+    """Return the lags of a stream whose next sample may be taken at any time."""
+    lag = arrival - time
+    early = _came_early(lag, error)
+    if early and _quantile(lag, 1.0 / ONE_IN) < -AHEAD_S:
+        return None
+    least = np.minimum.reduceat(lag, starts)
+    high = np.array([_quantile(least[part], 0.0) for part in parts])
+    low = high - PULL_S / 10.0
+    middle = np.array([float(arrival[starts[part]].mean()) for part in parts])
+    if early and _drifts(-middle[::-1], high[::-1], low[::-1], 0.0):  # it runs ahead
+        return None
+    sure = error <= 2.0 * np.nanmedian(error)  # none near a step
+    high[low <= USUAL_LAG_S] = lag[sure].min(initial=np.inf)
+    before = arrival[starts[:-1]] - np.minimum.reduceat(time, starts)[1:]
+    blur = max(2.0 * LAG_BLUR_S, 2.0 * PULL_S / len(time))
+    return high, low, _shown(np.where(sure[starts], least, np.nan), before, blur)
+
+
+def _shown(least: FloatArray, before: FloatArray, blur: float, scatter: float = 0.0) -> float:
+    """Return how long all samples take at least, as far as arrivals show that.
+
+    The soonest came so late, whether they waited for a pull or not; and samples that had not come
+    by the pull before took longer than until then. Beyond what both say, they may have waited.
+
+    Parameters
+    ----------
+    least
+        From the stamp of each pull's soonest sample to the pull, shape ``(n_pulls,)``.
+    before
+        From the stamp of the next sample to the pull, shape ``(n_pulls,)``.
+    blur
+        By how much the first may be beyond the second, where neither is exact.
+    scatter
+        Of the stamps about their samples.
+    """
+    few = len(least) // ONE_IN
+    soonest, latest = np.sort(least[np.isfinite(least)]), np.sort(before[np.isfinite(before)])
+    if not len(soonest) or not len(latest):
+        return SHORT_LAG_S
+    high = float(soonest[min(few, len(soonest) - 1)]) + 4.0 * scatter
+    low = float(latest[max(len(latest) - 1 - few, 0)]) + blur
+    return max(min(low, high), SHORT_LAG_S)
 
 
 def _quantile(values: FloatArray, part: float) -> float:

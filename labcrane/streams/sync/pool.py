@@ -49,7 +49,7 @@ def pooled(streams: Sequence[RawStream], hosts: Sequence[str]) -> list[RawStream
         same = [streams[j].stamps for j in sorted((k, *others)) if is_steady[j]]
         # The same one for all streams of a computer, so that they agree where it is followed.
         steady = max(same, key=np.ptp, default=np.empty(0))
-        result.append(replace(stream, probes=together, steady=steady))
+        result.append(replace(stream, probes=together, steady=steady, own_probes=ordered[k]))
     return result
 
 

@@ -81,8 +81,12 @@ class Quality:
         How often samples came in a burst after a pause, and how late.
     noise_s
         By how much stamps scatter that were not taken with the samples, at 95 %.
+    grid_s
+        Unit that stamps are cut or rounded to; 0 where they are not.
     late_stamps
         1 where chunks are stamped when they are sent.
+    shifts, shift_s
+        How often stamps are later, or sooner, from one sample on, by the largest shift.
     moved_p95_s, moved_max_s
         By how much evening moved samples.
     steps, restarts, sleeps, slews
@@ -93,13 +97,18 @@ class Quality:
     congested_s
         How long probes took far longer than usual, one after the other.
     silent_s
-        From its last sample to the end of the recording.
+        From its last sample to the end of the recording; of irregular streams, from when their
+        program did not answer probes any more, either.
     unsure, unprobed
         Samples near a step that may be of the other clock; samples of clocks never probed.
     whose
         Whose clock the stamps are of, where it is not the probed one: "receiver" or "foreign".
     frozen
         Samples of regular streams that repeat the stamp of the one before.
+    backward
+        Samples of regular streams that are placed before one that came earlier.
+    ahead_s
+        By how much irregular samples came before they happened, by their stamps; 0 if none did.
     """
 
     error_p50_s: float = np.nan
@@ -123,7 +132,10 @@ class Quality:
     stalls: int = 0
     longest_stall_s: float = 0.0
     noise_s: float = 0.0
+    grid_s: float = 0.0
     late_stamps: int = 0
+    shifts: int = 0
+    shift_s: float = 0.0
     moved_p95_s: float = 0.0
     moved_max_s: float = 0.0
     steps: int = 0
@@ -137,6 +149,8 @@ class Quality:
     unprobed: int = 0
     whose: str = ""
     frozen: int = 0
+    backward: int = 0
+    ahead_s: float = 0.0
 
 
 def worst_second(time: FloatArray, error: FloatArray) -> tuple[float, float]:

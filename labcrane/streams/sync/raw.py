@@ -16,6 +16,8 @@ ASSUMED_RTT_S = 1e-3
 """Round trip of a probe that was recorded without: few cables need longer."""
 
 
+FEW_ANSWERS = 5
+
 REMOTE, OFFSET, RTT, LOCAL = range(4)
 """Columns of probes."""
 
@@ -47,6 +49,9 @@ class RawStream:
     steady
         Stamps, on the same clock, of a regular stream of the same computer, whose sampler shows
         what probes do not, shape ``(n_steady,)``; its own where none are given and it is regular.
+    own_probes
+        Those that its own program answered, where ``probes`` are all of its computer's, shape
+        ``(n_own, 4)``; else None.
     """
 
     stamps: FloatArray
@@ -56,6 +61,7 @@ class RawStream:
     index: FloatArray | None = None
     own: FloatArray = field(default_factory=lambda: _nothing(2))
     steady: FloatArray = field(default_factory=lambda: np.empty(0))
+    own_probes: FloatArray | None = None
 
     def __post_init__(self) -> None:
         for name, columns in (("probes", 4), ("arrivals", 2), ("resets", 3), ("own", 2)):
@@ -90,6 +96,17 @@ class RawStream:
         counts, times = self.arrivals.T
         chunk = np.searchsorted(counts, np.arange(len(self.stamps)), side="right")
         return np.asarray(times[np.minimum(chunk, len(times) - 1)])
+
+    def answers_until(self) -> float:
+        """Return until when its program is known to answer, on our clock; infinity if it may yet.
+
+        Answers come at intervals, and some are lost: until twice the longest pause of them.
+        """
+        answered = self.probes if self.own_probes is None else self.own_probes
+        told = np.sort(answered[:, LOCAL])
+        if len(told) < FEW_ANSWERS:
+            return np.inf
+        return float(told[-1] + 2.0 * np.diff(told).max())
 
 
 def unwrapped(counts: FloatArray) -> FloatArray | None:

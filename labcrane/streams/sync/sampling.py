@@ -4,11 +4,12 @@ Lost samples, disorder, a changing rate, and whether stamps scatter because samp
 or because they were stamped so.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from labcrane.streams.sync.late_chunks import lost_before, lost_between, slope, soonest
+from labcrane.streams.sync.stamping import receipt, shifts
+from labcrane.streams.sync.stamping.late_chunks import lost_before, lost_between, slope, soonest
 from labcrane.types import FloatArray
 
 FEW = 20
@@ -27,15 +28,31 @@ EQUAL_S = 3e-6
 SAME = 0.5
 """Where this part of all steps is the same, stamps are computed and not taken."""
 
+EARLIER = 0.1
+"""At least this part of chunks stamped when sent waited for less than the one before."""
+
 DELAYS = 0.25
 RATE_CHANGE = 1e-3
 PIECES = 8
 """So many pieces at least tell a changing rate."""
 
 LEAST_NOISE_S = 5e-5
-LATTICES = (1e-2, 1e-3, 1e-4)
+GRIDS_S = (1.0, 0.1, 1.0 / 64.0, 0.01, 1e-3, 1e-4)
+"""Units of coarse clocks: decimal ones, and that of a Windows timer."""
+
+WITHIN = 0.75
+"""Stamps on a grid scatter by half of its unit; what scatters by more was not taken evenly."""
+
+FEW_CHUNKS = 3
+"""In so many samples, or chunks, stamps that scatter by chance show how far they do."""
+
+BEHIND_S = 1e-6
+"""An irregular sample is out of order when it is stamped by more than this before another."""
+
 UNLIKE = 0.3
 STALL_S = 0.75
+SEVERAL = 3
+MOST_SEEN = 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,13 +73,22 @@ class Sampling:
         The rate at first and at last, where it changed; else empty.
     noise_s
         By how much stamps scatter about a steady sample clock, at 95 %; 0 where they were taken
-        so.
+        so, or scatter as their grid lets them.
+    grid_s
+        Unit that stamps are cut or rounded to; 0 where they are not.
+    reach_s
+        By how much a few neighbouring samples, or chunks, differ from evenly spaced ones.
     late_stamps
         Whether whole chunks are stamped when they are sent: an unknown delay lies in all of them.
     steady
         Whether evening helps: the scatter is the stamps', and the sample clock is steady.
     uncounted
         Whether samples are missing, and nothing tells where.
+    received
+        How samples waited before they were stamped, or were taken: either may be; None where
+        nothing shows that they did.
+    shifted
+        Where stamps are later, or sooner, from one sample on.
     stalls, longest_stall_s
         How often samples came in a burst after a pause, and the longest delay.
     index
@@ -76,9 +102,13 @@ class Sampling:
     disordered: int = 0
     rates_hz: tuple[float, ...] = ()
     noise_s: float = 0.0
+    grid_s: float = 0.0
+    reach_s: float = 0.0
     late_stamps: bool = False
     steady: bool = False
     uncounted: bool = False
+    received: receipt.Receipt | None = None
+    shifted: shifts.Shifts | None = None
     stalls: int = 0
     longest_stall_s: float = 0.0
     index: FloatArray = field(default_factory=lambda: np.empty(0))
@@ -88,12 +118,33 @@ class Sampling:
         """Samples per second, while they flowed."""
         return 1.0 / self.period
 
+    def judged_by(self, moved: FloatArray) -> "Sampling":
+        """Return it as steady only if evening moved samples as far as stamping noise scatters.
+
+        Noise is new in each stamp, so that a few neighbours show all of it. What adds up beyond
+        that is the sampler's own, as of a camera that takes longer in the dark.
+
+        Parameters
+        ----------
+        moved
+            By how much, in seconds, shape ``(n,)``.
+        """
+        if self.received is not None:
+            return self
+        by_grid = self.grid_s > 0.0 and not self.noise_s
+        allowed = WITHIN * self.grid_s if by_grid else self.reach_s
+        if float(np.quantile(np.abs(moved), 0.95)) <= allowed:
+            return self
+        return replace(self, noise_s=0.0, late_stamps=False, steady=False, uncounted=False)
+
 
 def examine(
     stamps: FloatArray,
     time: FloatArray,
     arrival: FloatArray | None,
     counter: FloatArray | None,
+    *,
+    probed: bool = True,
 ) -> Sampling:
     """Examine one clock's samples of a regular stream.
 
@@ -107,6 +158,8 @@ def examine(
         When each sample came, on ours; None when it is not known.
     counter
         The source's own, unwrapped; None when it has none.
+    probed
+        Whether times rest on probes; those by arrivals scatter for another reason.
     """
     index = np.arange(len(time), dtype=np.float64) if counter is None else counter
     stalls, longest = _stalls(time, arrival)
@@ -116,19 +169,69 @@ def examine(
     behind = int(np.count_nonzero(np.diff(np.maximum.accumulate(time)) == 0.0))
     sorted_steps = np.diff(time[order])
     disordered = behind if _is_shuffled(np.diff(time), sorted_steps) else 0
-    lattice = _lattice(stamps)
+    grid = coarse_unit(stamps)
     if disordered:
-        found = _steps(time[order], index[order], lattice, counted=counter is not None)
+        counts = index if counter is None else counter[order]  # who has none counts as they stand
+        found = _steps(time[order], counts, grid, counted=counter is not None)
     else:
-        found = _steps(time, index, lattice, counted=counter is not None)
-    noise, late = _noise(time, arrival, found, lattice)
+        found = _steps(time, index, grid, counted=counter is not None)
+    grid = 0.0 if _on_grid(found, stamps[order], grid) else grid
+    if probed and not disordered and not grid:
+        explained = found.computed and not found.missing and not found.clumped
+        waited = receipt.find(time, index, explained=explained)
+        if waited is not None:
+            pauses = np.diff(index) > 1.5  # noqa: PLR2004
+            return Sampling(
+                waited.period,
+                missing=int((np.diff(index)[pauses] - 1.0).sum()),
+                gaps=int(np.count_nonzero(pauses)),
+                longest_gap_s=float(np.diff(time)[pauses].max(initial=0.0)),
+                noise_s=waited.spread_s,
+                late_stamps=True,
+                steady=True,
+                received=waited,
+                stalls=stalls,
+                longest_stall_s=longest,
+                index=index,
+            )
+    noise, late, by_grid = _noise(time, arrival, found, grid)
     rates = _rates(found)
-    steady = noise > LEAST_NOISE_S and not disordered and not rates
+    steady = (noise > LEAST_NOISE_S or by_grid) and not disordered and not rates
     uncounted = late and found.missing > 0 and counter is None
     return Sampling(
-        found.period, found.missing, found.gaps, found.longest, disordered, rates, noise, late,
-        steady, uncounted, stalls, longest, found.index if not disordered else index,
+        found.period, found.missing, found.gaps, found.longest, disordered, rates, noise, grid,
+        _reach(found), late, steady, uncounted, None, found.shifted, stalls, longest,
+        found.index if not disordered else index,
     )  # fmt: skip
+
+
+def examine_irregular(
+    stamps: FloatArray,
+    time: FloatArray,
+    arrival: FloatArray | None,
+    counter: FloatArray | None,
+) -> Sampling:
+    """Examine one clock's samples of an irregular stream, of which no step is expected.
+
+    Parameters
+    ----------
+    stamps, time, arrival, counter
+        As of :func:`examine`.
+    """
+    index = np.arange(len(time), dtype=np.float64) if counter is None else counter
+    behind = time < np.maximum.accumulate(time) - BEHIND_S
+    grid = coarse_unit(stamps) if len(stamps) >= FEW else 0.0
+    parts = np.round(np.diff(stamps) / grid) if grid else np.zeros(0)
+    cut = np.count_nonzero(parts != np.median(parts)) >= SEVERAL if grid else False
+    stalls, longest = _stalls(time, arrival, alone=False)
+    return Sampling(
+        missing=int(np.maximum(np.diff(index) - 1.0, 0.0).sum()),
+        disordered=int(np.count_nonzero(behind)),
+        grid_s=grid if cut else 0.0,
+        stalls=stalls,
+        longest_stall_s=longest,
+        index=index,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,10 +247,12 @@ class _Steps:
     longest: float
     exact: bool
     computed: bool
+    clumped: bool
     balance: float
+    shifted: shifts.Shifts | None
 
 
-def _steps(time: FloatArray, index: FloatArray, lattice: float, *, counted: bool) -> _Steps:
+def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -> _Steps:
     steps, counts = np.diff(time), np.maximum(np.diff(index), 1.0)
     local = _local(steps / counts)
     typical = _typical(time, index)
@@ -167,14 +272,28 @@ def _steps(time: FloatArray, index: FloatArray, lattice: float, *, counted: bool
     between = boundary / local[~same]
     fraction = np.abs(between - np.round(between)) > 0.05 if len(between) else np.zeros(0, bool)  # noqa: PLR2004
     repeated = same.mean() > SAME and len(boundary) >= 5 and fraction.mean() > 0.5  # noqa: PLR2004
-    computed = clumped or (not lattice and bool(repeated))
+    # Steps are computed by one rate, whatever the clock that stamps the chunks does meanwhile.
+    one_rate = bool(np.ptp(np.quantile(local, (0.1, 0.9))) < RATE_CHANGE * typical)
+    # A chunk that waits for longer than the one before comes late, the next one early.
+    early = (steps - counts * float(np.median(local)))[~same] < -EQUAL_S
+    both_ways = len(early) > 0 and float(early.mean()) > EARLIER
+    computed = clumped or (not grid and bool(repeated) and one_rate and both_ways)
     exact = exact and not computed
     if not counted and not exact:
         whole = np.where(steps > np.maximum(20.0 * local, 1.0), np.round(steps / local), 1.0)
+    shifted = None
+    if exact and not grid:
+        shifted = shifts.find(steps, counts, local, counted=counted)
+        if not counted:
+            whole[shifted.at - 1] = 1.0
+    # A device that pauses and keeps its count has lost nothing, but was interrupted.
+    paused = counted & exact & (steps - whole * local > shifts.MOST_S)
     gaps = whole > 1.5 if exact or counted else whole > 1.0  # noqa: PLR2004
     missing = int((whole - 1.0)[gaps].sum())
+    gaps |= paused
     position = index if counted else index[0] + np.r_[0.0, np.cumsum(whole)]
-    mean, usual = slope(position, time), float(np.median(local))
+    flowed = time - np.r_[0.0, np.cumsum(np.where(paused, rest, 0.0))]
+    mean, usual = slope(position, flowed), float(np.median(local))
     if computed and not clumped and not counted:
         first = np.r_[0, np.flatnonzero(~same) + 1]
         rest = time[first] - usual * position[first]
@@ -185,7 +304,8 @@ def _steps(time: FloatArray, index: FloatArray, lattice: float, *, counted: bool
             missing += max(int(before[-1]), 1)
     longest = float(steps[gaps].max(initial=0.0))
     return _Steps(
-        time, mean, local, position, missing, int(gaps.sum()), longest, exact, computed, balance
+        time, mean, local, position, missing, int(gaps.sum()), longest, exact, computed, clumped,
+        balance, shifted,
     )  # fmt: skip
 
 
@@ -240,9 +360,11 @@ def _rates(found: _Steps) -> tuple[float, ...]:
 
 
 def _noise(
-    time: FloatArray, arrival: FloatArray | None, found: _Steps, lattice: float
-) -> tuple[float, bool]:
-    """Return by how much the stamps scatter that were not taken so, and whether they are late.
+    time: FloatArray, arrival: FloatArray | None, found: _Steps, grid: float
+) -> tuple[float, bool, bool]:
+    """Return by how much the stamps scatter that were not taken so, and why.
+
+    The second is whether they are late, the third whether only their grid lets them scatter.
 
     Stamps that are computed, of a coarse clock, or unlike the arrivals of their samples were not
     taken when the samples were.
@@ -258,11 +380,11 @@ def _noise(
     apart = np.abs(rest - level)
     spread = float(np.quantile(apart, 0.95))
     if found.computed:
-        return float(np.quantile(apart, 0.975)) + abs(float(np.mean(rest - level))), True
-    if lattice > LEAST_NOISE_S and not _on_grid(found, lattice):
-        return spread, False
+        return float(np.quantile(apart, 0.975)) + abs(float(np.mean(rest - level))), True, False
+    if grid and spread <= WITHIN * grid:
+        return 0.0, False, True
     if spread < max(LEAST_NOISE_S, 0.005 * found.period):
-        return 0.0, False
+        return 0.0, False, False
     if arrival is not None and len(arrival) == len(rest) and found.time is time:
         late = arrival - time + (rest - level)  # what arrival does on top of a steady clock
         own = rest - level
@@ -270,8 +392,23 @@ def _noise(
         share = float(own[near] @ (late - late.mean())[near]) / float(own[near] @ own[near])
         doubt = float(late.std()) / (float(own[near].std()) * np.sqrt(near.sum()))
         if share + 3.0 * doubt < 1.0 - UNLIKE and share < UNLIKE:
-            return spread, False
-    return 0.0, False
+            return spread, False, False
+    return 0.0, False, False
+
+
+def _reach(found: _Steps) -> float:
+    """Return by how much a few neighbouring samples, or chunks, differ from evenly spaced ones."""
+    size = FEW_CHUNKS
+    if found.computed:
+        steps = np.diff(found.time)
+        bursts = bool(np.median(steps) < CLUMPED * np.median(found.local))
+        count = int(np.count_nonzero(steps > found.local)) if bursts else _boundaries(found)
+        size *= max(len(found.time) // max(count, 1), 1)
+    rest = found.time - found.period * (found.index - found.index[0])
+    whole = len(rest) // size * size
+    return (
+        float(np.quantile(np.ptp(rest[:whole].reshape(-1, size), axis=1), 0.95)) if whole else 0.0
+    )
 
 
 def _boundaries(found: _Steps) -> int:
@@ -279,27 +416,48 @@ def _boundaries(found: _Steps) -> int:
     return int(np.count_nonzero(np.abs(steps - found.local) > EQUAL_S))
 
 
-def _lattice(stamps: FloatArray) -> float:
-    """Return the unit of a coarse clock whose whole multiples the stamps are; 0 if of none."""
-    for lattice in LATTICES:
-        some = stamps[:2000] / lattice
-        if (np.abs(some - np.round(some)) < 1e-3).all():  # noqa: PLR2004
-            return lattice
+def coarse_unit(stamps: FloatArray) -> float:
+    """Return the unit of a coarse clock of which stamps are whole ones apart; 0 if there is none.
+
+    A program may have added a constant to what its clock read.
+    """
+    blur = 4.0 * float(np.spacing(np.abs(stamps).max()))
+    for unit in GRIDS_S:
+        if blur < 0.1 * unit and all(
+            _whole((some - stamps[0]) / unit, blur / unit) for some in (stamps[:MOST_SEEN], stamps)
+        ):
+            return unit
     return 0.0
 
 
-def _on_grid(found: _Steps, lattice: float) -> bool:
-    """Whether whole periods are whole steps of the lattice, so that nothing was rounded."""
-    part = found.period / lattice
-    return abs(part - round(part)) < 1e-4  # noqa: PLR2004
+def _whole(parts: FloatArray, blur: float) -> bool:
+    return bool((np.abs(parts - np.round(parts)) < 1e-3 + blur).all())
 
 
-def _stalls(time: FloatArray, arrival: FloatArray | None) -> tuple[int, float]:
-    """Return how often samples came in a burst after a pause, and the longest delay."""
+def _on_grid(found: _Steps, stamps: FloatArray, grid: float) -> bool:
+    """Whether whole periods are whole units of the grid all along, so that nothing was cut."""
+    if not grid:
+        return True
+    part = found.period / grid
+    slips = np.round((stamps - stamps[0]) / grid - round(part) * (found.index - found.index[0]))
+    whole = abs(part - round(part)) < 1e-4  # noqa: PLR2004
+    return bool(whole and np.count_nonzero(np.diff(slips)) < SEVERAL)
+
+
+def _stalls(
+    time: FloatArray, arrival: FloatArray | None, *, alone: bool = True
+) -> tuple[int, float]:
+    """Return how often samples came in a burst after a pause, and the longest delay.
+
+    A single sample may be stamped with what happened long ago; ``alone`` says whether it counts.
+    """
     if arrival is None or len(time) < 2:  # noqa: PLR2004
         return 0, 0.0
     lag = arrival - time
     usual = float(np.median(lag))
     late = lag > min(usual, float(np.quantile(lag, 0.1)) + 0.5) + STALL_S
+    if not alone:  # in a burst, the sooner a sample was taken, the later it comes
+        burst = (np.diff(arrival) < np.diff(time)) & late[:-1]
+        late &= np.r_[burst, False] | np.r_[False, burst]
     begins = np.flatnonzero(np.diff(np.r_[0, late.astype(int)]) == 1)
     return len(begins), float(lag.max()) if len(begins) else 0.0

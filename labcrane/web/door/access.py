@@ -61,6 +61,9 @@ class Gate:
         The web server, an ASGI application.
     used, denied
         Told of a page whose token was used, and of who was refused what.
+    port
+        Where it is served. Browsers give a cookie to every port of a host: without it in the
+        cookie's name, what is served at one port would take away the right to see another.
     """
 
     def __init__(
@@ -69,10 +72,12 @@ class Gate:
         keys: Keys,
         used: Callable[[str], None],
         denied: Callable[[str], None],
+        port: int,
         *,
         secure: bool = False,
     ) -> None:
         self._secure = secure
+        self._port = port
         self._inner = inner
         self._keys = keys
         self._used = used
@@ -100,7 +105,7 @@ class Gate:
             page
             for page in self._keys.cookies
             if secrets.compare_digest(
-                shown.get(_name(page), "").encode(), self._keys.cookies[page].encode()
+                shown.get(self._name(page), "").encode(), self._keys.cookies[page].encode()
             )
         )
 
@@ -126,7 +131,7 @@ class Gate:
         answer = RedirectResponse(f"/{page}", SEE_OTHER, headers)
         if cookie is not None:
             answer.set_cookie(
-                _name(page), cookie, httponly=True, samesite="strict", secure=self._secure
+                self._name(page), cookie, httponly=True, samesite="strict", secure=self._secure
             )
         await answer(scope, receive, send)
 
@@ -140,6 +145,5 @@ class Gate:
         answer = PlainTextResponse(text, FORBIDDEN, {"cache-control": "no-store"})
         await answer(scope, receive, send)
 
-
-def _name(page: str) -> str:
-    return f"labcrane-{page}"
+    def _name(self, page: str) -> str:
+        return f"labcrane-{page}-{self._port}"

@@ -23,7 +23,7 @@ def serve_here(app: Any, page: str, port: int, say: Callable[[str], None]) -> No
     keys = Keys({page: secrets.token_urlsafe(24)}, {page: secrets.token_urlsafe(24)})
     link = f"http://{HOST}:{port}/{page}?token={keys.tokens[page]}"
     config = uvicorn.Config(
-        Guard(Gate(app, keys, lambda _: None, say), HOST, port, say),
+        Guard(Gate(app, keys, lambda _: None, say, port), HOST, port, say),
         host=HOST,
         port=port,
         log_level="error",

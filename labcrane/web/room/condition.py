@@ -58,8 +58,11 @@ def state_of(view: SessionView) -> str:
     return begins.get(view.stage.partition(" ")[0], "between")
 
 
-def lamp_of(view: SessionView, live: Live, period_s: float) -> Lamp:
-    """Return the lamp of a session: the worst of what is known."""
+def lamp_of(view: SessionView, live: Live, period_s: float, trouble: str = "") -> Lamp:
+    """Return the lamp of a session: the worst of what is known.
+
+    ``trouble`` is why what the session sends cannot be drawn, or nothing.
+    """
     if state_of(view) == "ended":
         return _at_the_end(view)
     if view.alarm:
@@ -73,6 +76,9 @@ def lamp_of(view: SessionView, live: Live, period_s: float) -> Lamp:
             "session is ended and saved by itself if it hangs",
         )  # fmt: skip
     found = [*_of_streams(view.streams), *_of_the_loop(live, period_s)]
+    if trouble:
+        why = f"what is drawn here may not be as it is: {trouble}"
+        found.append(Lamp("warn", why, "the session and its views go on; tell who keeps labcrane"))
     worst = next((one for one in found if one.level == "bad"), None)
     if worst or found:
         return worst or found[0]

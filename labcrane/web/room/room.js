@@ -87,17 +87,6 @@ export default {
           <button class="room-button" :id="'order-' + field.order" type="submit">Send</button>
         </form>
       </section>
-      <section class="room-card room-log"><h2>Events</h2>
-        <div class="room-filter"><label class="room-field">Show <select id="filter" v-model="kind">
-          <option value="">everything</option>
-          <option v-for="k in s.kinds" :key="k">{{ k }}</option></select></label>
-          <label class="room-field">Find <input id="find" v-model="find" autocomplete="off"></label></div>
-        <div id="events" class="room-scroll" tabindex="0" role="log" aria-label="Events">
-          <p v-if="!listed.length" class="room-faint">Nothing has happened yet that is shown here.</p>
-          <details v-for="e in listed" :key="e.n" class="room-event" :class="[e.level, e.kind]">
-            <summary><time>{{ e.time }}</time> {{ e.text }}</summary><pre>{{ e.raw }}</pre></details>
-        </div>
-      </section>
     </div>
     <div class="room-column">
       <section class="room-card" aria-label="Controls and joints">
@@ -134,6 +123,17 @@ export default {
           </svg>
           <p class="room-faint" id="movements">{{ said }}</p>
         </template>
+      </section>
+      <section class="room-card room-log"><h2>Events</h2>
+        <div class="room-filter"><label class="room-field">Show <select id="filter" v-model="kind">
+          <option value="">everything</option>
+          <option v-for="k in s.kinds" :key="k">{{ k }}</option></select></label>
+          <label class="room-field">Find <input id="find" v-model="find" autocomplete="off"></label></div>
+        <div id="events" class="room-scroll" tabindex="0" role="log" aria-label="Events">
+          <p v-if="!listed.length" class="room-faint">Nothing has happened yet that is shown here.</p>
+          <details v-for="e in listed" :key="e.n" class="room-event" :class="[e.level, e.kind]">
+            <summary><time>{{ e.time }}</time> {{ e.text }}</summary><pre>{{ e.raw }}</pre></details>
+        </div>
       </section>
     </div>
     <div class="room-column">

@@ -42,10 +42,13 @@ class ShownShapes:
     ----------
     run
         What is run, as the session tells; None before it has.
+    trouble
+        Why the newest that the session told could not be taken up; empty when it was.
     """
 
     def __init__(self, cues: Mapping[str, DrawnCue]) -> None:
         self.run: Run | None = None
+        self.trouble = ""
         self._specs = cues
         self._cues: dict[str, Cue] = {}
         self._built_for: Mapping[str, Mapping[str, object]] = {}
@@ -114,9 +117,26 @@ class ShownShapes:
         while True:
             samples, stamps = inlet.pull()
             if stamps:
-                said = json.loads(samples[-1][0])
-                if (told := json.dumps(said["scene"])) != scene:
-                    scene = told
-                    self.take(read_run(told))
-                self.situate(situation_of(said["situation"]))
+                scene = self.hear(str(samples[-1][0]), scene)
             time.sleep(PAUSE_S)
+
+    def hear(self, text: str, scene: str) -> str:
+        """Take up a text of the session's context; return the scene that is drawn now.
+
+        Parameters
+        ----------
+        scene
+            The scene that was drawn before.
+        """
+        try:
+            said = json.loads(text)
+            told = json.dumps(said["scene"])
+            if told != scene:
+                self.take(read_run(told))
+            self.situate(situation_of(said["situation"]))
+        # Whatever it is: a thread that dies of it would leave a picture that stands still.
+        except Exception as error:  # noqa: BLE001 - said on the page
+            self.trouble = f"{type(error).__name__}: {error}"
+            return scene
+        self.trouble = ""
+        return told

@@ -61,7 +61,8 @@ class Snapshot:
         session, plan = context.session, context.plan
         state = state_of(session)
         held = f" · HELD by {', '.join(sorted(session.holds))}" if session.holds else ""
-        lamp = lamp_of(session, context.live, self._period_s)
+        trouble = context.shown.trouble or context.live.trouble
+        lamp = lamp_of(session, context.live, self._period_s, trouble)
         return {
             "who": f"{context.participant} · session {plan.number}",
             "condition": " · ".join(filter(None, [

@@ -223,7 +223,7 @@ class Reader:
             used=used,
             free=free,
             lasts=int(free / (used / sessions)) if used and sessions else None,
-            report=_report(register),
+            report=newest_report(register),
             erased=tuple(f"{s.participant} on {s.date}: {s.reason}" for s in register.tombstones),
         )
 
@@ -252,7 +252,8 @@ class Reader:
         folder = self.data / name
         held = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
         if entry is None:
-            level = "ok" if version is None or "-" in name else "bad"
+            stamped = DataFolder.pseudonym(name) != name
+            level = "ok" if version is None or stamped else "bad"
             said = "" if level == "ok" else "none in the register"
             return Person(name, status, why, consent=said, consent_level=level, sat=sat, bytes=held)
         days = {sitting.session: sitting.date for sitting in entry.sessions}
@@ -393,7 +394,7 @@ def _groups(
     }
 
 
-def _report(register: Register) -> Path | None:
+def newest_report(register: Register) -> Path | None:
     """Return where the newest report is, as far as it is still there."""
     made = [Path(one.folder) for one in register.exports if one.exporter == "report"]
     return next((folder for folder in reversed(made) if (folder / "report.html").is_file()), None)

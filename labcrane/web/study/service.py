@@ -8,12 +8,14 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from labcrane.errors import LabcraneError
+from labcrane.participants.folders import Places
+from labcrane.participants.register import read
 from labcrane.recording.participant_file.writer import DAMAGED
 from labcrane.recording.paths import participant_path
 from labcrane.registry.registry import Registry
 from labcrane.web.door.access import STUDY
 from labcrane.web.door.serving import build_pages, serve_here
-from labcrane.web.study.overview import Reader
+from labcrane.web.study.overview import Reader, newest_report
 from labcrane.web.study.study_page import page_of
 from labcrane.web.viewer.film import Film
 from labcrane.web.viewer.opened import opened
@@ -59,7 +61,10 @@ def _routes(app: Any, reader: Reader, registry: Callable[[], Registry], scratch:
     @app.get("/report/{path:path}")  # type: ignore[untyped-decorator]  # as above
     def report(path: str) -> Response:
         """Give a file of the newest report, and none beside it."""
-        folder = reader.overview(date.today()).report
+        try:
+            folder = newest_report(read(Places(reader.data)))
+        except LabcraneError as error:
+            return PlainTextResponse(f"labcrane: {error}", BROKEN)
         if folder is not None:
             wanted = (folder / path).resolve()
             if wanted.is_relative_to(folder.resolve()) and wanted.is_file():
@@ -89,5 +94,6 @@ def _film(data: Path, person: str, session: int, scratch: Path) -> Film:
     """
     folder = next((each for each in data.iterdir() if each.name == person), data / "nobody")
     said: list[str] = []
-    record = opened(participant_path(folder), session, scratch / f"{session}", said.append)
-    return Film(record, f"{person} ({'; '.join(said)})" if said else person)
+    file = participant_path(folder)
+    record = opened(file, session, scratch / f"{session}", said.append)
+    return Film(record, f"{person} ({'; '.join(said)})" if said else person, (file, session))

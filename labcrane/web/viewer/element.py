@@ -21,6 +21,11 @@ class Timeline(Element, component="viewer.js"):
         Called with stream, column, begin and end; returns what is drawn.
     spectrogram
         The same for its frequencies.
+    mark
+        Called with what is marked, or which mark is taken back; returns the marks as they are then,
+        and what to say.
+    glance
+        Called with a time, or with begin and end; returns where it is looked at.
     """
 
     def __init__(
@@ -29,6 +34,8 @@ class Timeline(Element, component="viewer.js"):
         at: Callable[[float], None],
         curve: Callable[[str, str, float, float], Mapping[str, Any]],
         spectrogram: Callable[[str, str, float, float], Mapping[str, Any]],
+        mark: Callable[[Mapping[str, Any]], Mapping[str, Any]],
+        glance: Callable[[Mapping[str, Any]], Mapping[str, Any]],
     ) -> None:
         super().__init__()
         self._props["about"] = dict(about)
@@ -42,5 +49,13 @@ class Timeline(Element, component="viewer.js"):
             found = await asyncio.to_thread(how, *where, *span)
             self.run_method("curve", int(told["at"]), dict(found))
 
+        async def marked(event: events.GenericEventArguments) -> None:
+            self.run_method("marked", dict(await asyncio.to_thread(mark, event.args)))
+
+        async def glanced(event: events.GenericEventArguments) -> None:
+            self.run_method("glanced", dict(await asyncio.to_thread(glance, event.args)))
+
+        self.on("mark", marked)
+        self.on("glance", glanced)
         self.on("at", lambda event: at(float(event.args)))
         self.on("curve", asked)

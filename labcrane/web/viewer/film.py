@@ -8,6 +8,7 @@ from collections import OrderedDict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from threading import Lock
 from typing import Any
 
@@ -28,6 +29,7 @@ from labcrane.registry.registry import Registry
 from labcrane.streams.context import situation_after
 from labcrane.types import FloatArray
 from labcrane.web.room.sentences import sentence
+from labcrane.web.viewer.glances import Glances
 
 GROUPS = ("loop", "input", "command", "state", "task")
 FRAME = {"loop": "", "input": "axes."}
@@ -72,6 +74,9 @@ class Film:
         The session.
     called
         What it is called beside another one.
+    place
+        Participant file, in its place, and session: where marks are kept. None where nobody may
+        make any.
 
     Attributes
     ----------
@@ -81,8 +86,11 @@ class Film:
         How many seconds later than another film beside it this one is shown.
     """
 
-    def __init__(self, record: SessionRecord, called: str) -> None:
+    def __init__(
+        self, record: SessionRecord, called: str, place: tuple[Path, int] | None = None
+    ) -> None:
         self.called = called
+        self.place = place
         self.shift = 0.0
         self._record = record
         try:
@@ -218,6 +226,11 @@ class Film:
             (float(self.time[one] - self.start), float(self.time[one + 1] - self.start))
             for one in at.tolist()
         ]
+
+    @cached_property
+    def glances(self) -> Glances:
+        """Where somebody looked, if that was recorded."""
+        return Glances(self._record, self.start)
 
     @cached_property
     def signals(self) -> list[dict[str, str]]:

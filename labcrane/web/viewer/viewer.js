@@ -14,21 +14,23 @@ export default {
     <section class="room-card view-machine"><slot name="machine"></slot></section>
     <section class="room-card"><h2>Curves</h2>
       <div v-for="(chart, at) in charts" :key="at" class="view-chart">
-        <label class="room-field">Signal {{ at + 1 }} <select :id="'signal-' + at" v-model="chart.signal"
+        <div class="view-pick"><label class="room-field">Signal {{ at + 1 }} <select :id="'signal-' + at" v-model="chart.signal"
           @change="ask(at)"><option value="">none</option>
           <option v-for="(one, n) in about.signals" :key="n" :value="n">{{ one.label }}{{ one.unit && one.unit !== '1' ? ', ' + one.unit : '' }}</option>
         </select></label>
         <label v-if="chart.signal !== ''" class="room-field">as <select :id="'as-' + at" v-model="chart.as"
           @change="ask(at)"><option value="curve">curve</option><option value="spectrogram">spectrogram</option>
-        </select></label>
+        </select></label></div>
         <div v-show="chart.as === 'spectrogram' && chart.signal !== ''" class="view-spectrum">
           <canvas :id="'spectrum-' + at" width="300" height="128" role="img"
             :aria-label="'spectrogram of signal ' + (at + 1)" @click="into($event)"></canvas>
+          <svg class="view-over" viewBox="0 0 600 110" preserveAspectRatio="none" aria-hidden="true">
+            <line class="view-now" :x1="place(t)" :x2="place(t)" y1="0" y2="110"/></svg>
           <p class="room-faint" :id="'heard-' + at">{{ chart.heard }}</p></div>
         <svg v-if="chart.path" class="room-chart" viewBox="0 0 600 110" preserveAspectRatio="none" role="img"
           :aria-label="'signal ' + (at + 1)" @click="into($event)"><path class="room-late" :d="chart.path"/>
           <line class="view-now" :x1="place(t)" :x2="place(t)" y1="0" y2="110"/></svg>
-        <p v-if="chart.path" class="room-faint" :id="'range-' + at">{{ chart.said }}</p>
+        <p v-if="chart.path" class="room-faint" :id="'range-' + at"><strong :id="'value-' + at">{{ reading(chart) }}</strong> now · {{ chart.said }}</p>
       </div>
     </section>
   </div>
@@ -52,10 +54,37 @@ export default {
       <rect v-for="(one, n) in spans" :key="n" :class="one.kind" :x="one.x" :width="one.width" y="2" height="20"/>
       <rect v-for="(one, n) in holes" :key="'g' + n" class="view-gap" :x="one.x" :width="one.width" y="0" height="46"/>
       <path class="view-ticks" :d="ticks"/>
+      <rect v-for="(one, n) in marksHere" :key="'m' + n" class="view-mark" :x="one.x" :width="one.width" y="22" height="8"><title>{{ one.text }}</title></rect>
       <line class="view-now" :x1="place(t)" :x2="place(t)" y1="0" y2="46"/></svg>
     <p class="room-faint view-legend"><span class="view-swatch success"></span>success
       <span class="view-swatch other"></span>other end <span class="view-swatch approach"></span>not counted
-      <span class="view-swatch gap"></span>no frames</p>
+      <span class="view-swatch gap"></span>no frames
+      <span class="view-swatch mark"></span>your marks</p>
+  </section>
+  <section v-if="about.gaze" class="room-card"><h2>Gaze</h2>
+    <p id="looked"><strong>{{ glance.looked || 'no area' }}</strong> <span class="room-faint">is looked at, in the picture that the view had shown last; the display's own delay is not taken off</span></p>
+    <svg v-if="glance.areas.length || glance.trail.length" id="gaze" class="view-gaze" :viewBox="picture" role="img" :aria-label="'gaze, at ' + (glance.looked || 'no area')">
+      <g v-for="a in glance.areas" :key="a.name"><rect :class="{ looked: a.name === glance.looked }" :x="a.box[0]" :y="a.box[1]" :width="a.box[2] - a.box[0]" :height="a.box[3] - a.box[1]"><title>{{ a.name }}</title></rect></g>
+      <polyline v-if="glance.trail.length > 1" :points="glance.trail.join(' ')"/>
+      <circle v-if="glance.trail.length" :cx="glance.trail.at(-1)[0]" :cy="glance.trail.at(-1)[1]" :r="extent.width / 80"/></svg>
+    <svg class="view-lane" viewBox="0 0 600 20" preserveAspectRatio="none" role="img" aria-label="areas looked at over time" @click="into($event)">
+      <rect v-for="(one, n) in lookedAt" :key="n" :fill="one.colour" :x="one.x" :width="one.width" y="0" height="20"><title>{{ one.name }}</title></rect>
+      <line class="view-now" :x1="place(t)" :x2="place(t)" y1="0" y2="20"/></svg>
+    <p class="room-faint view-legend"><template v-for="(name, n) in areaNames" :key="name"><span class="view-swatch" :style="{ background: colour(n) }"></span>{{ name }}</template></p>
+  </section>
+  <section v-if="about.marking" class="room-card"><h2>Marks</h2>
+    <p class="room-faint">They are kept beside the recording and go into exports and the report; nothing recorded is changed. Write no names.</p>
+    <form class="view-controls" @submit.prevent="mark()">
+      <label class="room-field view-words">Mark <input id="mark-text" v-model="words" maxlength="4000" autocomplete="off"></label>
+      <button type="button" class="room-button" id="mark-from" :aria-pressed="from !== null" @click="from = from === null ? t : null">{{ from === null ? 'Begin here' : 'Begins at ' + clock(from) }}</button>
+      <button type="submit" class="room-button" id="mark-add" :disabled="!words.trim()">{{ from === null ? 'Mark this moment' : 'Mark until here' }}</button>
+    </form>
+    <p id="mark-said" role="status" :class="markSaid.startsWith('not kept') ? 'room-question' : 'room-faint'">{{ markSaid }}</p>
+    <div id="marks" class="room-scroll" tabindex="0" role="group" aria-label="Marks">
+      <p v-if="!marks.length" class="room-faint">None yet: go to a moment, press M, write what is to be seen.</p>
+      <div v-for="m in marks" :key="m.number" class="view-marked">
+        <button type="button" class="view-event" @click="go(m.t)"><span>{{ clock(m.t) }}{{ m.to > m.t ? ' to ' + clock(m.to) : '' }}</span> {{ m.text }}</button>
+        <button type="button" class="room-button" :aria-label="'Take back: ' + m.text" @click="takeBack(m)">Take back</button></div></div>
   </section>
   <section class="room-card"><h2>Events</h2>
     <label class="room-field">Find <input id="find" v-model="find" autocomplete="off"></label>
@@ -66,8 +95,8 @@ export default {
 </div>`,
   props: { about: Object },
   data() {
-    return { t: 0, speed: 1, span: 0, playing: false, find: "", came: 0, asked: 0,
-      charts: [0, 1, 2].map(() => ({ signal: "", path: "", said: "", as: "curve", heard: "" })) };
+    return { glance: { areas: [], trail: [], looked: "" }, extent: { width: 1, height: 1 }, lane: [], waits: false, wanted: null, words: "", from: null, marks: this.about.marks, markSaid: this.about.markSaid, t: 0, speed: 1, span: 0, playing: false, find: "", came: 0, asked: 0,
+      charts: [0, 1, 2].map(() => ({ signal: "", path: "", said: "", as: "curve", heard: "", values: null })) };
   },
   computed: {
     begin() { return this.span ? Math.min(Math.max(0, this.t - this.span / 2), Math.max(0, this.about.length - this.span)) : 0; },
@@ -77,6 +106,22 @@ export default {
         x: this.place(one.from), width: Math.max(0.5, this.place(one.to) - this.place(one.from)),
         kind: !one.counted ? "approach" : one.outcome === "success" ? "success" : "other",
       }));
+    },
+    picture() { return `0 0 ${this.extent.width} ${this.extent.height}`; },
+    areaNames() { return [...new Set(this.lane.filter(Boolean))].sort(); },
+    lookedAt() { // neighbouring steps at one area are one
+      const found = [], step = 600 / this.lane.length;
+      this.lane.forEach((name, n) => {
+        if (!name) return;
+        const last = found.at(-1);
+        if (last?.name === name && last.upto === n) { last.width += step; last.upto = n + 1; }
+        else found.push({ name, x: n * step, width: step, upto: n + 1, colour: this.colour(this.areaNames.indexOf(name)) });
+      });
+      return found;
+    },
+    marksHere() {
+      return this.marks.filter((one) => one.to >= this.begin && one.t <= this.end)
+        .map((one) => ({ text: one.text, x: this.place(one.t), width: Math.max(1.5, this.place(one.to) - this.place(one.t)) }));
     },
     holes() {
       return this.about.gaps.map(([from, to]) => ({ x: this.place(from), width: Math.max(1, this.place(to) - this.place(from)) }));
@@ -96,7 +141,10 @@ export default {
     addEventListener("keydown", this.key);
     document.documentElement.dataset.theme = matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light";
     const first = this.about.signals.findIndex((one) => one.column.startsWith("tip.position"));
-    this.charts[0].signal = first < 0 ? "" : first;
+    this.charts.forEach((chart, n) => { // the tip's three ways, before anything is chosen
+      const at = this.about.signals.findIndex((one) => one.column === `tip.position.${"xyz"[n]}`);
+      chart.signal = at >= 0 ? at : n === 0 && first >= 0 ? first : "";
+    });
     this.timer = setInterval(this.step, STEP_MS);
     this.askAll();
     this.go(this.about.at);
@@ -108,6 +156,7 @@ export default {
       const before = this.begin;
       this.t = Math.min(Math.max(0, t || 0), this.about.length);
       this.$emit("at", this.t);
+      this.look();
       if (this.begin !== before) this.askSoon();
     },
     step() {
@@ -127,8 +176,38 @@ export default {
       const box = e.currentTarget.getBoundingClientRect();
       this.go(this.begin + (this.end - this.begin) * (e.clientX - box.left) / box.width);
     },
+    mark() {
+      if (!this.words.trim()) return;
+      const other = this.from === null ? this.t : this.from;
+      this.$emit("mark", { t: Math.min(other, this.t), to: Math.max(other, this.t), text: this.words });
+    },
+    takeBack(mark) { this.$emit("mark", { withdraw: mark.number }); },
+    marked({ marks, markSaid }) { // what was written stays until it is kept
+      this.marks = marks;
+      this.markSaid = markSaid;
+      if (markSaid === "kept") { this.words = ""; this.from = null; }
+    },
     askSoon() { clearTimeout(this.soon); this.soon = setTimeout(this.askAll, 150); },
-    askAll() { this.charts.forEach((_, at) => this.ask(at)); },
+    askAll() {
+      this.charts.forEach((_, at) => this.ask(at));
+      if (this.about.gaze) this.$emit("glance", { lane: true, begin: this.begin, end: this.end });
+    },
+    colour(n) { return ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#999999"][n % 8]; },
+    look() { // one question at a time: the newest time is asked when the one before is answered
+      if (!this.about.gaze) return;
+      if (this.waits) { this.wanted = this.t; return; }
+      this.waits = true;
+      this.$emit("glance", { t: this.t });
+    },
+    glanced(found) {
+      if (found.lane) { this.lane = found.lane; return; }
+      this.glance = found;
+      const right = [...found.areas.map((a) => a.box[2]), ...found.trail.map((p) => p[0])];
+      const below = [...found.areas.map((a) => a.box[3]), ...found.trail.map((p) => p[1])];
+      this.extent = { width: Math.max(this.extent.width, ...right), height: Math.max(this.extent.height, ...below) };
+      this.waits = false;
+      if (this.wanted !== null) { this.wanted = null; this.look(); }
+    },
     ask(at) {
       const chart = this.charts[at];
       if (chart.signal === "") { chart.path = ""; return; }
@@ -154,7 +233,16 @@ export default {
       }));
       paint.putImageData(image, 0, 0);
     },
+    reading({ values }) { // of the step that the time is in: a value, or from the lowest to the highest
+      if (!values) return "";
+      const { low, high, begin, end, unit } = values;
+      const n = Math.min(low.length - 1, Math.floor(low.length * (this.t - begin) / Math.max(1e-9, end - begin)));
+      if (n < 0 || low[n] === null || low[n] === undefined) return "no value";
+      const [least, most] = [low[n].toPrecision(4), high[n].toPrecision(4)];
+      return `${least === most ? least : `${least} to ${most}`}${unit === "1" ? "" : ` ${unit}`}`;
+    },
     drawn(at, { low, high, unit }) {
+      this.charts[at].values = { low, high, unit, begin: this.begin, end: this.end };
       const known = [...low, ...high].filter((v) => v !== null);
       const chart = this.charts[at];
       if (!known.length) { chart.path = "M0,55"; chart.said = "no value here"; return; }
@@ -176,6 +264,7 @@ export default {
       const far = e.shiftKey ? 10 : 1;
       const does = { " ": () => this.play(), ArrowRight: () => this.go(this.t + far), ArrowLeft: () => this.go(this.t - far),
         ".": () => this.go(this.t + 1 / this.about.rate), ",": () => this.go(this.t - 1 / this.about.rate),
+        m: () => document.getElementById("mark-text")?.focus(),
         n: () => this.trial(1), b: () => this.trial(-1), Home: () => this.go(0), End: () => this.go(this.about.length) }[e.key];
       if (does) { does(); e.preventDefault(); }
     },

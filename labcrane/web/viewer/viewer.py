@@ -1,7 +1,7 @@
 """Viewer's page: the machine as it was recorded, beside its time line and its signals."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,12 +10,14 @@ from labcrane.errors import RecordingError
 from labcrane.registry.registry import Registry
 from labcrane.web.door.access import VIEWER
 from labcrane.web.door.serving import build_pages, serve_here
-from labcrane.web.page import PRIMARY, speak
+from labcrane.web.page import PRIMARY, see_through, speak
 from labcrane.web.room.model import MachineModel, span
 from labcrane.web.room.shown import ShownShapes
 from labcrane.web.scene import BACKGROUND, CAMERAS
 from labcrane.web.surroundings import Surroundings
 from labcrane.web.viewer.film import Film
+from labcrane.web.viewer.glances import Glances
+from labcrane.web.viewer.marks import Marks
 
 HERE = Path(__file__).parent
 
@@ -80,6 +82,7 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
     ui.add_css(STYLE)
     ui.add_css(HERE / "viewer.css")
     speak("en")
+    see_through()
     screens, lacking = [], []
     for film in films:
         cues, why = film.cues(registry)
@@ -96,6 +99,7 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
         for screen in screens:
             screen.look(name)
 
+    marks, glances = Marks(first), first.glances
     about = {
         "title": " and ".join(film.called for film in films),
         "said": f"{len(first.trials)} attempts at trials, {len(first.events)} events, "
@@ -108,8 +112,17 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
         "events": first.events,
         "gaps": first.gaps,
         "signals": first.signals,
+        **marks.shown(),
+        "gaze": glances.known,
     }
-    line = Timeline(about, show, partial(_curve, first), partial(_spectrogram, first))
+    line = Timeline(
+        about,
+        show,
+        partial(_curve, first),
+        partial(_spectrogram, first),
+        marks.asked,
+        partial(_glance, glances),
+    )
     with line.add_slot("machine"):
         with ui.row().classes("gap-2 mb-2").props('role=group aria-label="Cameras"'):
             for name in CAMERAS:
@@ -131,6 +144,15 @@ def _spectrogram(film: Film, stream: str, column: str, begin: float, end: float)
         return film.spectrogram(stream, column, begin, end)
     except RecordingError as error:
         return {"why": str(error)}
+
+
+def _glance(glances: Glances, asked: Mapping[str, Any]) -> dict[str, Any]:
+    try:
+        if "lane" in asked:
+            return {"lane": glances.lane(float(asked["begin"]), float(asked["end"]))}
+        return glances.as_json(float(asked["t"]))
+    except RecordingError as error:
+        return {"areas": [], "trail": [], "looked": f"not read: {error}"}
 
 
 def serve(

@@ -42,14 +42,7 @@ class DmdArm(Dynamics):
         self.signals = arm_signals(machine, self._parts, links)
         self._state = ArmState(machine, self._parts, links)
         drives(self._model, settings.proportional, machine, 1.0)  # complains before anything opens
-        if settings.jaws and (
-            machine.joints[-1].name != settings.jaws.joint or machine.joints[-1].a
-        ):
-            raise ProtocolError(
-                f"the jaws' joint {settings.jaws.joint!r} must be the machine's last and have "
-                f"length 0, but the last is {machine.joints[-1].name!r}, "
-                f"{machine.joints[-1].a:g} m long"
-            )
+        settings.check_jaws(machine)
         self._world: World | None = None
         self._trial: Trial | None = None
 

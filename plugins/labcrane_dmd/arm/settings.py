@@ -5,8 +5,8 @@ from typing import Annotated
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
-from labcrane import Machine, Settings
-from labcrane.core import AxisName, JointName, Names, Once, StudyPath, read_yaml
+from labcrane import Machine, ProtocolError, Settings
+from labcrane.core import AxisName, JointName, Names, Once, StudyPath, Usual, read_yaml
 
 
 class ValveSettings(Settings):
@@ -46,7 +46,7 @@ class JawsSettings(Settings):
     release_deg: PositiveFloat = 2.0
     """A grip is let go when the jaws are opened by this much, in degrees."""
 
-    squeeze_n: NonNegativeFloat = 0.0
+    squeeze_n: Annotated[NonNegativeFloat, Usual(0.1, 10_000.0)] = 0.0
     """By how much more each jaw presses on what it holds for every millimetre that it is driven
     further shut, in newtons, up to what its drive can give; opening lets go. At 0 a grip does not
     tighten."""
@@ -71,7 +71,7 @@ class ArmSettings(Settings):
     model: StudyPath
     """The model's YAML file, made with ``labcrane dmd fit``."""
 
-    proportional: tuple[JointName, ...] = ()
+    proportional: Annotated[tuple[JointName, ...], Once()] = ()
     """Joints that the model does not describe and whose speed is proportional to the signal, up
     to the machine's joint speed. Every joint is either here or in the model."""
 
@@ -91,25 +91,63 @@ class ArmSettings(Settings):
     def provides(self, machine: Machine) -> Names:
         from labcrane.machines import load_scene  # noqa: PLC0415 - loads numpy
 
-        things = {thing for path in self.scenes for thing in load_scene(path).things}
+        things: set[str] = set()
+        for at, path in enumerate(self.scenes):
+            try:
+                things |= {*load_scene(path).things}
+            except ProtocolError as error:
+                raise ProtocolError(str(error), at=("scenes", at)) from error
         return {
             "speed law": [*self._described(), *self.proportional],
-            "scene": [path.name.split(".")[0] for path in self.scenes],
+            "scene": [str(path) for path in self.scenes],
             "object": [*sorted(things), *(("jaw_upper", "jaw_lower") if self.jaws else ())],
         }
 
     def _described(self) -> tuple[str, ...]:
         """Return the joints that the model describes."""
-        written = read_yaml(self.model)
+        try:
+            written = read_yaml(self.model)
+        except ProtocolError as error:
+            raise ProtocolError(str(error), at=("model",)) from error
         described = written.get("segments") if isinstance(written, dict) else None
-        return tuple(described) if isinstance(described, dict) else ()
+        if not isinstance(described, dict):
+            raise ProtocolError(
+                f"dynamics.model is {self.model.name!r}, which is no model: it has no segments; "
+                "make one with labcrane dmd fit",
+                at=("model",),
+            )
+        return tuple(described)
 
     def doubts(self, machine: Machine) -> Mapping[str, str]:
         described = self._described()
-        both = [name for name in self.proportional if name in described]
-        if not both:
-            return {}
-        return {"proportional": f"has {', '.join(both)}, which {self.model.name} describes as well"}
+        found = {}
+        if both := [name for name in self.proportional if name in described]:
+            said = f"has {', '.join(both)}, which {self.model.name} describes as well"
+            found["proportional"] = said
+        if self.overload.release > self.overload.limit:
+            found["overload.release"] = (
+                f"is {self.overload.release:g}, above the limit of {self.overload.limit:g}: an "
+                "overload ends while it begins"
+            )
+        return found
+
+    def check_jaws(self, machine: Machine) -> None:
+        """Refuse jaws at another joint than the last.
+
+        Raises
+        ------
+        ProtocolError
+            The joint is not the last, or has a length.
+        """
+        last = machine.joints[-1]
+        joint = self.jaws.joint if self.jaws else last.name
+        if self.jaws and joint in machine.names and (last.name != joint or last.a):
+            raise ProtocolError(
+                f"the jaws' joint {joint!r} must be the machine's last and have length 0, but the "
+                f"last is {last.name!r}, {last.a:g} m long",
+                at=("jaws", "joint"),
+            )
 
     def needs(self, machine: Machine) -> Names:
+        self.check_jaws(machine)
         return {"joint": [self.jaws.joint] if self.jaws else [], "speed law": machine.names}

@@ -6,11 +6,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, NonNegativeFloat, ValidationError, model_validator
+from pydantic import Field, NonNegativeFloat, model_validator
 from ruamel.yaml import YAML
 
 from labcrane import ProtocolError, Settings
-from labcrane.core import read_yaml
+from labcrane.core import read_settings
 from labcrane_dmd.model.interpolation import FULL, Layer
 from labcrane_dmd.model.model import Direction, Model, Segment, Source
 from labcrane_dmd.model.output import written
@@ -128,16 +128,14 @@ def load(path: Path | str, between: Between | None = None) -> Model:
         The file is missing, or no model; the message says where it goes wrong.
     """
     try:
-        written = read_yaml(Path(path))
-        text = ModelText.model_validate(written)
+        text = read_settings(Path(path), ModelText)
     except ProtocolError as error:
-        raise ProtocolError(f"model {str(path)!r} cannot be read: {error}") from error
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(map(str, first["loc"])) or "the file"
+        first, *more = str(error).splitlines()
+        rest = f", and {len(more)} more" if more else ""
         raise ProtocolError(
-            f"{str(path)!r} is no model: {place}: {first['msg']}; make one with labcrane dmd fit"
-        ) from None
+            f"{str(path)!r} is no model: {first}{rest}; make one with labcrane dmd fit",
+            at=("model",),
+        ) from error
     rule = between or text.fit.between
     return Model(
         segments={name: _segment(name, each, rule) for name, each in text.segments.items()},

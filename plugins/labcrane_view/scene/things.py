@@ -27,6 +27,8 @@ def pieces(thing: PlacedObject, parts: Sequence[Geom]) -> Iterator[tuple[Mesh, C
     That is the frame of its first part, whose centre is what ``scene.NAME.position`` says.
     """
     for part in parts:
+        if not part.drawn:
+            continue
         placed = beside(parts[0], part)
         colour = _colour(thing, part)
         if part.mesh is not None:

@@ -2,14 +2,17 @@
 
 import math
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
-from pydantic import PositiveFloat
+from pydantic import Field, PositiveFloat
 
 from labcrane import Cue, FloatArray, Frame, Machine, Offer, Run, Settings, Signal, hookimpl, offer
 from labcrane.core import Cylinder, Shape
 
 labcrane_api = 1
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class MyPartSettings(Settings):
@@ -18,7 +21,7 @@ class MyPartSettings(Settings):
     radius: PositiveFloat = 0.03
     """Of the line, in metres."""
 
-    colour: tuple[float, float, float] = (1.0, 0.8, 0.1)
+    colour: tuple[Share, Share, Share] = (1.0, 0.8, 0.1)
     """Red, green and blue, each 0 to 1."""
 
 

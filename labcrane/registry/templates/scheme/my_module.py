@@ -1,22 +1,32 @@
 """my_part: from the operator's axes to joint speeds."""
 
+from typing import Annotated
+
 import numpy as np
 from pydantic import Field
 
 from labcrane import Controller, FloatArray, Machine, Offer, Run, Settings, Signal, hookimpl, offer
+from labcrane.core import Names, Once, Reference
 from labcrane.machines import jacobian
 
 labcrane_api = 1
+
+Axis = Annotated[str, Reference("axis")]
+"""An axis of the input: `labcrane check` looks it up."""
 
 
 class MyPartSettings(Settings):
     """Settings of my_part; a protocol writes them beside ``use``."""
 
-    axes: tuple[str, ...] = ("left.x", "right.y", "left.y", "right.x")
+    axes: Annotated[tuple[Axis, ...], Once()] = ("left.x", "right.y", "left.y", "right.x")
     """The axis that turns each joint, in the order of the machine's joints."""
 
     speed: float = Field(default=0.5, gt=0.0, le=1.0)
     """Share of each joint's full speed that a full push asks for."""
+
+    def needs(self, machine: Machine) -> Names:
+        """Return what has to be there though no protocol writes it: the axes by default."""
+        return {"axis": self.axes}
 
 
 class MyPart(Controller):

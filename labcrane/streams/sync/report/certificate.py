@@ -29,9 +29,12 @@ class Fault(StrEnum):
     CHANGED_RATE = "changing rate"
     RECEIVER = "stamps of the receiver's clock"
     FOREIGN = "stamps of an unknown clock"
+    AHEAD = "stamped ahead"
     SLOW = "stamps long before arrival"
     LATE_STAMPS = "stamped when sent"
     NOISY = "noisy stamps"
+    COARSE = "stamps cut to a coarse unit"
+    SHIFTED = "delay changed"
     FROZEN = "stamps that stand still"
     STEPPED = "clock stepped"
     RESTARTED = "restarted"
@@ -44,22 +47,24 @@ class Fault(StrEnum):
 
 
 _FAULTS: dict[Fault, Callable[[Quality, float], bool]] = {
-    Fault.LOST: lambda q, _: q.dropped > 0,
     Fault.INTERRUPTED: lambda q, _: q.longest_gap_s > LONG_S,
-    Fault.DISORDERED: lambda q, _: q.disordered > 0,
-    Fault.STALLED: lambda q, _: q.stalls > 0,
     Fault.WRONG_RATE: lambda q, hz: (
         np.isnan(q.first_rate_hz) and abs(q.rate_hz / hz - 1.0) > RATE_OFF
     ),
     Fault.CHANGED_RATE: lambda q, _: bool(np.isfinite(q.first_rate_hz)),
     Fault.LATE_STAMPS: lambda q, _: q.late_stamps > 0,
     Fault.NOISY: lambda q, _: q.noise_s > 0.0 and not q.late_stamps,
+    Fault.SHIFTED: lambda q, _: q.shifts > 0,
     Fault.FROZEN: lambda q, _: q.frozen > 0,
-    Fault.DIED: lambda q, _: q.silent_s > SILENT_S,
 }
 """Of regular streams only."""
 
-_CLOCK_FAULTS: dict[Fault, Callable[[Quality], bool]] = {
+_ANY_STREAMS_FAULTS: dict[Fault, Callable[[Quality], bool]] = {
+    Fault.LOST: lambda q: q.dropped > 0,
+    Fault.DISORDERED: lambda q: q.disordered > 0,
+    Fault.STALLED: lambda q: q.stalls > 0,
+    Fault.COARSE: lambda q: q.grid_s > 0.0,
+    Fault.DIED: lambda q: q.silent_s > SILENT_S,
     Fault.STEPPED: lambda q: q.steps > 0,
     Fault.RESTARTED: lambda q: q.restarts > 0,
     Fault.SLEPT: lambda q: q.sleeps > 0,
@@ -68,6 +73,7 @@ _CLOCK_FAULTS: dict[Fault, Callable[[Quality], bool]] = {
     Fault.UNPROBED: lambda q: not q.whose and q.unprobed > 0,
     Fault.RECEIVER: lambda q: q.whose == "receiver",
     Fault.FOREIGN: lambda q: q.whose == "foreign",
+    Fault.AHEAD: lambda q: q.ahead_s > 0.0,
     Fault.SLOW: lambda q: not q.whose and q.lag_s > LATE_S,
     Fault.PROBES_MISSING: lambda q: q.probe_age_s > UNPROBED_S,
 }
@@ -75,7 +81,7 @@ _CLOCK_FAULTS: dict[Fault, Callable[[Quality], bool]] = {
 
 def faults(quality: Quality, rate_hz: float) -> frozenset[Fault]:
     """Return the faults of a stream with this nominal rate; 0 is irregular."""
-    found = {fault for fault, is_there in _CLOCK_FAULTS.items() if is_there(quality)}
+    found = {fault for fault, is_there in _ANY_STREAMS_FAULTS.items() if is_there(quality)}
     if rate_hz > 0.0:
         found |= {fault for fault, is_there in _FAULTS.items() if is_there(quality, rate_hz)}
     return frozenset(found)

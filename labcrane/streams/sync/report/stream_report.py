@@ -9,6 +9,7 @@ import numpy as np
 from labcrane.core.findings import Finding, Verdict, worst
 from labcrane.recording.foreign_streams import COUNTER_GAP, RESET, TAKEN, RecordedStream
 from labcrane.streams.sync.quality import Quality
+from labcrane.streams.sync.raw import ASSUMED_RTT_S
 from labcrane.streams.sync.report.certificate import (
     CONGESTED_S,
     carries,
@@ -63,7 +64,7 @@ def judge_stream(
         findings = [_empty(required=required)]
     else:
         findings = judge_quality(quality, header.rate_hz, samples, limits, required=required)
-    findings += _noted(recorded)
+    findings += _noted(recorded) + _unwritten(recorded)
     return StreamReport(
         header.name,
         header.type,
@@ -75,10 +76,47 @@ def judge_stream(
         tuple(findings),
         tuple(sorted(faults(quality, header.rate_hz))) if samples else (),
         tuple(corrections(quality)),
+        unknowable(quality) if _probed_in_full(recorded) else UNWRITTEN,
+        carries(quality) + ("" if len(recorded.arrivals) or not samples else IF_ITS_OWN),
+        _taken(recorded),
+    )
+
+
+def uncorrected_stream(recorded: RecordedStream, why: str) -> StreamReport:
+    """Return the report of a stream whose times could not be corrected."""
+    header, samples, quality = recorded.header, len(recorded.time_raw), Quality()
+    finding = Finding(
+        Verdict.FAIL,
+        f"its clock could not be corrected: {why}",
+        "its times are those that came with it; correct again when it is mended: labcrane resync",
+    )
+    return StreamReport(
+        header.name,
+        header.type,
+        header.source_id,
+        Verdict.FAIL,
+        samples,
+        header.rate_hz,
+        quality,
+        (finding, *_noted(recorded)),
+        (),
+        (),
         unknowable(quality),
         carries(quality),
         _taken(recorded),
     )
+
+
+def _probed_in_full(recorded: RecordedStream) -> bool:
+    """Whether the round trips of its probes were recorded, if it was probed."""
+    return bool(len(recorded.probes)) or not len(recorded.offsets)
+
+
+UNWRITTEN = (
+    "the round trips of its probes were not recorded: a lasting asymmetry of the network may hide "
+    "half of the shortest one, whatever that was"
+)
+IF_ITS_OWN = ", if they are of the clock that was probed, which nothing shows"
 
 
 def judge_quality(
@@ -87,8 +125,8 @@ def judge_quality(
     """Judge corrected times by themselves."""
     findings = _flow(nominal, samples, quality, limits)
     findings += _stamping(quality, limits)
-    if nominal > 0 and limits.silent_s.judge(quality.silent_s) is not Verdict.PASS:
-        findings.append(_died(quality, required=required))
+    if limits.silent_s.judge(quality.silent_s) is not Verdict.PASS:
+        findings.append(_died(quality, nominal, required=required))
     findings += _clock(quality, limits) + _changes(quality) + _certainty(quality, limits)
     return findings
 
@@ -157,9 +195,12 @@ def _stamping(quality: Quality, limits: Limits) -> list[Finding]:
             f"its stamps lie {quality.lag_s:.3f} s before their arrival",
             "its program may stamp with a clock of its own: let it use LSL's",
         )
-    if quality.disordered:
-        text = f"{quality.disordered} samples came out of order"
-        _add(found, Verdict.WARN, text, "sort by time before you use them; look why they overtake")
+    if quality.ahead_s:
+        text = f"it is stamped up to {1e3 * quality.ahead_s:.1f} ms ahead: with what was to come, "
+        text += "or by a clock that is ahead"
+        advice = "right if its program stamps with the flip to come; compare it with a photodiode"
+        _add(found, Verdict.WARN, text, advice)
+    found += _order(quality)
     if quality.stalls:
         _add(
             found,
@@ -168,9 +209,14 @@ def _stamping(quality: Quality, limits: Limits) -> list[Finding]:
             "at most",
             "its times are right; feedback that used it was late: look what kept its program",
         )
-    if quality.frozen:
-        text = f"{quality.frozen} samples have the stamp of the one before"
-        _add(found, Verdict.WARN, text, "leave out the trials they are in; look at its program")
+    if quality.shifts:
+        text = f"{quality.shifts} times its stamps were shifted, by {1e3 * quality.shift_s:.0f} ms "
+        text += "at most: it paused, or its delay changed"
+        _add(found, Verdict.WARN, text, "what is later may be late by that; look at its buffers")
+    if quality.grid_s:
+        unit = f"{1e3 * quality.grid_s:g} ms"
+        text = f"its stamps are cut to {unit}, so that half of that is in their uncertainty"
+        _add(found, Verdict.WARN, text, "let its program stamp with LSL's clock at full resolution")
     if quality.late_stamps:
         text = f"chunks are stamped when they are sent ({1e3 * quality.noise_s:.1f} ms of scatter)"
         _add(found, Verdict.WARN, text, "measure the delay and give it as latency_s or min_delay_s")
@@ -180,10 +226,27 @@ def _stamping(quality: Quality, limits: Limits) -> list[Finding]:
     return found
 
 
-def _died(quality: Quality, *, required: bool) -> Finding:
+def _order(quality: Quality) -> list[Finding]:
+    """Judge whether samples come one after the other."""
+    found: list[Finding] = []
+    if quality.backward and not quality.disordered:
+        text = f"{quality.backward} samples are placed before one that came earlier: its buffer "
+        text += "changed, or its clock went back"
+        _add(found, Verdict.WARN, text, "leave out the trials they are in; look at its program")
+    if quality.disordered:
+        text = f"{quality.disordered} samples came out of order"
+        _add(found, Verdict.WARN, text, "sort by time before you use them; look why they overtake")
+    if quality.frozen:
+        text = f"{quality.frozen} samples have the stamp of the one before"
+        _add(found, Verdict.WARN, text, "leave out the trials they are in; look at its program")
+    return found
+
+
+def _died(quality: Quality, nominal: float, *, required: bool) -> Finding:
+    what = "sample came" if nominal > 0.0 else "sample came and no probe was answered"
     return Finding(
         Verdict.FAIL if required else Verdict.WARN,
-        f"it died: no sample came in the last {quality.silent_s:.0f} s",
+        f"it died: no {what} in the last {quality.silent_s:.0f} s",
         "leave out the trials after its last sample; look at its program and its battery",
     )
 
@@ -273,6 +336,20 @@ def _certainty(quality: Quality, limits: Limits) -> list[Finding]:
             f"{quality.unsure} samples are near a step of the clock and may be of either side",
             "leave out the trial they are in where milliseconds matter",
         )
+    return found
+
+
+def _unwritten(recorded: RecordedStream) -> list[Finding]:
+    """Tell what another recorder has not written down, and what nobody can know without it."""
+    found: list[Finding] = []
+    if len(recorded.time_raw) and not len(recorded.arrivals):
+        text = "when its samples came was not recorded, so that nothing shows whose clock their "
+        text += "stamps are of, or how late they are"
+        _add(found, Verdict.WARN, text, "compare it with an event that another stream has as well")
+    if len(recorded.offsets) and not len(recorded.probes):
+        text = f"how long its clock probes took was not recorded; {1e3 * ASSUMED_RTT_S:g} ms was "
+        text += "assumed, and a slower way hides more"
+        _add(found, Verdict.WARN, text, "measure the round trip between the two computers")
     return found
 
 

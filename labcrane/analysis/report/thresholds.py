@@ -1,0 +1,70 @@
+"""Thresholds that tracks found: everybody's, and how far such estimates are off."""
+
+import json
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from labcrane.analysis.cohort import Participant
+from labcrane.analysis.report.html import Page
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+ENDED = "track.end"
+LAW = "law"
+"""Column of what a recording says of a track, as JSON; not shown."""
+
+COLUMNS = (
+    "participant", "session", "block", "track", "estimate", "sd", "responses", "ended", LAW,
+)  # fmt: skip
+
+Judge = Callable[[str, str], "pd.DataFrame"]
+"""Returns how well a track finds thresholds, from its name and what a recording says of it."""
+
+
+def thresholds_of(participant: Participant) -> "pd.DataFrame":
+    """Return a row for each block with a track: where the track stood at its end.
+
+    A block that was gone on with, or run again, has the row of its last end.
+    """
+    import pandas as pd
+
+    rows = {}
+    for number, session in participant.sessions():
+        laws = session.context.get("tracks", {})
+        events = session.events
+        for told in events.loc[events["name"] == ENDED, "data"]:
+            name = str(told["track"])
+            law = json.dumps(laws[name], sort_keys=True) if name in laws else ""
+            where = [told.get(each) for each in ("estimate", "sd", "responses", "ended")]
+            rows[number, told["block"]] = (
+                participant.name, number, told["block_name"], name, *where, law,
+            )  # fmt: skip
+    table = pd.DataFrame(list(rows.values()), columns=list(COLUMNS))
+    return table.astype({"estimate": float, "sd": float})
+
+
+def add_thresholds(page: Page, found: "pd.DataFrame", judge: Judge | None) -> None:
+    """Add what was found, and what is to be believed of it; nothing where there was no track."""
+    import pandas as pd
+
+    if not len(found):
+        return
+    page.heading("Thresholds")
+    page.say(
+        "Where tracks stood at the end of their blocks, in the unit of their levels: the threshold "
+        "and its standard deviation by QUEST+, the mean of a staircase's levels at reversals and "
+        "theirs. Empty where too little was known."
+    )
+    page.table("thresholds", found.drop(columns=LAW))
+    laws = found.loc[found[LAW] != "", ["track", LAW]].drop_duplicates()
+    if judge is None or not len(laws):
+        return
+    quality = pd.concat([judge(*law) for law in laws.itertuples(index=False)], ignore_index=True)
+    page.say(
+        "How far such estimates are off: bias and spread are mean and standard deviation of "
+        "estimate minus truth, of simulated operators whose thresholds are known, spread evenly "
+        "from the easiest to the hardest level. Success falls with the level as QUEST+ believes; "
+        "of a staircase, which believes nothing, as steeply as the row says."
+    )
+    page.table("track_quality", quality)

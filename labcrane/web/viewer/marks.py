@@ -1,0 +1,50 @@
+"""Marks that are made on the viewer's page, and go to the record's annotations."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from labcrane.errors import LabcraneError
+from labcrane.recording.annotations import annotate, read_annotations, withdraw
+from labcrane.web.viewer.film import Film
+
+
+class Marks:
+    """The marks of one film, in seconds from its start, and what a page asks of them.
+
+    What is asked and cannot be done is said on the page; nothing that was recorded is touched.
+    """
+
+    def __init__(self, film: Film) -> None:
+        self._place = film.place
+        self._start = film.start
+
+    def shown(self, said: str = "") -> dict[str, Any]:
+        """Return every mark that holds and what is to be said of them, ready for JSON."""
+        if self._place is None:
+            return {"marks": [], "markSaid": "", "marking": False}
+        file, session = self._place
+        try:
+            found = read_annotations(file.absolute().parent, session)
+        except LabcraneError as error:
+            return {"marks": [], "markSaid": str(error), "marking": True}
+        marks = [
+            {"t": round(mark.time - self._start, 4), "to": round(mark.until - self._start, 4),
+             "text": mark.text, "written": mark.written, "number": mark.number}
+            for mark in found
+        ]  # fmt: skip
+        return {"marks": marks, "markSaid": said, "marking": True}
+
+    def asked(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        """Make a mark, or take one back; return what is shown then."""
+        if self._place is None:
+            return self.shown()
+        file, session = self._place
+        try:
+            if "withdraw" in asked:
+                withdraw(file, session, int(asked["withdraw"]))
+                return self.shown("taken back; the file keeps what it was")
+            begin, end = float(asked["t"]), float(asked["to"])
+            annotate(file, session, self._start + begin, str(asked["text"]), self._start + end)
+        except (LabcraneError, LookupError, TypeError, ValueError) as error:
+            return self.shown(f"not kept: {error}")
+        return self.shown("kept")
