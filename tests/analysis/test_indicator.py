@@ -2,6 +2,7 @@
 
 import csv
 import math
+import os
 import subprocess
 from collections.abc import Sequence
 from datetime import date
@@ -290,34 +291,33 @@ def test_a_folder_without_tests_says_what_a_test_is(tmp_path: Path) -> None:
 
 
 def converted(book: Path, sheet: int) -> list[list[str]]:
-    """Let LibreOffice open the workbook, work it out, and write one sheet as text."""
+    """Let LibreOffice open the workbook, work it out, and write one sheet as text.
+
+    Several may run at once, in other tests' processes, so it shares neither its settings nor its
+    folder of temporary files with another.
+    """
     need("soffice")
+    own = book.parent / "office"
+    (own / "temporary").mkdir(parents=True, exist_ok=True)
     how = f"csv:Text - txt - csv (StarCalc):44,34,76,1,,0,false,true,false,false,false,{sheet}"
-    home = f"-env:UserInstallation=file://{book.parent}/office"
-    subprocess.run(
-        [
-            "soffice",
-            home,
-            "--headless",
-            "--convert-to",
-            how,
-            "--outdir",
-            str(book.parent),
-            str(book),
-        ],
-        check=True,
+    home = f"-env:UserInstallation={(own / 'settings').as_uri()}"
+    into = ["--headless", "--convert-to", how, "--outdir", str(book.parent), str(book)]
+    done = subprocess.run(
+        ["soffice", home, *into],
+        env={**os.environ, "HOME": str(own), "TMPDIR": str(own / "temporary")},
         capture_output=True,
+        text=True,
         timeout=240,
+        check=False,
     )
+    assert done.returncode == 0, f"soffice ended with {done.returncode}: {done.stdout}{done.stderr}"
     [text] = book.parent.glob(f"{book.stem}-*.csv")
     rows = list(csv.reader(text.read_text().splitlines()))
     text.unlink()
     return rows
 
 
-def test_libreoffice_opens_the_workbook_and_its_totals_are_ours(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_libreoffice_opens_the_workbook_and_its_totals_are_ours(tmp_path: Path) -> None:
     record(tmp_path, "R001", the_vectors())
     record(tmp_path, "R002", [trial(50.0, reference=True), trial(80.0, (2, 0, 1, 0))])
     record(tmp_path, "R002", [trial(64.0, (1, 0, 0, 0))], session=2)
