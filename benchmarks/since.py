@@ -14,8 +14,8 @@ import os
 import statistics
 import subprocess
 import sys
-import tarfile
 import tempfile
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -56,10 +56,10 @@ def main(words: Sequence[str] | None = None) -> int:
 def unpack(commit: str, folder: Path) -> None:
     """Put a commit's files into a folder."""
     packed = subprocess.run(
-        ["git", "archive", "--format=tar", commit], cwd=ROOT, check=True, stdout=subprocess.PIPE
+        ["git", "archive", "--format=zip", commit], cwd=ROOT, check=True, stdout=subprocess.PIPE
     ).stdout
-    with tarfile.open(fileobj=io.BytesIO(packed)) as archive:
-        archive.extractall(folder, filter="data")
+    with zipfile.ZipFile(io.BytesIO(packed)) as archive:
+        archive.extractall(folder)
 
 
 def ratios(subject: str, before: Path, rounds: int) -> dict[str, float]:
