@@ -1,9 +1,11 @@
 """Synthesizer of a tone with pyo, to a sound device or block by block into an array."""
 
 import ctypes
+import io
 import os
 import time
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from typing import Any
 
 import numpy as np
@@ -15,7 +17,8 @@ from labcrane_sonification.tone import Tone, gains
 
 os.environ.setdefault("PYO_GUI_WX", "0")  # pyo looks for a GUI when it is imported
 os.environ.setdefault("JACK_NO_START_SERVER", "1")  # or it starts a JACK server of its own
-import pyo
+with redirect_stdout(io.StringIO()):  # where there is no GUI it advertises one, on every start
+    import pyo
 
 CHANNELS = 2
 LIMIT = 0.98

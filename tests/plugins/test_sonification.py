@@ -203,6 +203,12 @@ def test_impossible_settings_are_refused() -> None:
         SonificationSettings(overtones=(0, 99))
 
 
+def test_a_python_without_tkinter_says_nothing_of_it() -> None:
+    code = "import sys; sys.modules['tkinter'] = None; import labcrane_sonification.synth"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == ""
+
+
 NO_DEVICE = """
 from labcrane import DeviceError
 from labcrane_sonification.settings import SonificationSettings
