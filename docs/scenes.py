@@ -24,8 +24,11 @@ RETRIEVAL = HERE.parent / "protocols" / "retrieval"
 MOMENTS = {"start": 0.0, "way": 0.55, "end": 1.0}
 """Shares of a run."""
 
-SIDE = {"reach_through": {"eye": (2.85, 0.1, 1.3), "look": (1.6, 0.0, 0.85), "fov_deg": 80.0}}
-"""Cameras at the side of scenes that hide from the study's own: here one inside the car."""
+SIDE = {
+    "casualty": {"eye": (0.4, -4.6, 2.2), "look": (0.25, -0.5, 0.5), "fov_deg": 60.0},
+    "reach_through": {"eye": (2.85, 0.1, 1.3), "look": (1.6, 0.0, 0.85), "fov_deg": 80.0},
+}
+"""Cameras for scenes that the study's side view hides or cuts: the whole person, inside the car."""
 
 SIZE = (1200, 450)
 
