@@ -12,7 +12,8 @@ from pages.room import a_room, photograph, press, shown
 from selenium import webdriver
 
 from labcrane import open_recording
-from labcrane.machines import read_placed, segments, stands
+from labcrane.machines import PlacedObject, Segment, read_placed, segments, stands
+from labcrane.recording.journal_reader import read_journal
 
 ROOT = Path(__file__).parents[2]
 SEEN = """
@@ -25,6 +26,23 @@ window['scene_' + document.querySelector('.nicegui-scene').id].traverse(o => {
 return found;
 """
 """Where three.js has what has a name, and of how many parts it is."""
+
+
+def around(things: str) -> list[tuple[PlacedObject, Segment]]:
+    """Return what an event placed, each with its segments."""
+    return [(each, segment) for each in read_placed(things) for segment in segments(each)]
+
+
+def first_placed(journal: Path) -> list[tuple[PlacedObject, Segment]]:
+    """Return what a running session's journal says was placed first; nothing while it is silent."""
+    log, _ = read_journal([journal])
+    found = [event.data["things"] for event in log.events if event.name == "scene.placed"]
+    return around(found[0]) if found else []
+
+
+def counted(seen: dict[str, list[float]]) -> dict[str, int]:
+    """Return of how many parts each is that the page has."""
+    return {name: int(parts) for name, (*_, parts) in seen.items()}
 
 
 @pytest.mark.long
@@ -53,7 +71,12 @@ def test_what_stands_around_the_machine_is_drawn_where_the_session_has_it(
             shown(browser, "stage", f"waits to start: {what}")
             press(browser, "order-start")
         shown(browser, "stage", "trial")
-        wait_for(lambda: browser.execute_script(SEEN))
+        (journal,) = (tmp_path / "data").rglob("ses-01_run.xdf")
+        wait_for(lambda: first_placed(journal))
+        parts = {segment.name: len(segment.parts) for _, segment in first_placed(journal)}
+        wait_for(
+            lambda: counted(browser.execute_script(SEEN)) == parts
+        )  # one arrives after another
         shown(browser, "facts", "loop at most")
         seen = browser.execute_script(SEEN)
         photograph(browser, "scenario")
@@ -63,11 +86,8 @@ def test_what_stands_around_the_machine_is_drawn_where_the_session_has_it(
         room.ended()
     session = open_recording(room.folder / "P001-PILOT.h5").session(1)
     events = session.events
-    placed = read_placed(events[events["name"] == "scene.placed"]["data"].iloc[0]["things"])
-    drawn = [(each, segment) for each in placed for segment in segments(each)]
-    assert {segment.name: len(segment.parts) for _, segment in drawn} == {
-        name: parts for name, (*_, parts) in seen.items()
-    }
+    drawn = around(events[events["name"] == "scene.placed"]["data"].iloc[0]["things"])
+    assert {segment.name: len(segment.parts) for _, segment in drawn} == counted(seen)
     state = session.streams["state"].data
     placed_at = {segment.name: stands(each, segment.parts[0])[0] for each, segment in drawn}
     for name, (*where, _) in seen.items():
