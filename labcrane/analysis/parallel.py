@@ -1,6 +1,7 @@
 """The same work for many things at once: here, on the cores of this computer, or on a cluster."""
 
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
 
@@ -28,7 +29,7 @@ def usual_workers(orders: int) -> int:
 def work(
     do: Callable[[OrderT], ResultT],
     orders: Sequence[OrderT],
-    workers: int = 1,
+    workers: int | None = 1,
     scheduler: str | None = None,
 ) -> Iterator[ResultT]:
     """Yield what comes of each order, in the order in which they are finished.
@@ -40,7 +41,7 @@ def work(
     do
         A function of a module; it and the orders are sent to other processes.
     workers
-        Processes on this computer; 1 is this one.
+        Processes on this computer; 1 is this one, None as many as are worth it.
     scheduler
         Address of a Dask scheduler, ``tcp://host:8786``, whose workers do it instead.
 
@@ -51,6 +52,7 @@ def work(
     """
     if scheduler is not None:
         return _on_cluster(do, orders, scheduler)
+    workers = usual_workers(len(orders)) if workers is None else workers
     if workers > 1:
         return _on_cores(do, orders, workers)
     return map(do, orders)
@@ -67,7 +69,7 @@ def _on_cores(
     left = list(orders)
     why: Exception | None = None
     for _ in range(1 + RETRIES):
-        with ProcessPoolExecutor(max_workers=workers) as pool:
+        with ProcessPoolExecutor(max_workers=workers, initializer=_be_ended_by_the_parent) as pool:
             given = {pool.submit(do, order): order for order in left}
             try:
                 for future in as_completed(given):
@@ -77,6 +79,10 @@ def _on_cores(
             except BrokenProcessPool as error:
                 why = error
                 continue  # a worker was lost, and the whole pool with it
+            except (KeyboardInterrupt, GeneratorExit):
+                # Nobody waits for what is begun: what a worker does leaves nothing when it dies.
+                pool.shutdown(kill_workers=True)
+                raise
             finally:
                 for future in given:
                     future.cancel()
@@ -85,6 +91,11 @@ def _on_cores(
         f"worker processes died {1 + RETRIES} times, and {len(left)} of {len(orders)} pieces of "
         "work are not done; look for what kills them (memory?), or use fewer with --workers"
     ) from why
+
+
+def _be_ended_by_the_parent() -> None:
+    """Let the interrupt that a terminal sends to all of a program's processes be the parent's."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _on_cluster(

@@ -295,7 +295,7 @@ def power_of_report(
     cohorts: int,
     seed: int,
     claim: Claim = DIFFERENCE,
-    workers: int = 1,
+    workers: int | None = 1,
     scheduler: str | None = None,
 ) -> Iterator[Power]:
     """Yield the power of the test for each size of the cohort.

@@ -228,7 +228,7 @@ def _keep(done: Path, path: Path) -> None:
 
 
 def simulate_study(
-    orders: Sequence[SimulationJob], workers: int = 1, scheduler: str | None = None
+    orders: Sequence[SimulationJob], workers: int | None = 1, scheduler: str | None = None
 ) -> Iterator[DataFolder]:
     """Simulate the participants who are not there yet; yield each folder when it is finished.
 
@@ -246,7 +246,7 @@ def simulate_study(
 
 
 def simulate_tables(
-    orders: Sequence[SimulationJob], workers: int = 1, scheduler: str | None = None
+    orders: Sequence[SimulationJob], workers: int | None = 1, scheduler: str | None = None
 ) -> "Iterator[pd.DataFrame]":
     """Simulate the participants and yield their trial tables, in the order in which they are done.
 

@@ -156,6 +156,38 @@ def test_an_interrupted_simulation_goes_on_and_keeps_who_is_there(
     assert digests(data) == local
 
 
+def begun(data: Path, count: int) -> None:
+    """Wait until so many participants are there."""
+    deadline = time.monotonic() + 240
+    while len(list(data.glob("P*"))) < count:
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("workers", [1, 2])
+def test_an_interrupt_by_hand_says_who_is_there_and_the_same_command_makes_the_others(
+    study: Path, cohort: Path, tmp_path: Path, local: dict[str, str], workers: int
+) -> None:
+    data = tmp_path / "data"
+    words = ["simulate", str(study), "--out", str(data), "--workers", str(workers)]
+    words += ["--participants", "40"]
+    command = [sys.executable, "-m", "labcrane", *words]
+    going = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    with subprocess.Popen(command, start_new_session=True, **going) as program:
+        begun(data, 1)
+        os.killpg(program.pid, signal.SIGINT)  # as a terminal does, to workers too
+        said = " ".join(program.communicate(timeout=240)[0].split())
+    assert program.returncode == 128 + signal.SIGINT, said
+    there = len(list(data.glob("P*")))
+    assert 1 <= there < 40
+    assert f"interrupted: {there} of 40 participants are in {data}, whole; the same" in said
+    assert "Traceback" not in said
+    assert main([*words[:-1], "6"]) == 0
+    first = {path: each for path, each in digests(data).items() if path[:4] in NAMES}
+    assert first == {path: each for path, each in local.items() if path[:4] in NAMES}
+
+
 def test_another_population_is_not_mixed_into_a_folder(
     study: Path, cohort: Path, tmp_path: Path
 ) -> None:

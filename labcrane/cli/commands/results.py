@@ -22,7 +22,6 @@ Include = Annotated[
     list[str] | None,
     typer.Option(help="use also: simulated, pilot, half-finished; may be repeated"),
 ]
-Workers = Annotated[int, typer.Option(help="processes on this computer", min=1)]
 WorkersOrCores = Annotated[
     int | None,
     typer.Option(

@@ -10,7 +10,7 @@ import typer
 from labcrane.cli.commands.results import (
     Include,
     Scheduler,
-    Workers,
+    WorkersOrCores,
     cohort_of,
     progress_bar,
 )
@@ -43,7 +43,7 @@ def simulate(
         int | None, typer.Option(help="how many; as many as are planned by default", min=1)
     ] = None,
     cohort: CohortPath = None,
-    workers: Workers = 1,
+    workers: WorkersOrCores = None,
     scheduler: Scheduler = None,
 ) -> None:
     """Run a whole study with simulated operators, as fast as it goes.
@@ -66,16 +66,25 @@ def simulate_all(
     folder: Path,
     names: "Sequence[str]",
     cohort: Path | None,
-    workers: int,
+    workers: int | None,
     scheduler: str | None,
 ) -> None:
     """Simulate whoever is not in ``folder`` yet, and say how far it is."""
     from labcrane.simulation.simulation import simulate_study
 
     orders = _orders(protocol, folder, names, cohort)
-    with progress_bar("simulate", len(orders)) as advance:
-        for _ in simulate_study(orders, workers, scheduler):
-            advance()
+    try:
+        with progress_bar("simulate", len(orders)) as advance:
+            for _ in simulate_study(orders, workers, scheduler):
+                advance()
+    except KeyboardInterrupt:
+        there = sum(order.folder.path.exists() for order in orders)
+        out.print(
+            f"interrupted: {there} of {len(orders)} participants are in {folder}, whole; the same "
+            "command makes the others",
+            markup=False,
+        )
+        raise
 
 
 def _orders(
@@ -133,7 +142,7 @@ def power(
         str, typer.Option(help="powers for which the smallest cohort is searched: 0.8,0.9")
     ] = "",
     cohort: CohortPath = None,
-    workers: Workers = 1,
+    workers: WorkersOrCores = None,
     scheduler: Scheduler = None,
 ) -> None:
     """Find out how many participants the planned test needs, from simulated or recorded ones.
@@ -228,7 +237,7 @@ def _simulated(
     cohort: Path | None,
     study: "Study",
     effect: "Effect",
-    workers: int,
+    workers: int | None,
     scheduler: str | None,
 ) -> "pd.DataFrame":
     """Return the movements of a pool; files are made only where frames are asked for."""
@@ -253,7 +262,7 @@ def _simulated(
 
 
 def _recorded(
-    folder: Path, include: "list[str] | None", workers: int, scheduler: str | None
+    folder: Path, include: "list[str] | None", workers: int | None, scheduler: str | None
 ) -> "pd.DataFrame":
     """Return the movements of everybody who counts in a data folder."""
     cohort = cohort_of(folder.resolve() if scheduler else folder, include)
@@ -268,7 +277,7 @@ def _power_of_report(
     kind: "Kind",
     goals: "Sequence[float]",
     by: _Drawn,
-    workers: int,
+    workers: int | None,
     scheduler: str | None,
 ) -> None:
     from labcrane.design.seeds import derive
@@ -362,7 +371,7 @@ def _sizes(text: str) -> list[int]:
 
 
 def _movements(
-    folder: Path, names: "Sequence[str]", workers: int, scheduler: str | None
+    folder: Path, names: "Sequence[str]", workers: int | None, scheduler: str | None
 ) -> "pd.DataFrame":
     """Return the movements of the participants of a pool, who may be more in its folder."""
     from labcrane.analysis.cohort import find_cohort
@@ -374,7 +383,7 @@ def _movements(
 
 
 def _measured(
-    people: "Sequence[Participant]", workers: int, scheduler: str | None
+    people: "Sequence[Participant]", workers: int | None, scheduler: str | None
 ) -> "pd.DataFrame":
     import pandas as pd
 
