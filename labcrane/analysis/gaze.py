@@ -60,8 +60,10 @@ class Looks:
 def looks(session: SessionRecord) -> Looks | None:
     """Return what a session's gaze stream says, or None when it has none."""
     for stream in session.streams.values():
-        if stream.attrs.get("type") == KIND and CHANNEL in stream.data:
-            return Looks(stream.time, [area_name(value) for value in stream.data[CHANNEL]])
+        if stream.attrs.get("type") == KIND and CHANNEL in stream.units:
+            values = stream.values([CHANNEL])[CHANNEL].tolist()
+            names = {value: area_name(value) for value in set(values)}  # each name is kept once
+            return Looks(stream.time, [names[value] for value in values])
     return None
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from labcrane.analysis.cohort import Participant
 from labcrane.analysis.gaze import gaze_measures, looks
-from labcrane.analysis.movements import Groups, Movement, cut, groups, machine_of
+from labcrane.analysis.movements import Groups, Movement, cut, machine_of, movements_of
 from labcrane.analysis.smoothness import ldlj, path_ratio, sparc, sub_movements
 from labcrane.analysis.sticks import coordination, effort, limit_hits, reversals, stick_use
 from labcrane.analysis.tables.definitions import MEASURES
@@ -134,7 +134,7 @@ def measure_session(
     rate_hz = float(session.attrs["rate_hz"])
     seen = looks(session)
     rows = []
-    for movement in cut(frames or groups(session), trials, rate_hz):
+    for movement in cut(frames, trials, rate_hz) if frames else movements_of(session):
         row = measure(movement, machine, settings)
         span = movement.span
         if seen is not None and span is not None:

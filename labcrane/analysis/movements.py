@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from labcrane.files.yaml import parse_yaml
 from labcrane.machines.machine import Machine
@@ -19,6 +20,9 @@ Groups = Mapping[str, "pd.DataFrame"]
 """The columns of loop, input, command and state, one row per tick."""
 
 ROUNDING_S = 1e-9
+
+TICKS = 1 << 16
+"""Of a session, so many are in memory at a time; more where one trial has more."""
 
 USED: Mapping[str, tuple[str, ...]] = {
     "loop": ("due", "trial", "paused", "elapsed"),
@@ -87,15 +91,17 @@ class Movement:
         return np.array([self.result(f"{name}_{axis}") for axis in "xyz"])
 
 
-def groups(session: SessionRecord) -> dict[str, "pd.DataFrame"]:
-    """Read what a session's movements are cut out of, and nothing else."""
+def groups(
+    session: SessionRecord, start: int = 0, stop: int | None = None
+) -> dict[str, "pd.DataFrame"]:
+    """Read what movements are cut out of in some of a session's ticks, and nothing else."""
     import pandas as pd
 
     found = {}
     for group, wanted in USED.items():
         stream = session.streams[group]
         names = [name for name in stream.units if not wanted or _is_of(name, wanted)]
-        found[group] = pd.DataFrame(stream.columns(names), copy=False)
+        found[group] = pd.DataFrame(stream.columns(names, start, stop), copy=False)
     return found
 
 
@@ -107,8 +113,43 @@ def machine_of(session: SessionRecord) -> Machine:
 
 
 def movements_of(session: SessionRecord) -> Iterator[Movement]:
-    """Yield the movement of each row of a session's trial table."""
-    return cut(groups(session), session.trials, float(session.attrs["rate_hz"]))
+    """Yield the movement of each row of a session's trial table.
+
+    However long the session, so many ticks are in memory as the longest trial has, or
+    :data:`TICKS`.
+    """
+    trials, rate_hz = session.trials, float(session.attrs["rate_hz"])
+    if trials.empty:  # of a session that ended before its first result, without columns
+        return
+    first, last = _ticks_of(session, trials)
+    at = 0
+    while at < len(trials):
+        begin, after = first[at], at + 1
+        while after < len(trials) and begin <= first[after] and last[after] <= begin + TICKS:
+            after += 1
+        # Trials in one piece of the file: each piece is unpacked but once or twice.
+        frames = groups(session, begin, int(last[at:after].max()))
+        yield from cut(frames, trials.iloc[at:after], rate_hz)
+        at = after
+
+
+def _ticks_of(
+    session: SessionRecord, trials: "pd.DataFrame"
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Return the first tick of each trial, and the one after its last, counted from 0."""
+    edges = _edges(trials)
+    found = np.zeros(edges.shape, np.intp)
+    loop = session.streams["loop"]
+    for at in range(0, len(loop), TICKS):
+        found += np.searchsorted(loop.column("due", at, at + TICKS), edges)
+    return found[0], found[1]
+
+
+def _edges(trials: "pd.DataFrame") -> FloatArray:
+    """Return when trials began and ended, shape ``(2, n_trials)``."""
+    edges = _array(trials, ["started", "ended"]).T
+    wide: FloatArray = edges + np.array([[-ROUNDING_S], [ROUNDING_S]])
+    return wide
 
 
 def cut(frames: Groups, trials: "pd.DataFrame", rate_hz: float) -> Iterator[Movement]:
@@ -120,10 +161,8 @@ def cut(frames: Groups, trials: "pd.DataFrame", rate_hz: float) -> Iterator[Move
     tip, velocity, angles = (_array(state, _below(state, name)) for name in USED["state"])
     command = _array(frames["command"], _below(frames["command"], "command"))
     axes = {name: _array(frames["input"], [name])[:, 0] for name in map(str, frames["input"])}
-    for row in trials.to_dict("records"):
-        first, last = np.searchsorted(
-            due, [float(row["started"]) - ROUNDING_S, float(row["ended"]) + ROUNDING_S]
-        )
+    for row, edges in zip(trials.to_dict("records"), _edges(trials).T, strict=True):
+        first, last = np.searchsorted(due, edges)
         ticks = np.arange(first, last)
         ticks = ticks[running[ticks] & (trial[ticks] == row["trial"])]
         yield Movement(

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.indicator import Indicator, Performance, indicate
 from labcrane.analysis.indicator_settings import IndicatorSettings
-from labcrane.errors import RecordingError
+from labcrane.errors import LabcraneError, RecordingError
 from labcrane.recording.participant_file.reader import Recording, SessionRecord
+from labcrane.recording.participant_file.writer import DAMAGED
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -65,7 +66,7 @@ def operator_tests(
 ) -> list[OperatorTest]:
     """Return all tests of who is included, by operator, session and time.
 
-    Tests without a reference are left out, and those of all others scored.
+    Tests without a reference are left out, as are damaged recordings, and all others scored.
 
     Parameters
     ----------
@@ -86,7 +87,12 @@ def operator_tests(
         missing.append((name, why))
         leave_out(name, why)
 
-    tests = [test for person in people for test in _tests(person.recording, settings, without)]
+    tests: list[OperatorTest] = []
+    for person in people:
+        try:
+            tests += _tests(person.recording, settings, without)
+        except (LabcraneError, *DAMAGED) as error:  # one recording never stops a cohort
+            without(person.name, f"cannot be read: {error}")
     if not tests and missing:
         raise RecordingError("; ".join(f"{name} {why}" for name, why in missing))
     if not tests:

@@ -16,7 +16,7 @@ from labcrane_bids.dataset import (
 )
 from labcrane_bids.eeg import eeg_description, write_eeg
 from labcrane_bids.events import event_description, event_table
-from labcrane_bids.files import label, write_bare_tsv, write_json, write_tsv
+from labcrane_bids.files import first_tick, label, write_bare_tsv, write_json, write_tsv
 from labcrane_bids.motion import TrackingSystem, tracking_systems
 from labcrane_bids.phenotype import Phenotype
 from labcrane_bids.physio import continuous_recordings, left_out
@@ -78,7 +78,7 @@ class Bids(Exporter):
         context = session.context
         task = label(str(context.get("session_name", "")) or "crane")
         named = f"{stem}_task-{task}"
-        zero = session.streams["state"].time[0]
+        zero = first_tick(session)
         scans = []
         for system in tracking_systems(session, self._settings.every):
             path = at / "motion" / f"{named}_tracksys-{system.label}_motion"
@@ -112,17 +112,17 @@ class Bids(Exporter):
     def _motion(
         self, path: Path, system: TrackingSystem, session: SessionRecord, task: str
     ) -> None:
-        write_bare_tsv(path.with_name(f"{path.name}.tsv"), system.samples)
+        write_bare_tsv(path.with_name(f"{path.name}.tsv"), system.samples())
         channels = path.with_name(f"{path.name.removesuffix('_motion')}_channels.tsv")
         write_tsv(channels, system.channels)
         rate_hz = float(session.attrs["rate_hz"]) / self._settings.every
-        seconds = float(system.samples["latency"].iloc[-1]) if len(system.samples) else 0.0
+        seconds = system.seconds
         about: dict[str, Any] = {
             "TaskName": task,
             "TaskDescription": str(session.context.get("title", "")),
             "SamplingFrequency": rate_hz,
             "SamplingFrequencyEffective": (
-                (len(system.samples) - 1) / seconds if seconds > 0.0 else rate_hz
+                (system.count - 1) / seconds if seconds > 0.0 else rate_hz
             ),
             "TrackingSystemName": system.label,
             "DeviceSerialNumber": "n/a",

@@ -1,14 +1,15 @@
 """EEG: each stream of that type as BrainVision files, with channels and events beside them."""
 
-import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from labcrane import PluginError
-from labcrane.analysis import EEG_READERS, Sampled, channel_types, sampled, volts
+import numpy as np
+
+from labcrane.analysis import Sampled, channel_types, sampled, volts
 from labcrane.recording import SessionRecord, Stream
-from labcrane_bids.files import MISSING, write_json, write_tsv
+from labcrane_bids.brainvision import write_brainvision
+from labcrane_bids.files import MISSING, first_tick, write_json, write_tsv
 from labcrane_bids.settings import BidsSettings
 
 if TYPE_CHECKING:
@@ -42,13 +43,6 @@ def write_eeg(
     events
         The session's, in order, with an onset in seconds from the session's first tick.
     """
-    try:
-        import pybv
-    except ImportError as error:
-        raise PluginError(
-            f"stream {stream.name!r} is EEG, and pybv, which writes that, is not installed: "
-            f"{EEG_READERS}"
-        ) from error
     signal = sampled(stream)
     kinds = [TYPES[kind] for kind in channel_types(signal, stream)]
     scale = volts(signal, stream, settings.eeg_unit)
@@ -58,22 +52,15 @@ def write_eeg(
     )]  # fmt: skip
     path.parent.mkdir(exist_ok=True)
     table = _events(events, signal, session)
-    with warnings.catch_warnings():
-        # What is no voltage is not scaled; channels.tsv says what it is.
-        warnings.filterwarnings("ignore", "Encountered unsupported non-voltage units")
-        pybv.write_brainvision(
-            data=signal.data.T * scale[:, None],
-            sfreq=signal.rate_hz,
-            ch_names=list(signal.labels),
-            fname_base=path.name,
-            folder_out=path.parent,
-            events=[
-                {"onset": int(row["sample"]), "description": row["trial_type"], "type": "Comment"}
-                for row in table.to_dict("records")
-            ],
-            resolution=1.0,  # so that float32 in microvolts is what was recorded
-            unit=units,
-        )
+    # What is no voltage is not scaled; channels.tsv says what it is.
+    factors = np.where(electric, 1e6 * scale, scale)
+    write_brainvision(
+        path,
+        (piece * factors for piece in signal.pieces()),
+        signal.rate_hz,
+        list(zip(signal.labels, units, strict=True)),
+        list(zip(table["sample"], table["trial_type"], strict=True)),
+    )
     stem = path.name.removesuffix("_eeg")
     write_tsv(path.with_name(f"{stem}_events.tsv"), table)
     write_tsv(path.with_name(f"{stem}_channels.tsv"), _channels(signal, kinds, units))
@@ -102,7 +89,7 @@ def _events(events: "pd.DataFrame", signal: Sampled, session: SessionRecord) -> 
     """Return the events within the recording, at its samples; and where samples are missing."""
     import pandas as pd
 
-    zero = session.streams["state"].time[0]
+    zero = first_tick(session)
     positions = signal.at(events["onset"].to_numpy() + zero)
     there = events.assign(onset=positions / signal.rate_hz)[pd.notna(positions)]
     gaps = pd.DataFrame({"onset": signal.gaps / signal.rate_hz, "duration": 0.0})

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING, Any
 
 from labcrane.recording import SessionRecord, hed_sidecar, labelled, name_of
+from labcrane_bids.files import first_tick
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,7 +30,7 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
     """
     import pandas as pd
 
-    zero = session.streams["state"].time[0]
+    zero = first_tick(session)
     events = session.events.sort_values("time", kind="stable")
     trials = session.trials
     ended = {(row["trial"], row["attempt"]): row for _, row in trials.iterrows()}

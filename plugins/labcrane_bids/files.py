@@ -1,19 +1,34 @@
 """File names, tables and descriptions as BIDS writes them."""
 
+import gzip
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+
+from labcrane.recording import SessionRecord
+from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
+    import pyarrow as pa
 
 MISSING = "n/a"
+
+ROWS = 1 << 16
+"""Samples that are in memory at a time."""
 
 
 def label(text: str) -> str:
     """Return a value of an entity: letters and digits only."""
     return "".join(letter for letter in text if letter.isascii() and letter.isalnum())
+
+
+def first_tick(session: SessionRecord) -> float:
+    """Return when a session's first tick was, in seconds on its clock."""
+    return float(session.streams["state"].column("time", 0, 1)[0])
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
@@ -27,22 +42,40 @@ def write_tsv(path: Path, table: "pd.DataFrame") -> None:
     path.write_text(text, encoding="utf-8")
 
 
-def write_bare_tsv(path: Path, table: "pd.DataFrame") -> None:
-    """Write numbers without a header, as motion and physio files are; compressed for .gz."""
-    import gzip
-    import io
+def write_bare_tsv(path: Path, pieces: Iterable[Sequence[FloatArray]]) -> None:
+    """Write numbers without a header, as motion and physio files are; compressed for .gz.
 
+    Parameters
+    ----------
+    pieces
+        Columns of some rows, one piece after another: nothing longer need be in memory.
+    """
+    with path.open("wb") as file:
+        if path.suffix != ".gz":
+            _write_rows(file, pieces)
+            return
+        # Without a name and a time in its head, the same data are the same file.
+        with gzip.GzipFile(filename="", mode="wb", fileobj=file, mtime=0) as packed:
+            _write_rows(packed, pieces)
+
+
+def _write_rows(file: BinaryIO | gzip.GzipFile, pieces: Iterable[Sequence[FloatArray]]) -> None:
     import pyarrow as pa
     from pyarrow import csv
 
-    out = io.BytesIO()
-    rows = pa.Table.from_pandas(table, preserve_index=False)
-    csv.write_csv(rows, out, csv.WriteOptions(include_header=False, delimiter="\t"))
-    text = out.getvalue()
-    if table.isna().to_numpy().any():
-        # Arrow writes what is missing as nothing; a lone n/a is what BIDS wants there.
-        text = table.to_csv(
-            sep="\t", index=False, header=False, na_rep=MISSING, lineterminator="\n"
-        ).encode()
-    # Without a time in its head, the same data are the same file.
-    path.write_bytes(gzip.compress(text, mtime=0) if path.suffix == ".gz" else text)
+    options = csv.WriteOptions(include_header=False, delimiter="\t", quoting_style="none")
+    for piece in pieces:
+        rows = pa.table({str(n): _words(each) for n, each in enumerate(piece)})
+        csv.write_csv(rows, file, options)
+
+
+def _words(values: FloatArray) -> "pa.Array":
+    """Return numbers as Arrow writes them; what is missing is n/a."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    numbers = pa.array(values)
+    missing = np.isnan(values)
+    if not missing.any():
+        return numbers
+    return pc.if_else(pa.array(missing), MISSING, numbers.cast(pa.string()))

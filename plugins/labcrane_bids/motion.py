@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from labcrane.recording import SessionRecord, Stream
+from labcrane.types import FloatArray
+from labcrane_bids.files import ROWS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,23 +28,38 @@ class TrackingSystem:
     description
         What it is.
     channels
-        One row per column of ``samples``: name, component, type, tracked_point, units.
-    samples
-        One row per tick; the first column is the time since the first tick, in seconds.
+        One row per column of its samples: name, component, type, tracked_point, units.
+    count
+        Samples, of which every so many is one of the session's ticks.
+    seconds
+        From the first sample to the last.
     """
 
     label: str
     description: str
     channels: "pd.DataFrame"
-    samples: "pd.DataFrame"
+    count: int
+    seconds: float
+    _stream: Stream
+    _columns: list[str]
+    _every: int
+
+    def samples(self) -> Iterator[list[FloatArray]]:
+        """Yield the samples' columns, a piece at a time; the first is seconds from sample 0."""
+        stream, (zero,) = self._stream, self._stream.column("time", 0, 1)
+        ticks = ROWS - ROWS % self._every or self._every  # so that each piece begins with a sample
+        for at in range(0, len(stream), ticks):
+            values = stream.values(self._columns, at, at + ticks)
+            time = stream.column("time", at, at + ticks) - zero
+            yield [each[:: self._every] for each in (time, *values.values())]
 
 
 def tracking_systems(session: SessionRecord, every: int) -> Iterator[TrackingSystem]:
     """Yield the crane, and each stick of the operator."""
     state, axes = session.streams["state"], session.streams["input"]
-    yield _system("crane", "the simulated machine", state, list(map(str, state.data)), every)
+    yield _system("crane", "the simulated machine", state, list(state.units), every)
     sticks: dict[str, list[str]] = {}
-    for column in map(str, axes.data):
+    for column in axes.units:
         sticks.setdefault(column.rpartition(".")[0] or "input", []).append(column)
     for stick, columns in sticks.items():
         name = {"left": "joyL", "right": "joyR"}.get(stick, "".join(filter(str.isalnum, stick)))
@@ -62,9 +79,11 @@ def _system(
         component = part if part in AXES else "n/a"
         rows.append((column, component, kind, point, _unit(stream.units[column])))
     channels = pd.DataFrame(rows, columns=["name", "component", "type", "tracked_point", "units"])
-    samples = stream.data[columns].iloc[::every].copy()
-    samples.insert(0, LATENCY, stream.time[::every] - stream.time[0])
-    return TrackingSystem(label, description, channels, samples)
+    count = -(-len(stream) // every)
+    last = (count - 1) * every
+    ends = [stream.column("time", at, at + 1) for at in (0, last)] if count else []
+    seconds = float(ends[1][0] - ends[0][0]) if ends else 0.0
+    return TrackingSystem(label, description, channels, count, seconds, stream, columns, every)
 
 
 def _unit(unit: str) -> str:

@@ -1,17 +1,15 @@
 """Physio: gaze and other streams of numbers at a rate, each as a recording of its own."""
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from labcrane.analysis import eeg_streams
 from labcrane.recording import SessionRecord, Stream
-from labcrane_bids.files import MISSING, label
+from labcrane.types import FloatArray
+from labcrane_bids.files import MISSING, ROWS, first_tick, label
 from labcrane_bids.settings import BidsSettings
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 GAZE = "Gaze"
 KNOWN = {
@@ -33,9 +31,9 @@ SYSTEMS = {
 
 def continuous_recordings(
     session: SessionRecord, settings: BidsSettings
-) -> Iterator[tuple[str, "pd.DataFrame", dict[str, Any]]]:
+) -> Iterator[tuple[str, Iterator[list[FloatArray]], dict[str, Any]]]:
     """Yield recording label, samples and description of each stream that is no EEG."""
-    zero = session.streams["state"].time[0]
+    zero = first_tick(session)
     eyes = 0
     for stream in _others(session):
         gaze = stream.attrs.get("type") == GAZE
@@ -74,19 +72,16 @@ def _rate(stream: Stream) -> float:
 
 def _recording(
     stream: Stream, zero: float, settings: BidsSettings, *, gaze: bool
-) -> tuple["pd.DataFrame", dict[str, Any]]:
-    numbers = stream.data.select_dtypes("number")
-    labels = [str(name) for name in numbers]
+) -> tuple[Iterator[list[FloatArray]], dict[str, Any]]:
+    labels = stream.numeric
     called = [KNOWN.get(name, name) for name in labels] if gaze else labels
-    samples = numbers.set_axis(called, axis=1)
-    samples.insert(0, "timestamp", stream.time - zero)
     rate_hz = _rate(stream)
-    if rate_hz == 0.0 and len(stream.time) > 1:
-        rate_hz = float(1.0 / np.median(np.diff(stream.time)))
-    columns = list(map(str, samples))
+    if rate_hz == 0.0 and len(stream) > 1:
+        rate_hz = float(1.0 / np.median(np.diff(stream.column("time"))))
+    columns = ["timestamp", *called]
     about: dict[str, Any] = {
         "SamplingFrequency": rate_hz,
-        "StartTime": float(samples["timestamp"].iloc[0]) if len(samples) else 0.0,
+        "StartTime": float(stream.column("time", 0, 1)[0] - zero) if len(stream) else 0.0,
         "Columns": columns,
         "PhysioType": "eyetrack" if gaze else "generic",
         "Manufacturer": str(stream.attrs.get("source_id", MISSING)) or MISSING,
@@ -98,4 +93,11 @@ def _recording(
     units = ["s", *(stream.units[name] or "arbitrary" for name in labels)]
     for column, unit in zip(columns, units, strict=True):
         about[column] = {"Description": column.replace("_", " "), "Units": unit}
-    return samples, about
+    return _samples(stream, zero, labels), about
+
+
+def _samples(stream: Stream, zero: float, labels: list[str]) -> Iterator[list[FloatArray]]:
+    """Yield time and channels, a piece at a time."""
+    for at in range(0, len(stream), ROWS):
+        values = stream.values(labels, at, at + ROWS)
+        yield [stream.column("time", at, at + ROWS) - zero, *values.values()]

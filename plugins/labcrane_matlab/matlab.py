@@ -1,7 +1,8 @@
 """One MAT file per participant, and the function that loads them all."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from shutil import copyfile
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,8 @@ from labcrane.analysis import (
     measures_of,
     scores_of,
 )
-from labcrane.recording import SessionRecord
+from labcrane.recording import SessionRecord, Stream
+from labcrane_matlab.mat5 import Element, cells, numbers, struct, text, texts, write_mat
 from labcrane_matlab.settings import MatlabSettings
 
 if TYPE_CHECKING:
@@ -30,6 +32,9 @@ LONGEST = 63
 
 LARGEST = 2**31 - 1
 """Bytes in a variable of a MAT file of version 5."""
+
+ROWS = 1 << 16
+"""Samples of one column that are in memory at a time."""
 
 
 class Matlab(Exporter):
@@ -45,74 +50,104 @@ class Matlab(Exporter):
         self._settings = settings
 
     def export(self, participants: Iterable[Participant], folder: Path) -> None:
-        from scipy.io import savemat
-
         for participant in participants:
-            measures = beside_trials(measures_of(participant), participant)
-            book = codebook_of(participant, measures)
-            trials = book[book["table"] == "trials"]
-            content = {
-                "participant": participant.name,
-                "status": str(participant.status),
-                "why": participant.why,
+            content = self._content(participant)
+            _refuse_large(participant.name, content)
+            write_mat(folder / f"{participant.name}.mat", "labcrane", content)
+        copyfile(Path(__file__).with_name(READER), folder / READER)
+
+    def _content(self, participant: Participant) -> Element:
+        measures = beside_trials(measures_of(participant), participant)
+        book = codebook_of(participant, measures)
+        trials = book[book["table"] == "trials"]
+        return struct(
+            {
+                "participant": text(participant.name),
+                "status": text(str(participant.status)),
+                "why": text(participant.why),
                 "trials": columns(measures),
                 "questionnaires": columns(answers_of(participant)),
                 "scores": columns(scores_of(participant)),
                 "units": _units(dict(zip(trials["column"], trials["unit"], strict=True))),
-                "sessions": np.array(
-                    [self._session(number, record) for number, record in participant.sessions()],
-                    object,
+                "sessions": cells(
+                    [self._session(number, record) for number, record in participant.sessions()]
                 ),
             }
-            _refuse_large(participant.name, content["sessions"])
-            savemat(
-                folder / f"{participant.name}.mat",
-                {"labcrane": content},
-                long_field_names=True,
-                do_compression=True,
-                oned_as="column",
-            )
-        copyfile(Path(__file__).with_name(READER), folder / READER)
+        )
 
-    def _session(self, number: int, session: SessionRecord) -> dict[str, Any]:
+    def _session(self, number: int, session: SessionRecord) -> Element:
         events = session.events.copy()
         events["data"] = [
             "{}" if name == "session.start" else json.dumps(data, ensure_ascii=False)
             for name, data in zip(events["name"], events["data"], strict=True)
         ]
-        content: dict[str, Any] = {
-            "number": float(number),
-            "rate_hz": float(session.attrs["rate_hz"]),
-            "started": str(session.attrs.get("started", "")),
+        content = {
+            "number": _number(number),
+            "rate_hz": _number(float(session.attrs["rate_hz"])),
+            "started": text(str(session.attrs.get("started", ""))),
             "events": columns(events),
             "annotations": columns(session.annotations),
         }
         if self._settings.streams:
             names = fields(list(session.streams))
-            content["streams"] = {
-                field: {
-                    "name": name,
-                    "time": stream.time,
-                    "data": columns(stream.data),
-                    "units": _units(stream.units),
+            streams = zip(names, session.streams.values(), strict=True)
+            content["streams"] = struct({field: _stream(stream) for field, stream in streams})
+        return struct(content)
+
+
+def _stream(stream: Stream) -> Element:
+    """Return a stream, whose columns are read while they are written."""
+    names, count = list(stream.units), len(stream)
+    return struct(
+        {
+            "name": text(stream.name),
+            "time": _read(count, lambda cut: stream.column("time", cut.start, cut.stop)),
+            "data": struct(
+                {
+                    field: _read(count, partial(_channel, stream, name))
+                    for field, name in zip(fields(names), names, strict=True)
                 }
-                for field, (name, stream) in zip(names, session.streams.items(), strict=True)
-            }
-        return content
+            ),
+            "units": _units(stream.units),
+        }
+    )
 
 
-def columns(table: "pd.DataFrame") -> dict[str, Any]:
+def _channel(stream: Stream, name: str, cut: slice) -> Any:
+    return stream.values([name], cut.start, cut.stop)[name]
+
+
+def _read(count: int, read: Callable[[slice], Any]) -> Element:
+    """Return a column of a stream, a piece of which ``read`` reads."""
+
+    def pieces() -> Iterator[Any]:
+        for at in range(0, count, ROWS):
+            yield read(slice(at, at + ROWS))
+
+    if read(slice(0, 1)).dtype.kind in "fiub":
+        return numbers(count, pieces)
+    return texts(count, lambda: (_cell(value) for piece in pieces() for value in piece))
+
+
+def columns(table: "pd.DataFrame") -> Element:
     """Return a table as a struct of columns: numbers as doubles, everything else as cells."""
     named = zip(fields([str(name) for name in table]), table, strict=True)
-    return {field: _column(table[name]) for field, name in named}
+    return struct({field: _column(table[name]) for field, name in named})
 
 
-def _column(values: "pd.Series[Any]") -> Any:
+def _column(values: "pd.Series[Any]") -> Element:
     if values.dtype.kind in "fiub":
-        return values.to_numpy(np.float64)
-    cells = np.empty(len(values), object)
-    cells[:] = ["" if value is None or value != value else str(value) for value in values]  # noqa: PLR0124 - NaN
-    return cells
+        doubles = values.to_numpy(np.float64)
+        return numbers(len(doubles), lambda: [doubles])
+    return texts(len(values), lambda: map(_cell, values))
+
+
+def _cell(value: Any) -> str:
+    return "" if value is None or value != value else str(value)  # noqa: PLR0124 - NaN
+
+
+def _number(value: float) -> Element:
+    return numbers(1, lambda: [np.array([value])])
 
 
 def fields(names: list[str]) -> list[str]:
@@ -129,22 +164,14 @@ def fields(names: list[str]) -> list[str]:
     return taken
 
 
-def _units(units: dict[str, str]) -> dict[str, str]:
-    return dict(zip(fields(list(units)), units.values(), strict=True))
+def _units(units: dict[str, str]) -> Element:
+    named = zip(fields(list(units)), units.values(), strict=True)
+    return struct({field: text(unit) for field, unit in named})
 
 
-def _refuse_large(name: str, sessions: Any) -> None:
-    size = _bytes(sessions.tolist())
-    if size > LARGEST:
+def _refuse_large(name: str, content: Element) -> None:
+    if content.size > LARGEST:
         raise RecordingError(
-            f"{name} has {size / 1e9:.1f} GB of numbers; a MAT file of version 5 holds 2 GB: read "
-            "the participant file itself with h5read, or export with --set streams=false"
+            f"{name} has {content.size / 1e9:.1f} GB of numbers; a MAT file of version 5 holds 2 "
+            "GB: read the participant file itself with h5read, or export with --set streams=false"
         )
-
-
-def _bytes(value: Any) -> int:
-    if isinstance(value, dict):
-        return sum(map(_bytes, value.values()))
-    if isinstance(value, list):
-        return sum(map(_bytes, value))
-    return int(value.nbytes) if isinstance(value, np.ndarray) else 0

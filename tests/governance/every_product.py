@@ -21,7 +21,7 @@ from pyarrow import parquet
 from labcrane.analysis.indicator import Performance, indicate
 from labcrane.analysis.indicator_settings import IndicatorSettings
 from labcrane.analysis.operator_tests import OperatorTest
-from labcrane.analysis.report.workbook import write_workbook
+from labcrane.analysis.report.workbook import write_csv, write_workbook
 from labcrane.cli.app import main
 from labcrane.cli.commands import simulate
 from labcrane.participants import recovery
@@ -91,6 +91,7 @@ def _workbook(lab: Lab, path: Path) -> None:
     """Write what ``score`` writes of scenarios, which this study has none of."""
     with product(lab.places.root, "score", path.parent, PEOPLE, TODAY, whole=True) as made:
         write_workbook(_tests(), made.folder / path.name)
+        write_csv(_tests(), made.folder / path.with_suffix(".csv").name)
 
 
 def _tests() -> list[OperatorTest]:
@@ -194,12 +195,40 @@ def killed_and_finished(
     """
     draws, killed = random.Random(seed), 0
     for _ in range(kills):
-        lab = snapshot.put_back()
-        killed += killed_at(draws.randint(1, 120), lambda lab=lab: work(lab))
-        if is_done(lab):
-            recovery.move(lab.places, snapshot._folder / "store")
-        else:
-            work(lab)
-        assert read(lab.places).work is None
+        killed += _killed_and_finished(snapshot, draws.randint(1, 120), work, is_done, check)
+    return killed
+
+
+def killed_at_every_write(
+    snapshot: Snapshot,
+    work: Callable[[Lab], object],
+    is_done: Callable[[Lab], bool],
+    check: Callable[[Lab], None],
+) -> int:
+    """Kill ``work`` at its first write, then at its second one, until it ends; return how many."""
+    number = 1
+    while _killed_and_finished(snapshot, number, work, is_done, check):
+        number += 1
+    return number - 1
+
+
+def _killed_and_finished(
+    snapshot: Snapshot,
+    number: int,
+    work: Callable[[Lab], object],
+    is_done: Callable[[Lab], bool],
+    check: Callable[[Lab], None],
+) -> bool:
+    lab = snapshot.put_back()
+    killed = killed_at(number, lambda: work(lab))
+    if is_done(lab):
+        recovery.move(lab.places, snapshot._folder / "store")
+    else:
+        work(lab)
+    assert read(lab.places).work is None
+    try:
         check(lab)
+    except AssertionError as error:
+        error.add_note(f"killed before write {number}")
+        raise
     return killed

@@ -16,6 +16,7 @@ from governance.every_product import (
     everything,
     files,
     killed_and_finished,
+    killed_at_every_write,
     own,
     says,
 )
@@ -56,7 +57,7 @@ def erased(lab: Lab, name: str, before: dict[str, dict[str, str]]) -> None:
     assert (elsewhere / "tables" / "read.R").is_file()
     assert (lab.places.exports / "psychds" / "dataset_description.json").is_file()
     assert list((elsewhere / "report").rglob("*")) == []
-    assert not (lab.places.root / "evaluation.xlsx").exists()
+    assert not list(lab.places.root.glob("evaluation.*"))
     assert list((elsewhere / "power").rglob("*")) == []
     planned = pd.read_csv(elsewhere / "plan.csv")["participant"]
     assert list(planned) == [each for each in ("P001", "P002", "P003", "P004") if each != name]
@@ -87,6 +88,7 @@ def test_nothing_of_an_erased_person_is_left_and_nothing_of_others_is_touched(
     lab = made.put_back()
     before = {other: own(root_of(lab), other) for other in PEOPLE}
     assert all(len(each) > 15 for each in before.values())
+    assert len(list(lab.places.root.glob("evaluation.*"))) == 2
     assert sum(says(path, name) for path in root_of(lab).rglob("*") if path.is_file()) > 25
     done = recovery.erase(lab.places, name, REASON, TODAY)
     erased(lab, name, before)
@@ -124,18 +126,16 @@ def test_an_erasure_killed_at_random_writes_is_finished_by_the_next_call(made: S
 
 
 @pytest.mark.soak
-def test_an_erasure_killed_at_very_many_writes_is_finished_by_the_next_call(
-    made: Snapshot,
-) -> None:
+def test_an_erasure_killed_at_every_write_is_finished_by_the_next_call(made: Snapshot) -> None:
     lab = made.put_back()
     before = {other: own(root_of(lab), other) for other in PEOPLE}
-    killed = killed_and_finished(
-        made, 7, 60,
+    killed = killed_at_every_write(
+        made,
         lambda lab: recovery.erase(lab.places, "VP-001", REASON, TODAY),
         lambda lab: bool(read(lab.places).tombstones),
         lambda lab: erased(lab, "VP-001", before),
-    )  # fmt: skip
-    assert killed > 40
+    )
+    assert killed > 100
 
 
 def relabelled(lab: Lab, before: dict[str, dict[str, str]]) -> None:
@@ -179,6 +179,19 @@ def test_a_relabelling_killed_at_random_writes_is_finished_by_the_next_call(
         lambda lab: relabelled(lab, before),
     )  # fmt: skip
     assert killed >= 2
+
+
+@pytest.mark.soak
+def test_a_relabelling_killed_at_every_write_is_finished_by_the_next_call(made: Snapshot) -> None:
+    lab = made.put_back()
+    before = {other: own(root_of(lab), other) for other in PEOPLE}
+    killed = killed_at_every_write(
+        made,
+        lambda lab: recovery.correct(lab.places, "P001", "P100", "typed wrongly", TODAY),
+        lambda lab: "P100" in read(lab.places).participants and read(lab.places).work is None,
+        lambda lab: relabelled(lab, before),
+    )
+    assert killed > 100
 
 
 @pytest.mark.long

@@ -1,11 +1,14 @@
 """Sampled signal: a stream as its samples, one after another, and which sample a time is at."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from labcrane.errors import RecordingError
+from labcrane.recording.participant_file.columns import CHUNK
 from labcrane.recording.participant_file.reader import Stream
 from labcrane.types import FloatArray
 
@@ -38,8 +41,6 @@ class Sampled:
         one that is off by more than a thousandth.
     time
         Of each sample, in seconds on the session's clock, shape ``(n,)``.
-    data
-        In the channels' units, shape ``(n, n_channels)``.
     gaps
         Numbers of the samples before which some are missing, shape ``(n_gaps,)``.
     """
@@ -49,8 +50,19 @@ class Sampled:
     units: tuple[str, ...]
     rate_hz: float
     time: FloatArray
-    data: FloatArray
     gaps: npt.NDArray[np.intp]
+    _stream: Stream
+
+    @cached_property
+    def data(self) -> FloatArray:
+        """All samples in the channels' units, shape ``(n, n_channels)``, kept in memory."""
+        return np.concatenate([np.empty((0, len(self.labels))), *self.pieces()])
+
+    def pieces(self, rows: int = CHUNK) -> Iterator[FloatArray]:
+        """Yield :attr:`data` by at most so many samples, which are read from the file then."""
+        for at in range(0, len(self.time), rows):
+            values = self._stream.values(self.labels, at, at + rows)
+            yield np.column_stack([values[name] for name in self.labels]).astype(np.float64)
 
     def at(self, times: FloatArray) -> FloatArray:
         """Return the samples at which something happened, counted from 0, with fractions.
@@ -85,13 +97,13 @@ def sampled(stream: Stream) -> Sampled:
             f"stream {stream.name!r} is one of the session's own, or its clock was not corrected, "
             "so that nothing is known to be at any sample of it; labcrane resync tries again"
         )
-    numbers = stream.data.select_dtypes("number")
-    if numbers.shape[1] != stream.data.shape[1] or len(numbers) < 2:  # noqa: PLR2004 - for a rate
+    numeric, count = stream.numeric, len(stream)
+    if len(numeric) != len(stream.units) or count < 2:  # noqa: PLR2004 - for a rate
         raise RecordingError(
-            f"stream {stream.name!r} holds {len(numbers)} samples of {numbers.shape[1]} channels "
+            f"stream {stream.name!r} holds {count} samples of {len(numeric)} channels "
             "of numbers; a signal needs two samples, and numbers alone"
         )
-    time = np.maximum.accumulate(stream.time)
+    time = np.maximum.accumulate(stream.column("time"))
     steps = np.diff(time)
     rate_hz = _rate(header.rate_hz, steps)
     if not rate_hz:
@@ -101,13 +113,13 @@ def sampled(stream: Stream) -> Sampled:
         )
     even = abs(float(np.median(steps)) * rate_hz - 1.0) <= EVEN
     return Sampled(
-        tuple(map(str, numbers)),
+        tuple(numeric),
         tuple(channel.type for channel in header.channels),
         tuple(channel.unit for channel in header.channels),
         rate_hz,
         time,
-        numbers.to_numpy(np.float64),
         1 + np.flatnonzero(steps > (LOST / rate_hz if even else SILENT_S)),
+        stream,
     )
 
 

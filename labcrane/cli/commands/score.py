@@ -64,7 +64,7 @@ def score(
     for each in advice(tests):
         out.print(f"{each.operator}, {each.about}: {each.verdict} ({each.evidence})", markup=False)
     out.print(f"workbook: {path}, and its tests as {path.with_suffix('.csv').name}", markup=False)
-    if left_out:
+    if left_out or cohort.unreadable:
         raise typer.Exit(LEFT_OUT)
 
 

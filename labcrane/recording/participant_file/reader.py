@@ -136,6 +136,28 @@ class Stream:
                     )
         return found
 
+    def values(
+        self, names: Sequence[str], start: int = 0, stop: int | None = None
+    ) -> dict[str, npt.NDArray[Any]]:
+        """Return samples ``start`` to ``stop`` of channels by name.
+
+        Unlike in :meth:`columns`, ``"time"`` is the channel that a source calls so.
+        """
+        with reading(self._path) as file:
+            chosen = {name: file[self._paths[name]] for name in names}
+            return {
+                name: np.asarray(
+                    each.asstr("utf-8")[start:stop] if holds_texts(each) else each[start:stop]
+                )
+                for name, each in chosen.items()
+            }
+
+    @cached_property
+    def numeric(self) -> list[str]:
+        """Names of the channels that hold numbers, in their order."""
+        with reading(self._path) as file:
+            return [name for name, path in self._paths.items() if file[path].dtype.kind in "fiu"]
+
     def batches(
         self,
         columns: Sequence[str] | None = None,
