@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from datetime import date
 from difflib import get_close_matches
 from math import isfinite
-from typing import Any
+from types import UnionType
+from typing import Any, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -171,7 +172,7 @@ def _number(error: ErrorDetails, model: type[BaseModel], what: str) -> str:
     if isinstance(error["input"], str) and _COMMA.fullmatch(error["input"]):
         return f"{what}; write decimals with a point: {error['input'].strip().replace(',', '.')}"
     keys = [step for step in error["loc"] if isinstance(step, str) and not is_member(step)]
-    field = _field(model, error["loc"])
+    field = field_at(model, error["loc"])
     unit = unit_of(keys[-1], field.metadata) if field and keys else None
     return f"{what} in {unit}, or one with its unit, as {EXAMPLES[unit]}" if unit else what
 
@@ -258,7 +259,7 @@ def _keys(model: type[BaseModel], place: Place) -> list[str]:
     return list(inside.model_fields) if inside else []
 
 
-def _field(model: type[BaseModel], loc: Place) -> FieldInfo | None:
+def field_at(model: type[BaseModel], loc: Place) -> FieldInfo | None:
     """Return the field of the last key of a place; None where it is no model's."""
     keys = [at for at, step in enumerate(loc) if isinstance(step, str) and not is_member(step)]
     holder = _model_at(model, loc[: keys[-1]]) if keys else None
@@ -271,15 +272,22 @@ def _model_at(model: type[BaseModel], place: Place) -> type[BaseModel] | None:
         if isinstance(step, int) or is_member(step):
             continue
         annotation = fields.model_fields[step].annotation if step in fields.model_fields else None
-        nested = [a for a in (annotation, *getattr(annotation, "__args__", ())) if _is_model(a)]
+        nested = list(_models(annotation))
         if not nested:
             return None
         fields = nested[0]
     return fields  # type: ignore[no-any-return]  # a model, or one in a field of it
 
 
-def _is_model(annotation: Any) -> bool:
-    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+def _models(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Yield the models that are an annotation, one of its members, or its items."""
+    if hasattr(annotation, "__metadata__"):
+        annotation = annotation.__origin__
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    elif get_origin(annotation) in {tuple, list, Union, UnionType}:
+        for each in get_args(annotation):
+            yield from _models(each)
 
 
 def named(place: Place) -> str:

@@ -1,7 +1,7 @@
 """References of components' settings, looked up among all that the protocol's components name."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from functools import cached_property
 from os.path import normpath
@@ -57,12 +57,15 @@ class Parts:
         The tasks that could be built.
     sections
         Parts of the protocol that are nobody's components, by their place.
+    faulty
+        Components with wrong numbers, which were noted, and have their defaults here.
     """
 
     machine: Machine
     components: Mapping[Place, ComponentSpec]
     tasks: Mapping[str, Task]
     sections: Mapping[Place, Settings] = field(default_factory=dict)
+    faulty: Set[Place] = frozenset()
 
 
 class ReferenceChecker:
@@ -74,6 +77,7 @@ class ReferenceChecker:
         self._components = parts.components
         self._tasks = parts.tasks
         self._sections = parts.sections
+        self._faulty = parts.faulty
         self._known: dict[str, Known] = {}
         self._noted: set[Place] = set()  # files of which something was said
 
@@ -100,7 +104,9 @@ class ReferenceChecker:
                         message = f"{_dotted(place)} needs the {kind} {name!r}, and "
                         self._source.problem(place, message + _has(kind, name, known))
             if place[0] in READ_BY_BUILDING:
-                self._read(place, choice, faulty=self._source.wrong > before)
+                self._read(
+                    place, choice, faulty=self._source.wrong > before or place in self._faulty
+                )
 
     def _read(self, place: Place, choice: ComponentSpec, *, faulty: bool) -> None:
         """Build what names files, so that what is wrong inside of them is found before a run.

@@ -442,8 +442,10 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
             **{tuple(part.split(".", 1)): choice for part, choice in others.items()},
         }
         there = {place: choice for place, choice in chosen.items() if choice}
+        faulty = chooser.but_for_numbers
         pages: dict[Place, Settings] = {("page",): protocol.page} if protocol else {}
-        references = ReferenceChecker(source, Parts(machine[0], there, tasks, pages))
+        parts = Parts(machine[0], there | faulty, tasks, pages, {*faulty})
+        references = ReferenceChecker(source, parts)
         references.check()
         beyond = tuple(references.beyond_the_operator())
     source.raise_problems()

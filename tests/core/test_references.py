@@ -509,3 +509,32 @@ def test_the_events_of_every_session_are_those_that_its_code_tells() -> None:
         if path.stem != "references"
     )
     assert [event for event in EVENTS if f'"{event}"' not in said] == []
+
+
+@pytest.mark.parametrize(
+    ("study", "old", "new", "said"),
+    [
+        ("aiming", "wrist: right.x, shoulder: -right.y}\n  dead_zone: 0.05", "wrist: right.z, shoulder: -right.y}\n  dead_zone: much", ["scheme.map.wrist is 'right.z'", "scheme.dead_zone is 'much'"]),
+        ("aiming", "end: rest_inside, limit_s: 30", "end: trigger, trigger: left.knob, limit_s: 3 parsnips", ["tasks.aiming.trigger is 'left.knob'", "tasks.aiming.limit_s"]),
+        ("aiming", "camera: cab", "areas: [targt], size: [1280, much], keys: [lft]", ["views.operator.areas[1] is 'targt'", "views.operator.size[2]", "views.operator.keys[1] is 'lft'"]),
+        ("aiming", "camera: cab", "camera: {eye: [1, 2, 3], look: [3, 4, 5], fov_deg: 800, on: bom}", ["views.operator.camera.on is 'bom'", "views.operator.camera.fov_deg is 800"]),
+        ("aiming", "camera: cab", "beside: [{eye: [1, 2, 3], look: [3, 4, 5], delay_s: -1, on: bom}]", ["views.operator.beside[1].on is 'bom'", "views.operator.beside[1].delay_s is -1"]),
+        ("aiming", "at: target, far: 4.0", "at: target, far: -4", ["feedback.ball.far is -4"]),
+    ],
+)  # fmt: skip
+def test_a_wrong_number_hides_no_wrong_name_of_its_component(
+    told, study: str, old: str, new: str, said: Sequence[str]
+) -> None:
+    text = AIMING if study == "aiming" else RETRIEVAL
+    assert old in text
+    lines = told(study, text.replace(old, new, 1))
+    found = [line.split(": ", 1)[1] for line in lines]
+    assert len(found) == len(said), lines
+    assert all(any(line.startswith(each) for line in found) for each in said), lines
+
+
+def test_a_wrong_number_of_the_input_hides_no_wrong_axis_elsewhere(told) -> None:
+    text = RETRIEVAL.replace("jaws: 4}", "jaws: 4}, timeout_s: -1", 1)
+    lines = told("retrieval", text.replace("find_axis: float.base", "find_axis: float.bas", 1))
+    assert any("tasks.retrieval.find_axis is 'float.bas'" in line for line in lines), lines
+    assert any("input.timeout_s is -1" in line for line in lines), lines
