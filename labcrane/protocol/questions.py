@@ -16,6 +16,7 @@ from labcrane.files.system import is_there
 from labcrane.files.yaml import Place
 from labcrane.protocol.components import ComponentSpec
 from labcrane.protocol.effective import written_numbers
+from labcrane.protocol.pages import unserved
 from labcrane.protocol.references import twice
 from labcrane.protocol.steps import READING_S, Block
 from labcrane.protocol.streams import SHARES
@@ -180,13 +181,16 @@ def _doubts(study: Study) -> Doubts:
 
 def _of_the_pages(study: Study) -> Doubts:
     """Question what is the laboratory's, and not here: a check may be made at another desk."""
-    page = study.protocol.page
-    for key, path in (("certificate", page.certificate), ("key", page.key)):
-        if path is not None and not study.recorded and not is_there(study.path.parent / path):
-            yield (
-                ("page", key),
-                f"page.{key} is {str(path)!r}, which is not on this computer",
-            )
+    page, folder = study.protocol.page, study.path.parent
+    if study.recorded or page.certificate is None or page.key is None:
+        return
+    files = {"certificate": folder / page.certificate, "key": folder / page.key}
+    for key, path in files.items():
+        if not is_there(path):
+            written = getattr(page, key)
+            yield ("page", key), f"page.{key} is {str(written)!r}, which is not on this computer"
+    if all(map(is_there, files.values())) and (why := unserved(**files)):
+        yield ("page", "certificate"), why
 
 
 def _of_pattern(study: Study) -> Doubts:

@@ -12,7 +12,7 @@ from labcrane.core.roles import Component, Task
 from labcrane.core.settings import Settings
 from labcrane.errors import LabcraneError, nearest
 from labcrane.files.names import absent, outside
-from labcrane.files.system import is_there
+from labcrane.files.system import is_file, is_there
 from labcrane.files.yaml import Place, YamlFile
 from labcrane.machines.machine import Machine
 from labcrane.protocol.components import ComponentSpec
@@ -128,9 +128,12 @@ class ReferenceChecker:
     def _check_sections(self) -> None:
         """Look up the files that the protocol names beside its components."""
         for place, section in self._sections.items():
+            before = self._source.wrong
             for mention in mentioned(section):
                 if mention.mark == Reference("file"):
                     self._is_there((*place, *mention.place), mention.value)
+            if self._source.wrong == before:
+                list(self._needed(place, section))  # looks into its files
 
     def _refers(
         self, at: Place, mention: Mentioned, mark: Reference, choice: ComponentSpec
@@ -204,6 +207,10 @@ class ReferenceChecker:
             self._source.problem(at, f"{_dotted(at)} is {path.name!r}, and {why}")
         elif not is_there(path):
             self._source.problem(at, f"{_dotted(at)} is {path.name!r}, and {absent(path)}")
+        elif not is_file(path):
+            self._source.problem(
+                at, f"{_dotted(at)} is {path.name!r}, which is a folder; name a file in it"
+            )
         else:
             for each in used(path):
                 if why := outside(each, folder):

@@ -253,9 +253,9 @@ class FreeSettings(Settings):
             return given
         found = _lab_file(given["file"], info)
         if not isinstance(found, dict):
-            raise ValueError(  # noqa: TRY004 - pydantic collects these
-                f"the lab's file {given['file']!r} holds {found!r}; it must hold keys: title, "
-                "questions"
+            raise WrongKey(
+                f"the lab's file {given['file']!r} holds no keys; it must hold title and questions",
+                at=("file",),
             )
         if twice := sorted({*found} & {*given}):
             raise ValueError(

@@ -10,6 +10,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Annotated, Any
 
+import matplotlib
 import pytest
 from ruamel.yaml import YAML
 
@@ -20,6 +21,7 @@ from labcrane.core.references import EVENTS, Mentioned, Reference, mentioned
 from labcrane.core.roles import InputDevice
 from labcrane.machines import load_machine
 from labcrane.protocol.protocol import Participants
+from labcrane.protocol.questions import questions
 from labcrane.protocol.study import Study, load
 from labcrane.registry.registry import Registry, discover
 
@@ -538,3 +540,64 @@ def test_a_wrong_number_of_the_input_hides_no_wrong_axis_elsewhere(told) -> None
     lines = told("retrieval", text.replace("find_axis: float.base", "find_axis: float.bas", 1))
     assert any("tasks.retrieval.find_axis is 'float.bas'" in line for line in lines), lines
     assert any("input.timeout_s is -1" in line for line in lines), lines
+
+
+FOLDER, EMPTY, NOISE = None, b"", b"\x00\x01noise\xff"
+
+
+@pytest.mark.parametrize("holds", [FOLDER, EMPTY, NOISE], ids=["folder", "empty", "noise"])
+@pytest.mark.parametrize(
+    ("old", "new", "name", "said"),
+    [
+        ("camera: cab", "font: a.ttf", "a.ttf", "27:31: "),
+        ("machine: ch8 ", "page: {logo: a.png}\nmachine: ch8 ", "a.png", "10:14: "),
+        ("machine: ch8 ", "page: {logo: a.svg}\nmachine: ch8 ", "a.svg", "10:14: "),
+        ("design:", "questionnaires: {a: {use: free, file: q.yaml}}\ndesign:", "q.yaml", "30:39: "),
+    ],
+)  # fmt: skip
+def test_a_file_that_a_run_would_open_is_looked_into(
+    told, tmp_path: Path, old: str, new: str, name: str, said: str, holds: bytes | None
+) -> None:
+    told("aiming", AIMING)
+    file = tmp_path / "aiming" / name
+    file.mkdir() if holds is None else file.write_bytes(holds)
+    assert AIMING.count(old) == 1
+    (line,) = told("aiming", AIMING.replace(old, new))
+    assert line.startswith(said), line
+    assert re.search(
+        "which is a folder; name|is no font; give|export the picture|cannot be read|holds no keys; it must",
+        line,
+    ), line
+
+
+def test_a_font_that_is_cut_off_is_refused_and_a_whole_one_is_not(told, tmp_path: Path) -> None:
+    told("aiming", AIMING)
+    raw = (Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "STIXGeneral.ttf").read_bytes()
+    text = AIMING.replace("camera: cab", "font: a.ttf")
+    for part in (4, 100, len(raw) // 2, len(raw) - 100):
+        (tmp_path / "aiming" / "a.ttf").write_bytes(raw[:part])
+        (line,) = told("aiming", text)
+        assert line == (
+            "27:31: font is 'a.ttf', which is cut off; give a TrueType or OpenType font"
+        )
+    (tmp_path / "aiming" / "a.ttf").write_bytes(raw)
+    assert told("aiming", text) == []
+
+
+def test_instructions_that_are_a_folder_are_told_so(told) -> None:
+    (line,) = told("aiming", AIMING.replace("instructions: instructions.md", "instructions: ."))
+    assert line == "38:23: instructions is '.', which is a folder; name a text file in it"
+
+
+def test_a_certificate_that_is_none_is_asked_about(told, tmp_path: Path, registry) -> None:
+    told("aiming", "page: {certificate: a.pem, key: a.key}\n" + AIMING)
+    folder = tmp_path / "aiming"
+    for name in ("a.pem", "a.key"):
+        (folder / name).write_text("no PEM\n", encoding="utf-8")
+    asked = [
+        each
+        for each in questions(load(folder / "protocol.yaml", registry))
+        if each.place[0] == "page"
+    ]
+    assert [each.key for each in asked] == ["page.certificate"]
+    assert "give both in PEM, without a passphrase; is that meant?" in asked[0].text
