@@ -375,9 +375,23 @@ def _of_the_machine(study: Study) -> Doubts:
     for joint, speed in zip(study.machine.joints, study.machine.speeds, strict=True):
         named = f"joint {joint.name!r} of the machine"
         if math.degrees(speed) > FASTEST_JOINT_DEG_S:
-            yield ("machine",), f"{named} turns by {math.degrees(speed):.4g} degrees in a second"
+            said = f"{named} turns by {math.degrees(speed):.4g} degrees in a second"
+            yield _of_joint(study, "speeds_deg_s", joint.name), said
         elif joint.mass_kg > HEAVIEST_LINK_KG:
-            yield ("machine",), f"the link of {named} weighs {joint.mass_kg:g} kg"
+            said = f"the link of {named} weighs {joint.mass_kg:g} kg"
+            yield _of_joint(study, "", joint.name), said
+
+
+def _of_joint(study: Study, key: str, joint: str) -> Place:
+    """Return where the protocol says something of a joint, or names it; else the machine's file."""
+    written = study.written.get("machine")
+    described = written if isinstance(written, Mapping) else {}
+    joints = described.get("joints", ())
+    if joint in described.get(key, ()):
+        return ("machine", key, joint)
+    if isinstance(joints, Mapping):
+        return ("machine", "joints", joint)
+    return ("machine", "joints", joints.index(joint)) if joint in joints else ("machine",)
 
 
 def _of_silent_blocks(study: Study) -> Doubts:

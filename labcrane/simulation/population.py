@@ -22,6 +22,7 @@ from labcrane.core.records import Value
 from labcrane.design.plan import SessionPlan
 from labcrane.design.seeds import derive
 from labcrane.errors import ProtocolError, nearest
+from labcrane.files.complaints import WrongKey
 from labcrane.files.yaml import YamlFile
 from labcrane.protocol.steps import Section
 from labcrane.protocol.study import Study
@@ -56,8 +57,9 @@ class Uniform(Section):
     @model_validator(mode="after")
     def _in_order(self) -> "Uniform":
         if self.lowest > self.highest:
-            raise ValueError(
-                f"lowest is {self.lowest:g}, above highest, {self.highest:g}; exchange them"
+            raise WrongKey(
+                f"lowest is {self.lowest:g}, above highest, {self.highest:g}; exchange them",
+                at=("lowest",),
             )
         return self
 

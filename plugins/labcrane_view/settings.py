@@ -73,15 +73,19 @@ class CameraSettings(Settings):
     @model_validator(mode="after")
     def _depth_rises(self, info: ValidationInfo) -> "CameraSettings":
         if self.look == self.eye and not was_run(info):
-            raise ValueError("look is where its eye is; write a point that it looks at")
+            raise WrongKey("look is where its eye is; write a point that it looks at", at=("look",))
         if self.look == "targets" and self.on is not None:
-            raise ValueError(
+            raise WrongKey(
                 f"a camera that rides on {self.on!r} cannot hold the targets in its picture; write "
-                "look: as a point"
+                "look: as a point",
+                at=("look",),
             )
         near, far = self.depth_m
         if not near < far:
-            raise ValueError(f"depth_m is {near:g} to {far:g} m; the second must be farther away")
+            raise WrongKey(
+                f"depth_m is {near:g} to {far:g} m; the second must be farther away",
+                at=("depth_m",),
+            )
         return self
 
 

@@ -601,3 +601,68 @@ def test_a_certificate_that_is_none_is_asked_about(told, tmp_path: Path, registr
     ]
     assert [each.key for each in asked] == ["page.certificate"]
     assert "give both in PEM, without a passphrase; is that meant?" in asked[0].text
+
+
+def column_of(text: str, part: str) -> str:
+    """Return line and column of a part of a text, as a message begins."""
+    at = text.index(part)
+    return f"{text[:at].count(chr(10)) + 1}:{at - text.rfind(chr(10), 0, at)}: "
+
+
+QUESTION = "questionnaires: {a: {use: free, title: A, questions: [{name: x, text: X?, %s}]}}\n"
+TRACK = "design:\n  tracks: {t: {factor: pairs, levels: {2m_far_left: 2, 4m_far_left: 4}, %s}}\n"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "at", "said"),
+    [
+        ("camera: cab", "camera: {eye: [1, 2, 3], look: [1, 2, 3]}", "[1, 2, 3]}", "look is where its eye is"),
+        ("camera: cab", "camera: {eye: [1, 2, 3], on: slew, look: targets}", "targets}", "cannot hold the targets"),
+        ("camera: cab", "beside: [{eye: [1, 2, 3], look: targets, depth_m: [3, 2]}]", "[3, 2]", "must be farther away"),
+        ("design:", QUESTION % "kind: choice" + "design:", "choice}", "has no choices"),
+        ("design:", QUESTION % "kind: scale, choices: [a, b]" + "design:", "[a, b]", "has choices"),
+        ("design:", QUESTION % "lowest: 20" + "design:", "20}", "must rise"),
+        ("design:", QUESTION % "lowest: 2, highest: 1" + "design:", "1}", "must rise"),
+        ("design:", QUESTION % "kind: text}, {name: x, text: Y?" + "design:", "x, text: Y?", "is the name of two questions"),
+        ("design:", TRACK % "up_down: {}, quest_plus: {spreads: [1]}", "{spreads", "both are there"),
+        ("design:", TRACK % "up_down: {}, measure: movement_time", "movement_time}}", "write the limit as well"),
+        ("design:", TRACK % "up_down: {}, at_most: 9", "9}}", "write the measure as well"),
+        ("design:", TRACK % "up_down: {}, measure: movement_time, at_least: 3, at_most: 2", "2}}", "no trial is a success"),
+        ("design:", TRACK % "up_down: {reversals: 30}, rounds: 20", "30}, rounds", "there are 20 rounds"),
+        ("design:", TRACK % "up_down: {}, rounds: 5", "5}}", "there are 5 rounds"),
+        ("machine: ch8 ", "machine: {urdf: a.urdf, joints: [a, b, c], tip: t, mjcf: a.xml} ", "a.xml", "described by one file"),
+        ("design:", "streams: {a: {type: EEG, evening: forbid, min_delay_s: 0.01}}\ndesign:", "0.01}", "or do not forbid evening"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_of_several_keys_is_told_at_one_of_them(
+    told, old: str, new: str, at: str, said: str
+) -> None:
+    text = AIMING.replace(old, new, 1)
+    found = [line for line in told("aiming", text) if said in line]
+    assert len(found) == 1, found
+    assert found[0].startswith(column_of(text, at)), found
+
+
+@pytest.mark.parametrize(
+    ("joints", "more", "at"),
+    [
+        ("{slew: joint1, shoulder: joint2, elbow: joint3, wrist: joint4}", ", speeds_deg_s: {elbow: 900}", "900"),
+        ("{slew: joint1, shoulder: joint2, elbow: joint3, wrist: joint4}", "", "joint3"),
+    ],
+)  # fmt: skip
+def test_a_question_of_a_described_machine_is_asked_where_the_joint_is(
+    told, tmp_path: Path, registry: Registry, joints: str, more: str, at: str
+) -> None:
+    machine = f"machine: {{urdf: openmanipulator_x.urdf, joints: {joints}, tip: gripper{more}}}"
+    text = AIMING.replace("machine: ch8", machine).replace("[2, 3, 4, 6], width: 0.5", NEAR)
+    text = text.replace("bullet_crane, actuator: ideal", "kinematic_crane")
+    told("aiming", text)
+    folder = tmp_path / "aiming"
+    robot = (PROTOCOLS.parent / "examples" / "machines" / "openmanipulator_x.urdf").read_text()
+    joint = robot.index('name="joint3"')
+    fast = robot[:joint] + re.sub(r'velocity="[^"]*"', 'velocity="20"', robot[joint:], count=1)
+    (folder / "openmanipulator_x.urdf").write_text(fast, encoding="utf-8")
+    study = load(folder / "protocol.yaml", registry)
+    asked = [each for each in questions(study) if "degrees in a second" in each.text]
+    found = [f"{study.where(each.place).removeprefix(f'{study.path}:')}: " for each in asked]
+    assert found == [column_of(text, at)]

@@ -116,7 +116,7 @@ def test_a_lapse_delays_the_movement_by_as_much_as_it_lasts() -> None:
             r":2:12: 'skill' is no number that 'simulated",
         ),
         ("groups: {loud: {fitts_b_s: 2}}", r":2:10: there is no group 'loud'; there is none, slow"),
-        ("operator: {lapse_s: {lowest: 2, highest: 1}}", r":2:21: .*lowest is 2, above highest, 1"),
+        ("operator: {lapse_s: {lowest: 2, highest: 1}}", r":2:30: .*lowest is 2, above highest, 1"),
         ("dropouts: 0.1", r":2:1: 'dropouts' is not a key of the file; did you mean 'dropout'\?"),
     ],
 )
