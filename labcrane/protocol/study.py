@@ -293,6 +293,14 @@ class Checker:
             message = f"task {block.task!r} has no result {track.measure!r}; {there}"
             self._source.problem((*at, "measure"), message)
             return False
+        units = {column: s.unit for s in task.results for column in s.columns}
+        if units.get(track.measure) == "s" and track.at_most is not None and track.at_most <= 0.0:
+            message = (
+                f"at_most is {track.at_most:g} s, and {track.measure} is a time, so that no trial "
+                "is a success; it must be greater than 0 s"
+            )
+            self._source.problem((*at, "at_most"), message)
+            return False
         return self._alike(at, track, task)
 
     def _alike(self, at: Place, track: Track, task: Task) -> bool:

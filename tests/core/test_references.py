@@ -666,3 +666,32 @@ def test_a_question_of_a_described_machine_is_asked_where_the_joint_is(
     asked = [each for each in questions(study) if "degrees in a second" in each.text]
     found = [f"{study.where(each.place).removeprefix(f'{study.path}:')}: " for each in asked]
     assert found == [column_of(text, at)]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("limit_s: 30", "limit_s: -1", "tasks.aiming.limit_s is -1; it must be greater than 0 s"),
+        ("width: 0.5", "width: -1 cm", "tasks.aiming.width is -0.01; it must be greater than 0 m"),
+        ("dead_zone: 0.05", "dead_zone: 5 %", "scheme.dead_zone is '5 %'; it must be a number; write 0.05 for 5 %"),
+        ("dead_zone: 0.05", "dead_zone: 5", "scheme.dead_zone is 5; it must be less than 1"),
+        ("design:", TRACK % "up_down: {harder_afters: 1}", "'harder_afters' is not a key of design.tracks.t.up_down; did you mean 'harder_after'?"),
+        ("design:", TRACK % "up_down: {}, foo: 1", "'foo' is not a key of design.tracks.t; possible: factor, levels, up_down, quest_plus, start, rounds, measure, at_least, at_most, carry"),
+        ("design:", "monitors: {a: {use: stick_signal, foo: 1}}\ndesign:", "'foo' is not a key of monitors.a, which has none; leave it out"),
+    ],
+)  # fmt: skip
+def test_a_number_that_cannot_be_is_told_with_its_bound_and_unit(
+    told, old: str, new: str, said: str
+) -> None:
+    assert old in AIMING
+    (line,) = told("aiming", AIMING.replace(old, new, 1))
+    assert line.split(": ", 1)[1] == said
+
+
+@pytest.mark.parametrize("most", ["-1", "0"])
+def test_no_time_is_below_nothing(told, most: str) -> None:
+    track = TRACK % f"up_down: {{}}, measure: movement_time, at_most: {most}"
+    text = AIMING.replace("design:", track, 1).replace("block: {task", "block: {track: t, task")
+    (line,) = told("aiming", text)
+    assert line.startswith(column_of(text, f"{most}}}}}"))
+    assert line.endswith("so that no trial is a success; it must be greater than 0 s")

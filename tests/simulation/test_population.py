@@ -136,7 +136,7 @@ def test_a_value_that_no_operator_can_have_is_refused(
     assert main(["simulate", str(study.path), "--out", out, "--participants", "1"]) == 2
     said = capsys.readouterr().err
     assert "participant P001 was drawn with lapse_rate 2." in said
-    assert "which 'simulated_operator' cannot have" in said
+    assert "which 'simulated_operator' cannot have: it must be less than or equal to 1" in said
     assert "narrow its distribution" in said
 
 
