@@ -27,9 +27,6 @@ from labcrane.files.yaml import YamlFile
 from labcrane.protocol.steps import Section
 from labcrane.protocol.study import Study
 
-BESIDE = "cohort.yaml"
-"""Name of the population's file beside a protocol."""
-
 
 class Lognormal(Section):
     """Positive, with a long tail: most differences between people are of this kind."""

@@ -127,6 +127,18 @@ def test_mistakes_are_named_with_their_line(study: Study, text: str, message: st
         read_population(path, study)
 
 
+def test_a_wrong_cohort_beside_the_protocol_is_told_by_its_check(
+    study: Study, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cohort = study.path.with_name("cohort.yaml")
+    cohort.write_text("labcrane_cohort: 1\ndropout: 5\n")
+    assert main(["check", str(study.path)]) == 2
+    said = "".join(capsys.readouterr().err.split("\n"))
+    assert "cohort.yaml:2:10: dropout is 5; it must be less than or equal to 1" in said
+    cohort.write_text("labcrane_cohort: 1\ndropout: 0.5\n")
+    assert main(["check", str(study.path)]) == 0
+
+
 def test_a_value_that_no_operator_can_have_is_refused(
     study: Study, capsys: pytest.CaptureFixture[str]
 ) -> None:
