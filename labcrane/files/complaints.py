@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from datetime import date
 from difflib import get_close_matches
 from math import isfinite
-from typing import Any
+from types import UnionType
+from typing import Any, Union, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -55,6 +56,7 @@ OF_KEYS = "[key]"
 """How pydantic ends the place of a mapping's key."""
 
 _MEMBER = re.compile(r"\[.*[\]'\"]|^(constrained-)?(str|int|float|bool)$")
+_PERCENT = re.compile(r"\s*(-?(?:\d+\.?\d*|\.\d+))\s*%\s*")
 _COMMA = re.compile(r"\s*-?\d+,\d+\s*")
 
 
@@ -139,9 +141,7 @@ def explain(error: ErrorDetails, place: Place, model: type[BaseModel]) -> str:
     loc = error["loc"]
     key = loc[-1] if loc else named(place)
     if error["type"] == "extra_forbidden":
-        possible = _keys(model, loc[:-1])
-        instead = suggestion(str(key), possible, "possible:")
-        return f"{str(key)!r} is not a key of {named((*place, *loc[:-1]))}; {instead}"
+        return _no_key(str(key), model, place, loc[:-1])
     if error["type"] == "missing" and isinstance(key, int):
         holder = named((*place, *loc[:-1]))
         return f"{holder} is {shown(error['input'])}; it needs {key + 1} items"
@@ -161,19 +161,33 @@ def explain(error: ErrorDetails, place: Place, model: type[BaseModel]) -> str:
         pattern = error.get("ctx", {}).get("pattern", "")
         what = PATTERNS.get(pattern, f"of the form {pattern}")
     what = WANTED.get(error["type"], what)
-    if what in NUMBERS:
-        what = _number(error, model, what)
-    return f"{name} is {shown(error['input'])}; it must be {what}"
+    return f"{name} is {shown(error['input'])}; it must be {_number(error, model, what)}"
 
 
 def _number(error: ErrorDetails, model: type[BaseModel], what: str) -> str:
-    """Return which number must be there: in which unit, and with a point."""
+    """Return which number must be there: in which unit, and with a point; others as they are."""
+    unit = _unit(error, model)
+    if error["type"] in BOUNDS:
+        return f"{what} {unit}" if unit else what
+    if what not in NUMBERS:
+        return what
     if isinstance(error["input"], str) and _COMMA.fullmatch(error["input"]):
         return f"{what}; write decimals with a point: {error['input'].strip().replace(',', '.')}"
-    keys = [step for step in error["loc"] if isinstance(step, str) and not is_member(step)]
-    field = _field(model, error["loc"])
-    unit = unit_of(keys[-1], field.metadata) if field and keys else None
+    unit = _unit(error, model)
+    if (
+        not unit
+        and isinstance(error["input"], str)
+        and (share := _PERCENT.fullmatch(error["input"]))
+    ):
+        return f"{what}; write {float(share[1]) / 100:g} for {share[0].strip()}"
     return f"{what} in {unit}, or one with its unit, as {EXAMPLES[unit]}" if unit else what
+
+
+def _unit(error: ErrorDetails, model: type[BaseModel]) -> str | None:
+    """Return the unit of the number that is complained of; None where it has none."""
+    keys = [step for step in error["loc"] if isinstance(step, str) and not is_member(step)]
+    field = field_at(model, error["loc"])
+    return unit_of(keys[-1], field.metadata) if field and keys else None
 
 
 WANTED = {
@@ -195,6 +209,8 @@ WANTED = {
     "finite_number": "a number that is one: neither .nan nor .inf",
 }
 """What each of pydantic's types is for people who write YAML."""
+
+BOUNDS = {"greater_than", "greater_than_equal", "less_than", "less_than_equal"}
 
 NUMBERS = {"a number", "a whole number"}
 
@@ -253,12 +269,16 @@ def is_member(step: object) -> bool:
     return isinstance(step, str) and bool(_MEMBER.search(step))
 
 
-def _keys(model: type[BaseModel], place: Place) -> list[str]:
-    inside = _model_at(model, place)
-    return list(inside.model_fields) if inside else []
+def _no_key(key: str, model: type[BaseModel], place: Place, loc: Place) -> str:
+    """Return that what holds a key has none of that name, and which it has."""
+    inside, holder = _model_at(model, loc), named((*place, *loc))
+    if inside is not None and not inside.model_fields:
+        return f"{key!r} is not a key of {holder}, which has none; leave it out"
+    there = suggestion(key, inside.model_fields if inside else (), "possible:")
+    return f"{key!r} is not a key of {holder}; {there}"
 
 
-def _field(model: type[BaseModel], loc: Place) -> FieldInfo | None:
+def field_at(model: type[BaseModel], loc: Place) -> FieldInfo | None:
     """Return the field of the last key of a place; None where it is no model's."""
     keys = [at for at, step in enumerate(loc) if isinstance(step, str) and not is_member(step)]
     holder = _model_at(model, loc[: keys[-1]]) if keys else None
@@ -266,20 +286,42 @@ def _field(model: type[BaseModel], loc: Place) -> FieldInfo | None:
 
 
 def _model_at(model: type[BaseModel], place: Place) -> type[BaseModel] | None:
-    fields: Any = model
+    """Return the model that describes what stands at a place; None where it is no model's."""
+    at: Any = model
     for step in place:
-        if isinstance(step, int) or is_member(step):
-            continue
-        annotation = fields.model_fields[step].annotation if step in fields.model_fields else None
-        nested = [a for a in (annotation, *getattr(annotation, "__args__", ())) if _is_model(a)]
-        if not nested:
-            return None
-        fields = nested[0]
-    return fields  # type: ignore[no-any-return]  # a model, or one in a field of it
+        if not is_member(step):
+            at = next(_under(at, step), None)
+    return next(_models(at), None)
 
 
-def _is_model(annotation: Any) -> bool:
-    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+def _under(annotation: Any, step: str | int) -> Iterator[Any]:
+    """Yield the annotations of what stands under a key of something, or is its item."""
+    if hasattr(annotation, "__metadata__"):
+        annotation = annotation.__origin__
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        if step in annotation.model_fields:
+            yield annotation.model_fields[str(step)].annotation
+    elif origin in {Union, UnionType}:
+        for each in arguments:
+            yield from _under(each, step)
+    elif origin is dict and isinstance(step, str):
+        yield arguments[1]
+    elif origin in {tuple, list} and isinstance(step, int):
+        yield (
+            arguments[min(step, len(arguments) - 1)] if Ellipsis not in arguments else arguments[0]
+        )
+
+
+def _models(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Yield the models that are an annotation, one of its members, or its items."""
+    if hasattr(annotation, "__metadata__"):
+        annotation = annotation.__origin__
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    elif get_origin(annotation) in {tuple, list, Union, UnionType}:
+        for each in get_args(annotation):
+            yield from _models(each)
 
 
 def named(place: Place) -> str:

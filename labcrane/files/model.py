@@ -3,7 +3,7 @@
 import ast
 import inspect
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -22,7 +22,7 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticKnownError, core_schema
 
-from labcrane.files.complaints import Truth
+from labcrane.files.complaints import Truth, field_at
 from labcrane.files.units import read_quantities, unit_of
 
 UNIT = "x-unit"
@@ -132,6 +132,18 @@ def _plain_types(annotation: Any) -> Iterator[Any]:
         yield from map(type, arguments)
     else:
         yield annotation
+
+
+def number_at(model: type[BaseModel], place: Sequence[str | int]) -> tuple[str | int, ...]:
+    """Return where the key of a number is, which has a default, at a place or around it.
+
+    Nothing where there is none: without it the model would not be what was written.
+    """
+    keys = [at for at, step in enumerate(place) if isinstance(step, str)]
+    key = tuple(place[: keys[-1] + 1]) if keys else ()
+    field = field_at(model, key)
+    is_number = field is not None and not field.is_required() and _shape(field.annotation)
+    return key if is_number else ()
 
 
 def was_run(info: ValidationInfo) -> bool:

@@ -73,6 +73,9 @@ DEVICES = frozenset(
 
 HASHED = 8
 
+COHORT = "cohort.yaml"
+"""Name of a simulated population's file beside a protocol."""
+
 
 def check_name(name: str, what: str) -> str:
     """Return a name as it is, if it can be part of a path everywhere.

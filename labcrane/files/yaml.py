@@ -3,6 +3,7 @@
 import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence, Set
+from copy import deepcopy
 from dataclasses import dataclass, field
 from datetime import date
 from functools import lru_cache
@@ -20,6 +21,7 @@ from labcrane.errors import ProtocolError
 from labcrane.files.complaints import Place as Place  # noqa: PLC0414 - public here
 from labcrane.files.complaints import is_member, named, shown, told
 from labcrane.files.misread import GARBLED, misread, unreadable
+from labcrane.files.model import number_at
 from labcrane.limits import LIMITS, LimitError, check_size, foreign
 
 DEEPEST = LIMITS["YAML file"].depth
@@ -138,6 +140,31 @@ class YamlFile:
                 at = (*place, *_inside(value, each.place))
                 self.problem(at, each.message, key=each.key)
             return None
+
+    def but_for_numbers(self, model: type[ModelT], value: Mapping[str, Any]) -> ModelT | None:
+        """Return a mapping as a ``model``, with the defaults of what is wrong with its numbers.
+
+        That is what its names can be looked up in: numbers name nothing. None where more is wrong,
+        which :meth:`check` notes.
+        """
+        context = {"folder": self.path.parent, "recorded": self.recorded}
+        for _ in range(2):  # what looks at several keys speaks when each is right
+            try:
+                return model.model_validate(value, context=context)
+            except ValidationError as error:
+                value = deepcopy(value)
+                wrong = {
+                    number_at(model, _inside(value, each.place))
+                    for each in told(error.errors(), (), model)
+                }
+            if () in wrong:
+                return None
+            for *way, key in wrong:
+                holder: Any = value
+                for step in way:
+                    holder = holder[step]
+                del holder[key]
+        return None
 
     def checked(self, model: type[ModelT]) -> ModelT:
         """Return the whole file as a ``model``, or raise all mistakes in it."""

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from labcrane.streams.sync.report.sync_report import SyncReport
     from labcrane.web.state import Ended
 
-MOST_LOGO = 2_000_000
-"""Bytes: every tablet loads it."""
 
 LEVELS = {"PASS": "ok", "WARN": "warn", "FAIL": "bad"}
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
@@ -79,6 +77,8 @@ def _check_logo(protocol: Path, where: "PageSettings") -> None:
     logo = protocol.parent / where.logo
     if not logo.is_file():
         raise ProtocolError(f"there is no logo {str(logo)!r}; a path counts from the protocol")
+    from labcrane.protocol.pages import MOST_LOGO
+
     if (size := logo.stat().st_size) > MOST_LOGO:
         raise ProtocolError(
             f"the logo {str(logo)!r} has {size:,} bytes, and pages show {MOST_LOGO:,} at most; "
@@ -133,14 +133,9 @@ def _tls(protocol: Path, where: "PageSettings") -> tuple[Path | None, Path | Non
     """
     if where.certificate is None or where.key is None:
         return None, None
-    import ssl
+    from labcrane.protocol.pages import unserved
 
     certificate, key = protocol.parent / where.certificate, protocol.parent / where.key
-    try:
-        ssl.create_default_context(ssl.Purpose.CLIENT_AUTH).load_cert_chain(certificate, key)
-    except (OSError, ValueError) as error:  # ssl's errors are OSErrors
-        raise ProtocolError(
-            f"the pages cannot be served with certificate {str(certificate)!r} and key "
-            f"{str(key)!r}: {error}; give both in PEM, without a passphrase"
-        ) from error
+    if why := unserved(certificate, key):
+        raise ProtocolError(why)
     return certificate, key

@@ -64,6 +64,9 @@ class ComponentResolver:
         self._source = source
         self._registry = registry
         self.call_monitor = CallMonitor()
+        self.but_for_numbers: dict[Place, ComponentSpec] = {}
+        """Components with nothing wrong but numbers, with defaults for these: names in them, and
+        those that they give, can be looked up all the same."""
 
     def choose(
         self, role: type[RoleT], place: Place, default: Use | None = None
@@ -139,10 +142,14 @@ class ComponentResolver:
             self._source.problem(named, str(error))
             return None
         settings = self._source.check(offer.settings, place, use.settings)
-        if settings is None:
-            return None
         plugin = self._registry.plugin(role, use.use)
         called = f"{self._source.where(named)}: {ROLES[role].word} {use.use!r}"
+        if settings is None:
+            if rest := self._source.but_for_numbers(offer.settings, use.settings):
+                self.but_for_numbers[place] = ComponentSpec(
+                    use.use, plugin, offer, rest, self.call_monitor, called
+                )
+            return None
         return ComponentSpec(use.use, plugin, offer, settings, self.call_monitor, called)
 
     def choose_feedback(

@@ -1,17 +1,31 @@
 """Settings of the pages: where they are served."""
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
-from labcrane.core.settings import Settings, StudyPath, WrongKey, was_run
+from labcrane.core.settings import Names, Settings, StudyPath, WrongKey, was_run
+from labcrane.errors import ProtocolError
+from labcrane.files.system import is_file
+from labcrane.machines.machine import Machine
 
 Language = Literal["en", "de", "pl", "fr", "es"]
 
 
-PICTURES = (".png", ".jpg", ".jpeg", ".svg")
+PICTURES: Mapping[str, bytes] = {
+    ".png": b"\x89PNG\r\n\x1a\n",
+    ".jpg": b"\xff\xd8\xff",
+    ".jpeg": b"\xff\xd8\xff",
+    ".svg": b"<svg",
+}
+"""What is at the beginning of a picture, by its ending; of an SVG it is somewhere there."""
+
+MOST_LOGO = 2_000_000
+"""Bytes: every tablet loads it."""
+
 READABLE = 4.5
 """Contrast of words and what they stand on, as WCAG 2.2 asks for at AA."""
 
@@ -22,6 +36,22 @@ def contrast_to_white(colour: str) -> float:
     linear = [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in parts]  # noqa: PLR2004 - sRGB's own
     light = sum(v * weight for v, weight in zip(linear, (0.2126, 0.7152, 0.0722), strict=True))
     return 1.05 / (light + 0.05)
+
+
+def unserved(certificate: Path, key: Path) -> str:
+    """Return why pages cannot be served with a certificate and its key; nothing where they can."""
+    import ssl  # noqa: PLC0415 - few studies have their own
+
+    context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+    try:
+        # Without a passphrase it would be asked for in the terminal.
+        context.load_cert_chain(certificate, key, password="")
+    except (OSError, ValueError) as error:  # ssl's errors are OSErrors
+        return (
+            f"the pages cannot be served with certificate {str(certificate)!r} and key "
+            f"{str(key)!r}: {error}; give both in PEM, without a passphrase"
+        )
+    return ""
 
 
 class PageSettings(Settings):
@@ -99,3 +129,22 @@ class PageSettings(Settings):
             there = "key" if self.certificate is None else "certificate"
             raise WrongKey("certificate and key belong together: give both, or none", at=(there,))
         return self
+
+    def needs(self, machine: Machine) -> Names:
+        """Look into the logo: a page with a hole looks broken."""
+        if self.logo is not None and is_file(self.logo):
+            raw, kind = self.logo.read_bytes(), self.logo.suffix.lower()
+            if len(raw) > MOST_LOGO:
+                raise ProtocolError(
+                    f"the logo {self.logo.name!r} has {len(raw):,} bytes, and pages show "
+                    f"{MOST_LOGO:,} at most; make it smaller",
+                    at=("logo",),
+                )
+            sign = PICTURES[kind]
+            if not (sign in raw if kind == ".svg" else raw.startswith(sign)):
+                raise ProtocolError(
+                    f"page.logo is {self.logo.name!r}, and what is in it is no {kind[1:].upper()}; "
+                    "export the picture anew",
+                    at=("logo",),
+                )
+        return {}

@@ -16,6 +16,7 @@ from labcrane.files.system import is_there
 from labcrane.files.yaml import Place
 from labcrane.protocol.components import ComponentSpec
 from labcrane.protocol.effective import written_numbers
+from labcrane.protocol.pages import unserved
 from labcrane.protocol.references import twice
 from labcrane.protocol.steps import READING_S, Block
 from labcrane.protocol.streams import SHARES
@@ -180,13 +181,16 @@ def _doubts(study: Study) -> Doubts:
 
 def _of_the_pages(study: Study) -> Doubts:
     """Question what is the laboratory's, and not here: a check may be made at another desk."""
-    page = study.protocol.page
-    for key, path in (("certificate", page.certificate), ("key", page.key)):
-        if path is not None and not study.recorded and not is_there(study.path.parent / path):
-            yield (
-                ("page", key),
-                f"page.{key} is {str(path)!r}, which is not on this computer",
-            )
+    page, folder = study.protocol.page, study.path.parent
+    if study.recorded or page.certificate is None or page.key is None:
+        return
+    files = {"certificate": folder / page.certificate, "key": folder / page.key}
+    for key, path in files.items():
+        if not is_there(path):
+            written = getattr(page, key)
+            yield ("page", key), f"page.{key} is {str(written)!r}, which is not on this computer"
+    if all(map(is_there, files.values())) and (why := unserved(**files)):
+        yield ("page", "certificate"), why
 
 
 def _of_pattern(study: Study) -> Doubts:
@@ -371,9 +375,23 @@ def _of_the_machine(study: Study) -> Doubts:
     for joint, speed in zip(study.machine.joints, study.machine.speeds, strict=True):
         named = f"joint {joint.name!r} of the machine"
         if math.degrees(speed) > FASTEST_JOINT_DEG_S:
-            yield ("machine",), f"{named} turns by {math.degrees(speed):.4g} degrees in a second"
+            said = f"{named} turns by {math.degrees(speed):.4g} degrees in a second"
+            yield _of_joint(study, "speeds_deg_s", joint.name), said
         elif joint.mass_kg > HEAVIEST_LINK_KG:
-            yield ("machine",), f"the link of {named} weighs {joint.mass_kg:g} kg"
+            said = f"the link of {named} weighs {joint.mass_kg:g} kg"
+            yield _of_joint(study, "", joint.name), said
+
+
+def _of_joint(study: Study, key: str, joint: str) -> Place:
+    """Return where the protocol says something of a joint, or names it; else the machine's file."""
+    written = study.written.get("machine")
+    described = written if isinstance(written, Mapping) else {}
+    joints = described.get("joints", ())
+    if joint in described.get(key, ()):
+        return ("machine", key, joint)
+    if isinstance(joints, Mapping):
+        return ("machine", "joints", joint)
+    return ("machine", "joints", joints.index(joint)) if joint in joints else ("machine",)
 
 
 def _of_silent_blocks(study: Study) -> Doubts:

@@ -1,7 +1,7 @@
 """References of components' settings, looked up among all that the protocol's components name."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from functools import cached_property
 from os.path import normpath
@@ -12,7 +12,7 @@ from labcrane.core.roles import Component, Task
 from labcrane.core.settings import Settings
 from labcrane.errors import LabcraneError, nearest
 from labcrane.files.names import absent, outside
-from labcrane.files.system import is_there
+from labcrane.files.system import is_file, is_there
 from labcrane.files.yaml import Place, YamlFile
 from labcrane.machines.machine import Machine
 from labcrane.protocol.components import ComponentSpec
@@ -57,12 +57,15 @@ class Parts:
         The tasks that could be built.
     sections
         Parts of the protocol that are nobody's components, by their place.
+    faulty
+        Components with wrong numbers, which were noted, and have their defaults here.
     """
 
     machine: Machine
     components: Mapping[Place, ComponentSpec]
     tasks: Mapping[str, Task]
     sections: Mapping[Place, Settings] = field(default_factory=dict)
+    faulty: Set[Place] = frozenset()
 
 
 class ReferenceChecker:
@@ -74,6 +77,7 @@ class ReferenceChecker:
         self._components = parts.components
         self._tasks = parts.tasks
         self._sections = parts.sections
+        self._faulty = parts.faulty
         self._known: dict[str, Known] = {}
         self._noted: set[Place] = set()  # files of which something was said
 
@@ -100,7 +104,9 @@ class ReferenceChecker:
                         message = f"{_dotted(place)} needs the {kind} {name!r}, and "
                         self._source.problem(place, message + _has(kind, name, known))
             if place[0] in READ_BY_BUILDING:
-                self._read(place, choice, faulty=self._source.wrong > before)
+                self._read(
+                    place, choice, faulty=self._source.wrong > before or place in self._faulty
+                )
 
     def _read(self, place: Place, choice: ComponentSpec, *, faulty: bool) -> None:
         """Build what names files, so that what is wrong inside of them is found before a run.
@@ -122,9 +128,12 @@ class ReferenceChecker:
     def _check_sections(self) -> None:
         """Look up the files that the protocol names beside its components."""
         for place, section in self._sections.items():
+            before = self._source.wrong
             for mention in mentioned(section):
                 if mention.mark == Reference("file"):
                     self._is_there((*place, *mention.place), mention.value)
+            if self._source.wrong == before:
+                list(self._needed(place, section))  # looks into its files
 
     def _refers(
         self, at: Place, mention: Mentioned, mark: Reference, choice: ComponentSpec
@@ -198,6 +207,10 @@ class ReferenceChecker:
             self._source.problem(at, f"{_dotted(at)} is {path.name!r}, and {why}")
         elif not is_there(path):
             self._source.problem(at, f"{_dotted(at)} is {path.name!r}, and {absent(path)}")
+        elif not is_file(path):
+            self._source.problem(
+                at, f"{_dotted(at)} is {path.name!r}, which is a folder; name a file in it"
+            )
         else:
             for each in used(path):
                 if why := outside(each, folder):

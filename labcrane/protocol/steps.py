@@ -18,6 +18,7 @@ from labcrane.errors import ProtocolError, suggestion
 from labcrane.files.complaints import shown
 from labcrane.files.model import AtMost, Usual, was_run
 from labcrane.files.names import absent, outside
+from labcrane.files.system import is_folder
 from labcrane.files.units import Unit
 from labcrane.files.yaml import Place, YamlFile, read_text
 from labcrane.protocol.design import Criterion
@@ -228,6 +229,10 @@ def _instructions(source: YamlFile, place: Place, value: Any) -> dict[str, Any] 
     path = source.path.parent / value
     if not source.recorded and (why := outside(path, source.path.parent)):
         told = f"instructions is {value!r}, and {why}"
+        source.problem((*place, "instructions"), told)
+        return None
+    if is_folder(path):
+        told = f"instructions is {value!r}, which is a folder; name a text file in it"
         source.problem((*place, "instructions"), told)
         return None
     try:

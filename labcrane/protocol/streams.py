@@ -10,7 +10,7 @@ from pydantic import (
     model_validator,
 )
 
-from labcrane.core.settings import Settings, Usual
+from labcrane.core.settings import Settings, Usual, WrongKey
 from labcrane.streams.sync.report.limits import Limit, Limits
 
 if TYPE_CHECKING:  # a protocol is checked without loading what corrects clocks
@@ -67,9 +67,10 @@ class StreamNeed(Settings):
         if self.type is None and self.name is None and self.source_id is None:
             raise ValueError("a stream needs a type, a name or a source_id to be found by")
         if self.evening == "forbid" and self.min_delay_s is not None:
-            raise ValueError(
+            raise WrongKey(
                 "min_delay_s finds the samples that were delayed least, which is evening; leave it "
-                "out, or do not forbid evening"
+                "out, or do not forbid evening",
+                at=("min_delay_s",),
             )
         return self
 

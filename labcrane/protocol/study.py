@@ -293,6 +293,14 @@ class Checker:
             message = f"task {block.task!r} has no result {track.measure!r}; {there}"
             self._source.problem((*at, "measure"), message)
             return False
+        units = {column: s.unit for s in task.results for column in s.columns}
+        if units.get(track.measure) == "s" and track.at_most is not None and track.at_most <= 0.0:
+            message = (
+                f"at_most is {track.at_most:g} s, and {track.measure} is a time, so that no trial "
+                "is a success; it must be greater than 0 s"
+            )
+            self._source.problem((*at, "at_most"), message)
+            return False
         return self._alike(at, track, task)
 
     def _alike(self, at: Place, track: Track, task: Task) -> bool:
@@ -442,8 +450,10 @@ def load(path: Path, registry: Registry, *, recorded: bool = False) -> Study:
             **{tuple(part.split(".", 1)): choice for part, choice in others.items()},
         }
         there = {place: choice for place, choice in chosen.items() if choice}
+        faulty = chooser.but_for_numbers
         pages: dict[Place, Settings] = {("page",): protocol.page} if protocol else {}
-        references = ReferenceChecker(source, Parts(machine[0], there, tasks, pages))
+        parts = Parts(machine[0], there | faulty, tasks, pages, {*faulty})
+        references = ReferenceChecker(source, parts)
         references.check()
         beyond = tuple(references.beyond_the_operator())
     source.raise_problems()

@@ -169,15 +169,23 @@ class Track(Settings):
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
         if (self.up_down is None) == (self.quest_plus is None):
-            there = "both are there" if self.up_down else "neither is there"
-            raise ValueError(f"{there}; one of up_down and quest_plus chooses the levels")
+            there, at = (
+                ("both are there", ("quest_plus",)) if self.up_down else ("neither is there", ())
+            )
+            told = f"{there}; one of up_down and quest_plus chooses the levels"
+            raise WrongKey(told, at=at)
         if self.start and self.start not in self.levels:
             raise WrongKey(
                 f"start is {self.start!r}, which is no level; there is {', '.join(self.levels)}",
                 at=("start",),
             )
         if bool(self.measure) != (self.at_least is not None or self.at_most is not None):
-            raise ValueError("a measure has at_least, at_most or both, and they have a measure")
+            limits = [key for key in ("at_least", "at_most") if getattr(self, key) is not None]
+            raise WrongKey(
+                "a measure has at_least, at_most or both, and they have a measure; write the "
+                f"{'measure' if limits else 'limit'} as well",
+                at=(limits[0] if limits else "measure",),
+            )
         return self
 
     @model_validator(mode="after")
@@ -186,16 +194,19 @@ class Track(Settings):
             return self
         least, most = self.at_least, self.at_most
         if least is not None and most is not None and least > most:
-            raise ValueError(
+            raise WrongKey(
                 f"at_least is {least:g} and at_most {most:g}: no trial is a success; write an "
-                "at_most that is larger"
+                "at_most that is larger",
+                at=("at_most",),
             )
         if self.up_down is not None:
             for key in ("harder_after", "easier_after", "reversals"):
                 if (count := getattr(self.up_down, key)) > self.rounds:
-                    raise ValueError(
+                    written = key in self.up_down.model_fields_set
+                    raise WrongKey(
                         f"up_down.{key} is {count}, and there are {self.rounds} rounds; write "
-                        f"{self.rounds} or less, or more rounds"
+                        f"{self.rounds} or less, or more rounds",
+                        at=("up_down", key) if written else ("rounds",),
                     )
         return self
 

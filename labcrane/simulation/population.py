@@ -22,12 +22,10 @@ from labcrane.core.records import Value
 from labcrane.design.plan import SessionPlan
 from labcrane.design.seeds import derive
 from labcrane.errors import ProtocolError, nearest
+from labcrane.files.complaints import WrongKey, told
 from labcrane.files.yaml import YamlFile
 from labcrane.protocol.steps import Section
 from labcrane.protocol.study import Study
-
-BESIDE = "cohort.yaml"
-"""Name of the population's file beside a protocol."""
 
 
 class Lognormal(Section):
@@ -56,8 +54,9 @@ class Uniform(Section):
     @model_validator(mode="after")
     def _in_order(self) -> "Uniform":
         if self.lowest > self.highest:
-            raise ValueError(
-                f"lowest is {self.lowest:g}, above highest, {self.highest:g}; exchange them"
+            raise WrongKey(
+                f"lowest is {self.lowest:g}, above highest, {self.highest:g}; exchange them",
+                at=("lowest",),
             )
         return self
 
@@ -145,10 +144,12 @@ class Population(Section):
         try:
             checked = type(choice.settings).model_validate(settings)
         except ValidationError as error:
-            name = error.errors()[0]["loc"][0]
+            first = next(told(error.errors(), ("operator",), type(choice.settings)))
+            name = str(first.place[0])
+            what = first.message.partition("; ")[2] or first.message
             raise ProtocolError(
-                f"participant {participant} was drawn with {name} {own[str(name)]:g}, which "
-                f"{choice.name!r} cannot have: {error.errors()[0]['msg']}; narrow its distribution"
+                f"participant {participant} was drawn with {name} {own[name]:g}, which "
+                f"{choice.name!r} cannot have: {what}; narrow its distribution"
             ) from None
         answers = self.answered(study, participant)
         return replace(study, operator=replace(choice, settings=checked), answers=answers)

@@ -179,16 +179,21 @@ class Question(Settings):
     @model_validator(mode="after")
     def _can_be_answered(self, info: ValidationInfo) -> "Question":
         if self.kind == "choice" and not self.choices:
-            raise ValueError(f"question {self.name!r} is a choice and has no choices; list them")
+            raise WrongKey(
+                f"question {self.name!r} is a choice and has no choices; list them",
+                at=("choices" if "choices" in self.model_fields_set else "kind",),
+            )
         if not was_run(info) and self.kind != "choice" and self.choices:
-            raise ValueError(
+            raise WrongKey(
                 f"question {self.name!r} has choices, and its kind is {self.kind!r}; write kind: "
-                "choice, or leave them out"
+                "choice, or leave them out",
+                at=("choices",),
             )
         if not self.lowest < self.highest:
-            raise ValueError(
+            raise WrongKey(
                 f"question {self.name!r} must rise, but goes from {self.lowest:g} to "
-                f"{self.highest:g}; write a highest above the lowest"
+                f"{self.highest:g}; write a highest above the lowest",
+                at=("highest" if "highest" in self.model_fields_set else "lowest",),
             )
         return self
 
@@ -253,13 +258,14 @@ class FreeSettings(Settings):
             return given
         found = _lab_file(given["file"], info)
         if not isinstance(found, dict):
-            raise ValueError(  # noqa: TRY004 - pydantic collects these
-                f"the lab's file {given['file']!r} holds {found!r}; it must hold keys: title, "
-                "questions"
+            raise WrongKey(
+                f"the lab's file {given['file']!r} holds no keys; it must hold title and questions",
+                at=("file",),
             )
         if twice := sorted({*found} & {*given}):
-            raise ValueError(
-                f"{', '.join(twice)} is said in {given['file']!r} and in the protocol; keep one"
+            raise WrongKey(
+                f"{', '.join(twice)} is said in {given['file']!r} and in the protocol; keep one",
+                at=(twice[0],),
             )
         return {**found, **given, "file": None}
 
@@ -268,7 +274,10 @@ class FreeSettings(Settings):
     def _differ(cls, questions: tuple[Question, ...]) -> tuple[Question, ...]:
         names = [question.name for question in questions]
         if twice := sorted(set(_twice(names))):
-            raise ValueError(f"{', '.join(twice)} is the name of two questions; rename one")
+            last = len(names) - 1 - names[::-1].index(twice[0])
+            raise WrongKey(
+                f"{', '.join(twice)} is the name of two questions; rename one", at=(last, "name")
+            )
         return questions
 
     def provides(self, machine: Machine) -> Names:

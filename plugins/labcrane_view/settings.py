@@ -1,5 +1,6 @@
 """Settings of a view."""
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from string import ascii_lowercase, digits
@@ -16,7 +17,7 @@ from pydantic import (
 )
 from pydantic import PositiveInt as Pixels
 
-from labcrane import Machine, Settings
+from labcrane import Machine, ProtocolError, Settings
 from labcrane.core import (
     CameraName,
     EventName,
@@ -72,15 +73,19 @@ class CameraSettings(Settings):
     @model_validator(mode="after")
     def _depth_rises(self, info: ValidationInfo) -> "CameraSettings":
         if self.look == self.eye and not was_run(info):
-            raise ValueError("look is where its eye is; write a point that it looks at")
+            raise WrongKey("look is where its eye is; write a point that it looks at", at=("look",))
         if self.look == "targets" and self.on is not None:
-            raise ValueError(
+            raise WrongKey(
                 f"a camera that rides on {self.on!r} cannot hold the targets in its picture; write "
-                "look: as a point"
+                "look: as a point",
+                at=("look",),
             )
         near, far = self.depth_m
         if not near < far:
-            raise ValueError(f"depth_m is {near:g} to {far:g} m; the second must be farther away")
+            raise WrongKey(
+                f"depth_m is {near:g} to {far:g} m; the second must be farther away",
+                at=("depth_m",),
+            )
         return self
 
 
@@ -116,6 +121,30 @@ FARTHEST_VIEWING_M = 10.0
 FEWEST_ARCMIN, MOST_ARCMIN = 5.0, 180.0
 
 FONTS = (".ttf", ".otf", ".ttc", ".pfb", ".pfa", ".woff", ".fon")
+
+OTHER_FONTS = (b"ttcf", b"wOFF", b"\x80\x01", b"%!", b"MZ")
+"""What is at the beginning of fonts that are no TrueType and no OpenType of their own."""
+
+
+def _is_file(path: Path) -> bool:
+    return os.path.isfile(path)  # noqa: PTH113 - a name that no disk takes is none, and no error
+
+
+def _no_font(path: Path) -> str:
+    """Return why a file is no font; nothing where it looks like one."""
+    raw = path.read_bytes()
+    if raw.startswith(OTHER_FONTS):
+        return ""
+    if raw[:4] not in {b"\0\1\0\0", b"true", b"OTTO"}:
+        return "is no font"
+    count = int.from_bytes(raw[4:6], "big")
+    records = [raw[at : at + 16] for at in range(12, 12 + 16 * count, 16)]
+    ends = [
+        int.from_bytes(each[8:12], "big") + int.from_bytes(each[12:], "big") for each in records
+    ]
+    whole = records and len(records[-1]) == len(records[0]) and max(ends) <= len(raw)
+    return "" if whole else "is cut off"
+
 
 ENTERING = ("target.entered",)
 """Events that tell whether the tip is where it should be."""
@@ -298,6 +327,14 @@ class ViewSettings(Settings):
             "screen": [str(screen) for screen in self.all_screens],
             "key of that view": self.keys,
         }
+
+    def needs(self, machine: Machine) -> Names:
+        if self.font is not None and _is_file(self.font) and (why := _no_font(self.font)):
+            raise ProtocolError(
+                f"font is {self.font.name!r}, which {why}; give a TrueType or OpenType font",
+                at=("font",),
+            )
+        return {}
 
     def doubts(self, machine: Machine) -> Mapping[str, str]:
         names = [camera.name for camera in self.cameras]

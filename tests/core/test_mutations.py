@@ -97,7 +97,8 @@ def try_mutations(
         passed += 1
         try:
             name = pseudonyms(study.protocol.participants.pattern, 1)[0]
-            visit = Visit(study, name, 1, folder / f"data{number}", simulated=True, fast=True)
+            session = random.Random(f"{seed} {number}").randint(1, len(study.protocol.sessions))
+            visit = Visit(study, name, session, folder / f"data{number}", simulated=True, fast=True)
             run(visit, Impatient())
         except LabcraneError as error:
             asked = {each.key for each in questions(study)} - standing

@@ -10,6 +10,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Annotated, Any
 
+import matplotlib
 import pytest
 from ruamel.yaml import YAML
 
@@ -20,6 +21,7 @@ from labcrane.core.references import EVENTS, Mentioned, Reference, mentioned
 from labcrane.core.roles import InputDevice
 from labcrane.machines import load_machine
 from labcrane.protocol.protocol import Participants
+from labcrane.protocol.questions import questions
 from labcrane.protocol.study import Study, load
 from labcrane.registry.registry import Registry, discover
 
@@ -509,3 +511,187 @@ def test_the_events_of_every_session_are_those_that_its_code_tells() -> None:
         if path.stem != "references"
     )
     assert [event for event in EVENTS if f'"{event}"' not in said] == []
+
+
+@pytest.mark.parametrize(
+    ("study", "old", "new", "said"),
+    [
+        ("aiming", "wrist: right.x, shoulder: -right.y}\n  dead_zone: 0.05", "wrist: right.z, shoulder: -right.y}\n  dead_zone: much", ["scheme.map.wrist is 'right.z'", "scheme.dead_zone is 'much'"]),
+        ("aiming", "end: rest_inside, limit_s: 30", "end: trigger, trigger: left.knob, limit_s: 3 parsnips", ["tasks.aiming.trigger is 'left.knob'", "tasks.aiming.limit_s"]),
+        ("aiming", "camera: cab", "areas: [targt], size: [1280, much], keys: [lft]", ["views.operator.areas[1] is 'targt'", "views.operator.size[2]", "views.operator.keys[1] is 'lft'"]),
+        ("aiming", "camera: cab", "camera: {eye: [1, 2, 3], look: [3, 4, 5], fov_deg: 800, on: bom}", ["views.operator.camera.on is 'bom'", "views.operator.camera.fov_deg is 800"]),
+        ("aiming", "camera: cab", "beside: [{eye: [1, 2, 3], look: [3, 4, 5], delay_s: -1, on: bom}]", ["views.operator.beside[1].on is 'bom'", "views.operator.beside[1].delay_s is -1"]),
+        ("aiming", "at: target, far: 4.0", "at: target, far: -4", ["feedback.ball.far is -4"]),
+    ],
+)  # fmt: skip
+def test_a_wrong_number_hides_no_wrong_name_of_its_component(
+    told, study: str, old: str, new: str, said: Sequence[str]
+) -> None:
+    text = AIMING if study == "aiming" else RETRIEVAL
+    assert old in text
+    lines = told(study, text.replace(old, new, 1))
+    found = [line.split(": ", 1)[1] for line in lines]
+    assert len(found) == len(said), lines
+    assert all(any(line.startswith(each) for line in found) for each in said), lines
+
+
+def test_a_wrong_number_of_the_input_hides_no_wrong_axis_elsewhere(told) -> None:
+    text = RETRIEVAL.replace("jaws: 4}", "jaws: 4}, timeout_s: -1", 1)
+    lines = told("retrieval", text.replace("find_axis: float.base", "find_axis: float.bas", 1))
+    assert any("tasks.retrieval.find_axis is 'float.bas'" in line for line in lines), lines
+    assert any("input.timeout_s is -1" in line for line in lines), lines
+
+
+FOLDER, EMPTY, NOISE = None, b"", b"\x00\x01noise\xff"
+
+
+@pytest.mark.parametrize("holds", [FOLDER, EMPTY, NOISE], ids=["folder", "empty", "noise"])
+@pytest.mark.parametrize(
+    ("old", "new", "name", "said"),
+    [
+        ("camera: cab", "font: a.ttf", "a.ttf", "27:31: "),
+        ("machine: ch8 ", "page: {logo: a.png}\nmachine: ch8 ", "a.png", "10:14: "),
+        ("machine: ch8 ", "page: {logo: a.svg}\nmachine: ch8 ", "a.svg", "10:14: "),
+        ("design:", "questionnaires: {a: {use: free, file: q.yaml}}\ndesign:", "q.yaml", "30:39: "),
+    ],
+)  # fmt: skip
+def test_a_file_that_a_run_would_open_is_looked_into(
+    told, tmp_path: Path, old: str, new: str, name: str, said: str, holds: bytes | None
+) -> None:
+    told("aiming", AIMING)
+    file = tmp_path / "aiming" / name
+    file.mkdir() if holds is None else file.write_bytes(holds)
+    assert AIMING.count(old) == 1
+    (line,) = told("aiming", AIMING.replace(old, new))
+    assert line.startswith(said), line
+    assert re.search(
+        "which is a folder; name|is no font; give|export the picture|cannot be read|holds no keys; it must",
+        line,
+    ), line
+
+
+def test_a_font_that_is_cut_off_is_refused_and_a_whole_one_is_not(told, tmp_path: Path) -> None:
+    told("aiming", AIMING)
+    raw = (Path(matplotlib.get_data_path()) / "fonts" / "ttf" / "STIXGeneral.ttf").read_bytes()
+    text = AIMING.replace("camera: cab", "font: a.ttf")
+    for part in (4, 100, len(raw) // 2, len(raw) - 100):
+        (tmp_path / "aiming" / "a.ttf").write_bytes(raw[:part])
+        (line,) = told("aiming", text)
+        assert line == (
+            "27:31: font is 'a.ttf', which is cut off; give a TrueType or OpenType font"
+        )
+    (tmp_path / "aiming" / "a.ttf").write_bytes(raw)
+    assert told("aiming", text) == []
+
+
+def test_instructions_that_are_a_folder_are_told_so(told) -> None:
+    (line,) = told("aiming", AIMING.replace("instructions: instructions.md", "instructions: ."))
+    assert line == "38:23: instructions is '.', which is a folder; name a text file in it"
+
+
+def test_a_certificate_that_is_none_is_asked_about(told, tmp_path: Path, registry) -> None:
+    told("aiming", "page: {certificate: a.pem, key: a.key}\n" + AIMING)
+    folder = tmp_path / "aiming"
+    for name in ("a.pem", "a.key"):
+        (folder / name).write_text("no PEM\n", encoding="utf-8")
+    asked = [
+        each
+        for each in questions(load(folder / "protocol.yaml", registry))
+        if each.place[0] == "page"
+    ]
+    assert [each.key for each in asked] == ["page.certificate"]
+    assert "give both in PEM, without a passphrase; is that meant?" in asked[0].text
+
+
+def column_of(text: str, part: str) -> str:
+    """Return line and column of a part of a text, as a message begins."""
+    at = text.index(part)
+    return f"{text[:at].count(chr(10)) + 1}:{at - text.rfind(chr(10), 0, at)}: "
+
+
+QUESTION = "questionnaires: {a: {use: free, title: A, questions: [{name: x, text: X?, %s}]}}\n"
+TRACK = "design:\n  tracks: {t: {factor: pairs, levels: {2m_far_left: 2, 4m_far_left: 4}, %s}}\n"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "at", "said"),
+    [
+        ("camera: cab", "camera: {eye: [1, 2, 3], look: [1, 2, 3]}", "[1, 2, 3]}", "look is where its eye is"),
+        ("camera: cab", "camera: {eye: [1, 2, 3], on: slew, look: targets}", "targets}", "cannot hold the targets"),
+        ("camera: cab", "beside: [{eye: [1, 2, 3], look: targets, depth_m: [3, 2]}]", "[3, 2]", "must be farther away"),
+        ("design:", QUESTION % "kind: choice" + "design:", "choice}", "has no choices"),
+        ("design:", QUESTION % "kind: scale, choices: [a, b]" + "design:", "[a, b]", "has choices"),
+        ("design:", QUESTION % "lowest: 20" + "design:", "20}", "must rise"),
+        ("design:", QUESTION % "lowest: 2, highest: 1" + "design:", "1}", "must rise"),
+        ("design:", QUESTION % "kind: text}, {name: x, text: Y?" + "design:", "x, text: Y?", "is the name of two questions"),
+        ("design:", TRACK % "up_down: {}, quest_plus: {spreads: [1]}", "{spreads", "both are there"),
+        ("design:", TRACK % "up_down: {}, measure: movement_time", "movement_time}}", "write the limit as well"),
+        ("design:", TRACK % "up_down: {}, at_most: 9", "9}}", "write the measure as well"),
+        ("design:", TRACK % "up_down: {}, measure: movement_time, at_least: 3, at_most: 2", "2}}", "no trial is a success"),
+        ("design:", TRACK % "up_down: {reversals: 30}, rounds: 20", "30}, rounds", "there are 20 rounds"),
+        ("design:", TRACK % "up_down: {}, rounds: 5", "5}}", "there are 5 rounds"),
+        ("machine: ch8 ", "machine: {urdf: a.urdf, joints: [a, b, c], tip: t, mjcf: a.xml} ", "a.xml", "described by one file"),
+        ("design:", "streams: {a: {type: EEG, evening: forbid, min_delay_s: 0.01}}\ndesign:", "0.01}", "or do not forbid evening"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_of_several_keys_is_told_at_one_of_them(
+    told, old: str, new: str, at: str, said: str
+) -> None:
+    text = AIMING.replace(old, new, 1)
+    found = [line for line in told("aiming", text) if said in line]
+    assert len(found) == 1, found
+    assert found[0].startswith(column_of(text, at)), found
+
+
+@pytest.mark.parametrize(
+    ("joints", "more", "at"),
+    [
+        ("{slew: joint1, shoulder: joint2, elbow: joint3, wrist: joint4}", ", speeds_deg_s: {elbow: 900}", "900"),
+        ("{slew: joint1, shoulder: joint2, elbow: joint3, wrist: joint4}", "", "joint3"),
+    ],
+)  # fmt: skip
+def test_a_question_of_a_described_machine_is_asked_where_the_joint_is(
+    told, tmp_path: Path, registry: Registry, joints: str, more: str, at: str
+) -> None:
+    machine = f"machine: {{urdf: openmanipulator_x.urdf, joints: {joints}, tip: gripper{more}}}"
+    text = AIMING.replace("machine: ch8", machine).replace("[2, 3, 4, 6], width: 0.5", NEAR)
+    text = text.replace("bullet_crane, actuator: ideal", "kinematic_crane")
+    told("aiming", text)
+    folder = tmp_path / "aiming"
+    robot = (PROTOCOLS.parent / "examples" / "machines" / "openmanipulator_x.urdf").read_text()
+    joint = robot.index('name="joint3"')
+    fast = robot[:joint] + re.sub(r'velocity="[^"]*"', 'velocity="20"', robot[joint:], count=1)
+    (folder / "openmanipulator_x.urdf").write_text(fast, encoding="utf-8")
+    study = load(folder / "protocol.yaml", registry)
+    asked = [each for each in questions(study) if "degrees in a second" in each.text]
+    found = [f"{study.where(each.place).removeprefix(f'{study.path}:')}: " for each in asked]
+    assert found == [column_of(text, at)]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("limit_s: 30", "limit_s: -1", "tasks.aiming.limit_s is -1; it must be greater than 0 s"),
+        ("width: 0.5", "width: -1 cm", "tasks.aiming.width is -0.01; it must be greater than 0 m"),
+        ("dead_zone: 0.05", "dead_zone: 5 %", "scheme.dead_zone is '5 %'; it must be a number; write 0.05 for 5 %"),
+        ("dead_zone: 0.05", "dead_zone: 5", "scheme.dead_zone is 5; it must be less than 1"),
+        ("design:", TRACK % "up_down: {harder_afters: 1}", "'harder_afters' is not a key of design.tracks.t.up_down; did you mean 'harder_after'?"),
+        ("design:", TRACK % "up_down: {}, foo: 1", "'foo' is not a key of design.tracks.t; possible: factor, levels, up_down, quest_plus, start, rounds, measure, at_least, at_most, carry"),
+        ("design:", "monitors: {a: {use: stick_signal, foo: 1}}\ndesign:", "'foo' is not a key of monitors.a, which has none; leave it out"),
+    ],
+)  # fmt: skip
+def test_a_number_that_cannot_be_is_told_with_its_bound_and_unit(
+    told, old: str, new: str, said: str
+) -> None:
+    assert old in AIMING
+    (line,) = told("aiming", AIMING.replace(old, new, 1))
+    assert line.split(": ", 1)[1] == said
+
+
+@pytest.mark.parametrize("most", ["-1", "0"])
+def test_no_time_is_below_nothing(told, most: str) -> None:
+    track = TRACK % f"up_down: {{}}, measure: movement_time, at_most: {most}"
+    text = AIMING.replace("design:", track, 1).replace("block: {task", "block: {track: t, task")
+    (line,) = told("aiming", text)
+    assert line.startswith(column_of(text, f"{most}}}}}"))
+    assert line.endswith("so that no trial is a success; it must be greater than 0 s")

@@ -43,7 +43,7 @@ def bare_computer() -> Iterator[None]:
 
 
 def crew(folder: Path, text: str, policy: str) -> FeedbackProcesses:
-    (folder / "no.ttf").write_text("letters without a font", encoding="utf-8")
+    (folder / "no.ttf").write_text("%! letters without a font", encoding="utf-8")
     study = a_study(folder, SHORT + text + f"on_fault: {{feedback_lost: {policy}}}\n")
     return FeedbackProcesses(Visit(study, "P001", 1, folder, simulated=True))
 

@@ -124,7 +124,7 @@ def test_neither_data_beside_the_study_nor_the_labs_key_are_in_its_bundle_or_loc
     with protocol.open("a", encoding="utf-8") as file:
         file.write("page: {certificate: lab.pem, key: lab.key, logo: crane.svg}\n")
     for name in ("lab.pem", "lab.key", "crane.svg"):
-        (protocol.parent / name).write_text(f"what is in {name}\n", encoding="utf-8")
+        (protocol.parent / name).write_text(f"<svg>what is in {name}\n", encoding="utf-8")
     (protocol.parent / "data").mkdir()
     (protocol.parent / "data" / "P001.h5").write_bytes(b"somebody")
     registry = discover(study=protocol)

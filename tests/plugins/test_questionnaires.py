@@ -241,7 +241,9 @@ def test_the_labs_own_questions_may_stand_in_a_file_of_their_own(tmp_path: Path)
     twice = BY_FILE.replace("comfort.yaml", "comfort.yaml, title: Warmth")
     assert "title is said in 'comfort.yaml' and in" in refusal(tmp_path, ASK_COMFORT, twice)
     file.write_text("Too hot?", encoding="utf-8")
-    assert "holds 'Too hot?'; it must hold keys" in refusal(tmp_path, ASK_COMFORT, BY_FILE)
+    assert "holds no keys; it must hold title and questions" in refusal(
+        tmp_path, ASK_COMFORT, BY_FILE
+    )
     file.unlink()
     assert "comfort.yaml' cannot be read" in refusal(tmp_path, ASK_COMFORT, BY_FILE)
 

@@ -116,7 +116,7 @@ def test_a_lapse_delays_the_movement_by_as_much_as_it_lasts() -> None:
             r":2:12: 'skill' is no number that 'simulated",
         ),
         ("groups: {loud: {fitts_b_s: 2}}", r":2:10: there is no group 'loud'; there is none, slow"),
-        ("operator: {lapse_s: {lowest: 2, highest: 1}}", r":2:21: .*lowest is 2, above highest, 1"),
+        ("operator: {lapse_s: {lowest: 2, highest: 1}}", r":2:30: .*lowest is 2, above highest, 1"),
         ("dropouts: 0.1", r":2:1: 'dropouts' is not a key of the file; did you mean 'dropout'\?"),
     ],
 )
@@ -125,6 +125,18 @@ def test_mistakes_are_named_with_their_line(study: Study, text: str, message: st
     path.write_text(f"labcrane_cohort: 1\n{text}\n")
     with pytest.raises(ProtocolError, match=message):
         read_population(path, study)
+
+
+def test_a_wrong_cohort_beside_the_protocol_is_told_by_its_check(
+    study: Study, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cohort = study.path.with_name("cohort.yaml")
+    cohort.write_text("labcrane_cohort: 1\ndropout: 5\n")
+    assert main(["check", str(study.path)]) == 2
+    said = "".join(capsys.readouterr().err.split("\n"))
+    assert "cohort.yaml:2:10: dropout is 5; it must be less than or equal to 1" in said
+    cohort.write_text("labcrane_cohort: 1\ndropout: 0.5\n")
+    assert main(["check", str(study.path)]) == 0
 
 
 def test_a_value_that_no_operator_can_have_is_refused(
@@ -136,7 +148,7 @@ def test_a_value_that_no_operator_can_have_is_refused(
     assert main(["simulate", str(study.path), "--out", out, "--participants", "1"]) == 2
     said = capsys.readouterr().err
     assert "participant P001 was drawn with lapse_rate 2." in said
-    assert "which 'simulated_operator' cannot have" in said
+    assert "which 'simulated_operator' cannot have: it must be less than or equal to 1" in said
     assert "narrow its distribution" in said
 
 

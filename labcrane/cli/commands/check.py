@@ -74,12 +74,18 @@ def examined(protocol: Path, *, simulated: bool = False) -> "tuple[Study, tuple[
     LabcraneError
         With one line for every mistake.
     """
+    from labcrane.files.names import COHORT
+    from labcrane.files.system import is_there
     from labcrane.protocol.questions import questions
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
 
     study = load(protocol, discover(study=protocol))
     study.check_installed(simulated=simulated, feedback=not simulated)
+    if is_there(cohort := protocol.resolve().with_name(COHORT)):
+        from labcrane.simulation.population import read_population
+
+        read_population(cohort, study)
     return study, questions(study)
 
 

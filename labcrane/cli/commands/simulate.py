@@ -91,11 +91,11 @@ def _orders(
     protocol: Path, folder: Path, names: "Sequence[str]", cohort: Path | None
 ) -> "list[SimulationJob]":
     """Return whom to simulate, and say by which operators."""
-    from labcrane.simulation.population import BESIDE
+    from labcrane.files.names import COHORT
     from labcrane.simulation.simulation import SimulationJob
 
     stay_on_this_computer()
-    beside = protocol.resolve().with_name(BESIDE)
+    beside = protocol.resolve().with_name(COHORT)
     cohort = cohort or (beside if beside.exists() else None)
     out.print(f"operators: {cohort or 'all alike but for their seeds'}", markup=False)
     # Workers may be in another folder than we are.

@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import Field, PositiveFloat, ValidationError, model_validator
 
 from labcrane.errors import ProtocolError, nearest
+from labcrane.files.complaints import WrongKey
 from labcrane.files.model import StrictModel
 from labcrane.files.system import is_file
 from labcrane.machines.machine import FEWEST_JOINTS, Machine
@@ -52,7 +53,8 @@ class MachineDescription(StrictModel):
     @model_validator(mode="after")
     def _is_one_file(self) -> "MachineDescription":
         if (self.urdf is None) == (self.mjcf is None):
-            raise ValueError("a machine is described by one file; write urdf or mjcf")
+            at = () if self.urdf is None else ("mjcf",)
+            raise WrongKey("a machine is described by one file; write urdf or mjcf", at=at)
         return self
 
     def _check_names(self) -> None:
@@ -62,11 +64,11 @@ class MachineDescription(StrictModel):
                     there = nearest(name, self.names, "its joints are")
                     raise ProtocolError(f"{key} names {name!r}; {there}", at=(key, name))
 
-    def _place(self, name: str) -> tuple[str, ...]:
-        """Return where the protocol has a name of the file."""
-        called = [key for key, joint in self.names.items() if joint == name]
-        if called:
-            return ("joints", called[0]) if isinstance(self.joints, dict) else ("joints",)
+    def place(self, name: str) -> tuple[str | int, ...]:
+        """Return where the protocol has a name, of the file or of the study's own for a joint."""
+        for at, (own, joint) in enumerate(self.names.items()):
+            if name in {own, joint}:
+                return ("joints", own if isinstance(self.joints, dict) else at)
         return ("tip",) if name == self.tip else ()
 
     @property
@@ -106,7 +108,7 @@ class MachineDescription(StrictModel):
             axes = found.axes(self.names, self.tip, speeds, self.efforts)
             fields = machine_fields(axes, found.tip(self.tip), self.rest_deg, self.thickness)
         except ChainError as error:
-            raise ProtocolError(f"{path}: {error}", at=self._place(error.name)) from error
+            raise ProtocolError(f"{path}: {error}", at=self.place(error.name)) from error
         fields = {"title": self.title or found.title, "source": f"{path.name}", **fields}
         try:
             machine = Machine.model_validate(fields, context={"folder": folder})
@@ -117,9 +119,10 @@ class MachineDescription(StrictModel):
             named = list(self.names)[int(loc[1])] if loc[0] == "joints" and len(loc) > 1 else ""
             key = next((key for key in ("rest_deg", "speeds_deg_s", "efforts") if key in what), "")
             where = f"joint {named!r}" if named else ".".join(map(str, loc))
+            written = key and named in getattr(self, key)
             raise ProtocolError(
                 f"{path} as a machine: {where}: {what}",
-                at=(key, named) if key and named in getattr(self, key) else (),
+                at=(key, named) if written else self.place(named),
             ) from error
 
     def _file(self, path: Path, folder: Path) -> Any:
