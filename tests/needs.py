@@ -123,7 +123,7 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
     "mujoco": (lambda: find_spec("mujoco") is not None, "pip install mujoco"),
     "mne": (lambda: find_spec("mne") is not None, "pip install 'labcrane[eeg]'"),
     "mne_bids": (lambda: find_spec("mne_bids") is not None, "pip install mne-bids"),
-    "pybv": (lambda: find_spec("pybv") is not None, "pip install 'labcrane[eeg]'"),
+    "pybv": (lambda: find_spec("pybv") is not None, "pip install pybv"),
     "bids-validator-deno": (
         lambda: shutil.which("bids-validator-deno", path=Path(sys.executable).parent) is not None,
         "pip install bids-validator-deno",

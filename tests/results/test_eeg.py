@@ -75,7 +75,6 @@ def test_what_cannot_be_put_at_samples_is_refused_in_words(session: SessionRecor
         volts(none, amp, "degC")
 
 
-@needs("pybv")
 def test_events_of_eeg_and_of_motion_are_the_same_on_two_clocks(
     bids: Path, session: SessionRecord
 ) -> None:
@@ -119,7 +118,7 @@ def errors(folder: Path) -> list[str]:
     return [f"{i['code']} {i.get('location')}" for i in issues if i["severity"] == "error"]
 
 
-@needs("bids-validator-deno", "pybv")
+@needs("bids-validator-deno")
 def test_the_validator_finds_no_error_in_eeg_motion_physio_and_phenotype(bids: Path) -> None:
     assert errors(bids) == []
 
@@ -146,7 +145,7 @@ def test_the_validator_knows_the_tags_of_every_event_also_of_two_at_once(tmp_pat
 
 
 @pytest.mark.long
-@needs("mne", "mne_bids", "pybv")
+@needs("mne", "mne_bids")
 def test_mne_reads_the_participant_file_and_bids_alike_and_epochs_by_label(
     bids: Path, session: SessionRecord
 ) -> None:
