@@ -164,6 +164,7 @@ def _doubts(study: Study) -> Doubts:
     yield from _of_monitors(study)
     yield from _of_the_machine(study)
     yield from _of_silent_blocks(study)
+    yield from _of_what_groups_are_not_given(study)
     yield from _of_groups(study)
     yield from _of_squares(study)
     yield from _of_sessions(study)
@@ -408,6 +409,29 @@ def _of_silent_blocks(study: Study) -> Doubts:
                     f"has, so that every group is given {all_of_it}; write feedback: group, none, "
                     "all or a list of names",
                 )
+
+
+def _of_what_groups_are_not_given(study: Study) -> Doubts:
+    """Question feedback of a step that tells somebody the error whose group is not given it."""
+    groups = study.protocol.design.groups
+    for place, block in _blocks(study):
+        if block.feedback in ("group", "none") or "feedback" not in block.model_fields_set:
+            continue
+        kind = study.protocol.sessions[int(place[1])].steps[int(place[3])].kind
+        named = study.protocol.feedback if block.feedback == "all" else block.feedback
+        told = {
+            name: [repr(group) for group, given in groups.items() if name not in given]
+            for name in named
+            if study.choices[f"feedback.{name}"].settings.reveals()
+        }
+        if said := "; ".join(
+            f"{name!r} to {', '.join(without)}" for name, without in told.items() if without
+        ):
+            yield (
+                (*place, kind, "feedback"),
+                f"{kind} {int(place[3]) + 1} gives feedback to groups to whom the design does not "
+                f"give it, {said}; write feedback: group",
+            )
 
 
 def _of_groups(study: Study) -> Doubts:

@@ -4,8 +4,11 @@
 
 import json
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from rehearsal import SHORT
 
 from labcrane import ProtocolError
@@ -166,6 +169,47 @@ def test_a_number_that_nobody_means_is_asked_about_until_it_is_answered(
 def test_a_stream_that_can_be_no_neighbours_is_not_asked_about(tmp_path: Path, need: str) -> None:
     asked = questions(a_study(tmp_path, ("sessions:", f"streams: {{gaze: {need}}}\nsessions:")))
     assert asked == ()
+
+
+@given(
+    groups=st.dictionaries(
+        st.sampled_from("abc"), st.sets(st.sampled_from(("ball", "tone"))), min_size=2
+    ),
+    named=st.one_of(
+        st.just("all"), st.lists(st.sampled_from(("ball", "tone")), min_size=1, unique=True)
+    ),
+    kind=st.sampled_from(("block", "practice")),
+)
+@settings(deadline=None, max_examples=30)
+def test_feedback_of_a_step_is_asked_about_for_every_group_that_is_not_given_it(
+    groups: dict[str, set[str]], named: str | list[str], kind: str
+) -> None:
+    """A line of the protocol must not take away by accident what the groups differ in."""
+    design = {name: sorted(given) for name, given in groups.items()}
+    step = f"      - {kind}: {{task: aiming, pairs: 1, feedback: {json.dumps(named)}}}\n"
+    with TemporaryDirectory() as folder:
+        study = a_study(
+            Path(folder),
+            ("sessions:", f"design: {{groups: {json.dumps(design)}}}\n{BALL}"),
+            (BLOCK, step + BLOCK.replace("pairs", "feedback: group, pairs")),
+        )
+        key = f"sessions.1.steps.1.{kind}.feedback"
+        asked = [each.text for each in questions(study) if each.key == key]
+    names = ("ball", "tone") if named == "all" else named
+    expected = {
+        name: [group for group, given in groups.items() if name not in given] for name in names
+    }
+    said = "; ".join(
+        f"'{name}' to {', '.join(map(repr, without))}"
+        for name, without in expected.items()
+        if without
+    )
+    assert len(asked) == bool(said)
+    for text in asked:
+        assert (
+            f"{kind} 1 gives feedback to groups to whom the design does not give it, {said};"
+            in text
+        )
 
 
 def test_an_answer_to_nothing_is_told_with_the_nearest_question(tmp_path: Path) -> None:
