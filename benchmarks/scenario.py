@@ -42,7 +42,7 @@ TICKS = {"kinematic": 4800, "casualty": 7200, "carry": 4800}
 PICTURES = 10
 SIZE = (960, 540)
 
-LIMITS = {"casualty": 50.0, "carry": 20.0}
+LIMITS = {"casualty": 40.0, "carry": 18.0}
 """How much longer than a tick of the kinematic study one of a scenario may take, in the median."""
 
 HELD = 0.8
