@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from labcrane import RecordingError
-from labcrane.types import FloatArray
+from labcrane import FloatArray, RecordingError
 
 LARGEST = float(np.finfo(np.float32).max)
 

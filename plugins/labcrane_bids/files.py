@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
+from labcrane import FloatArray
 from labcrane.recording import SessionRecord
-from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from labcrane import FloatArray
 from labcrane.recording import SessionRecord, Stream
-from labcrane.types import FloatArray
 from labcrane_bids.files import ROWS
 
 if TYPE_CHECKING:

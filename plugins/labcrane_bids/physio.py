@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
+from labcrane import FloatArray
 from labcrane.analysis import eeg_streams
 from labcrane.recording import SessionRecord, Stream
-from labcrane.types import FloatArray
 from labcrane_bids.files import MISSING, ROWS, first_tick, label
 from labcrane_bids.settings import BidsSettings
 
