@@ -324,7 +324,7 @@ def test_a_scenario_whose_ticks_are_slower_than_promised_or_too_long_is_missed()
         taken = {"kinematic": 4e-5, "casualty": casualty, "carry": 6e-4}
         return missed(scenario.tick_rows({name: [np.full(9, one)] for name, one in taken.items()}))
 
-    assert not told(49.0 * 4e-5)
-    (slow,) = told(51.0 * 4e-5)
+    assert not told(39.0 * 4e-5)
+    (slow,) = told(41.0 * 4e-5)
     assert "casualty, median" in slow
     assert len(told(0.81 * tick)) == 2

@@ -56,7 +56,11 @@ def test_check_warns_of_a_block_that_gives_every_group_all_feedback_unsaid(tmp_p
     assert asked.text.startswith("sessions: step 1 of ")
     assert "so that every group is given ball, tone; write feedback: group, none, all" in asked.text
     said = questions(a_study(tmp_path, blocks("pairs: 1, feedback: all")))
-    assert [each.key for each in said] == ["design.groups"]  # which then do the same
+    assert [each.key for each in said] == [
+        "design.groups",  # which then do the same
+        "sessions.1.steps.1.block.feedback",
+    ]
+    assert "'ball' to 'none', 'auditory'; 'tone' to 'none', 'visual'" in said[1].text
 
 
 def test_a_block_says_what_is_switched_on(tmp_path: Path) -> None:
