@@ -72,11 +72,16 @@ def session_process(launcher: "subprocess.Popen[str]") -> psutil.Process | None:
 
 def recorders(launcher: "subprocess.Popen[str]") -> list[psutil.Process]:
     """Return the recorder processes of a launcher that write a journal of streams."""
-    return [
-        child
-        for child in _children(launcher)
-        if any("_streams" in file.path for file in _files(child))
-    ]
+    return [child for child in _children(launcher) if journals(child)]
+
+
+def journals(process: psutil.Process) -> list[Path]:
+    """Return the journals of streams that a process holds open.
+
+    A process that is still importing holds modules open whose names say "_streams" too.
+    """
+    paths = [Path(file.path) for file in _files(process)]
+    return [path for path in paths if path.suffix == ".xdf" and "_streams" in path.name]
 
 
 def spares(launcher: "subprocess.Popen[str]") -> list[psutil.Process]:

@@ -142,7 +142,7 @@ def find(launcher: psutil.Process, folder: Path) -> dict[str, psutil.Process]:
             said, files = " ".join(child.cmdline()), [file.path for file in child.open_files()]
         except psutil.Error:
             continue
-        mine = [path for path in files if path.startswith(str(folder))]
+        mine = [Path(path).name for path in files if path.startswith(str(folder))]
         if any("_streams" in path for path in mine):
             found["other recorder" if "recorder" in found else "recorder"] = child
         elif any("_run" in path and path.endswith(".xdf") for path in mine):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from faults.sessions import STUDY, labcrane, recorders, spares, unique, wait_for
+from faults.sessions import STUDY, journals, labcrane, recorders, spares, unique, wait_for
 
 from labcrane import open_recording
 from labcrane.recording.foreign_streams import read_streams
@@ -46,15 +46,10 @@ class Sender:
 
 def all_receive(launcher: "subprocess.Popen[str]") -> bool:
     """Whether two recorders have what the device sent since it was started again."""
-    paths = [
-        Path(file.path)
-        for recorder in recorders(launcher)
-        for file in recorder.open_files()
-        if "_streams" in file.path
-    ]
     found = [
         stream
-        for path in paths
+        for recorder in recorders(launcher)
+        for path in journals(recorder)
         for stream in read_streams([path])[0]
         if stream.header.name == "Amplifier" and (stream.data[:, 0] >= 100_000).any()
     ]
