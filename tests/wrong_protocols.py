@@ -3,6 +3,7 @@
 import itertools
 import random
 import re
+import shutil
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from io import StringIO
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
 from ruamel.yaml.nodes import MappingNode, SequenceNode
 
 from labcrane.analysis.indicator_settings import IndicatorSettings
@@ -90,10 +92,151 @@ on_fault: {}
 """
 """What everything needs; every key with a default is written out beside it."""
 
+OTHERWISE = """\
+labcrane: 1
+study: otherwise
+title: What everything leaves out
+participants: {}
+rate_hz: 200
+machine:
+  urdf: openmanipulator_x.urdf
+  joints: {slew: joint1, shoulder: joint2, elbow: joint3, wrist: joint4}
+  tip: gripper
+  rest_deg: {elbow: 60}
+  speeds_deg_s: {slew: 60, elbow: 60}
+input:
+  use: keyboard
+  view: cab
+  axes: {slew: [a, d], shoulder: [s, w], elbow: [k, i], wrist: [l, j], done: [q, space]}
+operator:
+  use: simulated_operator
+  axes: [keyboard.slew, keyboard.shoulder, keyboard.elbow, keyboard.wrist]
+  button: keyboard.done
+scheme:
+  use: joint_velocity
+  map:
+    slew: keyboard.slew
+    shoulder: keyboard.shoulder
+    elbow: keyboard.elbow
+    wrist: keyboard.wrist
+dynamics:
+  use: mujoco_crane
+  payload_kg: 0.05
+  grapple: {mass_kg: 0.05, length_m: 0.05, size_m: 0.03, damping: 0.001}
+tasks:
+  press:
+    use: aiming
+    distances: [0.05, 0.1]
+    width: 0.02
+    centre: [0.2, 0, 0.1]
+    end: trigger
+    trigger: keyboard.done
+    movements: 1
+  stop:
+    use: aiming
+    distances: [5 cm, 10 cm]
+    width: 2 cm
+    centre: [0.2, 0, 0.1]
+    end: rest_anywhere
+    trigger: keyboard.done
+    movements: 1
+questionnaires:
+  load: {use: nasa_tlx}
+feedback:
+  ball: {use: sphere}
+views:
+  cab:
+    use: view
+    camera: {name: side, eye: [0.3, -0.9, 0.5], look: targets}
+    beside:
+      - name: far
+        eye: [0.2, 0.1, 0.9]
+        look: [0.2, 0, 0]
+        shows: depth
+        depth_m: [0.1, 2]
+        rate_hz: 20
+        delay_s: 0.2
+    keys: [a, d, s, w, k, i, l, j, q, space]
+    hud: [block, distance, load]
+    depth_cues: [tip_shadow, plumb_line]
+    text_arcmin: 20
+    viewing_m: 0.7
+    screen_mm: 520
+    areas: [tip, target, grapple]
+    supervisor: {rate_hz: 4, width: 320}
+  desk:
+    use: view
+    camera: top
+    seen_by: examiner
+    screen: 1
+streams:
+  gaze:
+    name: Eyes
+    rate_hz: 250
+    channels: 4
+    counter: Count
+    latency_s: 0.01
+    min_delay_s: 0.001
+    required: false
+monitors: {gaze: {use: gaze_signal}, keys: {use: stick_signal}}
+triggers:
+  port: {use: serial_ttl, port: /dev/ttyUSB0, codes: {trial.start: 1, trial.end: 2}}
+  box: {use: box_ttl, port: COM3}
+design:
+  groups: {none: [], sphere: [ball]}
+  order: {pairs: latin_square}
+  tracks:
+    stairs:
+      factor: pairs
+      levels: {0.1m_far_left: 1, 0.05m_far_left: 2}
+      up_down: {harder_after: 3, steps: [1], reversals: 3}
+      rounds: 4
+      measure: movement_time
+      at_most: 5
+    quest:
+      factor: pairs
+      levels: {0.1m_far_left: 1, 0.05m_far_left: 2}
+      quest_plus: {spreads: [0.5, 1], until_sd: 0.1}
+      rounds: 4
+      start: 0.1m_far_left
+sessions:
+  - name: only
+    window_s: 90 min
+    steps:
+      - instructions: instructions.md
+      - practice: {task: press, pairs: 1, feedback: all, until: {successes: 1}}
+      - block: {task: press, fading: [1, 0.5, 0], feedback: group}
+      - block: {task: press, name: stair, track: stairs, feedback: none}
+      - block: {task: stop, name: quest, track: quest, feedback: none}
+      - questionnaire: [load]
+environment: record
+on_fault: {feedback_lost: pause}
+expected:
+  - dynamics.grapple.mass_kg
+  - dynamics.grapple.damping
+  - views.cab
+  - sessions.1.steps.2.practice.feedback
+"""
+"""What cannot stand beside what is in everything: a robot's file, a keyboard, a load, tracks."""
 
-def everything(registry: Registry) -> str:
-    """Return a protocol that writes out every setting of what it uses."""
-    data = YAML().load(SKELETON)
+SKELETONS = {"everything": SKELETON, "otherwise": OTHERWISE}
+
+
+def lay_out(study: str, folder: Path) -> None:
+    """Put what a study needs beside its protocol into a folder."""
+    shutil.copytree(PROTOCOLS / ("aiming" if study in SKELETONS else study), folder)
+    if study in SKELETONS:
+        shutil.copy(PROTOCOLS.parent / "examples" / "machines" / ROBOT, folder)
+
+
+ROBOT = "openmanipulator_x.urdf"
+
+
+def right(study: str, registry: Registry) -> str:
+    """Return a right protocol; one of ours writes out every setting of what it uses."""
+    if study not in SKELETONS:
+        return (PROTOCOLS / study / "protocol.yaml").read_text(encoding="utf-8")
+    data = YAML().load(SKELETONS[study])
     for role, entry in ROLES.items():
         for key in entry.keys:
             uses = data.get(key) or {}
@@ -107,8 +250,9 @@ def everything(registry: Registry) -> str:
         ("sync", TimeLimits),
         ("indicator", IndicatorSettings),
     ):
-        _fill(data[key], model)
-    _fill(data["streams"]["brain"], StreamNeed)
+        _fill(data.setdefault(key, {}), model)
+    for stream in data["streams"].values():
+        _fill(stream, StreamNeed)
     out = StringIO()
     _yaml().dump(data, out)
     return out.getvalue()
@@ -150,6 +294,8 @@ class Wrong:
     columns
         Where in that line it may be pointed at: the key, or the value; empty where that is not
         known.
+    gone
+        What was there, of something that is missed; otherwise empty.
     must
         Whether it must be refused or questioned: it cannot be meant.
     """
@@ -161,9 +307,32 @@ class Wrong:
     line: int
     must: bool
     columns: frozenset[int] = frozenset()
+    gone: str = ""
 
     def __str__(self) -> str:
         return f"{self.study} {'.'.join(map(str, self.place))}: {self.fault}"
+
+    def is_missed(self, line: int, message: str) -> bool:
+        """Whether it may be told in a line that something is missed.
+
+        Where it was, what it was in, and whatever names it or what was in it; or elsewhere if the
+        message names it: a scheme needs the axis of a valve, and nothing in the file says so.
+        """
+        words = set(re.findall(r"\w+", f"{self.place[-1]} {self.gone}"))
+        return line in self._around(words) or bool(words & set(re.findall(r"\w+", message)))
+
+    def _around(self, words: set[str]) -> set[int]:
+        text = self.text.decode()
+        try:
+            at = {each.place: each.line for each in entries(text)}
+        except YAMLError:  # an anchor went with it
+            at = {}
+        found = {at.get(self.place[:depth], 1) for depth in range(len(self.place))}
+        found |= {self.line, at.get(self.place, self.line)}
+        for number, line in enumerate(text.splitlines(), start=1):
+            if words & set(re.findall(r"\w+", line)):
+                found.add(number)
+        return found
 
 
 FREE = {"title", "name", "text", "left", "right", "pattern", "language", "type", "source_id",
@@ -177,7 +346,10 @@ OF_LAB = {
     ("views",),
     ("streams",),
     ("monitors",),
+    ("triggers",),
+    ("input", "axes"),
     ("design", "groups"),
+    ("design", "tracks"),
 }
 """Mappings whose keys are the study's own names."""
 
@@ -292,7 +464,8 @@ def faults(study: str, text: str, seed: int = 0) -> Iterator[Wrong]:
         if isinstance(last, str) and (entry.left != entry.begin or entry.right != entry.end):
             cut = text[: entry.left] + text[entry.right :]
             line = line_at.get(holder, 1)
-            yield Wrong(study, REMOVED, entry.place, cut.encode(), line, must=False)
+            gone = text[entry.left : entry.right]
+            yield Wrong(study, REMOVED, entry.place, cut.encode(), line, must=False, gone=gone)
         around = set()  # what only the whole of something knows is told there
         for depth in range(1, len(entry.place)):
             whole = at_place[entry.place[:depth]]
@@ -302,9 +475,21 @@ def faults(study: str, text: str, seed: int = 0) -> Iterator[Wrong]:
             begins = _column(new, entry.start + 1)
             inside = {begins + 1} if what[0] in "[{" else set()
             columns = frozenset({_column(text, entry.begin), begins, *inside, *around})
+            gone = text[entry.start : entry.end] if what in NOTHING or last == "name" else ""
             yield Wrong(
-                study, f"written as {what}", entry.place, new.encode(), entry.line, must, columns
+                study,
+                f"written as {what}",
+                entry.place,
+                new.encode(),
+                entry.line,
+                must,
+                columns,
+                gone,
             )
+
+
+NOTHING = {"{}", "[]", "null"}
+"""What is written instead of something misses what was in it."""
 
 
 def _column(text: str, at: int) -> int:

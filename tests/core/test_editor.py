@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from core.language_client import Editor
 from needs import needs
-from wrong_protocols import PROTOCOLS, Wrong, everything, faults
+from wrong_protocols import PROTOCOLS, SKELETONS, Wrong, faults, right
 
 from labcrane.cli.app import main
 from labcrane.protocol.study import load
@@ -52,7 +52,7 @@ def told(path: Path, capsys: pytest.CaptureFixture[str]) -> list[dict[str, Any]]
 def drawn(registry: Registry, count: int, seed: int) -> list[Wrong]:
     """Return wrong protocols of a study that says all there is, and of the aiming study."""
     found: list[Wrong] = []
-    for study, text in (("everything", everything(registry)), ("aiming", AIMING)):
+    for study, text in (*((each, right(each, registry)) for each in SKELETONS), ("aiming", AIMING)):
         found += random.Random(seed).sample(list(faults(study, text, seed)), count)
     return found
 
