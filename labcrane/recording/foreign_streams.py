@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from labcrane.recording.journal_reader import JournalState, state
 from labcrane.recording.overlap import Union, sample_keys, union
+from labcrane.recording.unstamped import Received, stamped
 from labcrane.recording.xdf.header import Channel, StreamHeader
 from labcrane.recording.xdf.reader import XdfFile, XdfStream, read_xdf
 from labcrane.recording.xdf.samples import Texts
@@ -44,6 +45,9 @@ SAME_CLOCK_S = 10.0
 
 TAKEN = "taken"
 """Which stream was taken where any of its type would have been."""
+
+UNSTAMPED = "unstamped"
+"""A note of samples that came without a stamp, and whose stamps are worked back."""
 
 COUNTER_GAP = "counter gap"
 """A note of samples that the source's own counter left out; ``missing`` says how many."""
@@ -163,10 +167,26 @@ def _uid(header: StreamHeader) -> str:
 
 def _of_parts(streams: list[RecordedStream]) -> RecordedStream:
     """Return one stream of what each part has of it, in the order in which they were opened."""
+    streams = _all_stamped(streams)
     opened = [_opened(stream) for stream in streams]
     if None not in opened:
         streams = [streams[at] for at in np.argsort(np.array(opened, float), kind="stable")]
     return reduce(_continued, streams)
+
+
+def _all_stamped(streams: Sequence[RecordedStream]) -> list[RecordedStream]:
+    """Return what each part has of a stream, with stamps for samples that came without one."""
+    received = [Received(each.time_raw, each.data, each.texts) for each in streams]
+    found = []
+    for at, stream in enumerate(streams):
+        others = [*received[:at], *received[at + 1 :]]
+        stamps, estimated = stamped(received[at], stream.header.rate_hz, others)
+        notes = [
+            Note(float(stamps[end]), {"event": UNSTAMPED, "samples": [begin, end]})
+            for begin, end in estimated
+        ]
+        found.append(replace(stream, time_raw=stamps, notes=(*stream.notes, *notes)))
+    return found
 
 
 def _opened(stream: RecordedStream) -> float | None:
@@ -291,7 +311,8 @@ def _told_once(
         kept = [note for note in ours if not (note.data.get("event") == SIGNAL and both(note))]
     else:
         other = []
-    later = [note for note in theirs if note.time > ended or note.data.get("event") == OPENED]
+    own = {OPENED, UNSTAMPED}  # of a recorder, not of the stream
+    later = [note for note in theirs if note.time > ended or note.data.get("event") in own]
     return kept, [*other, *later]
 
 

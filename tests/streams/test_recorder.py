@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyxdf
-from streams.emulation import Lab, stop, until, until_ready
+from streams.emulation import HERE, Lab, stop, until, until_ready
 
 from labcrane.errors import StreamError
 from labcrane.recording.foreign_streams import read_streams
@@ -125,6 +125,22 @@ def test_a_killed_recorder_goes_on_in_the_next_part(lab):
     assert len(after) > 0
     assert (np.diff(stream.data[:, 0])[: len(before) - 1] == 1.0).all()
     assert events(stream) == ["opened", "opened"]
+
+
+def test_samples_of_a_chunk_under_way_when_the_recorder_connects_have_the_times_they_are_of(lab):
+    lab.start(str(HERE / "halfway.py"), "Amplifier", "amplifier-1")
+    recorder = lab.recorder(AMPLIFIER)
+    until(recorder, lambda status: named(status, "Amplifier")["samples"] > 64)
+    assert stop(recorder) == 0
+    (came,) = (
+        each.stamps for each in read_xdf(lab.journal).streams if each.header.name == "Amplifier"
+    )
+    assert came[:3].tolist() == pytest.approx([0.004, 0.008, 0.012], abs=1e-9), "as liblsl has them"
+    stream = lab.streams()["Amplifier"]
+    assert stream.data[0, 0] == 5
+    assert stream.time_raw == pytest.approx(stream.data[:, 1], abs=1e-8)
+    (note,) = (note.data for note in stream.notes if note.data["event"] == "unstamped")
+    assert note["samples"] == [0, 11]
 
 
 def test_two_programs_with_one_source_id_are_warned_of(lab):

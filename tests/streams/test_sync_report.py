@@ -48,6 +48,15 @@ def test_a_stream_in_order_passes():
     assert (report.verdict, report.findings, report.samples) == (Verdict.PASS, (), 30_000)
 
 
+def test_samples_whose_stamps_are_worked_back_are_counted_once_and_told():
+    notes = [Note(100.0, {"event": "unstamped", "samples": part}) for part in ([0, 8], [3, 8])]
+    findings = judged(recorded(notes=notes)).findings
+    (found,) = (each for each in findings if "without a stamp" in each.text)
+    assert found.verdict is Verdict.WARN
+    assert found.text.startswith("8 samples came without a stamp: a recorder connected in the mid")
+    assert found.advice == "leave out the trial they are in, if it is one"
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_a_buffer_that_shrinks_is_told(seed: int) -> None:
     draw = np.random.default_rng(seed)

@@ -7,7 +7,13 @@ from typing import Any
 import numpy as np
 
 from labcrane.core.findings import Finding, Verdict, worst
-from labcrane.recording.foreign_streams import COUNTER_GAP, RESET, TAKEN, RecordedStream
+from labcrane.recording.foreign_streams import (
+    COUNTER_GAP,
+    RESET,
+    TAKEN,
+    UNSTAMPED,
+    RecordedStream,
+)
 from labcrane.streams.sync.quality import Quality
 from labcrane.streams.sync.raw import ASSUMED_RTT_S
 from labcrane.streams.sync.report.certificate import (
@@ -364,6 +370,14 @@ def _noted(recorded: RecordedStream) -> list[Finding]:
             f"its program was restarted {resets} times",
             "corrected; look why it stopped",
         )
+    rest = set[int]()
+    for note in recorded.notes:
+        if note.data.get("event") == UNSTAMPED:
+            rest |= set(range(*note.data["samples"]))
+    if rest:
+        text = f"{len(rest)} samples came without a stamp: a recorder connected in the middle of a "
+        text += "chunk; theirs are worked back from the next chunk's, a period each"
+        _add(found, Verdict.WARN, text, "leave out the trial they are in, if it is one")
     for text in {str(note.data["text"]) for note in recorded.notes if _is_warning(note.data)}:
         _add(found, Verdict.WARN, text.partition(": ")[0], text.partition(": ")[2] or "correct it")
     return found
