@@ -30,6 +30,7 @@ from labcrane.approval.environment import (
 )
 from labcrane.approval.lock import lock_path, read_lock
 from labcrane.approval.materials import files_of_settings, study_files
+from labcrane.approval.repacked import repacked
 from labcrane.errors import ProtocolError
 from labcrane.files.atomic import UNFINISHED, copy, sha256, write_text
 from labcrane.files.yaml import YamlFile
@@ -69,7 +70,7 @@ def bundle(study: Study, registry: Registry, folder: Path) -> Bundle:
     ------
     ProtocolError
         What is installed here is not what the study was approved with; the folder is there already;
-        a wheel cannot be had, or holds other files than what is installed here.
+        a wheel cannot be had.
     """
     if folder.exists():
         raise ProtocolError(f"{folder} is there already; give the bundle a new folder")
@@ -170,17 +171,15 @@ def _wanted(package: Distribution) -> str:
 
 
 def _checked_wheels(packages: list[Distribution], folder: Path) -> dict[str, Path]:
-    """Return the wheel of each package by its name, if it holds what is installed here."""
+    """Return the wheel of each package by its name, with what is installed here in it."""
     wheels = {one_name(path.name.partition("-")[0]): path for path in folder.glob("*.whl")}
     for package in packages:
         name = one_name(package.name)
         if name not in wheels:
             raise ProtocolError(f"pip made no wheel of {name} {package.version}; install it anew")
         if not is_working_copy(package) and fingerprint(package) != _of_wheel(wheels[name]):
-            raise ProtocolError(
-                f"the wheel of {name} {package.version} that pip finds has other files than what "
-                "is installed here; install it anew, and record the change with labcrane amend"
-            )
+            wheels[name].unlink()  # what is here was approved, and not what an index has
+            wheels[name] = repacked(package, folder)
     return wheels
 
 
