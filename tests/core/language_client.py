@@ -65,7 +65,7 @@ class Editor:
         if kind is None:
             self._ask("shutdown")
             self._tell("exit")
-            self._server.communicate(timeout=60)
+            self._server.communicate(timeout=240)
             assert self._server.returncode == 0
         else:
             self._server.kill()

@@ -117,9 +117,9 @@ class Joined:
     def record(self) -> None:
         """Receive what it says it has presented, as the recorder does."""
         wanted = log_source(self.source, "notes")
-        (info,) = pylsl.resolve_byprop("source_id", wanted, timeout=60.0)
+        (info,) = pylsl.resolve_byprop("source_id", wanted, timeout=240.0)
         self._recorder = pylsl.StreamInlet(info)
-        self._recorder.open_stream(60.0)
+        self._recorder.open_stream(240.0)
 
     def shown(self) -> list[str]:
         """Send a frame and the context; return how many shapes each picture had."""

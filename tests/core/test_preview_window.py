@@ -48,7 +48,7 @@ def test_a_movement_is_played_in_real_time_in_a_window(tmp_path: Path) -> None:
             encoding="utf-8",
         )
         try:
-            (info,) = pylsl.resolve_byprop("name", log_name(view), timeout=60.0)
+            (info,) = pylsl.resolve_byprop("name", log_name(view), timeout=240.0)
             inlet = pylsl.StreamInlet(info)
             labels = inlet.info().get_channel_labels()
             rows: list[list[float]] = []

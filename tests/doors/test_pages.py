@@ -315,7 +315,7 @@ def test_pages_are_served_over_tls_by_the_labs_certificate(tmp_path: Path) -> No
         link = room.links()["supervisor"]
         assert link.startswith(f"https://127.0.0.1:{room.port}/supervisor?token=")
         trusted = ssl.create_default_context(cafile=tmp_path / "authority.pem")
-        to = http.client.HTTPSConnection("127.0.0.1", room.port, timeout=20, context=trusted)
+        to = http.client.HTTPSConnection("127.0.0.1", room.port, timeout=240, context=trusted)
         wait_for(lambda: opens(room.port))
         to.request("GET", link.partition(str(room.port))[2])
         given = to.getresponse()

@@ -16,7 +16,7 @@ while len(inlets) < 3:
     for info in resolver.results():
         if info.name() not in inlets:
             inlets[info.name()] = pylsl.StreamInlet(info, max_buflen=360)
-            inlets[info.name()].open_stream(5.0)
+            inlets[info.name()].open_stream(240.0)
     time.sleep(0.05)
 del resolver
 sys.stdout.write("ready\n")

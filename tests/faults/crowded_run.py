@@ -168,7 +168,7 @@ def begin(folder: Path, number: int) -> dict[str, object]:
         run.terminate() if run.poll() is None else None
         devices.kill()
         devices.wait()
-        run.wait(30)
+        run.wait(240)
     return {"took": took, **most, "holders": holders, "said": said[-12:] if took is None else []}
 
 

@@ -136,7 +136,7 @@ def a_witness(study: str, into: Path) -> Iterator[None]:
         try:
             yield
             process.terminate()  # it takes what is still under way
-            assert process.wait(timeout=120) == 0
+            assert process.wait(timeout=240) == 0
         finally:
             process.kill()
             process.wait()

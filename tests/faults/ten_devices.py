@@ -29,7 +29,7 @@ def look() -> None:
     while not (found := pylsl.resolve_byprop("name", "gateway.flow", 1, timeout=1.03)):
         pass
     flows.append(pylsl.StreamInlet(found[0]))
-    flows[0].open_stream(10.0)
+    flows[0].open_stream(240.0)
 
 
 threading.Thread(target=look, daemon=True).start()

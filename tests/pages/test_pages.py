@@ -226,4 +226,4 @@ runpy.run_module("labcrane.web.service", run_name="__main__")
 
 def test_the_pages_end_while_a_recording_is_being_read(tmp_path: Path) -> None:
     words = [sys.executable, "-W", "ignore", "-c", READING, str(tmp_path / "being_read.h5")]
-    assert subprocess.run(words, timeout=60, check=False).returncode == 3
+    assert subprocess.run(words, timeout=240, check=False).returncode == 3

@@ -136,7 +136,7 @@ def test_what_is_half_written_outlives_a_connection_that_was_lost(
     go_to(browser, "note-field")
     type_in(browser, "half a ")
     wait_for(lambda: browser.execute_script(ACKNOWLEDGED))  # what it was loaded with is not kept
-    browser.set_script_timeout(60)
+    browser.set_script_timeout(240)
     assert browser.execute_async_script(AWAY, 5000)
     assert browser.execute_script("return window.stays")
     type_in(browser, "note", Keys.ENTER)

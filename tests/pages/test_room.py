@@ -374,7 +374,7 @@ def test_a_browser_of_pages_that_died_is_not_waited_for_at_the_end(
         pages._process.take(Opened(1))
         assert pages._open()
         pages._process.exit_code = 1
-        assert restarted.wait(30.0)
+        assert restarted.wait(240.0)
         assert not pages._open()
     finally:
         pages._closed.set()

@@ -136,7 +136,7 @@ def test_every_state_of_the_control_room_is_for_everybody(
         opened(browser, told.links["supervisor"])
         for state, events in BEGUN.items():
             told.happens(*events)
-            wait_for(lambda state=state: browser.execute_script(STATE) == state, 60.0)
+            wait_for(lambda state=state: browser.execute_script(STATE) == state)
             if state == "fault":
                 shown(browser, "lamp", "left")
                 assert text(browser, "remedy"), "what to do is said"

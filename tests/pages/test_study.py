@@ -168,13 +168,13 @@ def served(lab: Lab) -> Iterator[str]:
         yield next(line for line in server.stdout if line.startswith("study: ")).split()[1]
     finally:
         server.terminate()
-        server.wait(60)
+        server.wait(240)
         server.stdout.close()
 
 
 def answer(link: str, path: str, **headers: str) -> int:
     place = urlsplit(link)
-    connection = HTTPConnection(place.hostname, place.port, timeout=60)
+    connection = HTTPConnection(place.hostname, place.port, timeout=240)
     connection.request("GET", path, headers=headers)
     status = connection.getresponse().status
     connection.close()

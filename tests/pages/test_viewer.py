@@ -444,10 +444,10 @@ def test_the_page_shows_the_recorded_pose_at_any_time(
             frames = link_frames(machine, row)
             wanted = {body.name: frames[body.frame] for body in film.run.bodies}
             browser.execute_script(GO, at)
-            wait_for(lambda wanted=wanted: apart(browser, wanted) < 1e-6, 10.0)
+            wait_for(lambda wanted=wanted: apart(browser, wanted) < 1e-6)
     finally:
         viewer.terminate()
-        viewer.wait(30)
+        viewer.wait(240)
         viewer.stdout.close()
 
 

@@ -341,8 +341,8 @@ def test_lsl_streams_become_a_recording(tmp_path: Path, capsys: pytest.CaptureFi
     rows, levels = steps(3)
 
     def talk() -> None:
-        signal_out.wait_for_consumers(20.0)
-        angle_out.wait_for_consumers(20.0)
+        signal_out.wait_for_consumers(240.0)
+        angle_out.wait_for_consumers(240.0)
         start = pylsl.local_clock()
         for now, signal, angle in rows:
             stamp = start + now - rows[0][0]

@@ -168,7 +168,7 @@ def test_a_device_that_is_pulled_out_is_told_and_nothing_raises(answering: Devic
     trigger = SerialTrigger(SerialSettings(port=gone.port, echo=True), as_byte, b"\0")
     with opened(trigger, make_run(ch8())):
         gone.close()
-        until = time.monotonic() + 10.0
+        until = time.monotonic() + 240.0
         while trigger.fault is None and time.monotonic() < until:
             trigger.send([7], 0.0)
         assert trigger.fault is not None

@@ -115,7 +115,7 @@ def kill(launcher: "subprocess.Popen[str]") -> None:
     processes += processes[0].children(recursive=True)
     for process in processes:
         process.kill()
-    psutil.wait_procs(processes, timeout=60)
+    psutil.wait_procs(processes, timeout=240)
     launcher.communicate()
 
 
