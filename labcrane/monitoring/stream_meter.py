@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from labcrane.recording.unstamped import Received, stamped
 from labcrane.streams.probes import Probe
 from labcrane.types import FloatArray
 
@@ -106,8 +107,11 @@ class StreamMeter:
                 self._samples, missing=self._missing, offset=offset, rtt=rtt, skew_ppm=skew
             )
         sizes = np.array([len(stamps) for _, stamps in chunks])
-        delays = np.array([arrival - stamps[-1] for arrival, stamps in chunks]) - (offset or 0.0)
-        flow = self._intervals(np.concatenate([stamps for _, stamps in chunks]))
+        stamps = np.concatenate([each for _, each in chunks])
+        stamps, _ = stamped(Received(stamps, np.empty((len(stamps), 0)), []), self._nominal, ())
+        arrivals = np.array([arrival for arrival, _ in chunks])
+        delays = arrivals - stamps[np.cumsum(sizes) - 1] - (offset or 0.0)
+        flow = self._intervals(stamps)
         return StreamReading(
             self._samples,
             rate_hz=flow.rate_hz,

@@ -277,6 +277,19 @@ def test_skew_chunks_jitter_gaps_and_delay_are_measured() -> None:
     assert reading.rtt == pytest.approx(1e-4)
 
 
+def test_who_begins_to_watch_within_a_chunk_sees_no_gap_since_the_clock_was_at_zero() -> None:
+    meter = StreamMeter(250.0)
+    meter.take(5000.0, np.arange(1, 12) / 250.0)  # as LSL counts what has no stamp
+    for number in range(1, 40):
+        stamps = 5000.0 + (np.arange(16) + 16 * (number - 1)) / 250.0
+        meter.take(stamps[-1] + 0.002, stamps)
+    meter.probe(Probe(5000.0, 0.0, 1e-4, 5000.0))
+    reading = meter.reading(now=5003.0)
+    assert reading.rate_hz == pytest.approx(250.0)
+    assert (reading.gaps, reading.disorder, reading.samples) == (0, 0, 11 + 39 * 16)
+    assert reading.largest_delay == pytest.approx(0.004)
+
+
 def test_disorder_is_counted() -> None:
     meter = StreamMeter(100.0)
     meter.take(1.0, np.array([0.0, 0.02, 0.01, 0.03]))
