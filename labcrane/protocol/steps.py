@@ -236,9 +236,14 @@ def _instructions(source: YamlFile, place: Place, value: Any) -> dict[str, Any] 
         source.problem((*place, "instructions"), told)
         return None
     try:
-        return {"kind": "instructions", "file": value, "text": read_text(path)}
+        text = read_text(path).removeprefix("\ufeff")  # as editors on Windows write it
     except ProtocolError as error:
         missing = isinstance(error.__context__, FileNotFoundError)
         told = f" is {value!r}, and {absent(path)}" if missing else f": {error}"
         source.problem((*place, "instructions"), f"instructions{told}")
         return None
+    if not text.strip() and not source.recorded:
+        told = f"instructions is {value!r}, which is empty; write in it what is to be read"
+        source.problem((*place, "instructions"), told)
+        return None
+    return {"kind": "instructions", "file": value, "text": text}

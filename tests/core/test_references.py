@@ -589,6 +589,16 @@ def test_instructions_that_are_a_folder_are_told_so(told) -> None:
     assert line == "38:23: instructions is '.', which is a folder; name a text file in it"
 
 
+@pytest.mark.parametrize("text", ["", "\n", " \t\r\n", "\ufeff\n"])
+def test_instructions_without_a_word_are_told(told, tmp_path: Path, text: str) -> None:
+    assert told("aiming", AIMING) == []
+    (tmp_path / "aiming" / "nothing.md").write_text(text, encoding="utf-8")
+    new = "instructions: nothing.md"
+    (line,) = told("aiming", AIMING.replace("instructions: instructions.md", new))
+    said = "instructions is 'nothing.md', which is empty; write in it what is to be read"
+    assert line == f"38:23: {said}"
+
+
 def test_a_certificate_that_is_none_is_asked_about(told, tmp_path: Path, registry) -> None:
     told("aiming", "page: {certificate: a.pem, key: a.key}\n" + AIMING)
     folder = tmp_path / "aiming"
