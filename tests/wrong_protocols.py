@@ -214,7 +214,7 @@ on_fault: {feedback_lost: pause}
 expected:
   - dynamics.grapple.mass_kg
   - dynamics.grapple.damping
-  - views.cab
+  - views.cab.hud
   - sessions.1.steps.2.practice.feedback
 """
 """What cannot stand beside what is in everything: a robot's file, a keyboard, a load, tracks."""

@@ -44,10 +44,6 @@ def read_settings(path: Path, model: type[ModelT]) -> ModelT:
 class Settings(StrictModel):
     """Base of every plugin's settings: unknown keys are errors, values never change."""
 
-    def warnings(self) -> Sequence[str]:
-        """Return what is allowed but should be known beforehand; ``labcrane check`` says it."""
-        return ()
-
     def reveals(self) -> str:
         """Return what whoever sees or hears the component learns of the task's error.
 

@@ -83,7 +83,8 @@ class Question:
 
 def questions(study: Study) -> tuple[Question, ...]:
     """Return what should be asked before people take part, and has not been answered."""
-    asked = {each.key: each for each in _asked(study)}
+    found = list(dict.fromkeys(_asked(study)))  # of one place there may be several
+    asked = {each.key for each in found}
     expected = study.protocol.expected
     stale = [
         Question(
@@ -95,7 +96,7 @@ def questions(study: Study) -> tuple[Question, ...]:
         for at, key in enumerate(expected)
         if key not in asked and not key.startswith(REHEARSAL)
     ]
-    return (*(each for key, each in asked.items() if key not in expected), *stale)
+    return (*(each for each in found if each.key not in expected), *stale)
 
 
 Finding = dict[str, Any]
@@ -224,7 +225,8 @@ def _of_repeats(study: Study) -> Doubts:
             lists["sessions", number, "steps", at, "questionnaire"] = step.questionnaires
     for place, names in lists.items():
         for name in twice(names):
-            yield place, f"{key_of(place)} has {name!r} twice"
+            again = len(names) - 1 - names[::-1].index(name)
+            yield (*place, again), f"{key_of(place)} has {name!r} twice"
     given: dict[frozenset[str], str] = {}
     for name, feedback in study.protocol.design.groups.items():
         if (other := given.setdefault(frozenset(feedback), name)) != name:
@@ -240,8 +242,6 @@ def _of_components(study: Study) -> Doubts:
         for key, text in choice.settings.doubts(study.machine).items():
             steps = [int(step) - 1 if step.isdecimal() else step for step in key.split(".")]
             yield (*place, *steps), f"{part}.{key} {text}"
-        for warning in choice.settings.warnings():
-            yield place, f"{part}: {warning}"
         if part in {f"views.{name}" for name in study.views} and (
             told := choice.settings.reveals()
         ):
@@ -412,7 +412,11 @@ def _of_silent_blocks(study: Study) -> Doubts:
 
 
 def _of_what_groups_are_not_given(study: Study) -> Doubts:
-    """Question feedback of a step that tells somebody the error whose group is not given it."""
+    """Question feedback of a step for whoever is of a group that is not given it.
+
+    Whether it tells the error does not matter: what tells the difference of two groups is given to
+    one of them alone.
+    """
     groups = study.protocol.design.groups
     for place, block in _blocks(study):
         if block.feedback in ("group", "none") or "feedback" not in block.model_fields_set:
@@ -422,7 +426,6 @@ def _of_what_groups_are_not_given(study: Study) -> Doubts:
         told = {
             name: [repr(group) for group, given in groups.items() if name not in given]
             for name in named
-            if study.choices[f"feedback.{name}"].settings.reveals()
         }
         if said := "; ".join(
             f"{name!r} to {', '.join(without)}" for name, without in told.items() if without

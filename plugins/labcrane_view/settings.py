@@ -1,7 +1,7 @@
 """Settings of a view."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from string import ascii_lowercase, digits
 from typing import Annotated, Literal
@@ -338,7 +338,7 @@ class ViewSettings(Settings):
 
     def doubts(self, machine: Machine) -> Mapping[str, str]:
         names = [camera.name for camera in self.cameras]
-        found = {}
+        found = self._told_to_everybody()
         if twice := [name for at, name in enumerate(names) if name in names[:at]]:
             found["beside"] = (
                 f"has a second camera called {twice[0]!r}, so that their areas of interest and "
@@ -360,6 +360,24 @@ class ViewSettings(Settings):
             found["hint_s"] = f"is {self.hint_s:g} s, in which nobody reads a hint"
         return found
 
+    def _told_to_everybody(self) -> dict[str, str]:
+        """Return what tells the operator of the task's error, or of success, in every group."""
+        if self.seen_by == "examiner":
+            return {}
+        found = {}
+        if "distance" in self.hud_lines:
+            found["hud"] = (
+                "has distance, which tells the operator the task's error in every group, also in "
+                "one without feedback; leave it out, make it feedback of a group, or write "
+                "seen_by: examiner if the operator does not see this view"
+            )
+        if self.patch is not None and (told := [e for e in self.patch.on if e in ENTERING]):
+            found["patch"] = (
+                f"changes on {told[0]}, which tells the operator, in every group, when the target "
+                "is reached; cover the patch with the photodiode, or let it change on other events"
+            )
+        return found
+
     @property
     def cameras(self) -> tuple[CameraSettings, ...]:
         """The first camera, and those beside it."""
@@ -371,20 +389,3 @@ class ViewSettings(Settings):
         if self.hud is not None:
             return self.hud
         return ("block", "trial", "distance") if self.seen_by == "examiner" else ("block", "trial")
-
-    def warnings(self) -> Sequence[str]:
-        if self.seen_by == "examiner":
-            return ()
-        found = []
-        if "distance" in self.hud_lines:
-            found.append(
-                "hud: distance tells the operator the task's error in every group, also in one "
-                "without feedback; leave it out, make it feedback of a group, or write seen_by: "
-                "examiner if the operator does not see this view"
-            )
-        if self.patch is not None and (told := [e for e in self.patch.on if e in ENTERING]):
-            found.append(
-                f"patch: {told[0]} tells the operator, in every group, when the target is reached; "
-                "cover the patch with the photodiode, or let it change on other events"
-            )
-        return tuple(found)

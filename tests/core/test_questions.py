@@ -87,7 +87,7 @@ GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
           (BLOCK, BLOCK.replace("pairs", "feedback: group, pairs"))],
          "design.groups.ball", "groups 'all' and 'ball' are given the same feedback"),
         ([(BLOCK, BLOCK.replace("pairs", "ask: [nasa_tlx, nasa_tlx], pairs"))],
-         "sessions.1.steps.1.block.ask", "has 'nasa_tlx' twice"),
+         "sessions.1.steps.1.block.ask.2", "has 'nasa_tlx' twice"),
         ([("machine: ch8", "operator: {use: simulated_operator, reaction_sd: 1e300}\nmachine: ch8")],
          "operator.reaction_sd", "is 1e+300"),
         ([("sessions:", "participants: {planned: 3}\ndesign: {order: {pairs: williams}}\nsessions:")],
@@ -176,7 +176,7 @@ def test_a_stream_that_can_be_no_neighbours_is_not_asked_about(tmp_path: Path, n
         st.sampled_from("abc"), st.sets(st.sampled_from(("ball", "tone"))), min_size=2
     ),
     named=st.one_of(
-        st.just("all"), st.lists(st.sampled_from(("ball", "tone")), min_size=1, unique=True)
+        st.just("all"), st.lists(st.sampled_from(("ball", "tone")), min_size=1, max_size=4)
     ),
     kind=st.sampled_from(("block", "practice")),
 )
@@ -195,7 +195,10 @@ def test_feedback_of_a_step_is_asked_about_for_every_group_that_is_not_given_it(
         )
         key = f"sessions.1.steps.1.{kind}.feedback"
         asked = [each.text for each in questions(study) if each.key == key]
+        again = [each.key for each in questions(study) if "twice" in each.text]
     names = ("ball", "tone") if named == "all" else named
+    assert len(again) == len({name for name in names if names.count(name) > 1})
+    assert key not in again, "an answer to the one would be an answer to the other"
     expected = {
         name: [group for group, given in groups.items() if name not in given] for name in names
     }
@@ -210,6 +213,26 @@ def test_feedback_of_a_step_is_asked_about_for_every_group_that_is_not_given_it(
             f"{kind} 1 gives feedback to groups to whom the design does not give it, {said};"
             in text
         )
+
+
+def test_feedback_that_does_not_say_what_it_tells_is_asked_about_as_well(tmp_path: Path) -> None:
+    (tmp_path / "plugins").mkdir()
+    (tmp_path / "plugins" / "broken.py").write_text(BROKEN)
+    design = "feedback: {ball: {use: broken}}\ndesign: {groups: {none: [], lit: [ball]}}\nsessions:"
+    named = BLOCK.replace("pairs", "feedback: [ball], pairs")
+    study = a_study(tmp_path, ("sessions:", design), (BLOCK, named))
+    key = "sessions.1.steps.1.block.feedback"
+    (asked,) = (each for each in questions(study) if each.key == key)
+    assert "to whom the design does not give it, 'ball' to 'none'; write feedback" in asked.text
+
+
+def test_two_doubts_of_one_view_are_both_asked_and_answered_apart(tmp_path: Path) -> None:
+    view = "{use: view, hud: [distance], patch: {on: [target.entered]}}"
+    views = ("sessions:", f"views: {{cab: {view}}}\nsessions:")
+    keys = [each.key for each in questions(a_study(tmp_path, views))]
+    assert keys == ["views.cab.hud", "views.cab.patch"]
+    answered = ("sessions:", "expected: [views.cab.patch]\nsessions:")
+    assert [each.key for each in questions(a_study(tmp_path, views, answered))] == keys[:1]
 
 
 def test_an_answer_to_nothing_is_told_with_the_nearest_question(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from PIL import ImageGrab
 from plugins.whole_picture import counted
 from windows import a_view, an_x_server, make_frame
 
+from labcrane.testing import ch8
 from labcrane_view.placement import free_place
 from labcrane_view.settings import ViewSettings
 
@@ -188,10 +189,10 @@ def test_digits_are_as_high_as_capitals_and_stand_on_the_line(digits: str) -> No
 def test_the_operator_sees_no_distance_unless_asked_for_and_the_examiner_does() -> None:
     assert ViewSettings().hud_lines == ("block", "trial")
     assert ViewSettings(seen_by="examiner").hud_lines == ("block", "trial", "distance")
-    assert ViewSettings().warnings() == ()
-    assert ViewSettings(seen_by="examiner", hud=("distance",)).warnings() == ()
-    (warning,) = ViewSettings(hud=("distance",)).warnings()
-    assert "tells the operator the task's error in every group" in warning
+    assert ViewSettings().doubts(ch8()) == {}
+    assert ViewSettings(seen_by="examiner", hud=("distance",)).doubts(ch8()) == {}
+    asked = ViewSettings(hud=("distance",)).doubts(ch8())
+    assert "tells the operator the task's error in every group" in asked["hud"]
 
 
 def test_check_warns_of_an_error_that_every_group_is_shown(
@@ -205,11 +206,11 @@ def test_check_warns_of_an_error_that_every_group_is_shown(
     path.write_text(SHORT + "views: {cab: {use: view, hud: [trial, distance]}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0
     said = capsys.readouterr()
-    assert "question: views.cab: hud: distance tells the operator the task's error" in said.err
+    assert "question: views.cab.hud has distance, which tells the operator the task's" in said.err
     always = "views: {cab: {use: view, patch: {on: [target.entered]}}}\n"
     path.write_text(SHORT + always, encoding="utf-8")
     assert main(["check", str(path)]) == 0
-    assert "patch: target.entered tells the operator, in every group" in capsys.readouterr().err
+    assert "views.cab.patch changes on target.entered, which tells the" in capsys.readouterr().err
     path.write_text(SHORT + "views: {hum: {use: sonification}}\n", encoding="utf-8")
     assert main(["check", str(path)]) == 0
     assert (

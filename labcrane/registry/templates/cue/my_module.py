@@ -24,6 +24,10 @@ class MyPartSettings(Settings):
     colour: tuple[Share, Share, Share] = (1.0, 0.8, 0.1)
     """Red, green and blue, each 0 to 1."""
 
+    def reveals(self) -> str:
+        # What it tells of the task's error: `labcrane check` asks who is given it. "" for nothing.
+        return "where the target is, and how far"
+
 
 class MyPart(Cue):
     """A line from the tip to the target."""
