@@ -2,8 +2,9 @@
 
 A gaze stream is a stream of LSL type ``Gaze`` with a channel labelled ``aoi``: for each sample the
 name of the area of interest that is looked at, or its number from 1; an empty text or 0 for none,
-NaN for a blink. A source that knows only where on the screen it is looked at is joined to the areas
-that a view recorded with its pictures: :func:`looks_on_screen`.
+NaN for a blink. A source that knows only where in the window it is looked at, in pixels, is joined
+to the areas that a view recorded with its pictures (``labcrane.feedback.NAME.areas``):
+:func:`looks_on_screen`.
 """
 
 import math
@@ -13,13 +14,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.recording.participant_file.reader import SessionRecord, Stream
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
 
 KIND, CHANNEL = "Gaze", "aoi"
+AREAS = ".areas"
+SIDES = ("left", "top", "right", "bottom")
+PIXELS = frozenset({"px", "pixel", "pixels"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,14 +61,66 @@ class Looks:
         return float(self.time[found[0]]) if found.size else float("nan")
 
 
-def looks(session: SessionRecord) -> Looks | None:
-    """Return what a session's gaze stream says, or None when it has none."""
-    for stream in session.streams.values():
+def looks(session: SessionRecord, delay_s: float = 0.0) -> Looks | None:
+    """Return what a session's gaze stream says, or None when it has none.
+
+    Parameters
+    ----------
+    session
+        A recorded session.
+    delay_s
+        Of the display, for a stream that says where in the window it is looked at: as in
+        :func:`looks_on_screen`. With 0, a picture is seen as soon as it is handed to the screen.
+    """
+    streams = session.streams.values()
+    for stream in streams:
         if stream.attrs.get("type") == KIND and CHANNEL in stream.units:
             values = stream.values([CHANNEL])[CHANNEL].tolist()
             names = {value: area_name(value) for value in set(values)}  # each name is kept once
             return Looks(stream.time, [names[value] for value in values])
-    return None
+    gaze = next((each for each in streams if each.attrs.get("type") == KIND and place(each)), None)
+    pictures = next((each for each in streams if each.name.endswith(AREAS)), None)
+    if gaze is None or pictures is None or not (columns := area_columns(pictures)):
+        return None
+    where = gaze.values(place(gaze))
+    boxes = pictures.values([column for four in columns.values() for column in four])
+    things = _things(list(columns))
+    areas = {
+        things[name]: np.column_stack([boxes[column] for column in four]).astype(np.float64)
+        for name, four in columns.items()
+    }
+    spots = np.column_stack([where[name] for name in place(gaze)]).astype(np.float64)
+    return looks_on_screen(gaze.time, spots, pictures.time, areas, delay_s)
+
+
+def place(gaze: Stream) -> tuple[str, ...]:
+    """Return the columns of a place in the window, x and y in pixels; nothing where none are."""
+    in_window = [name for name, unit in gaze.units.items() if unit.lower() in PIXELS]
+    across = [name for name in in_window if name.lower().endswith("x")]
+    down = [name for name in in_window if name.lower().endswith("y")]
+    return (across[0], down[0]) if across and down else ()
+
+
+def area_columns(pictures: Stream) -> dict[str, tuple[str, ...]]:
+    """Return the four columns of each area of a view's stream, by ``camera.thing``."""
+    columns = set(pictures.units)
+    found = {}
+    for column in pictures.units:
+        name, _, side = column.rpartition(".")
+        four = (*(f"{name}.{each}" for each in SIDES),)
+        if side == SIDES[0] and columns >= set(four):
+            found[name] = four
+    return found
+
+
+def _things(areas: Sequence[str]) -> dict[str, str]:
+    """Return what each area is called in a table: by its thing, with the camera if it has two."""
+    things = [name.partition(".")[2] for name in areas]
+    alone = len(set(things)) == len(things)
+    return {
+        name: thing if alone else name.replace(".", "_", 1)
+        for name, thing in zip(areas, things, strict=True)
+    }
 
 
 def looks_on_screen(

@@ -44,6 +44,9 @@ class MeasureSettings:
         Of :func:`~labcrane.analysis.smoothness.sub_movements`.
     limit_tolerance_deg
         Distance in degrees at which a joint is at its limit.
+    display_delay_s
+        From handing a picture to the screen to its light, in seconds, as ``labcrane doctor
+        --display`` measures it: which picture was looked at.
     """
 
     dead_zone: float = 0.05
@@ -54,6 +57,7 @@ class MeasureSettings:
     low_pass_hz: float = 6.0
     prominence: float = 0.05
     limit_tolerance_deg: float = 0.1
+    display_delay_s: float = 0.0
 
     def as_dict(self) -> dict[str, object]:
         """Return the settings by name, ready for JSON."""
@@ -132,7 +136,7 @@ def measure_session(
         return trials
     machine = machine_of(session)
     rate_hz = float(session.attrs["rate_hz"])
-    seen = looks(session)
+    seen = looks(session, settings.display_delay_s)
     rows = []
     for movement in cut(frames, trials, rate_hz) if frames else movements_of(session):
         row = measure(movement, machine, settings)

@@ -66,10 +66,14 @@ def record(
     simulated: bool = False,
     pilot: bool = False,
     orders: Mapping[int, Sequence[Command]] | None = None,
-    gaze: bool = False,
+    gaze: bool | Sequence[str] = False,
     eeg: bool = False,
 ) -> Path:
-    """Record session 1; a program takes the controls, whatever the stamps say."""
+    """Record session 1; a program takes the controls, whatever the stamps say.
+
+    ``gaze`` is of eyes that name what they look at; or, by the names of cameras, of eyes that look
+    somewhere in the window, beside the areas that a view has shown there.
+    """
     visit = Visit(the_study, participant, 1, data, simulated=simulated, fast=True, pilot=pilot)
     plan = plan_session(the_study, participant, 1)
     claim(visit)
@@ -85,8 +89,10 @@ def record(
     if gaze or eeg:
         journals.append(visit.streams_journal)
         with XdfWriter(visit.streams_journal) as writer:
-            if gaze:
+            if gaze is True:
                 _gaze(writer, clock.now())
+            elif gaze:
+                _gaze_in_window(writer, clock.now(), gaze)
             if eeg:
                 events = read_xdf(visit.journal).stream(EVENTS).stamps
                 _eeg(writer, clock.now(), events)
@@ -105,6 +111,35 @@ def _gaze(writer: XdfWriter, until: float) -> None:
     time = np.arange(90.0, until, 0.02)
     data = np.column_stack([np.sin(time), np.cos(time), (time % 1.0 < 0.5) * 1.0])
     _stream(writer, header, time, OFFSET_S, data)
+
+
+def _gaze_in_window(writer: XdfWriter, until: float, cameras: Sequence[str]) -> None:
+    """Write the same eyes by where they look, and two areas of each camera's picture at 60 Hz.
+
+    What is looked at in the first half of each second is the target of the last camera, and
+    otherwise nothing; for a while the target is out of the picture, and in it under the tip.
+    """
+    px = (Channel("gaze_x", "px"), Channel("gaze_y", "px"))
+    header = StreamHeader("eyes", "Gaze", px, "double64", 50.0, source_id="eyes")
+    time = np.arange(90.0, until, 0.02)
+    on = time % 1.0 < 0.5
+    x = np.where(on, 100.0 + 1000.0 * (len(cameras) - 1), 700.0)
+    _stream(writer, header, time, OFFSET_S, np.column_stack([x, np.full(len(time), 50.0)]))
+    boxes = []
+    for at in range(len(cameras)):
+        left = 1000.0 * at
+        boxes += [left, 0.0, left + 200.0, 100.0, left + 80.0, 30.0, left + 120.0, 70.0]
+    sides = ("left", "top", "right", "bottom")
+    labels = [f"{c}.{what}.{side}" for c in cameras for what in ("tip", "target") for side in sides]
+    header = StreamHeader(
+        "labcrane.feedback.cab.areas",
+        "labcrane.feedback",
+        tuple(Channel(label, "px") for label in labels),
+        "double64",
+        source_id="areas",
+    )
+    shown = np.arange(90.0, until, 1 / 60)
+    _stream(writer, header, shown, 0.0, np.tile(boxes, (len(shown), 1)))
 
 
 EEG_HZ = 250.0

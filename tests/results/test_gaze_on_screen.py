@@ -1,11 +1,15 @@
 """Gaze joined to the picture that was on the glass, and its drift from a fixation target."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from labcrane.analysis.gaze import Looks, drift, looks_on_screen
+from labcrane import open_recording
+from labcrane.analysis.gaze import Looks, drift, looks, looks_on_screen
+from labcrane.analysis.measures import MeasureSettings, measure_session
+from results.recorded import record, study
 
 DELAY_S = 0.0437
 RATE_HZ = 120.0
@@ -43,6 +47,35 @@ def test_gaze_that_follows_the_light_is_on_the_object_that_was_shown(seed: int) 
 
     assert right(DELAY_S) >= 0.99
     assert right(0.0) < 0.95  # the delay matters: without it this test would prove nothing
+
+
+@pytest.mark.parametrize(("cameras", "area"), [(["cab"], "target"), (["cab", "top"], "top_target")])
+def test_eyes_that_look_into_the_window_are_measured_as_eyes_that_name_what_they_look_at(
+    tmp_path: Path, cameras: list[str], area: str
+) -> None:
+    """In the window the target is within the area of the tip, and the smaller one counts."""
+    tables = []
+    for name, gaze in (("named", True), ("seen", cameras)):
+        path = record(study(tmp_path / name), tmp_path / name / "data", "P001", gaze=gaze)
+        tables.append(measure_session(open_recording(path).session(1)))
+    named, seen = tables
+    assert (named["dwell_during_1"] > 0.2).any()
+    for measure in ("dwell_before", "dwell_during", "look_lead"):
+        np.testing.assert_array_equal(seen[f"{measure}_{area}"], named[f"{measure}_1"])
+    columns = {each for each in seen if each.startswith("dwell_")}
+    assert columns == {f"dwell_before_{area}", f"dwell_during_{area}"}
+
+
+def test_the_display_s_delay_is_a_setting_of_the_measures(tmp_path: Path) -> None:
+    path = record(study(tmp_path), tmp_path / "data", "P001", gaze=["cab"])
+    session = open_recording(path).session(1)
+    late = looks(session, 15.0)
+    assert late is not None
+    first = session.streams["labcrane.feedback.cab.areas"].time[0]
+    assert set(np.array(late.area)[late.time < first + 15.0]) == {""}
+    assert "target" in set(np.array(late.area)[late.time > first + 15.0])
+    table = measure_session(session, MeasureSettings(display_delay_s=1e6))
+    assert not [name for name in table if name.startswith("dwell_")], "no picture was seen yet"
 
 
 def test_the_picture_changes_exactly_the_delay_after_it_was_handed_over() -> None:

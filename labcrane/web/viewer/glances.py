@@ -7,19 +7,23 @@ measures, is not in it, and the page says so.
 """
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from labcrane.analysis.gaze import CHANNEL, KIND, area_name, looks_on_screen
+from labcrane.analysis.gaze import (
+    AREAS,
+    CHANNEL,
+    KIND,
+    area_columns,
+    area_name,
+    looks_on_screen,
+    place,
+)
 from labcrane.recording.participant_file.reader import SessionRecord, Stream
 from labcrane.types import FloatArray
 
-AREAS = ".areas"
-SIDES = ("left", "top", "right", "bottom")
-PIXELS = frozenset({"px", "pixel", "pixels"})
 TRAIL_S = 0.5
 """How much of the way of the gaze is shown."""
 
@@ -63,9 +67,9 @@ class Glances:
         streams = record.streams.values()
         self._gaze = next((one for one in streams if one.attrs.get("type") == KIND), None)
         self._pictures = next((one for one in streams if one.name.endswith(AREAS)), None)
-        self._place = _place(self._gaze)
+        self._place = () if self._gaze is None else place(self._gaze)
         self._named = self._gaze is not None and CHANNEL in self._gaze.units
-        self._areas = _areas(self._pictures)
+        self._areas = {} if self._pictures is None else area_columns(self._pictures)
 
     @property
     def known(self) -> bool:
@@ -125,27 +129,3 @@ class Glances:
             "trail": trail,
             "looked": glance.looked,
         }
-
-
-def _place(gaze: Stream | None) -> tuple[str, str] | None:
-    """Return the columns of a place on the screen, x and y; None where there are none."""
-    if gaze is None:
-        return None
-    on_screen = [name for name, unit in gaze.units.items() if unit.lower() in PIXELS]
-    across = [name for name in on_screen if name.lower().endswith("x")]
-    down = [name for name in on_screen if name.lower().endswith("y")]
-    return (across[0], down[0]) if across and down else None
-
-
-def _areas(pictures: Stream | None) -> dict[str, tuple[str, ...]]:
-    """Return the four columns of each area, by its name."""
-    return dict(_complete(pictures)) if pictures is not None else {}
-
-
-def _complete(pictures: Stream) -> Iterator[tuple[str, tuple[str, ...]]]:
-    columns = set(pictures.units)
-    for column in pictures.units:
-        name, _, side = column.rpartition(".")
-        four = (*(f"{name}.{each}" for each in SIDES),)
-        if side == SIDES[0] and columns >= set(four):
-            yield name, four
