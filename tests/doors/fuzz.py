@@ -15,7 +15,9 @@ import psutil
 
 CORPUS = Path(__file__).with_name("corpus")
 MOST_BYTES = 200_000_000
-MOST_S = 1.0
+MOST_S, BUSY_S = 1.0, 20.0
+"""Seconds of a thread for one input: where nothing else runs, and in tests beside others, whose
+lines are counted; what an input could make grow without end passes neither."""
 
 Enter = Callable[[bytes], object]
 
@@ -79,11 +81,11 @@ def changed(good: bytes, dice: random.Random, words: tuple[bytes, ...]) -> bytes
     return bytes(data)
 
 
-def attack(door: Door, count: int, seed: int) -> Mapping[str, int]:
+def attack(door: Door, count: int, seed: int, most_s: float = BUSY_S) -> Mapping[str, int]:
     """Send changed bytes through a door; return how many were taken and refused.
 
-    What takes more than a second of this process, or leaves it 200 MB larger, is a failure; so is
-    any error that is not documented. What breaks a door is named by seed and number.
+    What takes longer than ``most_s``, or leaves the process 200 MB larger, is a failure; so is any
+    error that is not documented. What breaks a door is named by seed and number.
     """
     dice, found = random.Random(seed), {"taken": 0, "refused": 0}
     good, words = door.good(), (*EVERYWHERE, *door.words)
@@ -92,7 +94,7 @@ def attack(door: Door, count: int, seed: int) -> Mapping[str, int]:
     before = process.memory_info().rss
     for number in range(count):
         given = changed(dice.choice(good), dice, words)
-        began = time.process_time()
+        began = time.thread_time()
         try:
             door.enter(given)
             found["taken"] += 1
@@ -101,8 +103,8 @@ def attack(door: Door, count: int, seed: int) -> Mapping[str, int]:
         except Exception as error:
             error.add_note(f"{door.name}, seed {seed}, input {number}: {given[:300]!r}")
             raise
-        took = time.process_time() - began
-        assert took < MOST_S, f"{door.name}, seed {seed}, input {number} took {took:.1f} s"
+        took = time.thread_time() - began
+        assert took < most_s, f"{door.name}, seed {seed}, input {number} took {took:.1f} s"
         if number % 50 == 0:
             grown = process.memory_info().rss - before
             assert grown < MOST_BYTES, f"{door.name}, seed {seed}, input {number}: {grown} bytes"

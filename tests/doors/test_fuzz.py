@@ -9,7 +9,7 @@ from pathlib import Path
 import can
 import numpy as np
 import pytest
-from doors.fuzz import Door, attack
+from doors.fuzz import MOST_S, Door, attack
 from doors.test_signals import FLOATS, VALVES, Newest
 from rehearsal import SHORT, a_study
 
@@ -236,7 +236,7 @@ def test_what_is_broken_is_taken_or_refused_by_a_documented_error(
 def test_two_hundred_thousand_broken_inputs(name: str, study: Study, tmp_path: Path) -> None:
     door = door_of(name, study, tmp_path)
     door.enter(door.good()[0])
-    attack(door, ONCE // GATE * door.cheap, seed=1500)
+    attack(door, ONCE // GATE * door.cheap, 1500, MOST_S)
 
 
 def test_ten_thousand_inputs_are_tried_in_the_gate() -> None:

@@ -147,9 +147,9 @@ def test_a_mail_address_is_what_stands_around_an_at(text: str) -> None:
 def _work(text: str) -> float:
     best = float("inf")
     for _ in range(5):
-        before = time.process_time()
+        before = time.thread_time()
         personal(text)
-        best = min(best, time.process_time() - before)
+        best = min(best, time.thread_time() - before)
     return best
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from doors.fuzz import BUSY_S, MOST_S
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -154,7 +155,9 @@ def wrong(data: dict, dice: random.Random) -> dict:
     return data
 
 
-def fuzz_protocols(folder: Path, registry: Registry, count: int, seed: int) -> None:
+def fuzz_protocols(
+    folder: Path, registry: Registry, count: int, seed: int, most_s: float = BUSY_S
+) -> None:
     shutil.copytree(PROTOCOLS, folder)
     found = [path for path in sorted(folder.rglob("*.yaml")) if "labcrane: 1" in path.read_text()]
     whole = {path: read_yaml(path) for path in found}
@@ -163,12 +166,12 @@ def fuzz_protocols(folder: Path, registry: Registry, count: int, seed: int) -> N
         path = dice.choice(found)
         changed = path.with_name("changed.yaml")
         changed.write_text(json.dumps(wrong(whole[path], dice)))
-        before = time.process_time()
+        before = time.thread_time()
         try:
             load(changed, registry)
         except LabcraneError as error:
             assert str(error)  # noqa: PT017 - many changes are harmless
-        assert time.process_time() - before < 1.0, changed.read_text()
+        assert time.thread_time() - before < most_s, changed.read_text()
 
 
 def test_a_protocol_with_anything_in_any_place_is_checked_without_a_traceback(
@@ -179,7 +182,7 @@ def test_a_protocol_with_anything_in_any_place_is_checked_without_a_traceback(
 
 @pytest.mark.soak
 def test_many_protocols_with_anything_in_any_place(tmp_path: Path) -> None:
-    fuzz_protocols(tmp_path / "protocols", discover(), 20_000, seed=156)
+    fuzz_protocols(tmp_path / "protocols", discover(), 20_000, 156, MOST_S)
 
 
 NOWHERE = ("{}" + "a" * 300, "b/" * 3000 + "{}", "{}/under a file", "c\0{}")
