@@ -19,6 +19,7 @@ from labcrane.recording.foreign_streams import MONITORS, SIGNAL, Note
 from labcrane.recording.participant_file.signal_faults import write_signal_faults
 from labcrane.recording.xdf.header import Channel, StreamHeader
 from labcrane.streams.probes import Probe
+from labcrane.streams.recorder import signal_feed
 from labcrane.streams.recorder.signal_feed import LIVES, SignalFeed, SignalTap
 
 STREAM = SignalStream("Sensor", "Odd", 100.0, (SignalChannel("a"), SignalChannel("b")))
@@ -158,9 +159,10 @@ def test_a_monitor_that_raises_in_its_process_is_told_by_its_name(tmp_path: Path
 def test_a_monitor_takes_its_process_with_it_and_another_one_goes_on(
     how: float, tmp_path: Path
 ) -> None:
-    noted = Noted(tmp_path, hang_s=2.0)
+    noted = Noted(tmp_path, hang_s=240.0)  # a busy computer is no hang
     noted.give(0.0, 5.0)
     noted.until(lambda: noted.tap.faults)
+    noted.feed._hang_s = 2.0
     noted.give(how)
 
     def died() -> bool:
@@ -168,12 +170,38 @@ def test_a_monitor_takes_its_process_with_it_and_another_one_goes_on(
         return noted.feed.fault is not None
 
     noted.until(died)
+    noted.feed._hang_s = 240.0
     assert not noted.tap.faults, "a fault that nobody looks at any more is not told"
     assert noted.notes[-1]["bad"] is False
     noted.give(0.0, 5.0)
     noted.until(lambda: noted.tap.faults)
     noted.feed.close()
     assert "died 1 times and are started again" in noted.feed.fault
+
+
+def test_what_a_process_found_before_it_died_is_taken_back_however_late_it_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(signal_feed, "PATIENCE_S", 240.0)
+    noted = Noted(tmp_path, hang_s=240.0)
+    hear, late = noted.tap.hear, []
+
+    def hear_late(answer: dict[str, object]) -> None:
+        if answer["changes"] and not late:
+            late.append(answer)
+            ends = time.monotonic() + 2.0  # as a thread that is held up while the process dies
+            while noted.feed.fault is None and time.monotonic() < ends:
+                noted.give(0.0)
+                time.sleep(0.02)
+        hear(answer)
+
+    monkeypatch.setattr(noted.tap, "hear", hear_late)
+    noted.give(0.0, 5.0)
+    noted.give(2.0)
+    noted.until(lambda: noted.feed.fault is not None and [n["bad"] for n in noted.notes])
+    noted.feed.close()
+    assert [n["bad"] for n in noted.notes] == [True, False]
+    assert not noted.tap.faults
 
 
 def test_samples_wait_for_no_monitor(tmp_path: Path) -> None:

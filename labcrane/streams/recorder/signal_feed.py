@@ -229,6 +229,8 @@ class SignalFeed:
                 process.stdin.close()
             process.kill()
             process.wait()
+            if self._reader is not None:  # what it has answered is heard before it is taken back
+                self._reader.join(PATIENCE_S)
         self._deaths += 1
         for tap in self._taps:
             tap.forget()
