@@ -18,7 +18,6 @@ from faults.faulty_study import (
 from labcrane import LabcraneError, open_recording
 from labcrane.cli.app import main
 from labcrane.feedback import handle as feedback_keeper
-from labcrane.launcher import hang_detector as stillness_module
 from labcrane.launcher.launcher import Launcher, Outcome
 from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.session.commands import QueueConsole
@@ -91,17 +90,14 @@ def test_the_launcher_passes_on_what_a_session_says_of_a_plugin(spoil: Spoil) ->
     assert recorded(protocol) is not None
 
 
-def test_a_component_that_hangs_is_named_and_its_process_ended(
-    spoil: Spoil, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(stillness_module, "TELL_S", 0.5)
-    monkeypatch.setattr(stillness_module, "HANG_S", 1.5)
+def test_a_component_that_hangs_is_named_and_its_process_ended(spoil: Spoil) -> None:
     protocol = spoil("task evaluate 30 hanging")
     outcome, told = launch(protocol)
     assert outcome.died == -9
     place = "task 'faulty_task' of plugin 'plugins/faulty.py', in evaluate() ("
     assert outcome.where.startswith(place)
-    (said,) = (line for line in told if "stood still" in line)
+    # A computer that is held up may have made it stand still before.
+    said = [line for line in told if "stood still" in line][-1]
     assert place in said
     tick = int(re.search(r"tick (\d+)", said)[1])
     session = recorded(protocol)
