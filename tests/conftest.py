@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 from needs import need, not_tried
 
 from labcrane.streams.network import LOOPBACK
@@ -43,6 +44,12 @@ sys.dont_write_bytecode = False
 # What a shell starts in the background ignores interrupts, and so does all that it starts itself:
 # tests interrupt programs as a person does.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# How long an example takes is the computer's doing, where several processes share two cores.
+settings.register_profile(
+    "tests", settings(), deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("tests")
 
 WAITING = 2
 """Processes beyond one a core: many tests wait, for a session in real time or for a device."""

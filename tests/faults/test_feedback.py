@@ -93,7 +93,10 @@ def hosts() -> list[psutil.Process]:
 
 
 def runs_feedback(process: psutil.Process) -> bool:
-    return "labcrane.feedback.process" in process.cmdline()
+    try:
+        return "labcrane.feedback.process" in process.cmdline()
+    except psutil.NoSuchProcess:  # the one that raises has just ended
+        return False
 
 
 @pytest.fixture

@@ -100,7 +100,8 @@ class Room:
             processes = [psutil.Process(self.launcher.pid)]
             processes += processes[0].children(recursive=True)
             for process in processes:
-                process.kill()
+                with suppress(psutil.NoSuchProcess):  # it ends when its launcher has gone
+                    process.kill()
             psutil.wait_procs(processes, timeout=240)
             self.launcher.wait()
         self._reader.join()

@@ -96,8 +96,7 @@ def test_pyxdf_reads_what_we_read_of_a_torn_journal(data: bytes, tmp_path: Path)
 
 @settings(
     max_examples=300,
-    deadline=2000,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 @given(flips=st.lists(st.tuples(st.floats(0, 1), st.integers(0, 7)), min_size=1, max_size=3))
 def test_flipped_bits_shorten_a_recording_but_change_no_number(
@@ -122,8 +121,7 @@ def test_flipped_bits_shorten_a_recording_but_change_no_number(
 
 @settings(
     max_examples=200,
-    deadline=2000,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 @given(
     start=st.floats(0, 1),
@@ -178,7 +176,7 @@ def test_a_damaged_length_costs_one_frame(data: bytes, tmp_path: Path) -> None:
     assert_true(file)
 
 
-@settings(max_examples=200, deadline=2000)
+@settings(max_examples=200)
 @given(content=st.binary(max_size=400))
 def test_noise_is_read_as_nothing(tmp_path_factory: pytest.TempPathFactory, content: bytes) -> None:
     file = read(tmp_path_factory.getbasetemp(), b"XDF:" + content)
