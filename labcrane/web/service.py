@@ -23,7 +23,7 @@ from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
 from labcrane.web.door.access import SCOPE, SUPERVISOR, Gate, Keys
 from labcrane.web.door.denials import Denials
-from labcrane.web.door.serving import MOST_HEAD, build_pages
+from labcrane.web.door.serving import AWAY_S, MOST_HEAD, build_pages
 from labcrane.web.live import Live
 from labcrane.web.page import PageContext
 from labcrane.web.pictures import Pictures
@@ -35,10 +35,6 @@ FORBIDDEN, NOT_FOUND = 403, 404
 NICENESS = 5
 """The loop's process comes first when the computer is busy, whatever browsers ask for; at 15
 the pages could not be reached for more than a minute."""
-
-AWAY_S = 30.0
-"""How long a browser may be without connection, as a tablet or a laptop that sleeps, and find its
-page as it was. After that the page is loaded anew; what was half written is in the browser."""
 
 MISSED = 10_000
 """How many changes of a page are kept for a browser that is away: more than come in ``AWAY_S``. One

@@ -4,13 +4,16 @@ import random
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from faults.sessions import unique, wait_for
 from pages.looks import check
 from pages.room import shown, text
+from pages.test_reach import ACKNOWLEDGED, AWAY
 from selenium import webdriver
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -387,6 +390,18 @@ const field = document.getElementById('as-0');
 field.value = 'spectrogram';
 field.dispatchEvent(new Event('change'));
 """
+AS_CURVE = AS_SPECTROGRAM.replace("'spectrogram'", "'curve'")
+LOST = 4
+LOSE = f"""
+const emit = window.socket.emit;
+window.lost = 0;
+window.socket.emit = (...words) => {{
+    if (words[0] === 'event' && window.lost < {LOST}) window.lost += 1;
+    else emit.apply(window.socket, words);
+}};
+"""
+"""Loses what the page says next, as a socket does that was closed before the page knows of it."""
+
 PAINTED = """
 const canvas = document.getElementById('spectrum-0');
 const pixels = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
@@ -417,6 +432,7 @@ def test_the_page_shows_the_recorded_pose_at_any_time(
     file = gazed
     record = open_recording(file).session(1)
     film = Film(record, file.stem)
+    angles = record.streams["state"].data[[f"joint.angle.{n}" for n in film.machine.names]]
     words = [sys.executable, "-m", "labcrane", "view", str(file), "--beside", str(file)]
     viewer = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
     try:
@@ -429,7 +445,8 @@ def test_the_page_shows_the_recorded_pose_at_any_time(
         wait_for(lambda: "dB" in text(browser, "heard-0"))
         assert browser.execute_script(PAINTED) > 100
         check(browser, "viewer with a spectrogram")
-        assert len(set(browser.execute_script(SHAPES))) == 1, "one file shows alike in both places"
+        lose_messages(browser, lambda at: pose(film, angles, at))
+        wait_for(lambda: len(set(browser.execute_script(SHAPES))) == 1)  # alike in both places
         browser.execute_script(GO, 4.0)
         heights = film.curve("state", "tip.position.z", 0.0, film.length)
         step = int(POINTS * 4.0 / film.length)
@@ -437,18 +454,42 @@ def test_the_page_shows_the_recorded_pose_at_any_time(
         wait_for(lambda: near(text(browser, "value-2"), low, high))
         mark_and_take_back(browser, file, film)
         look_at_areas(browser, film)
-        machine, times = film.machine, moments(film.length)
-        angles = record.streams["state"].data[[f"joint.angle.{n}" for n in machine.names]]
-        for at in times:
-            row = angles.iloc[film.index(at)].to_numpy(float)
-            frames = link_frames(machine, row)
-            wanted = {body.name: frames[body.frame] for body in film.run.bodies}
+        for at in moments(film.length):
+            wanted = pose(film, angles, at)
             browser.execute_script(GO, at)
             wait_for(lambda wanted=wanted: apart(browser, wanted) < 1e-6)
     finally:
         viewer.terminate()
         viewer.wait(240)
         viewer.stdout.close()
+
+
+def pose(film: Film, angles: pd.DataFrame, at: float) -> dict[str, np.ndarray]:
+    """Return where each body was, by its name."""
+    frames = link_frames(film.machine, angles.iloc[film.index(at)].to_numpy(float))
+    return {body.name: frames[body.frame] for body in film.run.bodies}
+
+
+def lose_messages(
+    browser: webdriver.Chrome, pose_at: Callable[[float], dict[str, np.ndarray]]
+) -> None:
+    """See that what is asked while a connection dies is asked again, and that the page stays."""
+    said = text(browser, "heard-0")
+    browser.execute_script(LOSE)
+    browser.execute_script(GO, 7.5)
+    browser.execute_script(AS_CURVE)
+    wait_for(lambda: browser.execute_script("return window.lost") == LOST)
+    wait_for(lambda: apart(browser, pose_at(7.5)) < 1e-6)
+    wait_for(lambda: text(browser, "range-0"))
+    browser.execute_script(AS_SPECTROGRAM)
+    wait_for(lambda: text(browser, "heard-0") == said)
+    wait_for(lambda: browser.execute_script(ACKNOWLEDGED))
+    browser.set_script_timeout(240)
+    assert browser.execute_async_script(AWAY, 5000), "longer than NiceGUI keeps a page by itself"
+    browser.execute_script(GO, 2.5)
+    wait_for(lambda: apart(browser, pose_at(2.5)) < 1e-6)
+    assert browser.execute_script("return window.stays"), "it was not loaded anew"
+    assert text(browser, "heard-0") == said
 
 
 def near(said: str, low: float, high: float) -> bool:

@@ -11,6 +11,10 @@ HOST = "127.0.0.1"
 MOST_HEAD = 16_384
 """Bytes of a request's line and headers."""
 
+AWAY_S = 30.0
+"""How long a browser may be without connection, as a tablet or a laptop that sleeps, and find its
+page as it was. After that the page is loaded anew; what was half written is in the browser."""
+
 MOST_MISSED = 1000
 
 

@@ -14,7 +14,7 @@ from labcrane.recording.participant_file.writer import DAMAGED
 from labcrane.recording.paths import participant_path
 from labcrane.registry.registry import Registry
 from labcrane.web.door.access import STUDY
-from labcrane.web.door.serving import build_pages, serve_here
+from labcrane.web.door.serving import AWAY_S, build_pages, serve_here
 from labcrane.web.study.overview import Reader, newest_report
 from labcrane.web.study.study_page import page_of
 from labcrane.web.viewer.film import Film
@@ -71,7 +71,7 @@ def _routes(app: Any, reader: Reader, registry: Callable[[], Registry], scratch:
                 return FileResponse(wanted)
         return PlainTextResponse(f"labcrane: the report has no {path!r}", NOT_FOUND)
 
-    @ui.page("/viewer", response_timeout=PATIENCE_S)
+    @ui.page("/viewer", response_timeout=PATIENCE_S, reconnect_timeout=AWAY_S)
     async def viewer(person: str, session: int = 1, beside: str = "") -> None:
         people = [person, *([beside] if beside else [])]
         try:

@@ -7,6 +7,12 @@ from typing import Any
 from nicegui import events
 from nicegui.element import Element
 
+REMEMBERED = 20
+"""Questions whose answers are kept: one that was asked again, as its answer was lost, is not done
+twice. The page has no more open ones: a key has one at a time."""
+
+Answer = Callable[[Mapping[str, Any]], Mapping[str, Any]]
+
 
 class Timeline(Element, component="viewer.js"):
     """Draws time line, curves and events, and says which time is to be shown.
@@ -15,47 +21,41 @@ class Timeline(Element, component="viewer.js"):
     ----------
     about
         What does not change: length, trials, events, gaps, signals.
-    at
-        Called with the time that is shown, in seconds from the start.
-    curve
-        Called with stream, column, begin and end; returns what is drawn.
-    spectrogram
-        The same for its frequencies.
-    mark
-        Called with what is marked, or which mark is taken back; returns the marks as they are then,
-        and what to say.
-    glance
-        Called with a time, or with begin and end; returns where it is looked at.
+    show
+        Called on the page's own thread with the time that is shown, in seconds from the start;
+        returns why it cannot be shown, or nothing.
+    answers
+        What answers each kind of question, called beside everything else: ``second``, ``lane``,
+        ``curve``, ``spectrogram`` and ``mark``.
     """
 
     def __init__(
         self,
         about: Mapping[str, Any],
-        at: Callable[[float], None],
-        curve: Callable[[str, str, float, float], Mapping[str, Any]],
-        spectrogram: Callable[[str, str, float, float], Mapping[str, Any]],
-        mark: Callable[[Mapping[str, Any]], Mapping[str, Any]],
-        glance: Callable[[Mapping[str, Any]], Mapping[str, Any]],
+        show: Callable[[float], str],
+        answers: Mapping[str, Answer],
     ) -> None:
         super().__init__()
         self._props["about"] = dict(about)
+        self._show = show
+        self._answers = dict(answers)
+        self._given: dict[int, Mapping[str, Any] | None] = {}
+        self.on("asked", self._asked)
 
-        async def asked(event: events.GenericEventArguments) -> None:
-            told = event.args
-            where = str(told["stream"]), str(told["column"])
+    async def _asked(self, event: events.GenericEventArguments) -> None:
+        asked = event.args
+        key, ident, kind = str(asked["key"]), int(asked["ident"]), str(asked["kind"])
+        if ident not in self._given:
+            self._given[ident] = None
+            why = self._show(float(asked["t"])) if kind == "second" else ""
             # Beside everything else: an hour of a signal is read, and a jump waits for nobody.
-            span = float(told["begin"]), float(told["end"])
-            how = spectrogram if told.get("as") == "spectrogram" else curve
-            found = await asyncio.to_thread(how, *where, *span)
-            self.run_method("curve", int(told["at"]), dict(found))
-
-        async def marked(event: events.GenericEventArguments) -> None:
-            self.run_method("marked", dict(await asyncio.to_thread(mark, event.args)))
-
-        async def glanced(event: events.GenericEventArguments) -> None:
-            self.run_method("glanced", dict(await asyncio.to_thread(glance, event.args)))
-
-        self.on("mark", marked)
-        self.on("glance", glanced)
-        self.on("at", lambda event: at(float(event.args)))
-        self.on("curve", asked)
+            try:
+                found = await asyncio.to_thread(self._answers[kind], asked)
+            except BaseException:  # whoever asks again is not left without an answer
+                self._given.pop(ident, None)
+                raise
+            self._given[ident] = {**found, "failed": why} if why else found
+            while len(self._given) > REMEMBERED:
+                self._given.pop(next(iter(self._given)))
+        if (answer := self._given.get(ident)) is not None:  # it is not still under way
+            self.run_method("answered", key, ident, dict(answer))

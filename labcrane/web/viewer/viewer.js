@@ -1,6 +1,7 @@
 // Viewer of a recorded session: a time line, curves and events about a time that the server is told.
+// Whatever is asked is asked again until it is answered: a message is lost with its connection.
 
-const STEP_MS = 60;
+const STEP_MS = 60, AGAIN_MS = 2000, SOON_MS = 150;
 
 export default {
   template: `
@@ -9,6 +10,7 @@ export default {
     <h1 id="title">{{ about.title }}</h1>
     <p class="room-faint" id="said">{{ about.said }}</p>
     <p v-for="line in about.lacking" :key="line" class="room-question">{{ line }}</p>
+    <p v-if="why" class="room-question" role="alert" id="why">{{ why }}</p>
   </header>
   <div class="view-grid">
     <section class="room-card view-machine"><slot name="machine"></slot></section>
@@ -23,13 +25,13 @@ export default {
         </select></label></div>
         <div v-show="chart.as === 'spectrogram' && chart.signal !== ''" class="view-spectrum">
           <canvas :id="'spectrum-' + at" width="300" height="128" role="img"
-            :aria-label="'spectrogram of signal ' + (at + 1)" @click="into($event)"></canvas>
+            :aria-label="'spectrogram of signal ' + (at + 1)" @click="into($event, chart)"></canvas>
           <svg class="view-over" viewBox="0 0 600 110" preserveAspectRatio="none" aria-hidden="true">
-            <line class="view-now" :x1="place(t)" :x2="place(t)" y1="0" y2="110"/></svg>
+            <line class="view-now" :x1="place(t, chart)" :x2="place(t, chart)" y1="0" y2="110"/></svg>
           <p class="room-faint" :id="'heard-' + at">{{ chart.heard }}</p></div>
         <svg v-if="chart.path" class="room-chart" viewBox="0 0 600 110" preserveAspectRatio="none" role="img"
-          :aria-label="'signal ' + (at + 1)" @click="into($event)"><path class="room-late" :d="chart.path"/>
-          <line class="view-now" :x1="place(t)" :x2="place(t)" y1="0" y2="110"/></svg>
+          :aria-label="'signal ' + (at + 1)" @click="into($event, chart)"><path class="room-late" :d="chart.path"/>
+          <line class="view-now" :x1="place(t, chart)" :x2="place(t, chart)" y1="0" y2="110"/></svg>
         <p v-if="chart.path" class="room-faint" :id="'range-' + at"><strong :id="'value-' + at">{{ reading(chart) }}</strong> now · {{ chart.said }}</p>
       </div>
     </section>
@@ -63,13 +65,13 @@ export default {
   </section>
   <section v-if="about.gaze" class="room-card"><h2>Gaze</h2>
     <p id="looked"><strong>{{ glance.looked || 'no area' }}</strong> <span class="room-faint">is looked at, in the picture that the view had shown last; the display's own delay is not taken off</span></p>
-    <svg v-if="glance.areas.length || glance.trail.length" id="gaze" class="view-gaze" :viewBox="picture" role="img" :aria-label="'gaze, at ' + (glance.looked || 'no area')">
+    <svg id="gaze" class="view-gaze" :viewBox="picture" role="img" :aria-label="'gaze, at ' + (glance.looked || 'no area')">
       <g v-for="a in glance.areas" :key="a.name"><rect :class="{ looked: a.name === glance.looked }" :x="a.box[0]" :y="a.box[1]" :width="a.box[2] - a.box[0]" :height="a.box[3] - a.box[1]"><title>{{ a.name }}</title></rect></g>
       <polyline v-if="glance.trail.length > 1" :points="glance.trail.join(' ')"/>
       <circle v-if="glance.trail.length" :cx="glance.trail.at(-1)[0]" :cy="glance.trail.at(-1)[1]" :r="extent.width / 80"/></svg>
-    <svg class="view-lane" viewBox="0 0 600 20" preserveAspectRatio="none" role="img" aria-label="areas looked at over time" @click="into($event)">
+    <svg class="view-lane" viewBox="0 0 600 20" preserveAspectRatio="none" role="img" aria-label="areas looked at over time" @click="into($event, lane)">
       <rect v-for="(one, n) in lookedAt" :key="n" :fill="one.colour" :x="one.x" :width="one.width" y="0" height="20"><title>{{ one.name }}</title></rect>
-      <line class="view-now" :x1="place(t)" :x2="place(t)" y1="0" y2="20"/></svg>
+      <line class="view-now" :x1="place(t, lane)" :x2="place(t, lane)" y1="0" y2="20"/></svg>
     <p class="room-faint view-legend"><template v-for="(name, n) in areaNames" :key="name"><span class="view-swatch" :style="{ background: colour(n) }"></span>{{ name }}</template></p>
   </section>
   <section v-if="about.marking" class="room-card"><h2>Marks</h2>
@@ -95,8 +97,8 @@ export default {
 </div>`,
   props: { about: Object },
   data() {
-    return { glance: { areas: [], trail: [], looked: "" }, extent: { width: 1, height: 1 }, lane: [], waits: false, wanted: null, words: "", from: null, marks: this.about.marks, markSaid: this.about.markSaid, t: 0, speed: 1, span: 0, playing: false, find: "", came: 0, asked: 0,
-      charts: [0, 1, 2].map(() => ({ signal: "", path: "", said: "", as: "curve", heard: "", values: null })) };
+    return { open: {}, next: {}, why: "", glance: { areas: [], trail: [], looked: "" }, extent: { width: 1, height: 1 }, lane: { names: [], begin: 0, end: 1 }, words: "", from: null, marks: this.about.marks, markSaid: this.about.markSaid, t: 0, speed: 1, span: 0, playing: false, find: "", came: 0, asked: 0,
+      charts: [0, 1, 2].map(() => ({ signal: "", path: "", said: "", as: "curve", heard: "", values: null, begin: 0, end: 1 })) };
   },
   computed: {
     begin() { return this.span ? Math.min(Math.max(0, this.t - this.span / 2), Math.max(0, this.about.length - this.span)) : 0; },
@@ -108,10 +110,10 @@ export default {
       }));
     },
     picture() { return `0 0 ${this.extent.width} ${this.extent.height}`; },
-    areaNames() { return [...new Set(this.lane.filter(Boolean))].sort(); },
+    areaNames() { return [...new Set(this.lane.names.filter(Boolean))].sort(); },
     lookedAt() { // neighbouring steps at one area are one
-      const found = [], step = 600 / this.lane.length;
-      this.lane.forEach((name, n) => {
+      const found = [], step = 600 / this.lane.names.length;
+      this.lane.names.forEach((name, n) => {
         if (!name) return;
         const last = found.at(-1);
         if (last?.name === name && last.upto === n) { last.width += step; last.upto = n + 1; }
@@ -146,17 +148,40 @@ export default {
       chart.signal = at >= 0 ? at : n === 0 && first >= 0 ? first : "";
     });
     this.timer = setInterval(this.step, STEP_MS);
+    this.asking = setInterval(this.again, AGAIN_MS);
     this.askAll();
     this.go(this.about.at);
   },
-  beforeUnmount() { removeEventListener("keydown", this.key); clearInterval(this.timer); },
+  beforeUnmount() { removeEventListener("keydown", this.key); clearInterval(this.timer); clearInterval(this.asking); },
   methods: {
-    place(t) { return 600 * (t - this.begin) / Math.max(1e-9, this.end - this.begin); },
+    place(t, { begin, end } = this) { return 600 * (t - begin) / Math.max(1e-9, end - begin); },
+    question(key, about) { // one of a key at a time: the newest is asked when the one before is answered
+      const asked = { key, ident: ++this.asked, ...about };
+      if (this.open[key]) { this.next[key] = asked; return; }
+      this.open[key] = asked;
+      this.$emit("asked", asked);
+    },
+    again() { for (const key in this.open) this.$emit("asked", this.open[key]); },
+    answered(key, ident, found) {
+      const asked = this.open[key], next = this.next[key];
+      if (asked?.ident !== ident) return; // answered before
+      delete this.open[key];
+      delete this.next[key];
+      if (next) { this.open[key] = next; this.$emit("asked", next); }
+      this.why = found.failed ?? "";
+      if (found.failed === undefined) this.take(asked, found, Boolean(next));
+    },
+    take(asked, found, outdated) {
+      if (asked.kind === "mark") this.marked(found);
+      else if (asked.kind === "second") { if (this.about.gaze) this.glanced(found); }
+      else if (outdated) return;
+      else if (asked.kind === "lane") this.lane = { names: found.lane, begin: asked.begin, end: asked.end };
+      else this.curve(asked, found);
+    },
     go(t) {
       const before = this.begin;
       this.t = Math.min(Math.max(0, t || 0), this.about.length);
-      this.$emit("at", this.t);
-      this.look();
+      this.question("second", { kind: "second", t: this.t });
       if (this.begin !== before) this.askSoon();
     },
     step() {
@@ -172,52 +197,46 @@ export default {
       const next = way > 0 ? starts.find((t) => t > this.t + 1e-6) : starts.filter((t) => t < this.t - 0.5).at(-1);
       if (next !== undefined) this.go(next);
     },
-    into(e) {
+    into(e, { begin, end } = this) {
       const box = e.currentTarget.getBoundingClientRect();
-      this.go(this.begin + (this.end - this.begin) * (e.clientX - box.left) / box.width);
+      this.go(begin + (end - begin) * (e.clientX - box.left) / box.width);
     },
     mark() {
       if (!this.words.trim()) return;
       const other = this.from === null ? this.t : this.from;
-      this.$emit("mark", { t: Math.min(other, this.t), to: Math.max(other, this.t), text: this.words });
+      this.change({ t: Math.min(other, this.t), to: Math.max(other, this.t), text: this.words });
     },
-    takeBack(mark) { this.$emit("mark", { withdraw: mark.number }); },
+    takeBack(mark) { this.change({ withdraw: mark.number }); },
+    change(what) { this.question(`mark ${this.asked}`, { kind: "mark", ...what }); }, // none replaces another
     marked({ marks, markSaid }) { // what was written stays until it is kept
       this.marks = marks;
       this.markSaid = markSaid;
       if (markSaid === "kept") { this.words = ""; this.from = null; }
     },
-    askSoon() { clearTimeout(this.soon); this.soon = setTimeout(this.askAll, 150); },
+    askSoon() { this.soon ??= setTimeout(() => { this.soon = null; this.askAll(); }, SOON_MS); }, // also while it plays
     askAll() {
       this.charts.forEach((_, at) => this.ask(at));
-      if (this.about.gaze) this.$emit("glance", { lane: true, begin: this.begin, end: this.end });
+      if (this.about.gaze) this.question("lane", { kind: "lane", begin: this.begin, end: this.end });
     },
     colour(n) { return ["#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#999999"][n % 8]; },
-    look() { // one question at a time: the newest time is asked when the one before is answered
-      if (!this.about.gaze) return;
-      if (this.waits) { this.wanted = this.t; return; }
-      this.waits = true;
-      this.$emit("glance", { t: this.t });
-    },
     glanced(found) {
-      if (found.lane) { this.lane = found.lane; return; }
       this.glance = found;
       const right = [...found.areas.map((a) => a.box[2]), ...found.trail.map((p) => p[0])];
       const below = [...found.areas.map((a) => a.box[3]), ...found.trail.map((p) => p[1])];
       this.extent = { width: Math.max(this.extent.width, ...right), height: Math.max(this.extent.height, ...below) };
-      this.waits = false;
-      if (this.wanted !== null) { this.wanted = null; this.look(); }
     },
     ask(at) {
       const chart = this.charts[at];
       if (chart.signal === "") { chart.path = ""; return; }
       const { stream, column } = this.about.signals[chart.signal];
       if (chart.as === "spectrogram") chart.path = "";
-      this.$emit("curve", { at, stream, column, begin: this.begin, end: this.end, as: chart.as });
+      this.question(`chart ${at}`, { kind: chart.as, at, stream, column, begin: this.begin, end: this.end });
     },
-    curve(at, found) {
-      if (this.charts[at].as === "spectrogram") this.spectrum(at, found);
-      else if (found.low) this.drawn(at, found);
+    curve({ at, kind, begin, end }, found) {
+      if (this.charts[at].signal === "") return; // taken away meanwhile
+      Object.assign(this.charts[at], { begin, end });
+      if (kind === "spectrogram") this.spectrum(at, found);
+      else this.drawn(at, found);
     },
     spectrum(at, { levels, top_hz, most_db, why }) { // faint to loud as black, violet, orange, white
       const canvas = document.getElementById(`spectrum-${at}`), paint = canvas.getContext("2d");
@@ -233,16 +252,16 @@ export default {
       }));
       paint.putImageData(image, 0, 0);
     },
-    reading({ values }) { // of the step that the time is in: a value, or from the lowest to the highest
+    reading({ values, begin, end }) { // of the step that the time is in: a value, or from the lowest to the highest
       if (!values) return "";
-      const { low, high, begin, end, unit } = values;
+      const { low, high, unit } = values;
       const n = Math.min(low.length - 1, Math.floor(low.length * (this.t - begin) / Math.max(1e-9, end - begin)));
       if (n < 0 || low[n] === null || low[n] === undefined) return "no value";
       const [least, most] = [low[n].toPrecision(4), high[n].toPrecision(4)];
       return `${least === most ? least : `${least} to ${most}`}${unit === "1" ? "" : ` ${unit}`}`;
     },
     drawn(at, { low, high, unit }) {
-      this.charts[at].values = { low, high, unit, begin: this.begin, end: this.end };
+      this.charts[at].values = { low, high, unit };
       const known = [...low, ...high].filter((v) => v !== null);
       const chart = this.charts[at];
       if (!known.length) { chart.path = "M0,55"; chart.said = "no value here"; return; }

@@ -2,14 +2,14 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from labcrane.errors import RecordingError
+from labcrane.errors import LabcraneError, RecordingError
+from labcrane.recording.participant_file.writer import DAMAGED
 from labcrane.registry.registry import Registry
 from labcrane.web.door.access import VIEWER
-from labcrane.web.door.serving import build_pages, serve_here
+from labcrane.web.door.serving import AWAY_S, build_pages, serve_here
 from labcrane.web.page import PRIMARY, see_through, speak
 from labcrane.web.room.model import MachineModel, span
 from labcrane.web.room.shown import ShownShapes
@@ -20,6 +20,9 @@ from labcrane.web.viewer.glances import Glances
 from labcrane.web.viewer.marks import Marks
 
 HERE = Path(__file__).parent
+
+Asked = Mapping[str, Any]
+Answer = Callable[[Asked], Asked]
 
 
 class Screen:
@@ -91,9 +94,13 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
         screens.append(Screen(film, shapes))
         lacking += why
 
-    def show(second: float) -> None:
-        for screen in screens:
-            screen.show(second)
+    def show(second: float) -> str:
+        try:
+            for screen in screens:
+                screen.show(second)
+        except (LabcraneError, *DAMAGED) as error:
+            return f"second {second:g} cannot be shown: {error}"
+        return ""
 
     def look(name: str) -> None:
         for screen in screens:
@@ -115,14 +122,7 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
         **marks.shown(),
         "gaze": glances.known,
     }
-    line = Timeline(
-        about,
-        show,
-        partial(_curve, first),
-        partial(_spectrogram, first),
-        marks.asked,
-        partial(_glance, glances),
-    )
+    line = Timeline(about, show, _answers(first, marks, glances))
     with line.add_slot("machine"):
         with ui.row().classes("gap-2 mb-2").props('role=group aria-label="Cameras"'):
             for name in CAMERAS:
@@ -134,25 +134,42 @@ def viewer_page(films: Sequence[Film], registry: Registry, at: float) -> None:
                 screen.build()
 
 
-def _curve(film: Film, stream: str, column: str, begin: float, end: float) -> dict[str, Any]:
+def _answers(film: Film, marks: Marks, glances: Glances) -> dict[str, Answer]:
+    """Return what answers each kind of question of the page; none of them raises."""
     units = {(one["stream"], one["column"]): one["unit"] for one in film.signals}
-    return {**film.curve(stream, column, begin, end), "unit": units[stream, column]}
 
+    def signal(asked: Asked) -> tuple[str, str, float, float]:
+        span = float(asked["begin"]), float(asked["end"])
+        return str(asked["stream"]), str(asked["column"]), *span
 
-def _spectrogram(film: Film, stream: str, column: str, begin: float, end: float) -> dict[str, Any]:
-    try:
-        return film.spectrogram(stream, column, begin, end)
-    except RecordingError as error:
-        return {"why": str(error)}
+    def curve(asked: Asked) -> Asked:
+        stream, column, begin, end = signal(asked)
+        return {**film.curve(stream, column, begin, end), "unit": units[stream, column]}
 
+    def spectrogram(asked: Asked) -> Asked:
+        try:
+            return film.spectrogram(*signal(asked))
+        except RecordingError as error:
+            return {"why": str(error)}
 
-def _glance(glances: Glances, asked: Mapping[str, Any]) -> dict[str, Any]:
-    try:
-        if "lane" in asked:
-            return {"lane": glances.lane(float(asked["begin"]), float(asked["end"]))}
-        return glances.as_json(float(asked["t"]))
-    except RecordingError as error:
-        return {"areas": [], "trail": [], "looked": f"not read: {error}"}
+    def second(asked: Asked) -> Asked:
+        return glances.as_json(float(asked["t"])) if glances.known else {}
+
+    def lane(asked: Asked) -> Asked:
+        return {"lane": glances.lane(float(asked["begin"]), float(asked["end"]))}
+
+    def told(answer: Answer) -> Answer:
+        def given(asked: Asked) -> Asked:
+            try:
+                return answer(asked)
+            except (LabcraneError, *DAMAGED) as error:
+                return {"failed": f"{asked['kind']}: not read: {error}"}
+
+        return given
+
+    answers: dict[str, Answer] = {"curve": curve, "spectrogram": spectrogram, "second": second}
+    answers |= {"lane": lane, "mark": marks.asked}
+    return {kind: told(answer) for kind, answer in answers.items()}
 
 
 def serve(
@@ -164,7 +181,7 @@ def serve(
 
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
 
-    @ui.page("/viewer")
+    @ui.page("/viewer", reconnect_timeout=AWAY_S)
     def viewer() -> None:
         viewer_page(films, registry, at)
 
