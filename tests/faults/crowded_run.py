@@ -160,7 +160,7 @@ def begin(folder: Path, number: int) -> dict[str, object]:
                 over.set()
                 run.stdin.write("end\n")
                 run.stdin.flush()
-            if time.monotonic() - began > 60.0:
+            if time.monotonic() - began > 240.0:
                 break
     finally:
         over.set()
