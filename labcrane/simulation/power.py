@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -39,8 +39,8 @@ class Effect:
     between
         The two words that are compared; empty for all there are.
     size
-        The effect that is put in, in the measure's unit per step of a number or between two words,
-        after the labels were permuted; None takes the data as they were simulated.
+        The effect that is put in place of the one that there is, in the measure's unit per step of
+        a number or between two words; None takes the data as they were simulated.
     """
 
     measure: str
@@ -135,6 +135,13 @@ class Tested:
     error: FloatArray
     freedom: FloatArray
 
+    def moved(self, by: float) -> "Tested":
+        """Return the same of people whose effects are all larger by so much.
+
+        An estimate is linear in them, and its error is of how people differ: it stays.
+        """
+        return replace(self, estimate=self.estimate + by)
+
 
 @dataclass(frozen=True, slots=True)
 class Pool:
@@ -217,7 +224,7 @@ class Power:
         (:func:`labcrane.simulation.share.share_of`).
     null, null_low, null_high
         The same with the labels permuted: how often something is found where nothing is. For
-        equivalence and non-inferiority, with an effect as large as the margin.
+        equivalence and non-inferiority, with an effect as large as the margin put in.
     type_m, type_s
         Of the cohorts in which something was found: by what the effect is overstated on average,
         and in which share it has the wrong sign (Gelman and Carlin 2014). NaN where nothing was
@@ -268,19 +275,20 @@ def power(
         drawn = _fresh(pool, size, cohorts) if fresh else _drawn(pool, size, cohorts, random)
         plain = pool.means[drawn]
         labels = None if pool.groups is None else pool.groups[drawn]
-        permuted, shuffled = _permuted(plain, labels, random)
-        added = pool.steps if shuffled is None else pool.steps[shuffled][..., None]
-        null = claim.p(_tested(permuted + claim.margin * added, shuffled, pool))
-        if effect.size is None:
-            tested, true = _tested(plain, labels, pool), _effect_of(pool)
+        tested = _tested(plain, labels, pool)
+        true = there = _effect_of(pool)
+        if claim.margin:
+            null = tested.moved(claim.margin - there)
         else:
-            tested, true = _tested(permuted + effect.size * added, shuffled, pool), effect.size
+            null = _tested(*_permuted(plain, labels, random), pool)
+        if effect.size is not None:
+            tested, true = tested.moved(effect.size - there), effect.size
         if claim.kind != "difference":
             true = 0.0
         yield summarise(
             size,
             Outcomes(claim.p(tested), tested.estimate),
-            Outcomes(null),
+            Outcomes(claim.p(null)),
             true,
             None if fresh else drawn,
             len(pool.means),

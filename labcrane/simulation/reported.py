@@ -1,5 +1,6 @@
 """Power of the report's own tests: cohorts of participants, each tested as the report does."""
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -45,6 +46,8 @@ NAMES: Mapping[Kind, str] = {
 }  # fmt: skip
 """What the tests are called."""
 
+_OF_GROUP = re.compile(rf"{GROUP}\[T\.[^\]]+\]")
+
 CHUNK = 25
 """Cohorts that a worker is given at a time."""
 
@@ -74,8 +77,9 @@ class Planned:
 
     @property
     def of_groups(self) -> bool:
-        """Whether the effect is between participants alone."""
-        return self.effect.factor == GROUP and bool(self.factors.groups)
+        """Whether the effect is between participants alone; a mixed model names it by a level."""
+        own = self.effect.factor == GROUP or _OF_GROUP.fullmatch(self.effect.factor) is not None
+        return own and bool(self.factors.groups)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +98,17 @@ class Answer:
     estimate: float = np.nan
     error: float = np.nan
     freedom: float = np.nan
+
+    def moved(self, by: float) -> "Answer":
+        """Return the answer, uncorrected, where the effect is larger by so much.
+
+        The estimate is linear in it, and its error is of how people differ: it stays.
+        """
+        from scipy.stats import t
+
+        estimate = self.estimate + by
+        p = float(2.0 * t.sf(abs(estimate) / self.error, self.freedom))
+        return Answer(p, estimate, self.error, self.freedom)
 
 
 NOTHING = Answer(np.nan)
@@ -302,22 +317,24 @@ def power_of_report(
 
     A cohort follows from the seed, its size and its number, whoever makes it.
     """
-    whole = ask(planned, planned.results).estimate
-    true = whole if planned.effect.size is None else planned.effect.size
+    there, wanted = ask(planned, planned.results).estimate, planned.effect.size
+    true = there if wanted is None else wanted
+    by = None if wanted is None else wanted - there
     for size in sizes:
         chunks = [
             (size, seed, first, min(first + CHUNK, cohorts)) for first in range(0, cohorts, CHUNK)
         ]
-        made = dict(work(partial(_chunk, planned), chunks, workers, scheduler))
-        cohorts_made = [each for first in sorted(made) for each in made[first]]
-        plain, null = ([one.answers[at] for one in cohorts_made] for at in (0, 1))
-        found = plain if planned.effect.size is None else _shifted(null, planned.effect.size)
+        made = dict(work(partial(_chunk, planned, by), chunks, workers, scheduler))
+        tried = [each for first in sorted(made) for each in made[first]]
+        found, null = [one.found for one in tried], [one.null for one in tried]
+        if claim.margin:
+            null = [each.moved(claim.margin - true) for each in found]
         yield summarise(
             size,
             Outcomes(_p(found, claim), np.array([each.estimate for each in found])),
-            Outcomes(_p(_shifted(null, claim.margin) if claim.margin else null, claim)),
+            Outcomes(_p(null, claim)),
             true if claim.kind == "difference" else 0.0,
-            np.stack([one.drawn for one in cohorts_made]),
+            np.stack([one.drawn for one in tried]),
             planned.results["participant"].nunique(),
         )
 
@@ -327,11 +344,14 @@ class Tried:
     """A cohort that was tested: who was drawn, and what the test says of it and of nothing."""
 
     drawn: npt.NDArray[np.intp]
-    answers: tuple[Answer, Answer]
+    found: Answer
+    null: Answer
 
 
-def _chunk(planned: Planned, order: tuple[int, int, int, int]) -> tuple[int, list[Tried]]:
-    """Test some cohorts, as they are and with nothing to be found; a worker's function."""
+def _chunk(
+    planned: Planned, by: float | None, order: tuple[int, int, int, int]
+) -> tuple[int, list[Tried]]:
+    """Test some cohorts, with the effect moved and with nothing to find; a worker's function."""
     size, seed, first, last = order
     drawer = Drawer(planned)
     tried = []
@@ -339,21 +359,24 @@ def _chunk(planned: Planned, order: tuple[int, int, int, int]) -> tuple[int, lis
         random = np.random.default_rng([seed, size, number])
         drawn = drawer.draw(size, random)
         cohort = drawer.cohort(drawn)
-        mixed = drawer.permuted(cohort, random)
-        tried.append(Tried(drawn, (ask(planned, cohort), ask(planned, mixed))))
+        null = ask(planned, drawer.permuted(cohort, random))
+        tried.append(Tried(drawn, _found(planned, cohort, by), null))
     return first, tried
 
 
-def _shifted(answers: Sequence[Answer], size: float) -> list[Answer]:
-    """Return the answers with an effect put in: estimates are linear, their errors stay."""
-    from scipy.stats import t
+def _found(planned: Planned, cohort: "pd.DataFrame", by: float | None) -> Answer:
+    """Return what the test says of a cohort in which the effect is larger by so much.
 
-    moved = []
-    for each in answers:
-        estimate = each.estimate + size
-        p = float(2.0 * t.sf(abs(estimate) / each.error, each.freedom))
-        moved.append(Answer(p, estimate, each.error, each.freedom))
-    return moved
+    A contrast is corrected with all others of its factor, which the second level is part of: its
+    movements are moved. The other tests stand by themselves.
+    """
+    if by is None:
+        return ask(planned, cohort)
+    if planned.kind != "contrast":
+        return ask(planned, cohort).moved(by)
+    effect = planned.effect
+    own = cohort[column(effect.factor)].map(outcomes.word) == effect.between[1]
+    return ask(planned, cohort.assign(**{effect.measure: cohort[effect.measure] + by * own}))
 
 
 def _p(answers: Sequence[Answer], claim: Claim) -> FloatArray:

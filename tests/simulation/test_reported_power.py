@@ -8,6 +8,8 @@ import pandas as pd
 import pytest
 from scipy.stats import ttest_1samp, ttest_ind
 from simple_crane import CRANE
+from statsmodels.formula.api import ols
+from statsmodels.stats.multitest import multipletests
 from statsmodels.stats.power import TTestIndPower
 
 from labcrane.analysis.cohort import find_cohort
@@ -118,14 +120,92 @@ def test_the_intervals_of_the_reports_tests_hold_the_power_as_often_as_they_say(
     assert 0.92 <= inside / repetitions <= 0.99
 
 
-def test_what_is_put_in_is_added_to_the_second_group() -> None:
+@pytest.mark.parametrize("there", [0.0, 2.0])
+def test_what_is_put_in_takes_the_place_of_what_two_groups_differ_by(there: float) -> None:
     put = read_effect("movement_time~group[none,visual]=0.9")
-    planned = plan_test("contrast", put, movements(), NOTHING)
+    planned = plan_test("contrast", put, movements(difference=there), NOTHING)
     (found,) = power_of_report(planned, [24], COHORTS, seed=6)
-    groups = [in_groups(empty) for _, empty in drawn(planned, 24, seed=6)]
-    expected = np.mean([ttest_ind(one, other + 0.9).pvalue < 0.05 for one, other in groups])
+    one, other = (each.mean() for each in in_groups(planned.results))
+    groups = [in_groups(plain) for plain, _ in drawn(planned, 24, seed=6)]
+    by = 0.9 - (other - one)
+    expected = np.mean([ttest_ind(one, other + by).pvalue < 0.05 for one, other in groups])
     assert found.power == expected
     assert 0.2 < expected < 1.0
+
+
+def test_what_is_put_in_is_corrected_with_the_other_contrasts() -> None:
+    """Of three groups, by a linear model of participants' means and Holm's correction."""
+    table = movements(120, groups=("a", "b", "c"), difference=0.6)
+    planned = plan_test("contrast", read_effect("movement_time~group[a,c]=1.1"), table, NOTHING)
+    (found,) = power_of_report(planned, [30], COHORTS, seed=8)
+    whole = table.groupby(["group", "participant"])["movement_time"].mean().groupby("group").mean()
+    corrected, plain = [], []
+    for cohort, _ in drawn(planned, 30, seed=8):
+        means = cohort.groupby(["group", "participant"])["movement_time"].mean().reset_index()
+        means.loc[means["group"] == "c", "movement_time"] += 1.1 - (whole["c"] - whole["a"])
+        model = ols("movement_time ~ 0 + group", means).fit()
+        pairs = model.t_test(np.array([[1, 0, -1], [1, -1, 0], [0, 1, -1]])).pvalue
+        corrected.append(multipletests(pairs, method="holm")[1][0] < 0.05)
+        plain.append(pairs[0] < 0.05)
+    assert found.power == np.mean(corrected)
+    assert np.mean(corrected) < np.mean(plain), "the draw shows no correction"
+
+
+def test_what_is_put_in_changes_a_trend_as_if_everybody_had_it() -> None:
+    table = movements(groups=("",), slope=-0.3)
+    put = read_effect("movement_time~sequence=0.09")
+    planned = plan_test("trend", put, table, NOTHING)
+    (found,) = power_of_report(planned, [16], COHORTS, seed=5)
+    by = 0.09 - ask(planned, planned.results).estimate
+    shown = []
+    for cohort, _ in drawn(planned, 16, seed=5):
+        values = cohort["movement_time"].to_numpy().reshape(16, 8) + by * np.arange(8.0)
+        slopes = np.polyfit(np.arange(8.0), values.T, 1)[0]
+        shown.append(ttest_1samp(slopes, 0.0).pvalue < 0.05)
+    assert found.power == np.mean(shown)
+    assert 0.2 < found.power < 1.0
+
+
+@pytest.mark.parametrize("text", ["group[T.visual]", "sequence", "group[T.visual]:sequence"])
+def test_what_is_put_in_changes_a_term_of_the_mixed_model_as_if_everybody_had_it(
+    text: str,
+) -> None:
+    table = movements(24, difference=2.0, slope=-0.2)
+    size = {"group[T.visual]": 0.1, "sequence": 0.01, "group[T.visual]:sequence": 0.02}[text]
+    planned = plan_test("mixed", read_effect(f"movement_time~{text}={size}"), table, NOTHING)
+    answer = ask(planned, planned.results)
+    random = np.random.default_rng([4, 24, 0])
+    drawer = Drawer(planned)
+    cohort = drawer.cohort(drawer.draw(24, random))
+    step = np.ones(len(cohort))
+    if "group" in text:
+        step *= cohort["group"] == "visual"
+    if "sequence" in text:
+        step *= cohort["place"] - cohort["place"].mean()
+    by = size - answer.estimate
+    moved = cohort.assign(movement_time=cohort["movement_time"] * np.exp(by * step))
+    (found,) = power_of_report(planned, [24], 1, seed=4)
+    expected, said = ask(planned, moved), ask(planned, cohort).moved(by)
+    assert said.estimate == pytest.approx(expected.estimate, abs=1e-4)
+    assert said.error == pytest.approx(expected.error, rel=1e-2)
+    assert found.power == float(expected.p < 0.05)
+
+
+def test_where_a_mixed_model_has_nothing_to_find_groups_that_differ_are_no_matter() -> None:
+    table = movements(60, difference=2.5)
+    of_groups = "movement_time~group[T.visual]"
+    planned = plan_test("mixed", read_effect(of_groups), table, NOTHING)
+    (found,) = power_of_report(planned, [16], 20, seed=1)
+    assert found.power > 0.8
+    assert found.null <= 0.25
+    planned = plan_test("mixed", read_effect(f"{of_groups}=0.0001"), table, NOTHING)
+    (found,) = power_of_report(planned, [16], 20, seed=1)
+    assert found.power <= 0.25
+    alike = Claim("equivalence", 0.5)
+    planned = plan_test("mixed", read_effect(f"{of_groups}=0.0001"), table, alike)
+    (found,) = power_of_report(planned, [16], 20, seed=1, claim=alike)
+    assert found.power > 0.8
+    assert found.null <= 0.25
 
 
 def test_the_f_test_of_two_groups_finds_what_their_contrast_finds() -> None:
@@ -135,7 +215,7 @@ def test_the_f_test_of_two_groups_finds_what_their_contrast_finds() -> None:
         for kind, effect in (("anova", PLAIN), ("contrast", OF_GROUPS))
     ]
     assert found[0].power == found[1].power
-    assert found[0].null == found[1].null
+    assert found[0].null == found[1].null  # groups are permuted in both
     assert found[0].type_m != found[0].type_m  # an F test has no sign
 
 

@@ -192,12 +192,14 @@ def _fit(formula: str, data: "pd.DataFrame", random: str) -> Any:
     import warnings
 
     from statsmodels.formula.api import mixedlm
-    from statsmodels.tools.sm_exceptions import ConvergenceWarning
+    from statsmodels.tools.sm_exceptions import ConvergenceWarning, SingularMatrixWarning
 
     with warnings.catch_warnings():
         warnings.simplefilter("error", ConvergenceWarning)
         # statsmodels takes every small variance for a boundary, in whatever unit it is.
         warnings.filterwarnings("ignore", "The MLE may be on the boundary", ConvergenceWarning)
+        # Of a step on the way; where the fit ends is looked at below.
+        warnings.simplefilter("ignore", SingularMatrixWarning)
         try:
             found = mixedlm(formula, data, groups="participant", re_formula=random).fit(reml=True)
         except (ConvergenceWarning, np.linalg.LinAlgError):
