@@ -1,6 +1,5 @@
 """Session: the rig is opened, led through its plan, and leaves a participant file."""
 
-import gc
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import asdict, dataclass
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from labcrane.core.clock import Clock, ManualClock, SystemClock
+from labcrane.core.garbage import settled
 from labcrane.core.records import Event, Frame, Phase, Run
 from labcrane.core.roles import Trigger
 from labcrane.design.counts import TrialCounts
@@ -230,7 +230,7 @@ def _record(
                 ahead = None
                 if forward is not None and isinstance(log, BatchLog):
                     ahead = forward(rig, run, sequencer, log)
-                with _settled():
+                with settled():
                     loop.run(rig, run, sequencer, clock, console, log, sinks, ahead)
         except (PluginError, DeviceError) as error:
             log.note(Event("session.failed", clock.now(), {"why": str(error)}))
@@ -388,19 +388,6 @@ def _opening(
         # The dead process could not close its trial; it is a row like any other.
         lost = {**so_far.interrupted, "outcome": str(Phase.INTERRUPTED)}
         yield Event("trial.end", now, lost)
-
-
-@contextmanager
-def _settled() -> Iterator[None]:
-    """Leave what is there before the first tick out of every search for garbage.
-
-    It is as much as everything else that a search looks through, and one takes many ticks' time.
-    """
-    gc.freeze()
-    try:
-        yield
-    finally:
-        gc.unfreeze()
 
 
 @contextmanager

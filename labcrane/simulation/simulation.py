@@ -18,6 +18,7 @@ import numpy as np
 
 from labcrane.analysis.measures import measures_of_trials
 from labcrane.analysis.parallel import work
+from labcrane.core.garbage import cleared
 from labcrane.core.records import Event, Run, Value
 from labcrane.design.plan import plan_session
 from labcrane.errors import ProtocolError, RecordingError
@@ -125,7 +126,8 @@ def simulate(order: SimulationJob) -> DataFolder:
         return order.folder
     place = order.data / UNFINISHED
     make_folder(place)
-    with tempfile.TemporaryDirectory(dir=place, prefix=f"{order.participant}-") as scratch:
+    own = tempfile.TemporaryDirectory(dir=place, prefix=f"{order.participant}-")
+    with cleared(), own as scratch:
         there = replace(order, data=Path(scratch)).folder
         ways = [_run(run, *each, order.loop) for each in visits(order, Path(scratch))]
         write_text(there.path / WAY, json.dumps([asdict(way) for way in ways], indent=2) + "\n")
@@ -146,7 +148,8 @@ def simulate_trials(order: SimulationJob) -> "pd.DataFrame":
     if path.exists():
         return pd.read_parquet(path)
     tables = []
-    with tempfile.TemporaryDirectory(prefix=f"labcrane-{order.participant}-") as scratch:
+    own = tempfile.TemporaryDirectory(prefix=f"labcrane-{order.participant}-")
+    with cleared(), own as scratch:
         for visit, attendance in visits(order, Path(scratch)):
             _run(_record, visit, attendance, order.loop)
             tables.append(_table(visit, attendance.rows))
