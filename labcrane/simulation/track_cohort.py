@@ -26,6 +26,10 @@ STEEPNESS = (0.5, 1.0, 2.0)
 LEAST = 20
 """Operators from whom bias and spread are told."""
 
+END = 0.1
+"""Share of the operators at either end, of whom bias is told besides: a mean over everybody hides
+that thresholds near the easiest or the hardest level are taken for ones further in."""
+
 
 @dataclass(frozen=True, slots=True)
 class Ability:
@@ -75,6 +79,8 @@ class Quality:
         Standard deviation of estimate minus truth.
     bias_in_sd
         Bias as a share of the spread.
+    bias_lowest, bias_highest
+        The same mean of the tenth of the operators with the lowest thresholds, and the highest.
     trials
         Counted trials of a block on average.
     ended
@@ -90,6 +96,8 @@ class Quality:
     bias_high: float
     spread: float
     bias_in_sd: float
+    bias_lowest: float
+    bias_highest: float
     trials: float
     ended: float
 
@@ -157,7 +165,8 @@ def quality(track: PlannedTrack, found: "pd.DataFrame") -> Quality:
     """Return bias and spread of a track's estimates."""
     from scipy.stats import t
 
-    errors = (found["estimate"] - found["truth"]).dropna().to_numpy(float)
+    known = found.dropna(subset=["estimate"]).sort_values("truth", kind="stable")
+    errors = (known["estimate"] - known["truth"]).to_numpy(float)
     count = len(errors)
     if count < LEAST:
         raise ProtocolError(
@@ -166,10 +175,11 @@ def quality(track: PlannedTrack, found: "pd.DataFrame") -> Quality:
         )
     bias, spread = float(errors.mean()), float(errors.std(ddof=1))
     reach = float(t.ppf(0.975, count - 1)) * spread / count**0.5
+    end = int(count * END)
     return Quality(
         track.name, track.settings.by, len(found), len(found) - count, bias, bias - reach,
-        bias + reach, spread, bias / spread, float(found["trials"].mean()),
-        float(found["ended"].mean()),
+        bias + reach, spread, bias / spread, float(errors[:end].mean()),
+        float(errors[-end:].mean()), float(found["trials"].mean()), float(found["ended"].mean()),
     )  # fmt: skip
 
 
@@ -182,7 +192,9 @@ def paragraph(found: Sequence[Quality]) -> str:
             f"Levels of {each.track!r} are chosen by {each.by}. With {each.operators} simulated "
             f"operators whose thresholds are known, its estimate was off by {each.bias:.3g} on "
             f"average (95 % interval {each.bias_low:.3g} to {each.bias_high:.3g}), with a standard "
-            f"deviation of {each.spread:.3g}, after {each.trials:.1f} trials{none}."
+            f"deviation of {each.spread:.3g}, after {each.trials:.1f} trials{none}; by "
+            f"{each.bias_lowest:.3g} in the tenth with the lowest thresholds, and by "
+            f"{each.bias_highest:.3g} in that with the highest."
         )
     sentences.append(
         "The simulated operators are a model; the numbers hold for people as far as they do."

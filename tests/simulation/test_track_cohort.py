@@ -43,6 +43,32 @@ def test_what_quest_plus_says_of_its_own_error_is_its_error() -> None:
     assert errors.std() == pytest.approx(1.0, abs=0.06)
 
 
+def test_what_is_off_at_the_ends_is_told_besides_the_mean_that_hides_it() -> None:
+    track = planned(15, quest_plus=QuestPlus(spreads=(2.0,), lapse=0.02))
+    found = quality(track, observe(track, abilities(track, 1000, (), seed=2), seed=3))
+    lowest, highest = (
+        quality(track, observe(track, [Ability(at, 2.0, 0.0, 0.02) for at in tenth], seed=4))
+        for tenth in (np.linspace(0.0, 1.2, 400), np.linspace(10.8, 12.0, 400))
+    )
+    assert abs(found.bias_in_sd) < 0.05
+    assert found.bias_lowest == pytest.approx(lowest.bias, abs=0.15)
+    assert found.bias_highest == pytest.approx(highest.bias, abs=0.15)
+    assert found.bias_lowest > 0.4 * found.spread
+    assert found.bias_highest < -0.4 * found.spread
+
+
+def test_a_tenth_is_a_tenth_of_those_of_whom_there_is_an_estimate() -> None:
+    truth = np.arange(30.0)
+    error = np.where(truth < 2, 5.0, np.where(truth < 4, 7.0, 0.0))
+    error[-1] = np.nan
+    error[-2:-4:-1] = -3.0, -4.0
+    table = pd.DataFrame({"truth": truth, "estimate": truth + error, "trials": 1, "ended": 1.0})
+    found = quality(planned(9, up_down=UpDown()), table.sample(frac=1.0, random_state=1))
+    assert found.bias_lowest == 5.0  # 29 of them: two at either end
+    assert found.bias_highest == -3.5
+    assert found.bias == pytest.approx((2 * 5 + 2 * 7 - 7) / 29)
+
+
 def test_a_staircase_finds_the_level_at_which_it_settles() -> None:
     law = UpDown(harder_after=2, easier_after=1, steps=(2, 1), reversals=20, leave_out=4)
     track = planned(300, up_down=law)

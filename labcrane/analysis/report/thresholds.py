@@ -64,7 +64,9 @@ def add_thresholds(page: Page, found: "pd.DataFrame", judge: Judge | None) -> No
     page.say(
         "How far such estimates are off: bias and spread are mean and standard deviation of "
         "estimate minus truth, of simulated operators whose thresholds are known, spread evenly "
-        "from the easiest to the hardest level. Success falls with the level as QUEST+ believes; "
-        "of a staircase, which believes nothing, as steeply as the row says."
+        "from the easiest to the hardest level; bias is also told of the tenth with the lowest "
+        "thresholds and of that with the highest, which are taken for ones further in. Success "
+        "falls with the level as QUEST+ believes; of a staircase, which believes nothing, as "
+        "steeply as the row says."
     )
     page.table("track_quality", quality)

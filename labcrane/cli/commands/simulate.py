@@ -481,7 +481,10 @@ def tracks(
         )
     if wrong := [each for each in spread or () if not each > 0.0]:
         raise ProtocolError(f"--spread {wrong[0]:g} is no spread; give numbers above 0")
-    table = whole_table("track", "operators", "bias", "95 %", "spread", "bias / spread", "trials")
+    table = whole_table(
+        "track", "operators", "bias", "95 %", "lowest tenth", "highest tenth", "spread",
+        "bias / spread", "trials",
+    )  # fmt: skip
     found, people = [], []
     for each in planned:
         seed = derive(study.protocol.study, "tracks", each.name)
@@ -494,6 +497,8 @@ def tracks(
             f"{one.operators - one.without}",
             f"{one.bias:.3f}",
             f"{one.bias_low:.3f} to {one.bias_high:.3f}",
+            f"{one.bias_lowest:.3f}",
+            f"{one.bias_highest:.3f}",
             f"{one.spread:.3f}",
             f"{one.bias_in_sd:.3f}",
             f"{one.trials:.1f}",
