@@ -37,6 +37,9 @@ SAMPLE = 100_000
 PILOT_TIMES = 0.35
 """What the crane study's 36 may take beside bare ticks."""
 
+FEW_TIMES, MANY_TIMES = 1.6, 1.8
+"""How much faster two workers are than one; of few participants each loads libraries for long."""
+
 COHORTS, FEW, MORE = 1000, 20, 120
 POWER_S = 600.0
 """What so many cohorts of 36 may take, with their pool, in seconds of the processor."""
@@ -47,8 +50,7 @@ def rows(participants: int = 36) -> list[Row]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         found = one_core(folder, participants)
-        found.append(two_cores(folder, max(participants // 3, 4)))
-        found.append(memory(folder, participants))
+        found += two_cores_and_memory(folder, participants)
         found.append(pilot(folder, participants))
         found += [power(folder, test, participants) for test in ("trend", "anova")]
     return found
@@ -143,17 +145,15 @@ def command(folder: Path, participants: int, workers: int) -> Use:
     return used(*words, "--participants", str(participants), "--workers", str(workers))
 
 
-def two_cores(folder: Path, participants: int) -> Row:
-    """Compare two workers with one."""
-    two, one = (command(folder, participants, workers).seconds for workers in (2, 1))
-    what = f"{participants} participants with two workers, s"
-    return Row("cohort", what, two, one, "with one", 1 / 1.8)
-
-
-def memory(folder: Path, few: int) -> Row:
-    """Compare the memory for few participants and for four times as many."""
-    small, large = (command(folder / "memory", count, 1).megabytes for count in (few, 4 * few))
-    return Row("cohort", f"{4 * few} participants, MB at most", large, small, f"{few} of them", 1.1)
+def two_cores_and_memory(folder: Path, few: int) -> Iterator[Row]:
+    """Compare two workers with one, and the memory for few participants and four times as many."""
+    alone = {count: command(folder, count, 1) for count in (few, 4 * few)}
+    for count, times in ((few, FEW_TIMES), (4 * few, MANY_TIMES)):
+        what = f"{count} participants with two workers, s"
+        two = command(folder, count, 2).seconds
+        yield Row("cohort", what, two, alone[count].seconds, "with one", 1.0 / times)
+    small, large = (alone[count].megabytes for count in (few, 4 * few))
+    yield Row("cohort", f"{4 * few} participants, MB at most", large, small, f"{few} of them", 1.1)
 
 
 def pilot(folder: Path, participants: int) -> Row:

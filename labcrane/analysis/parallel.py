@@ -86,6 +86,8 @@ def _on_cores(
             finally:
                 for future in given:
                     future.cancel()
+            # What is done is here: nobody waits for workers to unload their libraries.
+            pool.shutdown(kill_workers=True)
         return
     raise LabcraneError(
         f"worker processes died {1 + RETRIES} times, and {len(left)} of {len(orders)} pieces of "
