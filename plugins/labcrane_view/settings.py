@@ -362,13 +362,18 @@ class ViewSettings(Settings):
 
     def _told_to_everybody(self) -> dict[str, str]:
         """Return what tells the operator of the task's error, or of success, in every group."""
-        if self.seen_by == "examiner":
+        others = self.seen_by == "examiner"
+        if others and (self.all_screens or self.display == "hidden"):
             return {}
         found = {}
         if "distance" in self.hud_lines:
             found["hud"] = (
-                "has distance, which tells the operator the task's error in every group, also in "
-                "one without feedback; leave it out, make it feedback of a group, or write "
+                "has distance, and the window no screen of its own: where there is one monitor, "
+                "the operator sees the task's error in every group; give the examiner's monitor, "
+                "as screen: 0, or leave distance out of hud"
+                if others
+                else "has distance, which tells the operator the task's error in every group, also "
+                "in one without feedback; leave it out, make it feedback of a group, or write "
                 "seen_by: examiner if the operator does not see this view"
             )
         if self.patch is not None and (told := [e for e in self.patch.on if e in ENTERING]):

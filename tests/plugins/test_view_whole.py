@@ -190,7 +190,14 @@ def test_the_operator_sees_no_distance_unless_asked_for_and_the_examiner_does() 
     assert ViewSettings().hud_lines == ("block", "trial")
     assert ViewSettings(seen_by="examiner").hud_lines == ("block", "trial", "distance")
     assert ViewSettings().doubts(ch8()) == {}
-    assert ViewSettings(seen_by="examiner", hud=("distance",)).doubts(ch8()) == {}
+    assert ViewSettings(seen_by="examiner", screen=0, hud=("distance",)).doubts(ch8()) == {}
+    assert ViewSettings(seen_by="examiner", display="hidden").doubts(ch8()) == {}
+    assert ViewSettings(seen_by="examiner", hud=("trial",)).doubts(ch8()) == {}
+    for hud in (None, ("distance",)):
+        alone = ViewSettings(seen_by="examiner", hud=hud).doubts(ch8())
+        assert list(alone) == ["hud"]
+        assert "where there is one monitor, the operator sees the task's error" in alone["hud"]
+        assert "give the examiner's monitor, as screen: 0" in alone["hud"]
     asked = ViewSettings(hud=("distance",)).doubts(ch8())
     assert "tells the operator the task's error in every group" in asked["hud"]
 
