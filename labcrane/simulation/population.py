@@ -187,9 +187,13 @@ def read_population(path: Path | None, study: Study) -> Population:
     if path is None:
         return EVERYBODY_THE_SAME
     source = YamlFile.read(path)
-    population = source.checked(Population)
-    _check(population, study, source)
+    population = source.check(Population)
+    named = population or source.but_for_numbers(Population, source.data)
+    if named is not None:
+        _check(named, study, source)
     source.raise_problems()
+    if population is None:
+        raise AssertionError("what is wrong with a file is a problem, and problems were raised")
     return population
 
 

@@ -127,6 +127,19 @@ def test_mistakes_are_named_with_their_line(study: Study, text: str, message: st
         read_population(path, study)
 
 
+def test_a_wrong_number_hides_no_wrong_name_beside_it(study: Study) -> None:
+    path = study.path.with_name("cohort.yaml")
+    path.write_text(
+        "labcrane_cohort: 1\ndropout: 1.5\noperator: {skill: {median: 1, log_sd: 0.1}}\n"
+        "groups: {loud: {skill: 2}}\n"
+    )
+    with pytest.raises(ProtocolError) as told:
+        read_population(path, study)
+    first, *others = str(told.value).splitlines()
+    assert ":2:10: dropout is 1.5; it must be less than or equal to 1" in first
+    assert [each.split(" ")[1] for each in others] == ["'skill'", "there", "'skill'"]
+
+
 def test_a_wrong_cohort_beside_the_protocol_is_told_by_its_check(
     study: Study, capsys: pytest.CaptureFixture[str]
 ) -> None:
