@@ -1,7 +1,7 @@
 """Population of simulated participants: how its operators differ, and how many leave."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import NormalDist
@@ -200,6 +200,7 @@ def read_population(path: Path | None, study: Study) -> Population:
 def _check(population: Population, study: Study, source: YamlFile) -> None:
     groups = tuple(study.protocol.design.groups)
     _check_names(population.operator, study, source, ("operator",))
+    _check_ends(population, study, source)
     for group, factors in population.groups.items():
         if group not in groups:
             known = ", ".join(groups) or "none"
@@ -216,6 +217,61 @@ def _check(population: Population, study: Study, source: YamlFile) -> None:
         for item, spread in spreads.items():
             if why := _why_not(name, item, spread, items):
                 source.problem(("answers", name, item), why, key=True)
+
+
+def _check_ends(population: Population, study: Study, source: YamlFile) -> None:
+    """Complain of values, alone and with a group's factor, that the operator cannot have."""
+    written = _numbers(study)
+    for name, drawn in population.operator.items():
+        if name not in written:
+            continue
+        for end, value in _ends(drawn).items():
+            if why := _impossible(study, name, value):
+                source.problem(("operator", name, end), f"{name} is {value:g}; {why}")
+    for group, factors in population.groups.items():
+        for name, factor in factors.items():
+            if name not in written:
+                continue
+            drawn_from = population.operator.get(name)
+            values = [written[name]] if drawn_from is None else [*_ends(drawn_from).values()]
+            if why := _why_no_factor(study, name, factor, values):
+                source.problem(("groups", group, name), why)
+
+
+def _ends(spread: Lognormal | Uniform) -> dict[str, float]:
+    """Return values that are drawn for certain, or come as near as one likes, by their keys.
+
+    A median stands for all of a lognormal one, whose tails have no end: what only a tail reaches
+    is told of whom it was drawn for.
+    """
+    if isinstance(spread, Lognormal):
+        return {"median": spread.median}
+    return {"lowest": spread.lowest, "highest": spread.highest}
+
+
+def _impossible(study: Study, name: str, value: float) -> str:
+    """Return why the study's operator cannot be set so; nothing where it can.
+
+    What several settings ask of each other is not asked here: the others are drawn as well.
+    """
+    settings = study.operator.settings
+    try:
+        type(settings).model_validate(settings.model_dump() | {name: value})
+    except ValidationError as error:
+        alone = [each for each in error.errors() if each["type"] != "value_error"]
+        for complaint in told(alone, (), type(settings)):
+            if complaint.place and complaint.place[0] == name:
+                return complaint.message.partition("; ")[2] or complaint.message
+    return ""
+
+
+def _why_no_factor(study: Study, name: str, factor: float, values: Sequence[float]) -> str:
+    """Return why nobody of a group can have a setting, multiplied; nothing where they can."""
+    for value in values:
+        why = "" if _impossible(study, name, value) else _impossible(study, name, factor * value)
+        if why:
+            return f"{name} is {factor:g} times {value:g}, {factor * value:g}; {why}"
+    return ""
 
 
 def _why_not(
@@ -270,8 +326,7 @@ def _drawn(
 def _check_names(
     names: Mapping[str, object], study: Study, source: YamlFile, place: tuple[str, ...]
 ) -> None:
-    written = study.operator.settings.model_dump()
-    numbers = [name for name, value in written.items() if type(value) in (int, float)]
+    numbers = _numbers(study)
     for name in names:
         if name not in numbers:
             source.problem(
@@ -280,6 +335,12 @@ def _check_names(
                 f"{', '.join(numbers)}",
                 key=True,
             )
+
+
+def _numbers(study: Study) -> dict[str, float]:
+    """Return what the study's operator is set by, of what is a number."""
+    written = study.operator.settings.model_dump()
+    return {name: value for name, value in written.items() if type(value) in (int, float)}
 
 
 def _random(study: Study, participant: str, what: str) -> np.random.Generator:

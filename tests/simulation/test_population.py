@@ -152,15 +152,60 @@ def test_a_wrong_cohort_beside_the_protocol_is_told_by_its_check(
     assert main(["check", str(study.path)]) == 0
 
 
-def test_a_value_that_no_operator_can_have_is_refused(
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (
+            "operator: {lapse_rate: {lowest: 0.5, highest: 3}}",
+            r":2:47: lapse_rate is 3; it must be less than or equal to 1",
+        ),
+        (
+            "operator: {pace_sd: {lowest: -1, highest: 0.5}}",
+            r":2:30: pace_sd is -1; it must be greater than or equal to 0",
+        ),
+        (
+            "operator: {inside: {median: 1.2, log_sd: 0.1}}",
+            r":2:29: inside is 1.2; it must be less than or equal to 1",
+        ),
+        (
+            "groups: {slow: {inside: 2}}",
+            r":2:25: inside is 2 times 0.8, 1.6; it must be less than or equal to 1",
+        ),
+        (
+            "operator: {inside: {lowest: 0.4, highest: 0.6}}\ngroups: {slow: {inside: 2}}",
+            r":3:25: inside is 2 times 0.6, 1.2; it must be less than or equal to 1",
+        ),
+    ],
+)
+def test_values_that_no_operator_can_have_are_told_by_the_check(
+    study: Study, text: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cohort = study.path.with_name("cohort.yaml")
+    cohort.write_text(f"labcrane_cohort: 1\n{text}\n")
+    with pytest.raises(ProtocolError, match=message) as told:
+        read_population(cohort, study)
+    assert len(str(told.value).splitlines()) == 1
+    assert main(["check", str(study.path)]) == 2
+
+
+def test_what_a_factor_makes_possible_and_what_is_possible_alone_pass(study: Study) -> None:
+    cohort = study.path.with_name("cohort.yaml")
+    cohort.write_text(
+        "labcrane_cohort: 1\noperator: {inside: {lowest: 0.1, highest: 1}, "
+        "lapse_rate: {lowest: 0, highest: 1}}\ngroups: {slow: {inside: 0.5}}\n"
+    )
+    read_population(cohort, study)
+
+
+def test_a_tail_that_no_operator_can_have_is_told_of_whom_it_was_drawn_for(
     study: Study, capsys: pytest.CaptureFixture[str]
 ) -> None:
     cohort = study.path.with_name("cohort.yaml")
-    cohort.write_text("labcrane_cohort: 1\noperator: {lapse_rate: {lowest: 2, highest: 3}}\n")
+    cohort.write_text("labcrane_cohort: 1\noperator: {inside: {median: 1, log_sd: 0.001}}\n")
     out = str(study.path.parent / "data")
-    assert main(["simulate", str(study.path), "--out", out, "--participants", "1"]) == 2
+    assert main(["simulate", str(study.path), "--out", out, "--participants", "12"]) == 2
     said = capsys.readouterr().err
-    assert "participant P001 was drawn with lapse_rate 2." in said
+    assert "was drawn with inside 1" in said
     assert "which 'simulated_operator' cannot have: it must be less than or equal to 1" in said
     assert "narrow its distribution" in said
 
