@@ -15,7 +15,7 @@ import os
 import platform
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from importlib import import_module
 from importlib.metadata import version
@@ -62,7 +62,21 @@ def main(words: Sequence[str] | None = None) -> int:
         write(lines)
     beyond = [*failed, *missed(measured)]
     print("\n".join(f"MISSED {each}" for each in beyond) or f"all {len(measured)} are kept")
+    others = [text for each in lines if each not in chosen for text in lines[each]]
+    print("".join(f"MISSED BEFORE {each}\n" for each in missed_before(others)), end="")
     return 1 if failed or (asked.check and beyond) else 0
+
+
+def missed_before(lines: Iterable[str]) -> list[str]:
+    """Return which kept rows were above their limits when they were measured, or had none."""
+    found = []
+    for text in lines:
+        cells = [part.strip() for part in text.split("|")]
+        subject, what, ratio, limit, when = (cells[at] for at in (1, 2, 6, 7, 8))
+        if not limit or not float(ratio) <= float(limit):
+            says = f"{ratio} of {limit}" if limit else f"{ratio}, without a limit"
+            found.append(f"{subject}: {what}: {says}, kept of {when}; measure {subject} again")
+    return found
 
 
 def line(subject: str, row: Row) -> str:

@@ -141,18 +141,18 @@ def laboratory(folder: Path) -> Row:
 
 def sound(folder: Path) -> Row:
     """Play a minute of a session's sound in real time while every core is kept busy."""
-    from busy_computer import a_busy_computer  # noqa: PLC0415
+    from busy_computer import crowded_computer  # noqa: PLC0415
     from faults.jack_session import a_jack_session  # noqa: PLC0415
     from faults.sessions import unique  # noqa: PLC0415
     from faults.test_sound_session import STUDY, Ending  # noqa: PLC0415
 
     (folder / "sound").mkdir()
     study = STUDY.format(study=unique("sound"))
-    with a_busy_computer() as stillness:
+    with crowded_computer() as standstill:
         session, _ = a_jack_session(study, folder / "sound", Ending(SOUND_S), real_time=True)
     heard = session.streams["labcrane.feedback.tone"].data
     missed = float(heard["tone.missed"].iloc[-1])
-    stood = float(np.ceil(stillness.total_s / PERIOD_S))
+    stood = float(np.ceil(standstill.total_s / PERIOD_S))
     what = f"blocks missed in {SOUND_S:g} s of sound on a busy computer, and one"
     return Row("beside", what, 1.0 + missed, 1.0 + stood, "for which it stood still, and one", 1.0)
 

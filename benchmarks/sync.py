@@ -114,8 +114,8 @@ def main() -> int:
 
 def unkind(draws: int, page: Path | None) -> list[Row]:
     """Print a line for each unkind device; return what is promised. ``page`` gets the table."""
+    from streams.strangers import ALL  # noqa: PLC0415
     from streams.unkind_score import score, shortcomings, table_line  # noqa: PLC0415 - the path
-    from streams.unkinder import ALL  # noqa: PLC0415
 
     every, lines = [], [*HEAD]
     print(*HEAD, sep="\n")

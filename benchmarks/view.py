@@ -50,7 +50,7 @@ def rows() -> list[Row]:
         view = View(settings, run.machine)
         view.open(run)
         view.update(SessionState(block=1, block_name="benchmark", trial=1, trials=1))
-        print(f"{view.facts()['renderer']}, {view.facts()['size']}")
+        print(f"{view.metadata()['renderer']}, {view.metadata()['size']}")
         shown = [_seconds(view, run, whole=True)]  # warms up
         shown, bare = [], []
         for _ in range(ROUNDS):

@@ -22,7 +22,7 @@ from labcrane.errors import LabcraneError
 from labcrane.machines.library import load_machine
 from labcrane.machines.machine import Machine
 from labcrane.protocol.protocol import protocol_model
-from labcrane.protocol.steps import Block, Break
+from labcrane.protocol.steps import Block, Break, Fixation
 from labcrane.protocol.study import load
 from labcrane.registry.hookspecs import ROLES
 from labcrane.registry.offers import Offer
@@ -47,6 +47,7 @@ def protocol_page() -> str:
     schema = protocol_model().model_json_schema()
     parts = {name: part for name, part in schema["$defs"].items() if name not in OWN_WORDS}
     parts |= {"Block": Block.model_json_schema(), "Break": Break.model_json_schema()}
+    parts["Fixation"] = Fixation.model_json_schema()
     lines = [
         "# Every key of a protocol",
         "",
@@ -68,6 +69,7 @@ STEPS = (
     "| `consent` | none: `- consent`. The examiner confirms it |",
     "| `instructions` | a text file beside the protocol |",
     "| `questionnaire` | a name, or a list of names |",
+    "| `fixation` | a [check of the eye tracker](#fixation); `{}` for five points |",
     "| `practice` | a [block](#block) whose trials do not count; may have `until` |",
     "| `reference` | a [block](#block) that later ones are compared with |",
     "| `block` | a [block](#block) |",
@@ -117,7 +119,7 @@ def takes(part: Schema) -> str:
 
 OWN_WORDS = {
     "Use": "a component: `{use: NAME}`",
-    "Limit": "[number, number]",
+    "WarnLimit": "[number, number]",
     "Step": "[step](#steps-of-a-session)",
 }
 PLAIN_WORDS = {"null": "`null`", "boolean": "`true` or `false`", "string": "text"}

@@ -2,8 +2,9 @@
 
 What every plugin needs is importable from here: roles, what flows through a run, settings, offers,
 errors. The rest of what is public is in ``core`` (records, items, shapes), ``machines``,
-``recording``, ``analysis``, ``replay``, ``registry`` (commands, what is not installed) and
-``testing`` (contract tests), each with ``__all__``. Nothing else is public.
+``recording``, ``analysis``, ``replay``, ``registry`` (commands, what is not installed),
+``participants``, ``streams`` (the newest sample of a stream) and ``testing`` (contract tests), each
+with ``__all__``. Nothing else is public.
 
 The names are listed in ``__init__.pyi``. One is imported from its module when it is asked for the
 first time, so that ``labcrane --help`` loads none of them.

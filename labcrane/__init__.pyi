@@ -1,6 +1,16 @@
 """The public names, and the modules from which they are imported."""
 
-from . import analysis, core, machines, participants, recording, registry, replay, testing
+from . import (
+    analysis,
+    core,
+    machines,
+    participants,
+    recording,
+    registry,
+    replay,
+    streams,
+    testing,
+)
 from .core.clock import Tick
 from .core.records import Frame, Run, Trial
 from .core.roles import (
@@ -67,5 +77,6 @@ __all__ = [
     "recording",
     "registry",
     "replay",
+    "streams",
     "testing",
 ]

@@ -105,6 +105,14 @@ LIMITS: Mapping[str, Limit] = {
     "key sample": Limit(
         64, "samples a tick", 0, "finite numbers, 0 to 1", "labcrane_keyboard", LOST
     ),
+    "trigger echo": Limit(
+        32,
+        "codes a tick",
+        0,
+        "bytes; those that nobody sent 20 a second",
+        "streams.triggers, labcrane_ttl",
+        "left out and counted; one event a second says how many",
+    ),
     "stream header": Limit(
         1_000_000, "characters", 32, "XML without a document type", "recording.xdf.header", ERROR
     ),
@@ -139,6 +147,14 @@ LIMITS: Mapping[str, Limit] = {
     ),
     "values of a mesh": Limit(
         1_000_000, "values", 0, "JSON of glTF 2", "machines.meshes.gltf", ERROR
+    ),
+    "robot description": Limit(
+        5_000_000,
+        "bytes",
+        100,
+        "URDF or MJCF without a document type; 20,000 elements with what is repeated",
+        "machines.descriptions.robot_xml",
+        ERROR,
     ),
     "participant file": Limit(
         5_000_000, "values a column", 0, "HDF5 without links and data outside", "recording", ERROR

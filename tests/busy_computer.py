@@ -18,7 +18,7 @@ STEP_S = 0.001
 
 
 @dataclass
-class Stillness:
+class Standstill:
     """For how long a core stood still at most, and in all, in s; known when all is over."""
 
     most_s: float = 0.0
@@ -26,9 +26,9 @@ class Stillness:
 
 
 @contextmanager
-def a_busy_computer() -> Iterator[Stillness]:
+def crowded_computer() -> Iterator[Standstill]:
     """Keep every core busy with ordinary programs, and watch whether it stands still."""
-    found, cores = Stillness(), os.sched_getaffinity(0)
+    found, cores = Standstill(), os.sched_getaffinity(0)
     idle = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
     busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in cores]
     watching = [subprocess.Popen([sys.executable, __file__, str(core)], **idle) for core in cores]

@@ -16,7 +16,9 @@ from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
+from left_out import leave_out, look_again, nothing_to_find
 from needs import need, not_tried
+from parts import Parts, add_options, asked_for
 
 from labcrane.streams.network import LOOPBACK
 
@@ -58,9 +60,15 @@ TURNS = "LABCRANE_TEST_TURNS"
 """Names the folder that the processes of a run share, for their locks."""
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    add_options(parser)
+
+
 def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput"):
         os.environ[TURNS] = str(_FOLDER)
+    if asked_for(config):
+        config.pluginmanager.register(Parts(config))
 
 
 def pytest_xdist_auto_num_workers() -> int:
@@ -68,6 +76,18 @@ def pytest_xdist_auto_num_workers() -> int:
     if sys.platform == "win32":
         return os.cpu_count() or 1
     return len(os.sched_getaffinity(0)) + WAITING
+
+
+def pytest_collection() -> None:
+    nothing_to_find()
+
+
+def pytest_collection_finish() -> None:
+    leave_out()
+
+
+def pytest_sessionfinish() -> None:
+    look_again()
 
 
 @pytest.hookimpl(tryfirst=True)  # before xdist reads the marks

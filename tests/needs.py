@@ -137,6 +137,10 @@ OTHERS: dict[str, tuple[Callable[[], bool], str]] = {
         "npm install --global axe-core@4.14.1",  # as .ci/run has it
     ),
     "questplus": (lambda: find_spec("questplus") is not None, "pip install questplus"),
+    "pupil_apriltags": (
+        lambda: find_spec("pupil_apriltags") is not None,
+        "pip install pupil-apriltags",
+    ),
     "numba": (lambda: find_spec("numba") is not None, "pip install 'labcrane[fast]'"),
     "lerobot": (
         lambda: _learner_has("lerobot"),

@@ -47,6 +47,24 @@ def test_a_ratio_above_its_limit_is_named_and_fails_the_check(
     assert benchmarks.main(["--only", "slow"]) == 0, "it only tells unless it is asked to check"
 
 
+def test_what_was_missed_before_and_is_not_measured_now_is_named(
+    benchmarks: types.ModuleType, capsys: pytest.CaptureFixture[str]
+) -> None:
+    benchmarks.main([])
+    with benchmarks.RESULTS.open("a", encoding="utf-8") as table:
+        table.write("| slow | a leap, us | 1 | a bare one | 1 | 1.00 |  | long ago |\n")
+    capsys.readouterr()
+    assert benchmarks.main(["--check", "--only", "fine"]) == 0
+    *_, kept, limitless = capsys.readouterr().out.splitlines()
+    assert kept.startswith("MISSED BEFORE slow: a step, us: 2.10 of 2.00, kept of 20")
+    assert limitless == (
+        "MISSED BEFORE slow: a leap, us: 1.00, without a limit, kept of long ago; "
+        "measure slow again"
+    )
+    benchmarks.main([])
+    assert "MISSED BEFORE" not in capsys.readouterr().out
+
+
 def test_the_table_is_what_was_measured_with_every_limit(benchmarks: types.ModuleType) -> None:
     benchmarks.main([])
     *_, fine, slow = benchmarks.RESULTS.read_text(encoding="utf-8").splitlines()
@@ -320,11 +338,13 @@ def test_a_scenario_whose_ticks_are_slower_than_promised_or_too_long_is_missed()
 
     missed = importlib.import_module("benchmarks.table").missed
 
-    def told(casualty: float) -> list[str]:
-        taken = {"kinematic": 4e-5, "casualty": casualty, "carry": 6e-4}
+    def told(casualty: float, reach_over: float = 6e-4) -> list[str]:
+        taken = {"kinematic": 4e-5, "casualty": casualty, "carry": 6e-4, "reach_over": reach_over}
         return missed(scenario.tick_rows({name: [np.full(9, one)] for name, one in taken.items()}))
 
     assert not told(39.0 * 4e-5)
     (slow,) = told(41.0 * 4e-5)
     assert "casualty, median" in slow
     assert len(told(0.81 * tick)) == 2
+    (slow,) = told(4e-5, 21.0 * 4e-5)
+    assert "reach_over, median" in slow

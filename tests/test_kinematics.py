@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from labcrane import FloatArray, Machine
-from labcrane.machines import Arm, jacobian, link_frames
+from labcrane.machines import Arm, jacobian, link_frames, rotation_matrix
 from labcrane.machines.kinematics import dh_matrix
 from labcrane.machines.library import load_machine
 
@@ -157,3 +158,8 @@ def test_the_dh_matrix_moves_by_the_link_and_the_printed_one_by_the_twist() -> N
     np.testing.assert_allclose(ours, slide, atol=1e-15)
     printed = [alpha * math.cos(theta), alpha * math.sin(theta), offset]
     assert np.abs(printed - slide).max() > 1.0
+
+
+def test_a_quaternion_turns_as_scipy_says() -> None:
+    for turn in Rotation.from_quat(np.random.default_rng(3).normal(size=(50, 4))):
+        assert rotation_matrix(turn.as_quat()) == pytest.approx(turn.as_matrix(), abs=1e-12)

@@ -580,5 +580,11 @@ def _files(text: str) -> Iterator[Text]:
     yield "an alias of nothing", titled("title: *nothing #"), title, True
     yield "a merge of a word", titled("<<: "), title, True
     yield "a tag", titled("title: !!int "), title, True
+    yield "bytes", titled("title: !!binary aGVsbG8= #"), title, True
+    yield "a quotation that is not closed", titled("title: '"), title, True
+    yield "as YAML 1.1", f"%YAML 1.1\n---\n{text}", 1, True
+    yield "a list for a key", f"{text}? [a]\n: b\n", len(lines) + 1, True
+    yield "nothing for a key", f"{text}~: b\n", len(lines) + 1, True
+    yield "a key twice, once as a number", f"{text}'5': a\n5: b\n", len(lines) + 2, True
     twice = titled("title: &a x\n#").replace("study: ", "study: &a ", 1)
     yield "an anchor twice", twice, title, True

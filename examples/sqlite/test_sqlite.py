@@ -9,7 +9,7 @@ from labcrane_sqlite import Sqlite, SqliteSettings
 
 from labcrane.analysis import Exporter
 from labcrane.testing import ExporterContract
-from labcrane.testing.exporters import MOVEMENT_S, RATE_HZ, TRIALS, a_participant
+from labcrane.testing.exporters import MOVEMENT_S, PARTICIPANT_TRIALS, RATE_HZ, make_participant
 
 
 class TestSqlite(ExporterContract):
@@ -19,7 +19,7 @@ class TestSqlite(ExporterContract):
 
 
 def test_sql_finds_every_trial_event_and_tick(tmp_path: Path) -> None:
-    people = [a_participant(tmp_path, name) for name in ("P001", "P002")]
+    people = [make_participant(tmp_path, name) for name in ("P001", "P002")]
     out = tmp_path / "out"
     out.mkdir()
     Sqlite(SqliteSettings(name="lab.db", ticks=True)).export(people, out)
@@ -35,9 +35,12 @@ def test_sql_finds_every_trial_event_and_tick(tmp_path: Path) -> None:
         assert ask(
             "select participant, count(*), sum(movement_time) from trial group by participant"
         ) == [
-            (name, TRIALS, pytest.approx(TRIALS * (MOVEMENT_S - 0.2))) for name in ("P001", "P002")
+            (name, PARTICIPANT_TRIALS, pytest.approx(PARTICIPANT_TRIALS * (MOVEMENT_S - 0.2)))
+            for name in ("P001", "P002")
         ]
-        assert ask("select count(*) from event where name = 'trial.end'") == [(2 * TRIALS,)]
+        assert ask("select count(*) from event where name = 'trial.end'") == [
+            (2 * PARTICIPANT_TRIALS,)
+        ]
         assert ask("select count(*) from state where participant = 'P002'") == [
-            (TRIALS * MOVEMENT_S * RATE_HZ,)
+            (PARTICIPANT_TRIALS * MOVEMENT_S * RATE_HZ,)
         ]

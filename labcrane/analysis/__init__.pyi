@@ -5,6 +5,7 @@ from .cohort import Participant, find_cohort
 from .electrodes.mne import EEG_READERS, channel_types, eeg_streams, events_at, to_mne, volts
 from .electrodes.sampled import Sampled, sampled
 from .exporter import Exporter
+from .gaze import fixations_of
 from .measures import measures_of
 from .movements import Movement, movements_of
 from .questionnaires import answers_of, asked_in, beside_trials, scores_of
@@ -27,6 +28,7 @@ __all__ = [
     "eeg_streams",
     "events_at",
     "find_cohort",
+    "fixations_of",
     "measures_of",
     "movements_of",
     "open_dataset",

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from labcrane.analysis.cohort import Participant
-from labcrane.analysis.gaze import gaze_units
+from labcrane.analysis.gaze import FIXATIONS, gaze_units
 from labcrane.analysis.questionnaires import ANSWERS, MEANING, SCORES, asked_in, score_column
 from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.recording.participant_file.reader import SessionRecord
@@ -43,24 +43,25 @@ def codebook_of(participant: Participant, measures: "pd.DataFrame") -> "pd.DataF
         trial_codebook(measures, sessions[0], sessions),
         event_codebook(),
         questionnaire_codebook(sessions),
+        fixation_codebook(),
         *map(stream_codebook, sessions),
     ]
     return pd.concat(tables).drop_duplicates(["table", "column"], ignore_index=True)
 
 
 def trial_codebook(
-    measures: "pd.DataFrame", session: SessionRecord, asking: Sequence[SessionRecord] = ()
+    measures: "pd.DataFrame", session: SessionRecord, sessions: Sequence[SessionRecord] = ()
 ) -> "pd.DataFrame":
     """Return one row per column of the table of measures: column, unit, description, source.
 
     Parameters
     ----------
-    asking
+    sessions
         Sessions whose questionnaires may be columns beside the trials.
     """
     import pandas as pd
 
-    asked = _asked(asking)
+    asked = _asked(sessions)
 
     units = session.context.get("trial_units", {})
     gaze = gaze_units(measures.columns)
@@ -86,6 +87,15 @@ def event_codebook() -> "pd.DataFrame":
     import pandas as pd
 
     rows = [("events", name, *about, WRITTEN) for name, about in EVENTS.items()]
+    return pd.DataFrame(rows, columns=["table", "column", "unit", "description", "source"])
+
+
+def fixation_codebook() -> "pd.DataFrame":
+    """Return the same of the table of points at which the eye tracker was checked."""
+    import pandas as pd
+
+    who = {name: ("", IDENTITY[name]) for name in ("participant", "session")}
+    rows = [("fixations", name, *about, MEASURED) for name, about in (who | {**FIXATIONS}).items()]
     return pd.DataFrame(rows, columns=["table", "column", "unit", "description", "source"])
 
 

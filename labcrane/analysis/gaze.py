@@ -8,12 +8,14 @@ to the areas that a view recorded with its pictures (``labcrane.feedback.NAME.ar
 """
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from labcrane.analysis.cohort import Participant
 from labcrane.recording.participant_file.reader import SessionRecord, Stream
 from labcrane.types import FloatArray
 
@@ -189,7 +191,8 @@ class Drift:
     Attributes
     ----------
     right_deg, down_deg
-        The median offset, in degrees of visual angle.
+        The median offset, in degrees of visual angle: its parts to the right and downwards, as seen
+        by whoever looks straight at the target.
     spread_deg
         Median distance of the samples from that, in degrees: the precision.
     """
@@ -200,7 +203,7 @@ class Drift:
 
     @property
     def deg(self) -> float:
-        """The offset's size, in degrees."""
+        """The offset's size, in degrees: the angle between the two lines of sight."""
         return math.hypot(self.right_deg, self.down_deg)
 
 
@@ -238,11 +241,170 @@ def drift(
             "no gaze sample was valid while the target was to be looked at; calibrate again"
         )
     metres = (np.vstack([there, target]) - centre) / px_per_m
-    angles = np.degrees(np.arctan2(metres, np.hypot(viewing_m, metres[:, ::-1])))
-    away = angles[:-1] - angles[-1]
+    rays = np.column_stack([metres, np.full(len(metres), viewing_m)])
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    seen, ray = rays[:-1], rays[-1]
+    # Beside the screen's middle its rows and columns are not at right angles to the line of sight.
+    rightwards = np.cross((0.0, 1.0, 0.0), ray)
+    rightwards /= np.linalg.norm(rightwards)
+    beyond = seen - ray  # exactly nothing for who looks at the target
+    aside = np.column_stack([beyond @ rightwards, beyond @ np.cross(ray, rightwards)])
+    sine = np.hypot(aside[:, 0], aside[:, 1])
+    angle = np.degrees(np.arctan2(sine, seen @ ray))
+    away = aside * (angle / np.where(sine > 0.0, sine, 1.0))[:, None]
     right, down = np.median(away, axis=0).tolist()
     spread = float(np.median(np.hypot(away[:, 0] - right, away[:, 1] - down)))
     return Drift(right, down, spread)
+
+
+FIXATIONS: Mapping[str, tuple[str, str]] = {
+    "step": ("1", "number of the step that checked the eye tracker"),
+    "point": ("1", "number of the point that was to be looked at"),
+    "time": ("s", "when the point appeared, on the session's clock"),
+    "right_deg": ("deg", "median offset of gaze from the point, to the right"),
+    "down_deg": ("deg", "median offset of gaze from the point, downwards"),
+    "deg": ("deg", "size of that offset"),
+    "spread_deg": ("deg", "median distance of samples from their median: the precision"),
+    "right_px": ("px", "median offset of gaze from the point, to the right"),
+    "down_px": ("px", "median offset of gaze from the point, downwards"),
+    "valid": ("1", "share of the samples that are numbers"),
+}
+"""Unit and meaning of the columns of :func:`fixations`."""
+
+SETTLED_S = 0.5
+"""After a point appears: the eye is on its way for the first third of a second, and settles."""
+
+
+@dataclass(frozen=True, slots=True)
+class Glass:
+    """The operator's picture, as its view told when it was ready.
+
+    Attributes
+    ----------
+    size
+        Width and height, in pixels.
+    flip
+        How the window shows it turned over: ``none``, ``horizontal`` or ``vertical``.
+    px_per_m, viewing_m
+        Pixels in a metre of it, and the eye's distance in metres; NaN where nobody said.
+    """
+
+    size: tuple[int, int]
+    flip: str = "none"
+    px_per_m: float = math.nan
+    viewing_m: float = math.nan
+
+    def pixel(self, x: float, y: float) -> tuple[float, float]:
+        """Return where a share of width and height is, in pixels from the upper left corner."""
+        across = 1.0 - x if self.flip == "horizontal" else x
+        down = 1.0 - y if self.flip == "vertical" else y
+        return across * self.size[0], down * self.size[1]
+
+
+def fixations(session: SessionRecord, settled_s: float = SETTLED_S) -> "pd.DataFrame":
+    """Return how far gaze was from each point of the session's checks of the eye tracker.
+
+    One row for each point that was shown for its whole time: ``step`` and ``point``, counted from
+    1; ``time`` on our clock, in seconds; ``right_deg``, ``down_deg``, ``deg`` and ``spread_deg`` as
+    in :class:`Drift`, NaN where nobody said how large the picture is, or how far the eye;
+    ``right_px`` and ``down_px``, the median offset in pixels; ``valid``, the share of samples that
+    are numbers. No row without a gaze stream that says where in the window somebody looks, in
+    pixels, or without an operator's view.
+
+    Parameters
+    ----------
+    session
+        A recorded session.
+    settled_s
+        What is left out after a point appears, in seconds: the eye's way to it.
+    """
+    import pandas as pd
+
+    kind = [each for each in session.streams.values() if each.attrs.get("type") == KIND]
+    gaze = next((each for each in kind if place(each)), None)
+    shown = list(_shown(session))
+    rows = []
+    if gaze is not None and shown:
+        where = gaze.values(place(gaze))
+        spots = np.column_stack([where[name] for name in place(gaze)]).astype(np.float64)
+        time = gaze.time
+        for point in shown:
+            held = (time >= point.began + settled_s) & (time < point.over)
+            found = _offset(spots[held], point.at, point.glass)
+            rows.append((point.step, point.number, point.began, *found))
+    return pd.DataFrame(rows, columns=list(FIXATIONS))
+
+
+@dataclass(frozen=True, slots=True)
+class ShownPoint:
+    """A point that was shown for its whole time: where, in pixels, and from when to when."""
+
+    step: int
+    number: int
+    began: float
+    over: float
+    at: tuple[float, float]
+    glass: Glass
+
+
+def _shown(session: SessionRecord) -> Iterator[ShownPoint]:
+    """Yield the points of a session that were shown for their whole time."""
+    step, began, glass = 0, 0.0, None
+    point: Mapping[str, Any] = {}
+    events = session.events
+    for name, time, data in zip(events["name"], events["time"], events["data"], strict=True):
+        match name:
+            case "feedback.ready":
+                glass = _glass(str(data["facts"])) or glass
+            case "step.start":
+                step = int(data["step"])
+            case "fixation.shown":
+                began, point = float(time), data
+            case "fixation.over" if data["done"] and point and glass is not None:
+                at = glass.pixel(float(point["x"]), float(point["y"]))
+                yield ShownPoint(step, int(point["point"]), began, float(time), at, glass)
+
+
+def fixations_of(participant: Participant) -> "pd.DataFrame":
+    """Return :func:`fixations` of all sessions, each row with whose and of which it is."""
+    import pandas as pd
+
+    tables = [
+        fixations(session).assign(participant=participant.name, session=number)
+        for number, session in participant.sessions()
+    ]
+    filled = [table for table in tables if len(table)]
+    found = pd.concat(filled, ignore_index=True) if filled else tables[0]
+    return found[["participant", "session", *FIXATIONS]]
+
+
+def _glass(facts: str) -> Glass | None:
+    """Return the picture that facts of a view are about; None where it is not the operator's."""
+    told = dict(re.findall(r"(?:^|, )(seen_by|size|flip|px_per_m|viewing_m) (\w[\w.+-]*)", facts))
+    size = re.fullmatch(r"(\d+)x(\d+)", told.get("size", ""))
+    if told.get("seen_by") != "operator" or size is None:
+        return None
+    return Glass(
+        (int(size[1]), int(size[2])),
+        told.get("flip", "none"),
+        float(told.get("px_per_m", math.nan)),
+        float(told.get("viewing_m", math.nan)),
+    )
+
+
+def _offset(spots: FloatArray, at: tuple[float, float], glass: Glass) -> tuple[float, ...]:
+    """Return a row's offsets in degrees and pixels, and the share of samples that are numbers."""
+    there = np.isfinite(spots).all(axis=1)
+    valid = float(there.mean()) if len(spots) else 0.0
+    if not there.any():
+        return (*(math.nan,) * 6, valid)
+    right, down = (np.median(spots[there], axis=0) - at).tolist()
+    if not math.isfinite(glass.px_per_m + glass.viewing_m):
+        return (*(math.nan,) * 4, right, down, valid)
+    middle = (glass.size[0] / 2.0, glass.size[1] / 2.0)
+    angle = drift(spots, at, middle, glass.px_per_m, glass.viewing_m)
+    angles = (angle.right_deg, angle.down_deg, angle.deg, angle.spread_deg)
+    return (*angles, right, down, valid)
 
 
 def area_name(value: object) -> str:

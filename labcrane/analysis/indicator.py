@@ -35,6 +35,8 @@ class Performance:
         Subjective ratings as shares, 0 to 1; NaN when the operator gave none.
     completed
         The completion factor k.
+    drop
+        How often something fell: it has no points of its own, and counts for k.
     """
 
     duration_s: float
@@ -45,6 +47,7 @@ class Performance:
     accuracy: float
     awareness: float
     completed: bool
+    drop: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,17 @@ from pydantic import NonNegativeFloat, PositiveInt, model_validator
 
 from labcrane.files.model import StrictModel
 
+COUNTS = {
+    "object": "n_object",
+    "body": "n_body",
+    "overload_max": "n_overload_max",
+    "overload_min": "n_overload_min",
+}
+"""The columns of a trial's row that hold its mistakes, by their component of the indicator."""
+
+TIME = "time"
+"""The column that holds how long a trial took."""
+
 Reading = Literal["separate_overloads", "shared_overloads"]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from labcrane.analysis.cohort import Participant
 from labcrane.analysis.gaze import gaze_measures, looks
 from labcrane.analysis.movements import Groups, Movement, cut, machine_of, movements_of
+from labcrane.analysis.quality import OF_AIMING, without_onset
 from labcrane.analysis.smoothness import ldlj, path_ratio, sparc, sub_movements
 from labcrane.analysis.sticks import coordination, effort, limit_hits, reversals, stick_use
 from labcrane.analysis.tables.definitions import MEASURES
@@ -68,7 +69,7 @@ DEFAULTS = MeasureSettings()
 
 
 @dataclass(frozen=True)
-class Measured(Participant):
+class MeasuredParticipant(Participant):
     """A participant whose measures have been worked out before.
 
     Attributes
@@ -85,7 +86,7 @@ def measures_of(participant: Participant, settings: MeasureSettings = DEFAULTS) 
 
     Worked out once, and kept beside the participant file (:mod:`~.analysis.tables.measure_cache`).
     """
-    if isinstance(participant, Measured):
+    if isinstance(participant, MeasuredParticipant):
         return participant.table
     about = {"measures": settings.as_dict()}
     table = kept(participant.path, about, lambda: _all_sessions(participant, settings))
@@ -106,7 +107,7 @@ def _all_sessions(participant: Participant, settings: MeasureSettings) -> "pd.Da
     return pd.concat(tables, ignore_index=True)
 
 
-def measure_or_say_why(participant: Participant) -> tuple[str, str, Measured | None]:
+def measure_or_say_why(participant: Participant) -> tuple[str, str, MeasuredParticipant | None]:
     """Return a participant's name and measures, or why there are none; a worker's function."""
     try:
         return participant.name, "", measure_ahead(participant)
@@ -114,10 +115,12 @@ def measure_or_say_why(participant: Participant) -> tuple[str, str, Measured | N
         return participant.name, f"cannot be measured: {error}", None
 
 
-def measure_ahead(participant: Participant) -> Measured:
+def measure_ahead(participant: Participant) -> MeasuredParticipant:
     """Return a participant with the measures worked out; a worker's function."""
     table = measures_of(participant)
-    return Measured(participant.name, participant.path, participant.status, participant.why, table)
+    return MeasuredParticipant(
+        participant.name, participant.path, participant.status, participant.why, table
+    )
 
 
 def measure_session(
@@ -157,8 +160,9 @@ def measures_of_trials(trials: "pd.DataFrame") -> "pd.DataFrame":
     """Return a session's trial table with :data:`OF_TRIALS`, for which no frame is needed."""
     import pandas as pd
 
+    moved = ~without_onset(trials)
     errors = {
-        name: trials[of].astype(float) if of in trials else float("nan")
+        name: trials[of].astype(float).where(moved) if of in trials else float("nan")
         for name, of in (("constant_error", "error_along"), ("absolute_error", "error"))
     }
     return pd.concat([trials, _order(trials)], axis=1).assign(**errors)
@@ -190,6 +194,8 @@ def measure(movement: Movement, machine: Machine, settings: MeasureSettings) -> 
         "constant_error": movement.result("error_along"),
         "absolute_error": movement.result("error"),
     }
+    if set(OF_AIMING) <= movement.row.keys() and np.isnan(movement.result("reaction_time")):
+        return nothing  # where the machine stood is nobody's accuracy
     if span is None or span.stop - span.start < SHORTEST:
         return nothing | errors
     speed, tip = movement.speed[span], movement.tip[span]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.indicator import Indicator, Performance, indicate
-from labcrane.analysis.indicator_settings import IndicatorSettings
+from labcrane.analysis.indicator_settings import COUNTS, TIME, IndicatorSettings
 from labcrane.errors import LabcraneError, RecordingError
 from labcrane.recording.participant_file.reader import Recording, SessionRecord
 from labcrane.recording.participant_file.writer import DAMAGED
@@ -19,15 +19,43 @@ from labcrane.recording.participant_file.writer import DAMAGED
 if TYPE_CHECKING:
     import pandas as pd
 
-COUNTS = {
-    "object": "n_object",
-    "body": "n_body",
-    "overload_max": "n_overload_max",
-    "overload_min": "n_overload_min",
-}
-TIME = "time"
+DROPS = "n_drop"
+"""Drops; a test without this column has none, and they have no points of their own."""
+
+DETECTION = ("deformity", "found", "false_reports")
+"""What was reported of deformities, where a test has these columns."""
+
 RATINGS = {"accuracy": "subjective_accuracy", "awareness": "situational_awareness"}
 OVERRIDE = "order.override"
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """What was reported of a deformity in one test.
+
+    Attributes
+    ----------
+    deformity, found
+        Whether there was one, and whether it was found, as 1 or 0; NaN where none was asked about.
+    false_reports
+        Reports of none, or from too far away; NaN where nothing is known of them.
+    """
+
+    deformity: float = math.nan
+    found: float = math.nan
+    false_reports: float = math.nan
+
+    @property
+    def kind(self) -> str | None:
+        """Which of hit, miss, false alarm and correct rejection it is; None where none was asked.
+
+        Where there is a deformity, finding it counts, whatever else was reported.
+        """
+        if math.isnan(self.deformity):
+            return None
+        if self.deformity:
+            return "hit" if self.found else "miss"
+        return "false alarm" if self.false_reports > 0.0 else "correct rejection"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +81,7 @@ class OperatorTest:
     why: str
     indicator: Indicator
     settings: IndicatorSettings
+    detection: Detection = Detection()
 
 
 LeaveOut = Callable[[str, str], None]
@@ -166,9 +195,10 @@ def _test(
     settings: IndicatorSettings,
 ) -> OperatorTest:
     counts = {name: int(row[column]) for name, column in COUNTS.items()}
+    drops = 0 if math.isnan(found := float(row.get(DROPS, 0))) else int(found)
     completed, why = completion(
         row,
-        max(counts.values()),
+        max(*counts.values(), drops),
         settings,
         overruled=_overruled(session, row),
         overruled_after=_overruled(session, row, after=True),
@@ -180,6 +210,7 @@ def _test(
         accuracy=_rating(answers, RATINGS["accuracy"], row),
         awareness=_rating(answers, RATINGS["awareness"], row),
         completed=completed,
+        drop=drops,
     )
     scenario = str(row.get("scenario") or row["block_name"])
     indicator = indicate(performance, reference_s, settings)
@@ -193,6 +224,7 @@ def _test(
         why,
         indicator,
         settings,
+        Detection(*(float(row.get(name, math.nan)) for name in DETECTION)),
     )
 
 

@@ -119,15 +119,16 @@ def exclusions(movements: "pd.DataFrame") -> "pd.DataFrame":
     names = ["participant", "session", "trial", "attempt", "outcome", "practice"]
     counted = is_result(movements)
     out = movements.reindex(columns=names).loc[~counted].copy()
+    still = without_onset(movements)[~counted]
     out["why"] = [
-        "practice" if row.practice else f"outcome {row.outcome}"
-        for row in out.itertuples(index=False)
+        "practice" if row.practice else f"outcome {row.outcome}" + ", no onset" * unmoved
+        for row, unmoved in zip(out.itertuples(index=False), still, strict=True)
     ]
     return out.drop(columns="practice")
 
 
 def is_result(movements: "pd.DataFrame") -> "pd.Series[bool]":
-    """Return which movements are results: successful and no practice.
+    """Return which movements are results: successful, with an onset, and no practice.
 
     A repeated trial's attempts before the last have the outcome ``repeated``.
     """
@@ -135,4 +136,25 @@ def is_result(movements: "pd.DataFrame") -> "pd.Series[bool]":
 
     if movements.empty:  # sessions that ended before their first result have no columns either
         return pd.Series([], index=movements.index, dtype=bool)
-    return (movements["outcome"] == "success") & (movements["practice"].astype(float) == 0.0)
+    return is_done(movements) & (movements["practice"].astype(float) == 0.0)
+
+
+def is_done(movements: "pd.DataFrame") -> "pd.Series[bool]":
+    """Return which movements are successes in which something moved, practice among them."""
+    return (movements["outcome"] == "success") & ~without_onset(movements)
+
+
+OF_AIMING = ("reaction_time", "movement_time", "error_along")
+"""Results by which an aimed movement is known; trials of other tasks lack the last of them."""
+
+
+def without_onset(movements: "pd.DataFrame") -> "pd.Series[bool]":
+    """Return which aimed movements have no onset: ended, or given up, before anything moved.
+
+    Their errors say where the machine stood and nothing of anybody's accuracy.
+    """
+    import pandas as pd
+
+    if not set(OF_AIMING) <= set(movements):
+        return pd.Series(data=False, index=movements.index, dtype=bool)
+    return movements["reaction_time"].isna() & movements["error_along"].notna()

@@ -66,20 +66,27 @@ def reversals(axis: FloatArray, hysteresis: float) -> int:
         return 0
     steps = np.diff(axis)
     moved = np.flatnonzero(steps)
-    # Only where the axis turns can anything change; a loop over every sample takes long.
     ways = np.sign(steps[moved])
     turns = moved[:-1][ways[:-1] != ways[1:]] + 1
-    count, direction = 0, 0
-    lowest = highest = float(axis[0])
-    for value in [*axis[turns].tolist(), float(axis[-1])]:
-        lowest, highest = min(lowest, value), max(highest, value)
-        if direction <= 0 and value - lowest > hysteresis:
-            count += direction < 0
-            direction, highest = 1, value
-        elif direction >= 0 and highest - value > hysteresis:
-            count += direction > 0
-            direction, lowest = -1, value
-    return count
+    ends = np.concatenate([axis[:1], axis[turns], axis[-1:]])
+    # A swing within the hysteresis and within both of its neighbours moves nothing that is counted:
+    # all that there are go at once, until none is left.
+    while True:
+        swings = np.abs(np.diff(ends))
+        least = swings <= hysteresis
+        least[1:] &= swings[1:] < swings[:-1]  # of several alike the first
+        least[:-1] &= swings[:-1] <= swings[1:]
+        if not least.any():
+            return len(swings) - 1
+        gone = np.zeros(len(ends), bool)
+        gone[:-1] |= least
+        gone[1:] |= least
+        # At an end the swing's own end goes, and the turning point stays.
+        gone[1] &= not least[0] or len(least) == 1
+        gone[-2] &= not least[-1] or len(least) == 1
+        ends = ends[~gone]
+        if len(ends) < 2:  # noqa: PLR2004 - no swing is left
+            return 0
 
 
 def coordination(left: FloatArray, right: FloatArray, rate_hz: float) -> tuple[float, float]:

@@ -14,6 +14,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ABOUT, SUMS = "bundle.json", "SHA256SUMS"
+OF_A_DISK = (".DS_Store", "Thumbs.db", "desktop.ini")
+"""Files that systems put beside others without being asked."""
 
 
 def main(arguments: list[str]) -> int:
@@ -43,7 +45,10 @@ def main(arguments: list[str]) -> int:
 
 def _wrong(bundle: Path, target: Path) -> Iterator[str]:
     """Yield why the bundle cannot be installed here; nothing when it can."""
-    about = json.loads((bundle / ABOUT).read_text(encoding="utf-8"))
+    about = _about(bundle)
+    if isinstance(about, str):
+        yield about
+        return
     here = {"system": sysconfig.get_platform(), "python": platform.python_version()}
     if _kind(about) != _kind(here):
         yield (
@@ -52,13 +57,48 @@ def _wrong(bundle: Path, target: Path) -> Iterator[str]:
         )
     if target.exists():
         yield f"{target} is there already; name a new folder"
-    for line in (bundle / SUMS).read_text(encoding="utf-8").splitlines():
+    yield from _other_files(bundle)
+
+
+def _other_files(bundle: Path) -> Iterator[str]:
+    """Yield each file that is not the one that was packed, is missing, or was put beside them."""
+    listed = {(bundle / SUMS).resolve()}
+    try:
+        lines = (bundle / SUMS).read_text(encoding="utf-8").splitlines()
+    except (OSError, ValueError) as error:
+        yield f"{SUMS} cannot be read ({error}); copy the bundle again"
+        return
+    for line in lines:
         digest, _, name = line.partition("  ")
         path = bundle / name
+        listed.add(path.resolve())
         if not path.is_file():
             yield f"{name} is missing; copy the bundle again"
         elif hashlib.sha256(path.read_bytes()).hexdigest() != digest:
             yield f"{name} is damaged or was changed; copy the bundle again"
+    # A plugin that was put beside the study's would be run with it.
+    for path in sorted(bundle.rglob("*")):
+        name = path.relative_to(bundle).as_posix()
+        if path.is_symlink():
+            yield f"{name} is a link, which no bundle holds; copy the bundle again"
+        elif path.is_file() and path.resolve() not in listed and path.name not in OF_A_DISK:
+            yield f"{name} is no part of this bundle; remove it, or copy the bundle again"
+
+
+def _about(bundle: Path) -> "dict[str, str] | str":
+    """Return what the bundle says of itself, or why that is not to be had."""
+    try:
+        about = json.loads((bundle / ABOUT).read_text(encoding="utf-8"))
+        texts = {name: about[name] for name in ("python", "system", "protocol")}
+    except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
+        why = f"{type(error).__name__}: {error}"
+        return f"{ABOUT} is missing or damaged ({why}); copy the bundle again"
+    inside = bundle.resolve()
+    if not all(isinstance(text, str) for text in texts.values()):
+        return f"{ABOUT} is damaged: it says no texts; copy the bundle again"
+    if not (bundle / texts["protocol"]).resolve().is_relative_to(inside):
+        return f"{ABOUT} names a protocol outside of the bundle; copy the bundle again"
+    return texts
 
 
 def _kind(of: dict[str, str]) -> tuple[str, list[str]]:

@@ -28,7 +28,7 @@ EVENTS = (("time", "s"), ("tick", "1"), ("part", "1"), ("trial", "1"), ("name", 
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class CodebookColumn:
     """One column.
 
     Attributes
@@ -49,12 +49,12 @@ class Column:
     source: str
 
 
-def codebook(study: Study) -> list[Column]:
+def codebook(study: Study) -> list[CodebookColumn]:
     """Return every column of frames, events and trials; nothing is opened for it."""
     parts = Rig.build(study, simulated=False)
     tasks = {choice.name: choice for choice in study.task_choices.values()}
     task_source = ", ".join(f"{choice.plugin}: {choice.name}" for choice in tasks.values())
-    found = [Column("loop", name, unit, CORE) for name, unit in LOOP]
+    found = [CodebookColumn("loop", name, unit, CORE) for name, unit in LOOP]
     for table, component, source in (
         ("input", parts.input, f"{study.input.plugin}: {study.input.name}"),
         ("command", parts.controller, f"{study.scheme.plugin}: {study.scheme.name}"),
@@ -63,26 +63,26 @@ def codebook(study: Study) -> list[Column]:
     ):
         layout = Layout(table, component.signals)
         names = zip(layout.columns, layout.units, strict=True)
-        found += [Column(table, name, unit, source) for name, unit in names]
-    found += [Column("events", name, unit, CORE) for name, unit in EVENTS]
+        found += [CodebookColumn(table, name, unit, source) for name, unit in names]
+    found += [CodebookColumn("events", name, unit, CORE) for name, unit in EVENTS]
     return found + _trials(study)
 
 
-def _trials(study: Study) -> list[Column]:
-    found: dict[str, Column] = {}
+def _trials(study: Study) -> list[CodebookColumn]:
+    found: dict[str, CodebookColumn] = {}
     about = [name for name in ABOUT if _has(study, name)]
     units = {**UNITS, **{name: "1" for name in FLAGS if name in about}}
     for name in (*about, *units):
-        found[name] = Column("trials", name, units.get(name, ""), CORE)
+        found[name] = CodebookColumn("trials", name, units.get(name, ""), CORE)
     for name, (task, values) in _conditions(study).items():
         choice = study.task_choices[task]
         unit = trial_units(study.tasks[task]).get(name, "" if _is_text(values) else "1")
-        found[name] = Column("trials", name, unit, f"{choice.plugin}: {choice.name}")
+        found[name] = CodebookColumn("trials", name, unit, f"{choice.plugin}: {choice.name}")
     for task, choice in study.task_choices.items():
         for signal in study.tasks[task].results:
             for name in signal.columns:
                 source = f"{choice.plugin}: {choice.name}"
-                found[name] = Column("trials", name, signal.unit, source)
+                found[name] = CodebookColumn("trials", name, signal.unit, source)
     return list(found.values())
 
 
@@ -116,7 +116,7 @@ def _is_text(values: Sequence[Value]) -> bool:
     return any(isinstance(value, str) for value in values)
 
 
-def rows(columns: Sequence[Column]) -> list[dict[str, str]]:
+def rows(columns: Sequence[CodebookColumn]) -> list[dict[str, str]]:
     """Return the codebook ready for JSON."""
     return [asdict(column) for column in columns]
 

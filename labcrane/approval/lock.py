@@ -2,9 +2,10 @@
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import date
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from labcrane.errors import ProtocolError
@@ -13,6 +14,8 @@ from labcrane.files.atomic import SHARED_FILE, write_text
 FORMAT = "labcrane lock"
 VERSION = 1
 SEAL = "seal"
+APPROVAL = ("board", "reference", "approved", "valid_until", "consent")
+"""What an approval says, in words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +67,32 @@ class Lock:
         text = self.content["materials"]["consent"]
         return hashlib.sha256(_canonical(text).encode()).hexdigest()[:12]
 
+    @property
+    def replaced(self) -> frozenset[str]:
+        """Seals of the locks that this one has replaced, by amendments."""
+        return frozenset(entry["replaces"] for entry in self.amendments)
+
+    def check_before(self, seals: Mapping[str, str]) -> None:
+        """Raise :class:`ProtocolError` unless this lock is, or has replaced, every one of before.
+
+        Whoever writes a lock anew can seal it anew; the register knows under which ones people
+        have taken part.
+
+        Parameters
+        ----------
+        seals
+            Under which locks the study was run, each with what was run under it, in words.
+        """
+        known = self.replaced | {self.seal}
+        if others := {seal: what for seal, what in seals.items() if seal not in known}:
+            listed = "\n".join(f"  {what}: {seal[:12]}" for seal, what in others.items())
+            raise ProtocolError(
+                f"{self.path} ({self.seal[:12]}) is not the lock under which people took part, and "
+                f"no amendment in it has replaced that one, so that it was not written by labcrane "
+                f"amend:\n{listed}\nrestore the lock from a copy, and record what has changed with "
+                "labcrane amend; for an approval of its own give another --data folder"
+            )
+
     def check_date(self, today: date) -> None:
         """Raise :class:`ProtocolError` when the approval has expired."""
         last = date.fromisoformat(self.approval["valid_until"])
@@ -113,7 +142,36 @@ def read_lock(protocol: Path) -> Lock:
     lock = Lock(path, content)
     if seal != lock.seal:
         raise ProtocolError(_edited(path, "its content does not match its seal"))
+    if why := _misshapen(content):
+        raise ProtocolError(_edited(path, why))
     return lock
+
+
+def _misshapen(content: Mapping[str, Any]) -> str | None:
+    """Return what no lock of labcrane says, however it is sealed; None where all is well."""
+    approval, materials = content.get("approval"), content.get("materials")
+    history = content.get("history")
+    if not (isinstance(approval, dict) and isinstance(materials, dict) and _is_history(history)):
+        return "it lacks the approval, the materials or the history"
+    if any(not isinstance(approval.get(name), str) for name in APPROVAL):
+        return f"its approval does not say {', '.join(APPROVAL)}"
+    try:
+        date.fromisoformat(approval["valid_until"])
+    except ValueError:
+        return f"its approval is valid until {approval['valid_until']!r}, which is no day"
+    consent, text = approval["consent"], materials.get("consent")
+    if not (isinstance(text, dict) and list(text) == [consent]):
+        return f"its approval is of the consent text {consent!r}, and its materials hold another"
+    place = PurePosixPath(consent)
+    if place.is_absolute() or ".." in place.parts:
+        return f"its consent text {consent!r} is not in the folder of the protocol"
+    return None
+
+
+def _is_history(history: object) -> bool:
+    return isinstance(history, list) and all(
+        isinstance(entry, dict) and isinstance(entry.get("replaces"), str) for entry in history
+    )
 
 
 def _edited(path: Path, why: str) -> str:

@@ -11,7 +11,7 @@ import typer
 
 from labcrane.cli.commands.approval import today
 from labcrane.core.records import Event
-from labcrane.session.commands import Command, Consent, Order, QueueConsole, read_request
+from labcrane.session.commands import Command, ConsentGiven, Order, QueueConsole, read_request
 
 if TYPE_CHECKING:
     from labcrane.approval.lock import Lock
@@ -62,7 +62,9 @@ def missing_consent(visit: "Visit") -> Missing | None:
 
     visit.study.check_participant(visit.participant)
     lock = verify(visit.study, discover(study=visit.study.path), today())
-    entry = read(Places(visit.data)).participants.get(visit.participant)
+    register = read(Places(visit.data))
+    lock.check_before(register.locks)
+    entry = register.participants.get(visit.participant)
     if entry and any(given.version == lock.consent_version for given in entry.consent):
         return None
     return Missing(visit, lock)
@@ -108,7 +110,7 @@ def _given(console: QueueConsole, version: str, kept: list[Command]) -> str | No
     for command in console.commands():
         if command.order is Order.END:
             return NOBODY
-        if read_request(command) == Consent(version):
+        if read_request(command) == ConsentGiven(version):
             by = command.by
         else:
             kept.append(command)

@@ -206,6 +206,12 @@ def _short(why: str) -> str:
     return FOLDERS.sub("", why)
 
 
+SAID: Mapping[str, str] = {
+    "judgement.awaited": "the test has ended: c completion, o override; space to go on",
+}
+"""What is said of events that are always told alike."""
+
+
 def _event_line(event: Event) -> str | None:
     data = event.data
     match event.name:
@@ -217,7 +223,7 @@ def _event_line(event: Event) -> str | None:
             return f"break of {data['seconds']:g} s"
         case "block.start":
             return f"block {data['block']}: {data['block_name']}"
-        case "input.lost" | "disk.lost" | "plugin.slow" | "trigger.lost":
+        case "input.lost" | "disk.lost" | "plugin.slow" | "trigger.lost" | "trigger.flood":
             return f"{event.name.upper().replace('.', ' ')}: {_short(str(data['why']))}"
         case "stream.lost" | "feedback.awaited":
             return f"{event.name.upper().replace('.', ' ')}: {data['what']}"
@@ -228,4 +234,4 @@ def _event_line(event: Event) -> str | None:
         case name if name.startswith("order.") and data["refused"]:
             return f"{name.removeprefix('order.')}: {data['refused']}"
         case _:
-            return sheet_line(event)
+            return SAID.get(event.name) or sheet_line(event)

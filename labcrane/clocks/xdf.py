@@ -34,7 +34,7 @@ class Resynced:
         How right they are.
     against_pyxdf
         By stream, the median and the largest distance of the times from pyxdf's, in seconds; empty
-        where pyxdf is not installed, or reads other samples.
+        where pyxdf is not installed, cannot read the file, or reads other samples.
     damage
         What of the file could not be read, one line each.
     """
@@ -114,9 +114,12 @@ def _compared(
     except ImportError:
         return {}
     theirs: dict[tuple[str, str], FloatArray] = {}
-    for stream in pyxdf.load_xdf(str(path))[0]:
-        info = stream["info"]
-        theirs[info["name"][0], info["source_id"][0] or ""] = np.asarray(stream["time_stamps"])
+    try:
+        for stream in pyxdf.load_xdf(str(path))[0]:
+            info = stream["info"]
+            theirs[info["name"][0], info["source_id"][0] or ""] = np.asarray(stream["time_stamps"])
+    except Exception:  # noqa: BLE001 - of a damaged file it raises whatever comes, documented nowhere
+        return {}
     found = {}
     for one, each in zip(streams, corrected, strict=True):
         other = theirs.get((one.header.name, one.header.source_id))

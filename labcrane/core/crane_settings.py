@@ -7,9 +7,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from labcrane.core.settings import Names, Settings
 from labcrane.machines.actuator import ACTUATOR_PRESETS, ActuatorSettings
-from labcrane.machines.machine import Machine
-
-GRAVITY = 9.81
+from labcrane.machines.machine import GRAVITY, Machine
 
 LONGEST_LAG_S = 5.0
 

@@ -256,6 +256,9 @@ class SessionState:
         it does not wait.
     over
         Why the session has ended; empty until it has.
+    fixation
+        The point that the operator is to look at, as shares of the picture's width and height;
+        empty for none.
     """
 
     step: int = 0
@@ -278,6 +281,7 @@ class SessionState:
     held: tuple[str, ...] = ()
     waiting: str = ""
     over: str = ""
+    fixation: tuple[float, ...] = ()
 
 
 UNDONE = frozenset({Phase.REPEATED, Phase.ENDED, Phase.INTERRUPTED})

@@ -145,7 +145,8 @@ class Preset:
 
 EVENTS = (
     "block.end", "block.start", "break.end", "break.start", "consent.asked", "consent.given",
-    "feedback.lost", "feedback.ready", "feedback.setting", "instructions.shown", "pause.end",
+    "feedback.lost", "feedback.ready", "feedback.setting", "fixation.over", "fixation.shown",
+    "instructions.shown", "judgement.awaited", "judgement.over", "pause.end",
     "pause.start", "practice.end", "questionnaire.answer", "questionnaire.end",
     "questionnaire.start", "session.end", "session.resumed", "session.start", "signal.bad",
     "signal.good", "step.end", "step.start", "stream.back", "stream.confirmed",

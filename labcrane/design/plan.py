@@ -16,7 +16,7 @@ from labcrane.protocol.study import Study
 
 
 @dataclass(frozen=True, slots=True)
-class Owed:
+class OwedQuestionnaire:
     """A questionnaire after a trial that a session stopped before or in the middle of.
 
     Attributes
@@ -66,6 +66,8 @@ class PlannedBlock:
         How many counted trials in a row had succeeded before it stopped.
     track
         What chooses the levels of a factor while it runs.
+    unjudged
+        The number of its test that the supervisor was still to judge before it stopped; 0 for none.
     """
 
     name: str
@@ -80,9 +82,10 @@ class PlannedBlock:
     reference: bool = False
     ask: tuple[str, ...] = ()
     feedback: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
-    owed: tuple[Owed, ...] = ()
+    owed: tuple[OwedQuestionnaire, ...] = ()
     streak: int = 0
     track: PlannedTrack | None = None
+    unjudged: int = 0
 
     @property
     def expected_s(self) -> float:
@@ -98,6 +101,10 @@ class PlannedStep:
 
     Attributes
     ----------
+    seconds
+        How long a break is, or each point of a check of the eye tracker is shown, in seconds.
+    points
+        Which are to be looked at, as shares of the picture's width and height.
     answered
         What was answered of its questionnaires before the session stopped.
     """
@@ -109,12 +116,15 @@ class PlannedStep:
     block: PlannedBlock | None = None
     questionnaires: tuple[str, ...] = ()
     answered: Mapping[str, Mapping[str, Value]] = field(default_factory=dict)
+    points: tuple[tuple[float, float], ...] = ()
 
     @property
     def expected_s(self) -> float:
         """How long it is likely to take, in seconds."""
         if self.block:
             return self.block.expected_s
+        if self.kind == "fixation":
+            return self.seconds * len(self.points)
         return self.seconds if self.kind == "break" else READING_S
 
 
@@ -195,7 +205,13 @@ class Planner:
     def _step(self, step: Step, block: PlannedBlock | None) -> PlannedStep:
         self._steps += 1
         return PlannedStep(
-            self._steps, step.kind, step.text, step.seconds, block, step.questionnaires
+            self._steps,
+            step.kind,
+            step.text,
+            step.seconds,
+            block,
+            step.questionnaires,
+            points=step.points,
         )
 
     def _block(self, block: Block, kind: str, *, last: bool) -> PlannedBlock:

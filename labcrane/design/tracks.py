@@ -44,7 +44,7 @@ class Response:
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class TrackState:
     """Where a track stands.
 
     Attributes
@@ -77,7 +77,7 @@ class Standing:
 
 def standing(
     track: Track, before: Sequence[tuple[str, bool]] = (), own: Sequence[tuple[str, bool]] = ()
-) -> Standing:
+) -> TrackState:
     """Return where a track stands.
 
     Parameters
@@ -89,7 +89,7 @@ def standing(
     if track.up_down is not None:
         stairs = climb(track.up_down, track.levels, track.start, responses, len(before))
         level = None if len(stairs.turns) >= track.up_down.reversals else stairs.level
-        return Standing(level, *stairs.estimate(track.up_down), len(responses))
+        return TrackState(level, *stairs.estimate(track.up_down), len(responses))
     settings, names = track.quest_plus, tuple(track.levels)
     if settings is None:
         raise AssertionError("a track without a law is refused when it is read")
@@ -98,9 +98,9 @@ def standing(
         counts[int(success), names.index(name)] += 1.0
     known = grid(settings, tuple(track.levels.values())).posterior(counts[1], counts[0])
     if settings.until_sd is not None and known.sd <= settings.until_sd:
-        return Standing(None, known.mean, known.sd, len(responses))
+        return TrackState(None, known.mean, known.sd, len(responses))
     first = track.start if not responses else ""
-    return Standing(first or names[known.best], known.mean, known.sd, len(responses))
+    return TrackState(first or names[known.best], known.mean, known.sd, len(responses))
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +150,9 @@ class PlannedTrack:
         trials = self.rounds.get(level)
         return None if trials is None else trials[(number - self.first) % self.size]
 
-    def stands(self, so_far: Mapping[int, Response], carried: Iterable[Response] = ()) -> Standing:
+    def stands(
+        self, so_far: Mapping[int, Response], carried: Iterable[Response] = ()
+    ) -> TrackState:
         """Return where it stands.
 
         Parameters

@@ -70,7 +70,7 @@ class Call:
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class ExaminationConfig:
     """What the process of an examination is told.
 
     Attributes
@@ -109,10 +109,12 @@ def examine(
     with tempfile.TemporaryDirectory(prefix="labcrane-doctor-") as folder:
         complaints = Path(folder) / "complaints"
         complaints.touch()
-        return _examine(Order(examination, asks, complaints, WAIT_S if wait_s is None else wait_s))
+        return _examine(
+            ExaminationConfig(examination, asks, complaints, WAIT_S if wait_s is None else wait_s)
+        )
 
 
-def _examine(order: Order) -> Sequence[Finding]:
+def _examine(order: ExaminationConfig) -> Sequence[Finding]:
     examination, wait_s = order.examination, order.wait_s
     process = ProcessHandle(MODULE, f"examine {examination.what}", Patience(stop_s=1.0))
     process.start(order)
@@ -185,7 +187,7 @@ def _ours(path: str) -> bool:
 def main() -> int:
     """Examine once; return the process's exit status."""
     parent = Parent()
-    order: Order | None = parent.order()
+    order: ExaminationConfig | None = parent.order()
     if order is None:
         return 0
     # Sound libraries fill the terminal with what they did not find; it is kept for a crash.

@@ -28,7 +28,7 @@ STEP_S = 0.005
 WATCH_S = 1.0
 
 
-class Reading(NamedTuple):
+class ClockReading(NamedTuple):
     """Three clocks read together, in s: the hardware's, the monotonic one and the wall's."""
 
     raw: float
@@ -36,12 +36,12 @@ class Reading(NamedTuple):
     wall: float
 
 
-def read() -> Reading:
+def read() -> ClockReading:
     """Read the clocks; the best of five attempts, so that an interruption does not show."""
     return min((_read() for _ in range(5)), key=lambda pair: pair[0])[1]
 
 
-def _read() -> tuple[float, Reading]:
+def _read() -> tuple[float, ClockReading]:
     if sys.platform == "win32":  # it slews no monotonic clock
         before = after = raw = time.perf_counter()
         wall = time.time()
@@ -50,7 +50,7 @@ def _read() -> tuple[float, Reading]:
         raw = time.clock_gettime(time.CLOCK_MONOTONIC_RAW)
         wall = time.time()
         after = time.clock_gettime(time.CLOCK_MONOTONIC)
-    return after - before, Reading(raw, (before + after) / 2.0, wall)
+    return after - before, ClockReading(raw, (before + after) / 2.0, wall)
 
 
 def light() -> list[Finding]:
@@ -59,7 +59,7 @@ def light() -> list[Finding]:
 
 
 def examine(
-    clocks: Callable[[], Reading] = read, wait: Callable[[float], None] = time.sleep
+    clocks: Callable[[], ClockReading] = read, wait: Callable[[float], None] = time.sleep
 ) -> list[Finding]:
     """Return how the clock is, after a look of a second at what NTP does to it."""
     before = clocks()
@@ -92,7 +92,7 @@ def _source(path: Path) -> list[Finding]:
     return [Finding(Verdict.WARN, f"the clock source is {name}, which is slow to read", fix)]
 
 
-def _bent(before: Reading, after: Reading) -> list[Finding]:
+def _bent(before: ClockReading, after: ClockReading) -> list[Finding]:
     passed = after.monotonic - before.monotonic
     ppm = 1e6 * (passed / (after.raw - before.raw) - 1.0)
     step = (after.wall - before.wall) - passed

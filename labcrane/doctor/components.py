@@ -24,7 +24,7 @@ MOVING = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class ExaminedPart:
     """What is to be looked at.
 
     Attributes
@@ -71,14 +71,14 @@ class PackedLook:
     def prepared(self) -> Callable[[apart.Tell | None], Iterable[Finding]]:
         """Load the plugins; return what examines."""
         registry = discover(study=self.study)
-        look: Look = pickle.loads(self.look)  # noqa: S301 - of whoever started this process
+        look: ExaminedPart = pickle.loads(self.look)  # noqa: S301 - of whoever started this process
         (role,) = (role for role, entry in ROLES.items() if entry.word == look.role)
         examines = registry.offers[role][look.name].examine
         assert examines is not None  # noqa: S101 - why it is looked at
         return partial(examines, look.settings)  # no call of ours between a look and its timer
 
 
-def of_study(study: Study, registry: Registry) -> list[Look]:
+def of_study(study: Study, registry: Registry) -> list[ExaminedPart]:
     """Return the looks that a study needs; ``registry`` is the one it was loaded with."""
     chosen = {
         f"input {study.input.name}": study.input,
@@ -91,13 +91,13 @@ def of_study(study: Study, registry: Registry) -> list[Look]:
         for offer in offers.values()
     }
     return [
-        Look(area, words[id(choice.offer)], choice.name, choice.settings, study.path)
+        ExaminedPart(area, words[id(choice.offer)], choice.name, choice.settings, study.path)
         for area, choice in chosen.items()
         if choice.offer.examine is not None
     ]
 
 
-def of_everything(registry: Registry) -> tuple[list[Look], list[str]]:
+def of_everything(registry: Registry) -> tuple[list[ExaminedPart], list[str]]:
     """Return the looks at everything installed, and what needs a protocol to be looked at."""
     looks, left_out = [], []
     for role, offers in registry.offers.items():
@@ -106,13 +106,13 @@ def of_everything(registry: Registry) -> tuple[list[Look], list[str]]:
                 continue
             word = ROLES[role].word
             try:
-                looks.append(Look(f"{word} {name}", word, name, offer.settings()))
+                looks.append(ExaminedPart(f"{word} {name}", word, name, offer.settings()))
             except ValidationError:
                 left_out.append(f"{word} {name}: give --protocol with a study that uses it")
     return looks, left_out
 
 
-def examine(look: Look, *, move: bool) -> Sequence[Finding]:
+def examine(look: ExaminedPart, *, move: bool) -> Sequence[Finding]:
     """Return what the plugin finds; ``move`` when a person is there to move things."""
     wait_s = apart.WAIT_S * (MOVING if move else 1.0)
     packed = PackedLook(f"{look.role} {look.name!r}", pickle.dumps(look), look.study)

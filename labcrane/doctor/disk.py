@@ -13,16 +13,16 @@ from labcrane.core.findings import Finding, Verdict
 from labcrane.errors import RecordingError
 from labcrane.files.append import AppendFile
 from labcrane.files.system import PRIVATE_MODES
-from labcrane.streams.sync.report.limits import Limit
+from labcrane.streams.sync.report.limits import WarnLimit
 
 NEEDED_BYTES = 1_000_000_000
 """Free space that is asked for where no protocol says how much a session takes."""
 
 BLOCK_BYTES, BLOCKS, RATE_HZ = 512, 240, 240.0
-WRITE_S = Limit(0.001, 0.004)
+WRITE_S = WarnLimit(0.001, 0.004)
 """99th percentile of a write, which happens within a tick."""
 
-SYNC_S = Limit(0.2, 1.0)
+SYNC_S = WarnLimit(0.2, 1.0)
 """Time to bring a second of recording to the disk; a power cut takes what is not there yet."""
 
 MOUNTS = Path("/proc/self/mounts")

@@ -173,7 +173,10 @@ def _ask(address: str, ports: range, wait_s: float) -> tuple[dict[str, ElementTr
                         refused = True
                         waiting.remove(each)
                         continue
-                    info = ElementTree.fromstring(text.partition("\r\n")[2])  # noqa: S314 - the lab's own network
+                    try:
+                        info = ElementTree.fromstring(text.partition("\r\n")[2])  # noqa: S314 - the lab's own network
+                    except ElementTree.ParseError:  # a question of somebody's, or another program
+                        continue
                     answers[info.findtext("uid") or text] = info
         finally:
             for each in senders:

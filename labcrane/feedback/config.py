@@ -10,7 +10,7 @@ from pydantic import GetPydanticSchema, PlainSerializer, TypeAdapter
 from pydantic_core import core_schema
 
 from labcrane.core.records import Run
-from labcrane.feedback.delays import Measured
+from labcrane.feedback.delays import MeasuredDelay
 from labcrane.recording.run_codec import read_run, write_run
 
 _AS_TEXT = core_schema.no_info_plain_validator_function(
@@ -19,7 +19,7 @@ _AS_TEXT = core_schema.no_info_plain_validator_function(
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class ComponentConfig:
     """A component by its offer's name and its settings."""
 
     use: str
@@ -57,16 +57,16 @@ class FeedbackConfig:
     """
 
     name: str
-    part: Part
+    part: ComponentConfig
     run: Annotated[Run, GetPydanticSchema(lambda _, __: _AS_TEXT)]
     source: str
     study: Annotated[Path, PlainSerializer(lambda path: str(path.resolve()))]
     always: bool
-    cues: Mapping[str, Part] = field(default_factory=dict)
-    measured: Measured | None = None
+    cues: Mapping[str, ComponentConfig] = field(default_factory=dict)
+    measured: MeasuredDelay | None = None
     recorded: bool = True
     title: str = ""
-    before: tuple[Part, ...] = ()
+    before: tuple[ComponentConfig, ...] = ()
     streams: Mapping[str, str] = field(default_factory=dict)
 
     def as_json(self) -> str:

@@ -18,7 +18,7 @@ Facts = Mapping[str, float | int | str | bool | None]
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class MeasuredDelay:
     """A delay, and what it holds for.
 
     Attributes
@@ -45,7 +45,7 @@ def delay_path(protocol: Path) -> Path:
     return protocol.with_name(f"{protocol.stem}.delays.json")
 
 
-def read_delays(protocol: Path) -> dict[str, Measured]:
+def read_delays(protocol: Path) -> dict[str, MeasuredDelay]:
     """Return what was measured, by the protocol's names for views and sounds.
 
     Raises
@@ -66,11 +66,11 @@ def read_delays(protocol: Path) -> dict[str, Measured]:
 
 
 @cache
-def _codec() -> TypeAdapter[dict[str, Measured]]:
-    return TypeAdapter(dict[str, Measured])
+def _codec() -> TypeAdapter[dict[str, MeasuredDelay]]:
+    return TypeAdapter(dict[str, MeasuredDelay])
 
 
-def store(protocol: Path, name: str, measured: Measured) -> Path:
+def store(protocol: Path, name: str, measured: MeasuredDelay) -> Path:
     """Put one measurement into the file, instead of an older one; return the file."""
     path = delay_path(protocol)
     all_ = {**read_delays(protocol), name: measured}
@@ -79,7 +79,7 @@ def store(protocol: Path, name: str, measured: Measured) -> Path:
     return path
 
 
-def delay_in_words(measured: Measured | None, facts: Facts) -> str:
+def delay_in_words(measured: MeasuredDelay | None, facts: Facts) -> str:
     """Return what is known of the delay of a component with these facts."""
     if measured is None:
         return NOT_MEASURED

@@ -14,7 +14,7 @@ from labcrane.core.records import Frame, Phase, Run, SessionState
 from labcrane.errors import ProtocolError, StreamError
 from labcrane.feedback.config import FeedbackConfig
 from labcrane.feedback.delay_analysis import Change, Kind, delay, onsets, steps
-from labcrane.feedback.delays import Measured
+from labcrane.feedback.delays import MeasuredDelay
 from labcrane.feedback.presenter import Presenter
 from labcrane.feedback.processes import host_orders
 from labcrane.protocol.rig import Rig
@@ -80,7 +80,7 @@ class Sensor:
         return times, np.array(self._values), float(rate)
 
 
-class Stage:
+class DelayStage:
     """Presents one frame over and over, and changes it when it is told to."""
 
     def __init__(self, order: FeedbackConfig, frame: Frame, kind: Kind, event: str) -> None:
@@ -133,7 +133,7 @@ def measure(
     count: int,
     channel: int = 1,
     say: Callable[[str], None] = lambda text: None,
-) -> Measured:
+) -> MeasuredDelay:
     """Measure the delay of the view or sound ``name``.
 
     Parameters
@@ -157,7 +157,7 @@ def measure(
         order = replace(order, cues={}, always=kind == "display")
         frame = _frame(run, built.dynamics.state().copy())
     sensor = Sensor(stream, channel)
-    stage = Stage(order, frame, kind, event)
+    stage = DelayStage(order, frame, kind, event)
     try:
         stage.open()
         say(f"measuring {name!r} with {stream!r}: {count} changes")
@@ -168,7 +168,7 @@ def measure(
     times, values, rate = sensor.signal()
     seen = steps(times, values) if kind == "display" else onsets(times, values)
     found = delay(changes, seen, rate)
-    return Measured(kind, date.today().isoformat(), stream, found, facts)
+    return MeasuredDelay(kind, date.today().isoformat(), stream, found, facts)
 
 
 def _kind(study: Study, name: str) -> tuple[Kind, str]:
@@ -207,7 +207,7 @@ def _frame(run: Run, state: "np.ndarray") -> Frame:
     )
 
 
-def _changes(stage: Stage, sensor: Sensor, kind: Kind, count: int) -> list[Change]:
+def _changes(stage: DelayStage, sensor: Sensor, kind: Kind, count: int) -> list[Change]:
     """Make the changes; return those that a sensor should see."""
     gaps = random.Random(0)  # noqa: S311 - only to be out of step with any refresh rate
     # The first pictures take long, and so does a sensor's program that has only just been found.

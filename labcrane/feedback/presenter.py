@@ -9,7 +9,7 @@ from labcrane.core.records import Frame, SessionState, Value
 from labcrane.core.roles import Component, Cue, Feedback
 from labcrane.core.settings import Settings
 from labcrane.core.signals import Layout
-from labcrane.feedback.config import FeedbackConfig, Part
+from labcrane.feedback.config import ComponentConfig, FeedbackConfig
 from labcrane.feedback.delays import delay_in_words
 from labcrane.registry.call_monitor import promised
 from labcrane.registry.offers import Offer
@@ -116,10 +116,10 @@ class Presenter:
         ]
         return feedback
 
-    def _built(self, role: type[RoleT], name: str, part: Part) -> RoleT:
+    def _built(self, role: type[RoleT], name: str, part: ComponentConfig) -> RoleT:
         offer = self._registry.find(role, part.use)
         return offer.build(self._settings(offer, name, part), self._order.run.machine)
 
-    def _settings(self, offer: Offer[RoleT], name: str, part: Part) -> Settings:
+    def _settings(self, offer: Offer[RoleT], name: str, part: ComponentConfig) -> Settings:
         changed = self._situation.settings.get(name, {})
         return offer.settings.model_validate({**part.settings, **changed})

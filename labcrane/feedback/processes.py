@@ -7,7 +7,7 @@ from dataclasses import replace
 from labcrane.core.records import Run
 from labcrane.design.seeds import derive
 from labcrane.errors import DeviceError
-from labcrane.feedback.config import FeedbackConfig, Part
+from labcrane.feedback.config import ComponentConfig, FeedbackConfig
 from labcrane.feedback.delays import read_delays
 from labcrane.feedback.handle import FeedbackHandle
 from labcrane.protocol.components import ComponentSpec
@@ -139,5 +139,5 @@ def cameras_of(study: Study) -> dict[str, tuple[str, ...]]:
     return {name: cameras for name, cameras in named.items() if cameras}
 
 
-def _part(choice: ComponentSpec) -> Part:
-    return Part(choice.name, choice.settings.model_dump(mode="json"))
+def _part(choice: ComponentSpec) -> ComponentConfig:
+    return ComponentConfig(choice.name, choice.settings.model_dump(mode="json"))

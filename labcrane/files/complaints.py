@@ -84,7 +84,11 @@ def told(
             continue
         if each["type"] == "missing" and (meant := _meant(each)):
             holder = named((*place, *loc[:-1]))
-            said = f"{holder} needs {str(loc[-1])!r}; is it what {meant!r} is to be?"
+            said = (
+                f"there is no space behind the colon of {str(loc[-1])!r}; add one"
+                if meant.startswith(f"{loc[-1]}:")
+                else f"{holder} needs {str(loc[-1])!r}; is it what {meant!r} is to be?"
+            )
             yield Complaint((*loc[:-1], meant), said, key=True)
             continue
         if of_key := loc[-1:] == (OF_KEYS,):
@@ -131,9 +135,9 @@ def _meant(error: ErrorDetails) -> str | None:
     there, wanted = error["input"], error["loc"][-1]
     if not isinstance(there, Mapping) or not isinstance(wanted, str):
         return None
-    return next(
-        iter(get_close_matches(wanted, [str(key) for key in there], n=1, cutoff=0.65)), None
-    )
+    keys = [str(key) for key in there]
+    joined = [key for key in keys if key.startswith(f"{wanted}:")]
+    return next(iter(joined or get_close_matches(wanted, keys, n=1, cutoff=0.65)), None)
 
 
 def explain(error: ErrorDetails, place: Place, model: type[BaseModel]) -> str:

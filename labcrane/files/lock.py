@@ -2,6 +2,7 @@
 
 import math
 import os
+import stat
 import sys
 import time
 from collections.abc import Iterator
@@ -19,7 +20,7 @@ LOOK_S = 0.05
 def exclusive(path: Path) -> Iterator[None]:
     """Hold the lock file ``path``; wait for whoever holds it."""
     make_folder(path.parent)
-    fd = os.open(path, os.O_RDWR | os.O_CREAT, PRIVATE_FILE)
+    fd = _opened(path)
     try:
         _lock(fd, wait=True)
         yield
@@ -61,9 +62,34 @@ def held(path: Path, refusal: str, patience_s: float = 0.0) -> Iterator[None]:
                 path.unlink()
 
 
+def _opened(path: Path) -> int:
+    """Return the lock file, open; what a link in its place leads to is left alone.
+
+    Raises
+    ------
+    RecordingError
+        A link or a folder is in its place, or it cannot be made.
+    """
+    if path.is_symlink():
+        raise RecordingError(NO_LOCK.format(path, "it is a link"))
+    try:
+        fd = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), PRIVATE_FILE)
+    except PermissionError:
+        raise  # on Windows, of a file that is just being removed
+    except OSError as error:
+        raise RecordingError(NO_LOCK.format(path, error.strerror)) from error
+    if not stat.S_ISREG(os.fstat(fd).st_mode):
+        os.close(fd)
+        raise RecordingError(NO_LOCK.format(path, "it is no file"))
+    return fd
+
+
+NO_LOCK = "{} cannot be used as a lock: {}; remove it, and do it again"
+
+
 def _locked(path: Path) -> int | None:
     """Return an open file with the lock on it; None when somebody else has it."""
-    fd = os.open(path, os.O_RDWR | os.O_CREAT, PRIVATE_FILE)
+    fd = _opened(path)
     if not _lock(fd, wait=False):
         os.close(fd)
         return None

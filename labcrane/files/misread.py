@@ -10,6 +10,7 @@ from typing import Any
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import ScalarNode
+from ruamel.yaml.tokens import ScalarToken
 
 GARBLED = (
     YAMLError, ValueError, LookupError, TypeError, ArithmeticError, AttributeError, AssertionError
@@ -55,10 +56,34 @@ def misread(error: MarkedYAMLError, text: str) -> tuple[Spot, str]:
                 f"{sign!r} opens here and is not closed as it should be, by {CLOSING[sign]!r}; add "
                 f"that, or a comma, before what stands in line {line}"
             )
+    if (quote := _quoted_far(error, text, line)) is not None:
+        return quote
     if (at := _without_space(lines, line)) is not None:
         spot, key = at
         return spot, f"there is no space behind the colon of {key!r}; add one"
     return (line, column), _plain(problem)
+
+
+def _quoted_far(error: MarkedYAMLError, text: str, line: int) -> tuple[Spot, str] | None:
+    """Return where a quotation begins that ends in another line, where all went wrong, and why."""
+    opened = error.context_mark
+    if opened and "quoted" in str(error.context) and "end of stream" in str(error.problem):
+        said = "the quotation mark that opens here is not closed; close it"
+        return (opened.line + 1, opened.column + 1), said
+    last: Any = None
+    try:
+        for token in YAML(typ="rt", pure=True).scan(text):
+            ends = token.end_mark.line
+            if isinstance(token, ScalarToken) and token.style and token.style in "'\"":
+                last = token if token.start_mark.line < ends == line - 1 else last
+    except GARBLED:  # as far as it can be read
+        pass
+    if last is None:
+        return None
+    return (last.start_mark.line + 1, last.start_mark.column + 1), (
+        f"the quotation mark that opens here is closed in line {line} only; close it where the "
+        "text ends"
+    )
 
 
 CLOSING = {"[": "]", "{": "}"}

@@ -37,6 +37,7 @@ MOST_BITS = 1000
 _MARKS = re.compile(r"[,:\[\]{}\n-]")
 _BRACKETS = re.compile(r"[\[\]{}]")
 _TWO_WHOLE = re.compile(r"[-+]?\d+,\d+(?![\d.eE])")
+_OLD = re.compile(r"(?:\ufeff?(?:[ \t]*(?:#.*)?|%(?!YAML).*)\n)*?(?=%YAML[ \t]+1\.[01](?!\d))")
 _STAIRS = re.compile(r"(?:[-?:] *){50}| {200}")
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
@@ -223,10 +224,10 @@ def _held(node: Any, step: str | int) -> tuple[tuple[int, int], tuple[int, int],
     if isinstance(node, CommentedMap):
         there = node.lc.data or {}
         # A key that is a number in the file is a text everywhere else.
-        written = step if step in there else next((key for key in there if str(key) == step), None)
-        if written is None:
+        written = [step] if step in there else [key for key in there if str(key) == step]
+        if not written:
             raise LookupError(step)
-        return node.lc.key(written), node.lc.value(written), node[written]
+        return node.lc.key(written[0]), node.lc.value(written[0]), node[written[0]]
     if isinstance(node, CommentedSeq) and isinstance(step, int) and 0 <= step < len(node):
         return node.lc.item(step), node.lc.item(step), node[step]
     raise LookupError(step)
@@ -318,7 +319,27 @@ class _Misfit(Exception):  # noqa: N818 - it is told as an error of the protocol
     at: str | None = None
 
 
+def _check_key(node: Any, key: Any, others: Mapping[str, Any]) -> None:
+    """Refuse a key that is no name, or becomes one that is there: of two, one would be lost."""
+    if key is None or isinstance(key, Mapping | list | tuple):
+        what = "nothing" if key is None else "a mapping or a list"
+        why = f"has {what} for a key; write a name, in quotation marks if it is one"
+    elif len(str(key).splitlines()) > 1:
+        why = f"has a line end in the key {str(key)[:40]!r}; write it in one line"
+    elif (sign := foreign(str(key))) is not None:
+        why = f"has the character U+{ord(sign):04X} in the key {str(key)[:40]!r}; leave it out"
+    elif str(key) in others:
+        why = f"has the key {str(key)!r} twice, with and without quotation marks; keep one"
+    else:
+        return
+    misfit = _Misfit(why)
+    misfit.at = _place_of(node, key, key=True)
+    raise misfit
+
+
 def _scalar(node: Any, *, recorded: bool) -> Any:
+    if isinstance(node, bytes) and not recorded:
+        raise _Misfit("holds bytes, by the tag !!binary; write text")
     if node is None or isinstance(node, bool | date | bytes):
         return node
     if isinstance(node, int) and node.bit_length() > MOST_BITS:
@@ -350,6 +371,7 @@ def _load(text: str, name: str, *, recorded: bool = False) -> Any:
     if (at := _too_deep(text)) is not None:
         where = _place_in(text[:at])
         raise ProtocolError(f"{name}:{where}: nested deeper than {DEEPEST} levels; write it flat")
+    _check_version(text, name, recorded=recorded)
     try:
         # Also where no line is asked for: the plain loader copies each merge into the next.
         with warnings.catch_warnings():
@@ -383,6 +405,15 @@ def _load(text: str, name: str, *, recorded: bool = False) -> Any:
     # ruamel.yaml stumbles over: it does not say what it raises.
     except GARBLED as error:
         raise ProtocolError(f"{name}{unreadable(text, error)}") from error
+
+
+def _check_version(text: str, name: str, *, recorded: bool) -> None:
+    """Refuse a file that says that it is older YAML, which reads words and times as others."""
+    if not recorded and (found := _OLD.match(text)):
+        raise ProtocolError(
+            f"{name}:{_place_in(found[0])}: the file is to be read as YAML 1.1, in which no is "
+            "false and 1:30 is 90; leave this line out"
+        )
 
 
 def _code(error: ReaderError) -> int:
@@ -427,6 +458,8 @@ def _plain(node: Any, name: str, *, recorded: bool = False) -> Any:
             if isinstance(node, Mapping):
                 held: Any = {}
                 for at, value in node.items():
+                    if not recorded:
+                        _check_key(node, at, held)
                     held[str(at)] = plain(value, depth + 1)
             elif isinstance(node, list | tuple | Set):
                 held = []
@@ -447,10 +480,10 @@ def _plain(node: Any, name: str, *, recorded: bool = False) -> Any:
         raise ProtocolError(f"{where} {error}") from None
 
 
-def _place_of(node: Any, at: Any) -> str | None:
+def _place_of(node: Any, at: Any, *, key: bool = False) -> str | None:
     """Return line and column of what a mapping or a list holds; None where they are not known."""
     try:
-        line, column = _held(node, at)[1]
+        line, column = _held(node, at)[0 if key else 1]
     except LookupError:
         return None
     return f"{line + 1}:{column + 1}"

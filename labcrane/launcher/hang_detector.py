@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from labcrane.recording.crash_marker import read_number, read_whereabouts
+from labcrane.recording.crash_marker import read_crash_marker, read_number
 
 TELL_S = 2.0
 """A session that has stood still for so long is told of."""
@@ -33,7 +33,7 @@ class HangDetector:
             self._number, self._since, self._told = number, now, False
             return False
         still = now - self._since
-        if still < TELL_S or (where := read_whereabouts(self._path)) is None:
+        if still < TELL_S or (where := read_crash_marker(self._path)) is None:
             return False
         patience = OPEN_S if where.tick < 0 else HANG_S
         if not self._told and (where.tick >= 0 or still > HANG_S):

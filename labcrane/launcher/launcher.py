@@ -15,9 +15,9 @@ from labcrane.errors import StreamError
 from labcrane.feedback.processes import FeedbackProcesses, log_requests
 from labcrane.launcher.hang_detector import HangDetector
 from labcrane.launcher.session_handle import SessionHandle
-from labcrane.launcher.session_process import Ended, Offered
+from labcrane.launcher.session_process import Offered, SessionEnded
 from labcrane.launcher.signal_reporter import SignalReporter, monitor_config
-from labcrane.recording.crash_marker import read_whereabouts
+from labcrane.recording.crash_marker import read_crash_marker
 from labcrane.recording.paths import parts
 from labcrane.session.commands import (
     Command,
@@ -140,7 +140,7 @@ class Launcher:
                 self._recorder.stop()
             if parts(visit.journal):
                 report = self.sync_report = finish(visit)
-        where = read_whereabouts(visit.whereabouts) if died is not None else None
+        where = read_crash_marker(visit.crash_marker) if died is not None else None
         owed = still_owed(visit, admission) if self._owes and parts(visit.journal) else ""
         self.outcome = Outcome(died, str(where or ""), report, owed)
         return self.outcome
@@ -220,7 +220,7 @@ class Launcher:
 
     def _watch(self, session: SessionHandle) -> int | None:
         """Return the exit code of a session that died, None of one that ended in order."""
-        detector = HangDetector(self._visit.whereabouts, self._say)
+        detector = HangDetector(self._visit.crash_marker, self._say)
         while True:
             over = session.ended  # asked first: what it said before is taken below
             try:
@@ -246,9 +246,11 @@ class Launcher:
                 for news in self._feedback.watch(self._say):
                     session.send(news)
 
-    def _pass_events(self, messages: Iterable[Event | Offered | Ended]) -> Ended | None:
+    def _pass_events(
+        self, messages: Iterable[Event | Offered | SessionEnded]
+    ) -> SessionEnded | None:
         for message in messages:
-            if isinstance(message, Ended):
+            if isinstance(message, SessionEnded):
                 return message
             if isinstance(message, Offered):
                 if self._feedback:

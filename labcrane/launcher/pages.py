@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from labcrane.protocol.pages import PageSettings
     from labcrane.session.visit import Visit
     from labcrane.streams.sync.report.sync_report import SyncReport
-    from labcrane.web.state import Ended
+    from labcrane.web.state import SessionLeft
 
 
 LEVELS = {"PASS": "ok", "WARN": "warn", "FAIL": "bad"}
@@ -86,10 +86,12 @@ def _check_logo(protocol: Path, where: "PageSettings") -> None:
         )
 
 
-def left_behind(visit: "Visit", outcome: "Outcome | None", report: "SyncReport | None") -> "Ended":
+def left_behind(
+    visit: "Visit", outcome: "Outcome | None", report: "SyncReport | None"
+) -> "SessionLeft":
     """Return what the supervisor is shown at the end of a run; no outcome is that of an error."""
     from labcrane.streams.sync.report.sync_report import COLUMNS
-    from labcrane.web.state import Ended
+    from labcrane.web.state import SessionLeft
 
     file = visit.folder.participant_file
     saved = []
@@ -102,7 +104,9 @@ def left_behind(visit: "Visit", outcome: "Outcome | None", report: "SyncReport |
     level, verdict, remedy = _verdict(visit, outcome, report)
     table = tuple(report.table()) if report else ()
     advice = tuple(report.advice()) if report else ()
-    return Ended(level, verdict, remedy, tuple(saved), COLUMNS if table else (), table, advice)
+    return SessionLeft(
+        level, verdict, remedy, tuple(saved), COLUMNS if table else (), table, advice
+    )
 
 
 def _verdict(

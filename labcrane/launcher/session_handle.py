@@ -5,7 +5,7 @@ import pickle
 from collections.abc import Callable
 
 from labcrane.core.records import Event
-from labcrane.launcher.session_process import Ended, Offered
+from labcrane.launcher.session_process import Offered, SessionEnded
 from labcrane.processes.handle import Patience, ProcessHandle
 from labcrane.session.commands import Message, MessageError, encode
 from labcrane.session.visit import Visit
@@ -45,7 +45,7 @@ class SessionHandle:
             return
         self._process.tell(line)
 
-    def wait(self, seconds: float) -> list[Event | Offered | Ended]:
+    def wait(self, seconds: float) -> list[Event | Offered | SessionEnded]:
         """Return what it has said, and wait so long for it."""
         self._process.wait(seconds)
         return self._process.messages()

@@ -31,7 +31,7 @@ MOST_A_TICK = 16
 
 
 @dataclass(frozen=True, slots=True)
-class Ended:
+class SessionEnded:
     """The last thing a session process says; ``error`` is None when it ran to its end."""
 
     error: LabcraneError | None = None
@@ -69,7 +69,7 @@ class ParentConsole:
         """Say which streams there are, so that nobody on this computer searches for them."""
         self._parent.tell(Offered(streams))
 
-    def end(self, ended: Ended) -> None:
+    def end(self, ended: SessionEnded) -> None:
         """Say how the session ended, after everything else, and wait until it is sent."""
         self._parent.tell(ended)
         self._parent.close(patience_s=None)
@@ -96,12 +96,12 @@ def main() -> int:
     return 0
 
 
-def _ended(run: Callable[[], None]) -> Ended:
+def _ended(run: Callable[[], None]) -> SessionEnded:
     try:
         run()
     except LabcraneError as error:
-        return Ended(error)
-    return Ended()
+        return SessionEnded(error)
+    return SessionEnded()
 
 
 if __name__ == "__main__":

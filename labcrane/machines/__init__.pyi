@@ -6,11 +6,12 @@ from .jointed_body import Hinge, Segment, beside, segments, stands
 from .kinematics import Arm, jacobian, link_frames
 from .library import load_machine
 from .links import link_boxes
-from .machine import Body, Joint
+from .machine import GRAVITY, Body, Joint
 from .meshes.mesh_file import MeshFile
 from .meshes.reader import read_surfaces
 from .meshes.solids import in_frame, read_solids, turned
 from .meshes.surface import MeshError, Surface
+from .rotation import rotation_matrix
 from .scene import Geom, PlacedObject, Scene, ShapeKind, load_scene, place_objects
 from .scene_codec import SCENE_PLACED, read_placed, write_placed
 from .scene_part import Part, load_part
@@ -18,6 +19,7 @@ from .urdf import urdf_joint, urdf_link, urdf_of
 
 __all__ = [
     "ACTUATOR_PRESETS",
+    "GRAVITY",
     "SCENE_PLACED",
     "Actuator",
     "ActuatorSettings",
@@ -47,6 +49,7 @@ __all__ = [
     "read_placed",
     "read_solids",
     "read_surfaces",
+    "rotation_matrix",
     "segments",
     "stands",
     "turned",

@@ -7,12 +7,13 @@ from struct import Struct
 
 import numpy as np
 
+from labcrane.machines.kinematics import Arm
 from labcrane.machines.machine import Machine
 from labcrane.types import FloatArray
 
 
-class CraneState:
-    """One array that is filled anew on every tick.
+class CraneState(Arm):
+    """An arm, and one array that its state is filled into on every tick.
 
     The tip's motion is scalar: that costs less than asking an engine for it, and
     is the tip of the joint angles in the same array to the last digit.
@@ -24,12 +25,7 @@ class CraneState:
     """
 
     def __init__(self, machine: Machine) -> None:
-        slew, *chain = machine.joints
-        self._base_x = machine.base_x
-        self._foot = slew.a
-        self._height = slew.d
-        self._slew_offset = slew.offset
-        self._links = tuple((number, each.a, each.offset) for number, each in enumerate(chain, 1))
+        super().__init__(machine)
         self.values: FloatArray = np.zeros(2 * len(machine.joints) + 6)
         # Packing numbers into an array costs half of assigning them.
         self._put = partial(Struct(f"{len(self.values)}d").pack_into, self.values.data, 0)

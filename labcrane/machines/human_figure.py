@@ -89,6 +89,10 @@ class Deformity(StrictModel):
     bend_deg: Extent = (20.0, 40.0)
     """By how much it is bent, in degrees; drawn evenly."""
 
+    absent: float = Field(default=0.0, ge=0.0, le=1.0)
+    """Share of trials in which no limb has it, drawn from the trial's seed: a report in one of them
+    is a false alarm."""
+
 
 class Figure(StrictModel):
     """A person of simple shapes, lying on the back."""
@@ -123,6 +127,10 @@ class Figure(StrictModel):
     limits_n: dict[str, PositiveFloat] = Field(default_factory=dict)
     """Contact force, in newtons, beyond which touching a region is a mistake."""
 
+    ground_n: dict[str, PositiveFloat] = Field(default_factory=dict)
+    """Force, in newtons, beyond a region's own weight with which it may meet the ground or what
+    carries it; more is a mistake. Half the weight of the whole by default. Of a jointed figure."""
+
     source: str = ""
     """Where the limits come from."""
 
@@ -131,7 +139,7 @@ class Figure(StrictModel):
         deformed = self.deformity.limbs if self.deformity else ()
         for name, known in (
             *((name, tuple(LIMBS)) for name in (*self.limbs_deg, *deformed)),
-            *((name, REGIONS) for name in self.limits_n),
+            *((name, REGIONS) for name in (*self.limits_n, *self.ground_n)),
         ):
             if name not in known:
                 raise ValueError(f"a figure has no {name!r}; it has {', '.join(known)}")
@@ -153,6 +161,9 @@ def figure_parts(
     if figure.deformity is not None:
         bent = str(random.choice(figure.deformity.limbs))
         bend = math.radians(random.uniform(*figure.deformity.bend_deg))
+        absent = figure.deformity.absent
+        if absent > 0.0 and random.random() < absent:
+            bent = None
     parts = list(TRUNK)
     ends: dict[str, tuple[Point, float]] = {}
     for name, (parent, length, thick, start) in LIMBS.items():

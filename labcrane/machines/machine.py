@@ -15,6 +15,9 @@ from labcrane.machines.meshes.mesh_file import Looks, MeshFile
 
 FEWEST_JOINTS = 3
 
+GRAVITY = 9.81
+"""Free fall in every engine and for every weight, in m/s²."""
+
 UPWARD_TO_LEVEL = -90.0
 """Twist in degrees from a slew axis to the pitch axes behind it."""
 

@@ -5,7 +5,7 @@ drawn from a seed in the same way.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -16,6 +16,7 @@ from labcrane.errors import ProtocolError
 from labcrane.files.model import StrictModel
 from labcrane.files.yaml import YamlFile
 from labcrane.machines.human_figure import REGIONS, Figure, Geom, ShapeKind, figure_parts
+from labcrane.machines.machine import GRAVITY
 from labcrane.machines.meshes.mesh_file import Looks
 from labcrane.machines.scene_part import Part, PartFile, load_part, lowest
 
@@ -147,6 +148,10 @@ class Goal(StrictModel):
     hold_s: NonNegativeFloat = 0.2
     """How long it must stay there, in seconds."""
 
+    touch: str | None = None
+    """Thing, or the figure, that must be touched from there: it feels a force, and from then on,
+    for ``hold_s``, none beyond its limits. Who pressed harder touches again."""
+
     grip: bool | None = None
     """Whether something must be in the grip (true), or nothing may be (false), to be there."""
 
@@ -192,6 +197,9 @@ class PlacedObject:
         In kg, 1, N.
     limits
         Largest force in N by part; a part without one may be pressed as one likes.
+    ground
+        Largest force in N, beyond its own weight, with which a part of somebody jointed may meet
+        what they lie on; by part.
     deformed
         The part that is deformed, if any.
     jointed
@@ -209,6 +217,7 @@ class PlacedObject:
     friction: float
     slip: float
     limits: dict[str, float]
+    ground: dict[str, float] = field(default_factory=dict)
     deformed: str | None = None
     jointed: bool = False
     carries: bool = False
@@ -265,7 +274,8 @@ def _check_goals(scene: Scene, source: YamlFile) -> None:
     if scene.figure is not None and scene.figure.jointed:
         known |= {f"figure.{region}" for region in REGIONS if region != REGIONS[0]}
     for number, goal in enumerate(scene.goals):
-        for key, word in (("what", goal.what), ("beside", goal.beside or "tip")):
+        asked = {"what": goal.what, "beside": goal.beside or "tip", "touch": goal.touch or "tip"}
+        for key, word in asked.items():
             if word not in known:
                 there = ", ".join(sorted(known))
                 source.problem(
@@ -290,6 +300,7 @@ def place_objects(scene: Scene, seed: int) -> tuple[PlacedObject, ...]:
                 friction=scene.figure.friction,
                 slip=scene.figure.slip_n,
                 limits=dict(scene.figure.limits_n),
+                ground=_ground(scene.figure),
                 deformed=deformed,
                 jointed=scene.figure.jointed,
             )
@@ -313,6 +324,12 @@ def _placed(name: str, thing: SceneObject, random: np.random.Generator) -> Place
         limits=_limits(name, said),
         carries=isinstance(said, Part) and said.carries,
     )
+
+
+def _ground(figure: Figure) -> dict[str, float]:
+    """Return with how much each region may meet the ground; of one rigid body nothing is known."""
+    half = 0.5 * figure.mass_kg * GRAVITY
+    return {name: figure.ground_n.get(name, half) for name in REGIONS} if figure.jointed else {}
 
 
 def _limits(name: str, said: SceneObject | Part) -> dict[str, float]:

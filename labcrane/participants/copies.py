@@ -15,7 +15,7 @@ from labcrane.files.atomic import UNFINISHED, replacing, write_text
 from labcrane.participants.folders import Places
 from labcrane.participants.mentions import Mentions
 from labcrane.participants.proof import mentioned
-from labcrane.participants.register import Export, Owed, Register
+from labcrane.participants.register import Export, OwedRemoval, Register
 
 TABLES = {".csv": ",", ".tsv": "\t"}
 """Files in which single rows can be taken out, and what separates their cells."""
@@ -47,7 +47,7 @@ class Reach:
     changed: list[str] = field(default_factory=list)
     removed: list[str] = field(default_factory=list)
     again: list[str] = field(default_factory=list)
-    owed: list[Owed] = field(default_factory=list)
+    owed: list[OwedRemoval] = field(default_factory=list)
 
 
 def kept_folder(places: Places, folder: Path) -> str:
@@ -75,7 +75,7 @@ def concerns(export: Export, participant: str) -> bool:
     return participant in export.people or any(participant in who for who in export.files.values())
 
 
-def traces(export: Export | Owed) -> list[str]:
+def traces(export: Export | OwedRemoval) -> list[str]:
     """Return by what an export's folder is known to be the one it was written into."""
     return [*export.files, *([export.staging] if export.staging else [])]
 
@@ -132,7 +132,7 @@ def edit_exports(
         if not concerns(export, old):
             continue
         if not reachable(places, export.folder, traces(export), reached):
-            owed = Owed(
+            owed = OwedRemoval(
                 participant=old,
                 to=new,
                 folder=export.folder,
@@ -182,8 +182,8 @@ def _drop_empty(folder: Path, files: Iterable[str]) -> None:
             place.rmdir()
 
 
-def _owed_link(path: Path, old: str, new: str | None) -> Owed:
-    return Owed(participant=old, to=new, folder=str(path), link=True)
+def _owed_link(path: Path, old: str, new: str | None) -> OwedRemoval:
+    return OwedRemoval(participant=old, to=new, folder=str(path), link=True)
 
 
 def _is_left_over(
@@ -400,7 +400,7 @@ def remove_from_stores(register: Register, participant: str, reach: Reach) -> No
         if not any(file.split("/")[0] == participant for file in files):
             continue
         if not store_reachable(name, register.study, files, reached):
-            reach.owed.append(Owed(participant=participant, folder=name))
+            reach.owed.append(OwedRemoval(participant=participant, folder=name))
             continue
         folder = in_store(Path(name), register.study, participant)
         if folder.is_symlink():

@@ -16,9 +16,9 @@ from labcrane.participants.copies import (
 from labcrane.participants.enrolment import check_words
 from labcrane.participants.folders import Places
 from labcrane.participants.mentions import Mentions
-from labcrane.participants.proof import mentioned
+from labcrane.participants.proof import searched
 from labcrane.participants.register import (
-    Owed,
+    OwedRemoval,
     Register,
     Tombstone,
     Work,
@@ -38,10 +38,13 @@ class Erased:
         Files that were removed or changed, and folders that could not be reached.
     mentions
         Files that still hold the pseudonym: written by people, not by labcrane.
+    unsearched
+        What could not be searched for it, and why: nobody may take it for clean.
     """
 
     reach: Reach
     mentions: list[str]
+    unsearched: list[str]
 
 
 BEYOND = (
@@ -79,7 +82,7 @@ def carry_out(places: Places, work: Work) -> Erased:
     participant, reach = work.participant, Reach()
     register = reaching(places, participant)
     reach.owed += [
-        Owed(participant=participant, folder=str(link), link=True)
+        OwedRemoval(participant=participant, folder=str(link), link=True)
         for link in places.links(participant)
     ]
     for folder in places.all_raw(participant):
@@ -96,7 +99,7 @@ def carry_out(places: Places, work: Work) -> Erased:
             Tombstone(participant=participant, date=work.date, reason=work.reason)
         )
         now.work = None
-    return Erased(reach, mentions(places, participant))
+    return Erased(reach, *mentions(places, participant))
 
 
 def reaching(places: Places, participant: str) -> Register:
@@ -120,21 +123,25 @@ def forget_store(register: Register, participant: str) -> None:
     }
 
 
-def mentions(places: Places, participant: str) -> list[str]:
-    """Return files with the pseudonym in name or content: of the data folder, and of all exports.
+def mentions(places: Places, participant: str) -> tuple[list[str], list[str]]:
+    """Return files with the pseudonym in name or content, and what could not be searched for it.
 
-    What is packed is opened. The register is left out: it keeps the tombstone.
+    Of the data folder, and of all exports. What is packed is opened. The register is left out: it
+    keeps the tombstone.
     """
     register = read(places)
     names = Mentions({*register.names(), participant})
     written = [
         places.root / export.folder / name for export in register.exports for name in export.files
     ]
-    found = []
+    found, unsearched = [], []
     for path in dict.fromkeys([*places.files(), *written]):
         if path == places.register or path.is_symlink() or not path.is_file():
             continue
         under = path.relative_to(places.root) if path.is_relative_to(places.root) else path.name
-        if participant in names.of(str(under)) | mentioned(path, names):
+        done = searched(path, names)
+        if participant in names.of(str(under)) | done.found:
             found.append(str(path))
-    return found
+        else:
+            unsearched += [f"{path.parent / line}" for line in done.closed]
+    return found, unsearched

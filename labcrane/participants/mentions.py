@@ -30,12 +30,27 @@ class Mentions:
     """
 
     def __init__(self, names: Iterable[str]) -> None:
-        self._owners = {word: name for name in names for word in spellings(name)}
+        self._owners = {word: name for name in names for word in spellings(name) if word}
         self._pattern = _pattern(list(self._owners))
+        self._letters = _letters(list(self._owners))
 
-    def of(self, text: str) -> set[str]:
-        """Return whose pseudonyms are in ``text``."""
-        return {self._owners[match[0]] for match in self._pattern.finditer(text)}
+    def of(self, text: str, start: int = 0, stop: int | None = None) -> set[str]:
+        """Return whose pseudonyms begin in ``text`` between two of its places.
+
+        What stands around a word decides whether it is a name, so that of a longer text that is
+        read in pieces each piece has something before and behind it.
+        """
+        # What begins with a look behind is tried at every sign, and files have many millions; the
+        # letters alone are searched for as fast as memory is read.
+        end = len(text) if stop is None else stop
+        found: set[str] = set()
+        at = self._letters.search(text)
+        while at is not None and at.start() < end:
+            match = self._pattern.match(text, at.start())
+            if match and at.start() >= start:
+                found.add(self._owners[match[0]])
+            at = self._letters.search(text, match.end() if match else at.start() + 1)
+        return found
 
     def renamed(self, text: str, old: str, new: str) -> str:
         """Return ``text`` with ``new`` where ``old`` was, each in the same spelling.
@@ -59,6 +74,11 @@ def _all_spellings(name: str) -> list[str]:
     bare = re.sub(r"[^A-Za-z0-9]", "", name)
     pilot, simulated = STAMPS
     return [name, *(f"{bare}{end}" for end in ("", pilot, simulated, f"{pilot}{simulated}"))]
+
+
+def _letters(words: list[str]) -> re.Pattern[str]:
+    """Return what finds the beginning of every word, whatever is around it."""
+    return re.compile("|".join(re.escape(word) for word in words) or r"(?!)")
 
 
 def _pattern(words: list[str]) -> re.Pattern[str]:

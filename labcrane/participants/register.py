@@ -119,7 +119,7 @@ class Tombstone(Record):
     reason: str
 
 
-class Owed(Record):
+class OwedRemoval(Record):
     """Copies under a pseudonym that are to be removed once their folder can be reached."""
 
     participant: str
@@ -163,8 +163,17 @@ class Register(Record):
     stores: dict[str, dict[str, str]] = Field(default_factory=dict)
     """The lab's stores, and the SHA-256 of every file that labcrane has put there."""
     tombstones: list[Tombstone] = Field(default_factory=list)
-    owed: list[Owed] = Field(default_factory=list)
+    owed: list[OwedRemoval] = Field(default_factory=list)
     work: Work | None = None
+
+    @property
+    def locks(self) -> dict[str, str]:
+        """Seals of the locks under which people took part, each with who did first, in words."""
+        found: dict[str, str] = {}
+        for name, entry in self.participants.items():
+            for each in entry.sessions:
+                found.setdefault(each.lock, f"{name}, session {each.session} of {each.date}")
+        return found
 
     def check_finished(self) -> None:
         """Raise :class:`ProtocolError` while something that was begun is not finished."""

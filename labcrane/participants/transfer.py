@@ -17,7 +17,7 @@ from labcrane.participants.copies import (
 )
 from labcrane.participants.folders import Places
 from labcrane.participants.mentions import Mentions
-from labcrane.participants.register import Owed, Register, changed, read
+from labcrane.participants.register import OwedRemoval, Register, changed, read
 from labcrane.recording.participant_file.recover import is_recovered
 
 
@@ -122,7 +122,7 @@ def settle_owed(places: Places) -> None:
         register.owed = [owed for owed in register.owed if not owed.reached]
 
 
-def _is_there(owed: Owed, register: Register) -> bool:
+def _is_there(owed: OwedRemoval, register: Register) -> bool:
     if owed.reached:
         return True
     if owed.link:
@@ -132,7 +132,7 @@ def _is_there(owed: Owed, register: Register) -> bool:
     return store_reachable(owed.folder, register.study, register.stores.get(owed.folder, ()), ())
 
 
-def _settle(owed: Owed, register: Register) -> None:
+def _settle(owed: OwedRemoval, register: Register) -> None:
     if owed.link:
         return
     folder = Path(owed.folder)

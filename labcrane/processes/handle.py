@@ -24,6 +24,11 @@ LAST_S = 1.0
 """How long the last words of a process that has ended may take to be read."""
 
 
+SAFELY = ("-P",)
+"""For Python: modules are not looked for in the folder where somebody happens to stand, which may
+hold the data of strangers, and a ``json.py`` among them."""
+
+
 @dataclass(frozen=True, slots=True)
 class Patience:
     """How long a child may take, in seconds.
@@ -197,7 +202,7 @@ class ProcessHandle:
     def _begun(self, order: object) -> _Life:
         first = None if order is None else pickle.dumps(order)
         process = subprocess.Popen(  # noqa: S603 - a module of ours
-            [sys.executable, "-m", self._module],
+            [sys.executable, *SAFELY, "-m", self._module],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             **_apart(),

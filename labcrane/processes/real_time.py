@@ -43,7 +43,7 @@ class Granted:
 if sys.platform == "linux":
 
     @contextmanager
-    def a_core_left() -> Iterator[int | None]:
+    def reserved_core() -> Iterator[int | None]:
         """Leave the last core that this process may use to a loop; None if it is the only one.
 
         The calling thread, and processes that it starts meanwhile, use the others.
@@ -66,7 +66,7 @@ if sys.platform == "linux":
         Parameters
         ----------
         core
-            The core that :func:`a_core_left` has left to it; None for any.
+            The core that :func:`reserved_core` has left to it; None for any.
 
         Raises
         ------
@@ -111,7 +111,7 @@ elif sys.platform == "win32":
     HIGH_PRIORITY_CLASS = 0x80
 
     @contextmanager
-    def a_core_left() -> Iterator[int | None]:
+    def reserved_core() -> Iterator[int | None]:
         """Leave no core to a loop: MMCSS chooses."""
         yield None
 
@@ -147,7 +147,7 @@ elif sys.platform == "win32":
 else:
 
     @contextmanager
-    def a_core_left() -> Iterator[int | None]:
+    def reserved_core() -> Iterator[int | None]:
         """Leave no core to a loop: this system does not pin threads."""
         yield None
 

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from labcrane.core.roles import Component, Cue, Feedback, Questionnaire, SignalMonitor
 from labcrane.core.settings import Settings
-from labcrane.errors import PluginError, ProtocolError
+from labcrane.errors import PluginError, ProtocolError, meant
 from labcrane.files.complaints import named
 from labcrane.files.names import outside
 from labcrane.files.yaml import Place, YamlFile
@@ -114,7 +114,14 @@ class ComponentResolver:
             Questionnaire, "questionnaires"
         )
         for place, name in self._asked(protocol):
-            if name not in chosen:
+            if name in chosen:
+                continue
+            own = meant(name, list(protocol.questionnaires))
+            if own and name not in self._registry.offers[Questionnaire]:
+                listed = ", ".join(protocol.questionnaires)
+                message = f"there is no questionnaire {name!r}; {own} the protocol has {listed}"
+                self._source.problem(place, message)
+            else:
                 chosen[name] = self._choice(Questionnaire, Use(use=name), place, place)
         return {name: choice for name, choice in chosen.items() if choice}
 
@@ -123,7 +130,7 @@ class ComponentResolver:
             for at, step in enumerate(session.steps):
                 place: Place = ("sessions", number, "steps", at)
                 written = self._at(place)
-                kind = next(iter(written)) if isinstance(written, dict) else step.kind
+                kind = next(iter(written)) if isinstance(written, dict) and written else step.kind
                 several = isinstance(self._at((*place, kind)), list)
                 for index, name in enumerate(step.questionnaires):
                     yield (*place, kind, index) if several else (*place, kind), name
@@ -224,7 +231,10 @@ class ComponentResolver:
     def _at(self, place: Place) -> object:
         node = self._source.data
         for step in place:
-            node = node.get(step) if isinstance(node, dict) else None
+            if isinstance(node, list) and isinstance(step, int):
+                node = node[step] if step < len(node) else None
+            else:
+                node = node.get(step) if isinstance(node, dict) else None
         return node
 
 

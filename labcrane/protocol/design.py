@@ -19,7 +19,7 @@ MOST_COUNTED = 200_000
 """States whose ways to go on are counted to draw an order: beyond it takes seconds, then hours."""
 
 
-class Order(Settings):
+class LevelOrder(Settings):
     """In which order the levels of a factor come."""
 
     rule: str
@@ -70,7 +70,7 @@ class Order(Settings):
 RuleName = Annotated[str, Field(json_schema_extra={"enum": list(RULES)})]
 """A rule in its short form; only a schema needs it, the long form is checked."""
 
-AS_WRITTEN = Order(rule="as_written")
+AS_WRITTEN = LevelOrder(rule="as_written")
 
 
 class Design(Settings):
@@ -80,7 +80,7 @@ class Design(Settings):
     """Between-subject groups, and the feedback that each is given: ``{none: [], visual:
     [sphere]}``. Participants are spread over them equally."""
 
-    order: dict[str, Order] = Field(default_factory=dict)
+    order: dict[str, LevelOrder] = Field(default_factory=dict)
     """For each factor of the tasks, in which order its levels come: ``{pairs: shuffled}``, or
     ``{pairs: {rule: shuffled, times: 3, in_a_row: 2}}``. Factors that are not named come as
     written."""
@@ -102,7 +102,9 @@ class Design(Settings):
                 raise ValueError(f"{name!r} stands there twice; once is enough")
         return primary
 
-    @field_validator("order", mode="before", json_schema_input_type=dict[str, RuleName | Order])
+    @field_validator(
+        "order", mode="before", json_schema_input_type=dict[str, RuleName | LevelOrder]
+    )
     @classmethod
     def _in_the_long_form(cls, order: Any) -> Any:
         if not isinstance(order, dict):

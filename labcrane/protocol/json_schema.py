@@ -12,7 +12,7 @@ from labcrane.files.model import UNIT
 from labcrane.files.units import EXAMPLES, SPELT
 from labcrane.machines.library import machine_names
 from labcrane.protocol.protocol import protocol_model
-from labcrane.protocol.steps import Block, Break, Session
+from labcrane.protocol.steps import Block, Break, Fixation, Session
 from labcrane.registry.hookspecs import roles_by_key
 from labcrane.registry.offers import Offer
 from labcrane.registry.registry import Registry
@@ -31,7 +31,7 @@ def protocol_schema(registry: Registry) -> Schema:
         for offer in registry.offers[role].values()
     }
     model = protocol_model()
-    models: list[type[Settings]] = [model, Session, Block, Break, *settings]
+    models: list[type[Settings]] = [model, Session, Block, Break, Fixation, *settings]
     references, whole = models_json_schema([(each, "validation") for each in models])
     shared: Schema = whole["$defs"]
     named = {each: shared[ref["$ref"].split("/")[-1]] for (each, _), ref in references.items()}
@@ -134,6 +134,7 @@ def _step(block: Schema) -> Schema:
         "reference": block,
         "block": block,
         "break": {"$ref": "#/$defs/Break"},
+        "fixation": {"$ref": "#/$defs/Fixation"},
     }
     return {
         "anyOf": [

@@ -234,5 +234,26 @@ def read(path: Path, *, recorded: bool = False) -> tuple[Protocol | None, YamlFi
     if not isinstance(source.data, dict):
         source.problem((), "it must be a mapping of keys, beginning with 'labcrane: 1'")
         return None, source
-    plain = {**source.data, "sessions": read_sessions(source)}
+    if swallowed := _swallowed(source.data):
+        key, inside = swallowed
+        source.problem(
+            (key,),
+            f"{key} has {inside!r} in it, which is a key of its own; close the quotation mark "
+            f"where the text of {key} ends",
+        )
+        return None, source
+    plain = dict(source.data)
+    if "sessions" in plain:
+        plain["sessions"] = read_sessions(source)
     return source.check(protocol_model(), value=plain), source
+
+
+def _swallowed(data: dict[str, Any]) -> tuple[str, str] | None:
+    """Return a key whose text holds another that is missed: its quotation was closed too late."""
+    missed = [name for name, about in Protocol.model_fields.items() if about.is_required()]
+    for key, value in data.items():
+        for name in missed:
+            held = isinstance(value, str) and re.search(rf"(?:^|\s){name}:(?:\s|$)", value)
+            if held and name not in data:
+                return key, f"{name}:"
+    return None

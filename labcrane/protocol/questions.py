@@ -58,7 +58,7 @@ PLAUSIBLE: Mapping[str, tuple[float, float]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Question:
+class CheckQuestion:
     """Something that can be run, and is hardly meant.
 
     Attributes
@@ -81,13 +81,13 @@ class Question:
         return f"{self.text} (if it is, write expected: [{self.key}])"
 
 
-def questions(study: Study) -> tuple[Question, ...]:
+def questions(study: Study) -> tuple[CheckQuestion, ...]:
     """Return what should be asked before people take part, and has not been answered."""
     found = list(dict.fromkeys(_asked(study)))  # of one place there may be several
     asked = {each.key for each in found}
     expected = study.protocol.expected
     stale = [
-        Question(
+        CheckQuestion(
             f"expected.{at + 1}",
             ("expected", at),
             f"expected has {key!r}, which nothing asks; "
@@ -104,7 +104,7 @@ Finding = dict[str, Any]
 what answers a question, and all in one line as people read it."""
 
 
-def about(study: Study, question: Question) -> Finding:
+def about(study: Study, question: CheckQuestion) -> Finding:
     """Return what is told of a question."""
     line, column = study.source.position(question.place) if study.source else (1, 1)
     return {
@@ -145,9 +145,9 @@ def key_of(place: Sequence[str | int]) -> str:
     return ".".join(str(step + 1) if isinstance(step, int) else step for step in place)
 
 
-def _asked(study: Study) -> Iterator[Question]:
+def _asked(study: Study) -> Iterator[CheckQuestion]:
     for place, text in _doubts(study):
-        yield Question(key_of(place), place, f"{text}; is that meant?")
+        yield CheckQuestion(key_of(place), place, f"{text}; is that meant?")
     yield from _of_the_operator(study)
 
 
@@ -160,6 +160,7 @@ def _doubts(study: Study) -> Doubts:
     yield from _of_commas(study)
     yield from _of_the_loop(study)
     yield from _of_feedback(study)
+    yield from _of_what_nobody_sees(study)
     yield from _of_what_is_shared(study)
     yield from _of_buttons(study)
     yield from _of_monitors(study)
@@ -266,10 +267,10 @@ def _of_sizes(study: Study) -> Doubts:
                 yield each.place, f"{said}, and {size.least:g} is very little"
 
 
-def _of_the_operator(study: Study) -> Iterator[Question]:
+def _of_the_operator(study: Study) -> Iterator[CheckQuestion]:
     """Question an operator who cannot stand in for the input: nothing can be simulated."""
     if needs_people(study.operator):
-        yield Question(
+        yield CheckQuestion(
             "operator",
             ("operator", "use"),
             f"the operator, {study.operator.name!r}, is a device that somebody moves, so that the "
@@ -278,7 +279,7 @@ def _of_the_operator(study: Study) -> Iterator[Question]:
         return
     if lacks := dict.fromkeys(name for _, name in study.beyond_operator):
         place = ("operator",) if "operator" in study.written else study.beyond_operator[0][0]
-        yield Question(
+        yield CheckQuestion(
             "operator",
             place,
             f"the operator, {study.operator.name!r}, who stands in for the input when nobody is "
@@ -321,6 +322,46 @@ def _of_feedback(study: Study) -> Doubts:
     for name in protocol.feedback:
         if name not in used:
             yield ("feedback", name), f"feedback {name!r} is never switched on"
+
+
+SWITCHES = ("all", "none", "group")
+"""What ``feedback:`` of a step can say instead of names."""
+
+
+def _of_what_nobody_sees(study: Study) -> Doubts:
+    """Question cues that no view draws for the operator, and feedback called as a switch is."""
+    for name in study.protocol.feedback:
+        if name in SWITCHES:
+            yield (
+                ("feedback", name),
+                f"feedback is called {name!r}, and feedback: {name} of a step is something else",
+            )
+    if study.recorded or any("operator" in audience for audience in _audiences(study)):
+        return
+    for name in study.cues:
+        yield (
+            ("feedback", name),
+            f"feedback {name!r} is drawn in views, and the operator has none, so that nobody sees "
+            "it; add one, as views: {operator: {use: view}}",
+        )
+    for number, session in enumerate(study.protocol.sessions):
+        for at, step in enumerate(session.steps):
+            if step.kind == "fixation":
+                yield (
+                    ("sessions", number, "steps", at, "fixation"),
+                    f"step {at + 1} of session {session.name!r} has points to be looked at, and "
+                    "the operator has no view, so that nobody sees them; add one, as views: "
+                    "{operator: {use: view}}",
+                )
+
+
+def _audiences(study: Study) -> Iterator[Sequence[str]]:
+    """Yield who sees each view; one that does not say is the operator's."""
+    for part, choice in study.choices.items():
+        key, _, name = part.partition(".")
+        if key == "views" or (key == "feedback" and name not in study.cues):
+            given = choice.settings.provides(study.machine)
+            yield given.get("audience", ("operator",) if key == "views" else ())
 
 
 def _of_what_is_shared(study: Study) -> Doubts:

@@ -15,6 +15,9 @@ from labcrane.files.yaml import parse_yaml
 
 YAML = (".yaml", ".yml")
 
+CODE = (".py", ".pyc", ".pyd", ".so", ".pth")
+"""Endings of what Python imports."""
+
 
 def plain_settings(settings: Settings, folder: Path) -> Any:
     """Return settings as JSON holds them, with the study's files named from its ``folder``."""
@@ -83,10 +86,15 @@ def _names(data: object) -> Iterator[str]:
 
 
 def write_files(files: Mapping[str, Mapping[str, str | None]], folder: Path) -> None:
-    """Write recorded files into ``folder``; those outside of the study's stay where they are."""
+    """Write recorded files into ``folder``; those outside of the study's stay where they are.
+
+    Settings name data; a file of code among them is nothing that labcrane recorded, and where it
+    is put it might be taken for a plugin of the study.
+    """
     for name, file in files.items():
         path, text = folder / name, file["text"]
-        if text is not None and path.resolve().is_relative_to(folder.resolve()):
+        inside = path.resolve().is_relative_to(folder.resolve())
+        if text is not None and inside and path.suffix.lower() not in CODE:
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text, encoding="utf-8")
 

@@ -1,5 +1,6 @@
 """Steps of a session, as a protocol writes them."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import (
@@ -91,16 +92,38 @@ class Break(Section):
     """How long it lasts, in seconds; the examiner can end it earlier, which is recorded."""
 
 
+FIXATION_POINTS = ((0.5, 0.5), (0.15, 0.15), (0.85, 0.15), (0.85, 0.85), (0.15, 0.85))
+"""The middle, and points towards the corners: calibration is worst there."""
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class Fixation(Section):
+    """A check of the eye tracker: the operator looks at points, one after another."""
+
+    seconds: Annotated[PositiveFloat, Field(ge=1.0), Unit("s"), Usual(1.0, 20.0)] = 2.0
+    """How long each point is shown, in seconds; the first half second is the way to it."""
+
+    points: Annotated[tuple[tuple[Share, Share], ...], Field(min_length=1)] = FIXATION_POINTS
+    """Where they are, as shares of the picture's width and height from its upper left corner."""
+
+
+TIMED: Mapping[str, type[Break | Fixation]] = {"break": Break, "fixation": Fixation}
+"""Steps that last for as long as they say."""
+
+
 class Step(Section):
     """One step of a session, with what kind it is and what it needs."""
 
     kind: Literal[
-        "consent", "instructions", "questionnaire", "practice", "reference", "block", "break"
-    ]
+        "consent", "instructions", "questionnaire", "fixation", "practice", "reference", "block",
+        "break",
+    ]  # fmt: skip
     text: str = ""
     file: str = ""
     block: Block | None = None
     seconds: float = 0.0
+    points: tuple[tuple[float, float], ...] = ()
     questionnaires: tuple[str, ...] = ()
 
     @property
@@ -158,16 +181,17 @@ def read_sessions(source: YamlFile) -> Any:
     return found
 
 
-STEPS = ("consent", "instructions", "questionnaire", "practice", "reference", "block", "break")
+STEPS = (
+    "consent", "instructions", "questionnaire", "fixation", "practice", "reference", "block",
+    "break",
+)  # fmt: skip
 
 
 def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
     if step == "consent":
         return {"kind": step}
     if not (isinstance(step, dict) and len(step) == 1):
-        source.problem(
-            place, f"a step is {shown(step)}; it must be {', '.join(STEPS)}, with its value"
-        )
+        _no_step(source, place, step)
         return None
     (kind, value), *_ = step.items()
     if kind not in STEPS:
@@ -176,9 +200,9 @@ def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
         return None
     if kind == "instructions":
         return _instructions(source, place, value)
-    if kind == "break":
-        pause = source.check(Break, (*place, kind))
-        return {"kind": kind, "seconds": pause.seconds} if pause else None
+    if kind in TIMED:
+        timed = source.check(TIMED[kind], (*place, kind))
+        return {"kind": kind, **timed.model_dump()} if timed else None
     if kind == "consent":
         told = "consent is a step by itself; write '- consent'"
         source.problem((*place, kind), told, key=True)
@@ -196,6 +220,20 @@ def _step(source: YamlFile, place: Place, step: Any) -> dict[str, Any] | None:
         source.problem((*place, kind, key), f"{why}; drop {key}, or the track", key=True)
         return None
     return {"kind": kind, "block": block} if block else None
+
+
+def _no_step(source: YamlFile, place: Place, step: Any) -> None:
+    """Note what is no step: often what belongs to one is not indented below it."""
+    (kind, value), *beside = (isinstance(step, dict) and step.items()) or [("", "")]
+    if kind in STEPS and value is None and not any(key in STEPS for key, _ in beside):
+        key = beside[0][0]
+        told = (
+            f"{key!r} is in one column with {kind!r}, to which it belongs; indent it, and what "
+            "follows, by two spaces more"
+        )
+        source.problem((*place, key), told, key=True)
+        return
+    source.problem(place, f"a step is {shown(step)}; it must be {', '.join(STEPS)}, with its value")
 
 
 def _beside_track(block: Block) -> tuple[str, str] | None:

@@ -11,7 +11,7 @@ from pydantic import (
 )
 
 from labcrane.core.settings import Settings, Usual, WrongKey
-from labcrane.streams.sync.report.limits import Limit, Limits
+from labcrane.streams.sync.report.limits import Limits, WarnLimit
 
 if TYPE_CHECKING:  # a protocol is checked without loading what corrects clocks
     from labcrane.recording.xdf.header import StreamHeader
@@ -136,34 +136,34 @@ SHARES = frozenset({"missing", "late"})
 class TimeLimits(Settings):
     """How right time stamps must be: beyond the first number a warning, beyond the second not."""
 
-    error_s: Limit = Limits().error_s
+    error_s: WarnLimit = Limits().error_s
     """Uncertainty of corrected time stamps at 95 %, in seconds."""
 
-    silent_s: Limit = Limits().silent_s
+    silent_s: WarnLimit = Limits().silent_s
     """From a required regular stream's last sample to the end of the recording, in seconds."""
 
-    rate: Limit = Limits().rate
+    rate: WarnLimit = Limits().rate
     """Relative deviation of a stream's effective rate from its nominal rate."""
 
-    gap_s: Limit = Limits().gap_s
+    gap_s: WarnLimit = Limits().gap_s
     """Longest interruption of a regular stream, in seconds."""
 
-    drift_ppm: Limit = Limits().drift_ppm
+    drift_ppm: WarnLimit = Limits().drift_ppm
     """Rate error of a source's clock, in parts per million."""
 
-    residual_s: Limit = Limits().residual_s
+    residual_s: WarnLimit = Limits().residual_s
     """Scatter of clock probes about their curve, in seconds."""
 
-    rtt_s: Limit = Limits().rtt_s
+    rtt_s: WarnLimit = Limits().rtt_s
     """95th percentile of the probes' round trips, in seconds."""
 
-    probe_age_s: Limit = Limits().probe_age_s
+    probe_age_s: WarnLimit = Limits().probe_age_s
     """Longest time without a trusted probe, in seconds."""
 
-    missing: Limit = Limits().missing
+    missing: WarnLimit = Limits().missing
     """Fraction of samples that a source's own counter says are lost."""
 
-    late: Limit = Limits().late
+    late: WarnLimit = Limits().late
     """Fraction of the loop's ticks that woke more than a period after they were due."""
 
     def limits(self) -> Limits:

@@ -15,7 +15,7 @@ from labcrane.types import FloatArray
 
 
 @dataclass(frozen=True)
-class Scene:
+class RunScene:
     """What does not change in a session's context."""
 
     rate_hz: float
@@ -27,14 +27,16 @@ class Scene:
 
 
 @cache
-def _codec() -> TypeAdapter[Scene]:
-    return TypeAdapter(Scene)
+def _codec() -> TypeAdapter[RunScene]:
+    return TypeAdapter(RunScene)
 
 
 def write_run(run: Run) -> str:
     """Return what does not change in a session's context, as JSON."""
     layouts = {"axes": run.axes, "command": run.command, "state": run.state, "task": run.task}
-    scene = Scene(run.rate_hz, run.participant_seed, run.machine, layouts, run.bodies, run.places)
+    scene = RunScene(
+        run.rate_hz, run.participant_seed, run.machine, layouts, run.bodies, run.places
+    )
     return json.dumps(_codec().dump_python(scene, mode="json"))
 
 

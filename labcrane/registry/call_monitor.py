@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from labcrane.core.signals import Layout, Signal
 from labcrane.errors import LabcraneError, PluginError
-from labcrane.recording.crash_marker import SHIFT, Place, WhereaboutsFile
+from labcrane.recording.crash_marker import SHIFT, CrashMarkerFile, Place
 from labcrane.registry.traceback import told
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class CallMonitor:
     @contextmanager
     def published(self, path: Path) -> Iterator[None]:
         """Say in a file where the session is; the file goes when that ends in order."""
-        file = WhereaboutsFile(path, self._places)
+        file = CrashMarkerFile(path, self._places)
         private, self._number = self._number, file.number
         try:
             yield

@@ -31,7 +31,7 @@ def watched(component: Component, name: str, plugin: str, call_monitor: CallMoni
 
 
 @contextmanager
-def hurried(components: Iterable[Component]) -> Iterator[None]:
+def loosely_watched(components: Iterable[Component]) -> Iterator[None]:
     """Watch components less closely: whether each keeps its word, not when and where.
 
     For simulations. Nobody waits for a tick of theirs, and one that dies is made again.

@@ -1,6 +1,5 @@
 """Engines compared: one session's input given to each, and how far apart what they move gets."""
 
-import html
 import json
 import time
 from collections.abc import Mapping, Sequence
@@ -16,6 +15,7 @@ import numpy as np
 
 from labcrane.core.records import Frame
 from labcrane.errors import ProtocolError
+from labcrane.files.html import rendered
 from labcrane.files.yaml import read_yaml
 from labcrane.recording.participant_file.reader import SessionRecord, open_recording
 from labcrane.replay.replay import replay_session
@@ -158,7 +158,9 @@ def compare_engines(
 
 def _with_engine(engine: str, record: SessionRecord, folder: Path) -> Path:
     """Write the recorded protocol with another engine, whose settings stay as they are."""
-    content = read_yaml(restore(record, folder, None, None))
+    content = read_yaml(
+        restore(record, folder, None, None, run_code=True)
+    )  # our own, just recorded
     content["dynamics"]["use"] = engine
     path = folder / f"{engine}.yaml"
     path.write_text(json.dumps(content), encoding="utf-8")
@@ -231,17 +233,5 @@ def _row(cells: Sequence[str]) -> str:
 
 def as_html(comparison: Comparison) -> str:
     """Return the page as HTML that needs nothing but itself."""
-    body = ["<h1>Engines compared</h1>"]
-    body += [f"<p>{html.escape(each)}</p>" for each in sentences(comparison)]
-    for title, rows in tables(comparison):
-        body.append(f"<h2>{html.escape(title)}</h2><table>")
-        for number, row in enumerate(rows):
-            tag = "td" if number else "th"
-            cells = "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in row)
-            body.append(f"<tr>{cells}</tr>")
-        body.append("</table>")
-    style = "body{font:15px/1.5 sans-serif;max-width:60rem;margin:2rem auto}td,th{padding:0 .8em}"
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>Engines compared</title>'
-        f"<style>{style}</style></head><body>{''.join(body)}</body></html>\n"
-    )
+    page = Path(__file__).with_name("engines.html")
+    return rendered(page, sentences=sentences(comparison), tables=tables(comparison))

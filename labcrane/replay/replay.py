@@ -20,15 +20,14 @@ from labcrane.core.records import Frame, Run
 from labcrane.design.plan import plan_session
 from labcrane.errors import ProtocolError, RecordingError
 from labcrane.protocol.rig import Rig
-from labcrane.protocol.study import Study, load
+from labcrane.protocol.study import Study
 from labcrane.recording.data_folder import DataFolder
 from labcrane.recording.frame_log import FrameLog, FrameRow, columns, sizes
 from labcrane.recording.participant_file.reader import SessionRecord, open_recording
-from labcrane.registry.registry import discover
-from labcrane.replay.restore import differing_parts, restore
+from labcrane.replay.restore import differing_parts, restored_study
 from labcrane.replay.script import RecordOver, Script
 from labcrane.session import loop
-from labcrane.session.resume import Ledger, Progress, carried_in
+from labcrane.session.resume import Ledger, Progress, carried_in, judged_in
 from labcrane.session.sequencer import Sequencer
 
 if TYPE_CHECKING:
@@ -88,6 +87,7 @@ def replay_session(
     machine: Path | None = None,
     speed: float | None = None,
     sinks: Sequence[Callable[[Frame], None]] = (),
+    run_code: bool = False,
 ) -> Replayed:
     """Run a recorded session again, and compare every number.
 
@@ -104,6 +104,9 @@ def replay_session(
         as the computer can and shows nothing.
     sinks
         Called with every frame: whatever is to be measured now.
+    run_code
+        Whether plugins that are in the recording are imported: they are programs of whoever made
+        the file.
 
     Raises
     ------
@@ -121,11 +124,7 @@ def replay_session(
             "not part of the input, so only sessions of one piece can be replayed"
         )
     with TemporaryDirectory(prefix="labcrane-replay-") as folder:
-        study = load(
-            restore(record, Path(folder), protocol, machine),
-            discover(study=protocol),
-            recorded=True,
-        )
+        study = restored_study(record, Path(folder), protocol, machine, run_code=run_code)
         parts = differing_parts(record, study)
         return _run(record, study, session, parts, speed, sinks)  # components read files too
 
@@ -148,7 +147,9 @@ def _run(
         run = closing.enter_context(rig.opened(study, plan.seed))
         log = _Log(run, script)
         waits = not bool(record.context["simulated"])
-        ledger = Ledger(study, plan, Progress(carried=carried_in(record.context)))
+        # Recordings of before tests waited to be judged go on at once, as they did.
+        so_far = Progress(carried=carried_in(record.context), judged=judged_in(record.context))
+        ledger = Ledger(study, plan, so_far)
         sequencer = Sequencer(study, plan, rig, waits=waits, awaits=script.awaited, ledger=ledger)
         shown: list[Callable[[Frame], None]] = []
         if speed is not None:

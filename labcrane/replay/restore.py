@@ -2,15 +2,18 @@
 
 import json
 import platform
+import re
 from collections.abc import Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from labcrane.errors import ProtocolError, RecordingError
 from labcrane.files.yaml import parse_yaml, read_yaml
 from labcrane.protocol.referenced_files import write_files
-from labcrane.protocol.study import Study
+from labcrane.protocol.study import Study, load
 from labcrane.recording.participant_file.reader import SessionRecord
+from labcrane.registry.registry import discover
 
 IRRELEVANT = ("pygame", "pylsl")
 """Of the recorded versions, those that bring input in or send frames out, and move nothing."""
@@ -18,47 +21,130 @@ IRRELEVANT = ("pygame", "pylsl")
 MOVING = ("scheme", "dynamics", "tasks.")
 """The parts that a replay runs again."""
 
+OWN = re.compile(r"plugins/[^./\\:\0][^/\\:\0]*\.py")
+"""What a plugin of a study's own is called in a recording."""
+
+
+def restored_study(
+    record: SessionRecord,
+    folder: Path,
+    protocol: Path | None = None,
+    machine: Path | None = None,
+    *,
+    run_code: bool = False,
+) -> Study:
+    """Return the study of a recorded session, put together in ``folder``.
+
+    Parameters
+    ----------
+    protocol, machine
+        Files to take instead of the recorded ones; plugins beside a given protocol are imported.
+    run_code
+        Whether plugins of the study that are in the recording are imported as well. They are
+        programs of whoever made the file, so nothing but a person's own word asks for it.
+
+    Raises
+    ------
+    ProtocolError
+        The protocol cannot be run with what is installed.
+    RecordingError
+        What is recorded of it is not as labcrane writes it.
+    """
+    path = restore(record, folder, protocol, machine, run_code=run_code)
+    code = own_code(record) if protocol is None else {}
+    try:
+        return load(path, discover(study=path if run_code else protocol), recorded=True)
+    except ProtocolError as error:
+        if not code or run_code:
+            raise
+        raise ProtocolError(
+            f"{error}\nthe study had plugins of its own, {', '.join(code)}, whose code is in the "
+            "recording and is not run, since it may be anybody's: give the study's --protocol, "
+            "beside which they are; or read them (context: own_plugins), and if you trust whoever "
+            "made the file, give --run-recorded-code"
+        ) from error
+
 
 def restore(
-    record: SessionRecord, folder: Path, protocol: Path | None, machine: Path | None
+    record: SessionRecord,
+    folder: Path,
+    protocol: Path | None,
+    machine: Path | None,
+    *,
+    run_code: bool = False,
 ) -> Path:
     """Write the recorded protocol and what it refers to into ``folder``; return its path.
 
-    A given ``protocol`` stays where it is, unless a ``machine`` is put into it.
+    A given ``protocol`` stays where it is, unless a ``machine`` is put into it. Nothing is written
+    outside of ``folder``, and no code without ``run_code``, whatever the recording says.
     """
     if protocol is not None and machine is None:
         return protocol
-    content = (
-        read_yaml(protocol)
-        if protocol
-        else parse_yaml(record.protocol, "the protocol", recorded=True)
-    )
-    described = machine.read_text(encoding="utf-8") if machine else record.context["machine"]
-    (folder / "machine.yaml").write_text(described, encoding="utf-8")
-    content["machine"] = "machine.yaml"
-    _write_instructions(content, record, folder)
-    if protocol is None:
-        _put_in_questionnaires(content, record)
-        write_files(record.context.get("files", {}), folder)
+    try:
+        content = (
+            read_yaml(protocol)
+            if protocol
+            else parse_yaml(record.protocol, "the protocol", recorded=True)
+        )
+        described = machine.read_text(encoding="utf-8") if machine else record.context["machine"]
+        content["machine"] = "machine.yaml"
+        if protocol is None:
+            _put_in_questionnaires(content, record)
+            write_files(record.context.get("files", {}), folder)
+        (folder / "machine.yaml").write_text(described, encoding="utf-8")
+        _write_instructions(content, record, folder)
+        for name, text in (own_code(record) if run_code and protocol is None else {}).items():
+            path = folder / name
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+    except (AttributeError, KeyError, OSError, TypeError, ValueError) as error:
+        if protocol is not None:
+            raise
+        raise RecordingError(
+            "what is recorded of the session's protocol is not as labcrane writes it "
+            f"({type(error).__name__}: {error}); run it with --protocol FILE"
+        ) from error
     path = folder / "protocol.yaml"
     path.write_text(json.dumps(content), encoding="utf-8")  # JSON is YAML
     return path
 
 
+def own_code(record: SessionRecord) -> dict[str, str]:
+    """Return the code of the study's own plugins that is in a recording, by its file's name.
+
+    Raises
+    ------
+    RecordingError
+        One of them has no name that a study's own plugin can have.
+    """
+    recorded = record.context.get("own_plugins", {})
+    code = {} if not isinstance(recorded, Mapping) else dict(recorded)
+    for name, text in code.items():
+        if not (OWN.fullmatch(name) and isinstance(text, str)):
+            raise RecordingError(
+                f"a plugin in the recording is called {name!r}, which no plugin of a study is: "
+                "they are files in its folder plugins/; the recording is not as labcrane writes it"
+            )
+    return code
+
+
 def _write_instructions(content: Mapping[str, Any], record: SessionRecord, folder: Path) -> None:
-    """Write the texts that were shown; those that were not change no state, and are left empty."""
+    """Write the texts that were shown; those that were not change no state, and are left empty.
+
+    They are called by their numbers: what a protocol calls them may lead anywhere.
+    """
     events = record.events
     shown = [
         data.get("text", "") for data in events.loc[events["name"] == "instructions.shown", "data"]
     ]
-    number = int(record.attrs["session"])
+    number, count = int(record.attrs["session"]), 0
     for at, session in enumerate(content["sessions"], start=1):
         for step in session["steps"]:
             if isinstance(step, dict) and "instructions" in step:
                 text = shown.pop(0) if at == number and shown else ""
-                path = folder / str(step["instructions"])
-                path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_text(text, encoding="utf-8")
+                count += 1
+                step["instructions"] = f"instructions-{count}.txt"
+                (folder / step["instructions"]).write_text(text, encoding="utf-8")
 
 
 def _put_in_questionnaires(content: Mapping[str, Any], record: SessionRecord) -> None:

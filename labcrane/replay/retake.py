@@ -19,11 +19,10 @@ from labcrane.core.records import Frame, Run, SessionState
 from labcrane.core.roles import Feedback
 from labcrane.errors import ProtocolError, RecordingError
 from labcrane.protocol.rig import Rig
-from labcrane.protocol.study import load
 from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.recording.recorded_frames import RecordedFrames
 from labcrane.registry.registry import discover
-from labcrane.replay.restore import restore
+from labcrane.replay.restore import restored_study
 from labcrane.streams.context import situation_after
 
 Picture = npt.NDArray[np.uint8]
@@ -77,7 +76,7 @@ class Retake:
         with ExitStack() as opening:
             folder = Path(opening.enter_context(TemporaryDirectory(prefix="labcrane-retake-")))
             registry = discover()
-            study = load(restore(self._record, folder, None, None), registry, recorded=True)
+            study = restored_study(self._record, folder)
             run = Rig.build(study, simulated=True).describe(study, participant_seed=0)
             self._frames = RecordedFrames(self._record)
             run = replace(run, axes=self._frames.axes)  # of whatever controls there were

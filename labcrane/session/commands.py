@@ -100,7 +100,7 @@ class SettingChange:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class AnswerGiven:
     """An answer as JSON, which only the questionnaire that is asked can read."""
 
     text: str
@@ -112,7 +112,7 @@ class Submission:
 
 
 @dataclass(frozen=True, slots=True)
-class Consent:
+class ConsentGiven:
     """Consent to a version of the text."""
 
     version: str
@@ -139,9 +139,9 @@ Request = (
     | Completion
     | Sighting
     | SettingChange
-    | Answer
+    | AnswerGiven
     | Submission
-    | Consent
+    | ConsentGiven
     | Denial
     | Malformed
 )
@@ -149,8 +149,8 @@ Request = (
 
 
 OF_WORDS: Mapping[Order, Callable[[str], Request]] = {
-    Order.ANSWER: Answer,
-    Order.CONSENT: Consent,
+    Order.ANSWER: AnswerGiven,
+    Order.CONSENT: ConsentGiven,
     Order.DENIED: Denial,
     Order.REPORT: Sighting,
 }

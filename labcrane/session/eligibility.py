@@ -50,8 +50,8 @@ def check_eligibility(visit: Visit, today: date | None = None) -> Admission:
     ------
     ProtocolError
         The study is not what was approved, or the packages are not and the protocol refuses that,
-        the approval has expired, the participant is not in the register, has not consented to the
-        approved text, was excluded, or comes too early or too late.
+        the lock was written anew by hand, the approval has expired, the participant is not in the
+        register, has not consented to the approved text, was excluded, or comes too early or late.
     """
     if visit.simulated or visit.pilot:
         return EXEMPT
@@ -62,6 +62,7 @@ def check_eligibility(visit: Visit, today: date | None = None) -> Admission:
     lock = verify(visit.study, discover(study=visit.study.path), today)
     register = read(places)
     register.check_finished()
+    lock.check_before(register.locks)
     entry = register.participants.get(visit.participant)
     consents = entry.consent if entry else []
     given = [consent for consent in consents if consent.version == lock.consent_version]

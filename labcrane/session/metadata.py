@@ -85,7 +85,18 @@ def _of_visit(visit: Visit, plan: SessionPlan) -> dict[str, Any]:
         "seed": plan.seed,
         "slot": plan.slot,
         "group": plan.group,
+        **_of_judgement(visit),
     }
+
+
+def _of_judgement(visit: Visit) -> dict[str, Any]:
+    """Return whether tests wait to be judged: where somebody is there, and there is an indicator.
+
+    Without a time of reference there is none, and nothing to judge.
+    """
+    steps = (step for each in visit.study.protocol.sessions for step in each.steps)
+    scored = any(step.kind == "reference" for step in steps)
+    return {"awaits_judgement": True} if scored and not visit.simulated else {}
 
 
 def _of_study(study: Study, *, simulated: bool) -> dict[str, Any]:

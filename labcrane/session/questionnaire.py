@@ -15,7 +15,7 @@ from labcrane.limits import LimitError, read_json
 from labcrane.participants.personal_data import personal
 from labcrane.protocol.study import Study
 from labcrane.recording.participant_file.questionnaires import ANSWER, END, SCORE
-from labcrane.session.commands import Answer, Submission
+from labcrane.session.commands import AnswerGiven, Submission
 
 Said = tuple[str, dict[str, Value]]
 """Name and data of an event that follows."""
@@ -213,13 +213,13 @@ class QuestionnaireRun:
         if simulated:
             yield from self._form.simulated(self._seed, self._known)
 
-    def handle(self, request: Answer | Submission, about: Mapping[str, Value]) -> Said:
+    def handle(self, request: AnswerGiven | Submission, about: Mapping[str, Value]) -> Said:
         """Take an answer, or hand the questionnaire in; return what is said of it.
 
         ``about`` is by whom it was given, and from which address.
         """
         by = str(about["by"])
-        if isinstance(request, Answer):
+        if isinstance(request, AnswerGiven):
             name, data = self._form.take(request.text, by)
         else:
             name, data = self._form.hand_in(by)

@@ -5,17 +5,24 @@ its journal, by the same fold while it runs and afterwards; so a session that wa
 one that was ended by order.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from labcrane.core.records import Phase, Trial, Value
+from labcrane.analysis.indicator_settings import COUNTS, TIME
+from labcrane.core.records import UNDONE, Phase, Trial, Value, is_counted
 from labcrane.design.counts import TableNumbers, TrialCounts, numbers, spans
-from labcrane.design.plan import Owed, PlannedBlock, PlannedStep, SessionPlan, next_attempt
-from labcrane.design.tracks import LEVEL, PlannedTrack, Response, Standing, check_carried
+from labcrane.design.plan import (
+    OwedQuestionnaire,
+    PlannedBlock,
+    PlannedStep,
+    SessionPlan,
+    next_attempt,
+)
+from labcrane.design.tracks import LEVEL, PlannedTrack, Response, TrackState, check_carried
 from labcrane.errors import ProtocolError, RecordingError
 from labcrane.protocol.study import Study
 from labcrane.recording.journal_reader import LoggedEvent, SessionLog, read_journal
@@ -74,6 +81,11 @@ class Progress:
         What every trial told its track, by trial number, in the order in which they ended.
     carried
         What trials of earlier sessions told their tracks.
+    judged
+        Whether the session waits for the supervisor to judge its tests.
+    unjudged
+        What was said at the end of the test that ended last, if the session still owes the
+        supervisor time to judge it; None otherwise.
     """
 
     stop: str = KILLED
@@ -93,6 +105,8 @@ class Progress:
     held: set[str] = field(default_factory=set)
     responses: dict[int, Response] = field(default_factory=dict)
     carried: tuple[Response, ...] = ()
+    judged: bool = False
+    unjudged: Mapping[str, Any] | None = None
 
     def take(self, name: str, data: Mapping[str, Any], *, closes: bool = True) -> None:
         """Take up an event.
@@ -106,16 +120,16 @@ class Progress:
         match name:
             case "session.start":
                 self.stop, self.called_complete = KILLED, False
-                self.carried = carried_in(data)
+                self.carried, self.judged = carried_in(data), judged_in(data)
             case "session.end":
                 self.stop = str(data["reason"])
                 self.called_complete = self.stop == COMPLETE
             case "session.failed":
                 self.stop = str(data["why"])
             case "session.resumed":
-                for number in numbers(data["void"]):
-                    self.done.pop(number, None)
-                    self.responses.pop(number, None)
+                self._take_void(numbers(data["void"]))
+            case "order.completion" | "order.override" | "judgement.over":
+                self._take_judgement(name, data)
             case "step.end" if data.get("done", closes):
                 self.steps.add(data["step"])
             case "trial.start" | "trial.end":
@@ -125,6 +139,13 @@ class Progress:
             case "pause.start" | "pause.end" | "stop_rule.met":
                 self._take_hold(name, data)
 
+    def _take_void(self, again: Iterable[int]) -> None:
+        for number in again:
+            self.done.pop(number, None)
+            self.responses.pop(number, None)
+            if self.unjudged is not None and self.unjudged["trial"] == number:
+                self.unjudged = None
+
     def _take_trial(self, name: str, data: Mapping[str, Any]) -> None:
         number = data["trial"]
         if name == "trial.start":
@@ -133,6 +154,7 @@ class Progress:
             self.done.pop(number, None)  # of two attempts the later one counts
             self.responses.pop(number, None)
             self.broken.discard(number)
+            self.unjudged = None
             for asked in [key for key in self.rated | set(self.ratings) if key[0] == number]:
                 self.rated.discard(asked)
                 self.ratings.pop(asked, None)
@@ -143,6 +165,8 @@ class Progress:
             self.broken.add(number)
         elif outcome is not Phase.REPEATED:
             self.done[number] = outcome
+            if self.judged and is_open(data):
+                self.unjudged = data
             if (response := Response.of(data)) is not None:
                 self.responses[number] = response
 
@@ -154,6 +178,12 @@ class Progress:
             given[data["item"]] = data["value"]
         elif data.get("done", data["handed_in"] or closes):
             (self.rated if rating else self.handed_in).add(key)
+
+    def _take_judgement(self, name: str, data: Mapping[str, Any]) -> None:
+        """Note that the last test was judged after its end, or that it stays as it is."""
+        said = data.get("after") and data.get("refused") is None
+        if data.get("done") if name == "judgement.over" else said:
+            self.unjudged = None
 
     def _take_hold(self, name: str, data: Mapping[str, Any]) -> None:
         if name == "pause.end":
@@ -171,6 +201,22 @@ EXAMINER, STOP = "examiner", "stop rule"
 def carried_in(context: Mapping[str, Any]) -> tuple[Response, ...]:
     """Return what a session's context says that its tracks go on from."""
     return tuple(Response(**each) for each in context.get("carried", ()))
+
+
+def judged_in(context: Mapping[str, Any]) -> bool:
+    """Return whether a session waits for its tests to be judged, by its context."""
+    return bool(context.get("awaits_judgement"))
+
+
+def is_open(ended: Mapping[str, Value]) -> bool:
+    """Whether a trial is a test whose completion factor nobody has set, by its ``trial.end``.
+
+    A test counts for the performance indicator: it has the columns from which that is worked out,
+    and is neither practice nor reference.
+    """
+    test = is_counted(ended) and not ended.get("reference") and ended["outcome"] not in UNDONE
+    there = {TIME, *COUNTS.values()} <= ended.keys()
+    return test and there and ended.get("completion") is None
 
 
 def carry(study: Study, journals: Sequence[Path]) -> tuple[Response, ...]:
@@ -321,9 +367,15 @@ class Ledger:
             return trial
         return block.track.choose(trial, self._so_far.responses, self._so_far.carried)
 
-    def stands(self, track: PlannedTrack) -> Standing:
+    def stands(self, track: PlannedTrack) -> TrackState:
         """Return where a track stands."""
         return track.stands(self._so_far.responses, self._so_far.carried)
+
+    @property
+    def unjudged(self) -> dict[str, Value]:
+        """Trial and attempt of the test that the supervisor is to be given time for, if any."""
+        ended = self._so_far.unjudged
+        return {} if ended is None else {name: ended[name] for name in ("trial", "attempt")}
 
 
 def remaining(study: Study, plan: SessionPlan, so_far: Progress, policy: Policy) -> SessionPlan:
@@ -338,7 +390,7 @@ def remaining(study: Study, plan: SessionPlan, so_far: Progress, policy: Policy)
     for step in plan.steps:
         if step.block:
             block = _rest(study, plan, step.block, so_far, policy)
-            if block.trials or block.owed:
+            if block.trials or block.owed or block.unjudged:
                 steps.append(replace(step, block=block))
         elif step.questionnaires:
             unasked = _unasked(step, so_far)
@@ -404,7 +456,18 @@ def _rest(
         for trial in left
     ]
     owed = tuple(_owed(block, so_far))
-    return replace(block, trials=tuple(again), owed=owed, streak=warm_up.streak)
+    unjudged = _unjudged(block, so_far, again)
+    return replace(block, trials=tuple(again), owed=owed, streak=warm_up.streak, unjudged=unjudged)
+
+
+def _unjudged(block: PlannedBlock, so_far: Progress, left: Sequence[Trial]) -> int:
+    """Return the number of the block's test that waits to be judged; 0 for none.
+
+    Before another trial there is time for that only where nothing else is asked.
+    """
+    number = so_far.unjudged["trial"] if so_far.unjudged is not None else 0
+    waits = not (left and block.ask) and number in {trial.number for trial in block.trials}
+    return number if waits else 0
 
 
 def _warm_up(
@@ -443,13 +506,15 @@ def _rounds(plan: SessionPlan, block: PlannedBlock) -> list[PlannedBlock]:
     return [block]
 
 
-def _owed(block: PlannedBlock, so_far: Progress) -> Iterator[Owed]:
+def _owed(block: PlannedBlock, so_far: Progress) -> Iterator[OwedQuestionnaire]:
     """Yield what is still to be asked after trials that are done."""
     for trial in block.trials:
         if trial.planned.counted and trial.number in so_far.done:
             for name in block.ask:
                 if (trial.number, name) not in so_far.rated:
-                    yield Owed(trial, name, so_far.ratings.get((trial.number, name), {}))
+                    yield OwedQuestionnaire(
+                        trial, name, so_far.ratings.get((trial.number, name), {})
+                    )
 
 
 def resumption(plan: SessionPlan, so_far: Progress, policy: Policy) -> dict[str, Value]:
@@ -490,6 +555,8 @@ def _step_texts(step: PlannedStep, counts: TrialCounts | TableNumbers) -> Iterat
     for owed in block.owed:
         after = counts.name(owed.after.number)
         yield f"step {step.number}: {owed.questionnaire} after {after}"
+    if block.unjudged:
+        yield f"step {step.number}: judgement of {counts.name(block.unjudged)}"
     if block.trials:
         trials = counts.names(trial.number for trial in block.trials)
         yield f"step {step.number}: {step.kind} {block.name!r}, {trials}"

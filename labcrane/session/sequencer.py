@@ -1,4 +1,4 @@
-"""The course of a session: which step, which trial, paused or not, tick by tick.
+"""Sequencer of a session: which step, which trial, paused or not, tick by tick.
 
 The steps are read like a script: every ``yield`` in a generator below is one tick, and gives back
 the frame that came of it.
@@ -12,10 +12,10 @@ from labcrane.participants.personal_data import personal
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.session.commands import (
-    Answer,
+    AnswerGiven,
     Command,
     Completion,
-    Consent,
+    ConsentGiven,
     Control,
     Denial,
     Malformed,
@@ -41,7 +41,7 @@ from labcrane.session.trial import TrialRun
 Ticks = Generator[None, Frame, None]
 
 
-STAGES = {"trial", "break", "questionnaire"}
+STAGES = {"trial", "break", "fixation", "questionnaire"}
 """What can be skipped."""
 
 
@@ -87,9 +87,10 @@ class Sequencer:
         self._held = Suspenders(study.protocol.on_fault, self._say, awaits)
         self._attempt: TrialRun | None = None
         self._last: TrialRun | None = None  # the one that runs, else the one that ended last
+        self._before = self._ledger.unjudged  # ended before this process began
         self._stage = ""
         self._step = 0
-        self._asking: QuestionnaireRun | None = None
+        self._questionnaire: QuestionnaireRun | None = None
         self._wishes: set[Order] = set()  # to start, skip or repeat what runs now
         self._warm_up = WarmUp()
         self.over = False
@@ -167,6 +168,8 @@ class Sequencer:
             yield from self._block(step.block)
         elif step.kind == "break":
             yield from self._break(step)
+        elif step.kind == "fixation":
+            yield from self._fixation(step)
         elif step.kind == "consent":
             self._note("consent.asked")  # what was confirmed is in the session's context
             yield from self._gate("consent")
@@ -196,8 +199,31 @@ class Sequencer:
         self._note("break.end", left=left / self._rate_hz)
         self._enter("")
 
+    def _fixation(self, step: PlannedStep) -> Ticks:
+        """Show each point for its time in one piece; after a pause, from its beginning."""
+        yield from self._gate("fixation")
+        self._enter("fixation")
+        for number, (x, y) in enumerate(step.points, start=1):
+            left = round(step.seconds * self._rate_hz)
+            while left > 0 and not self._wished_on():
+                if self._held.by:
+                    yield
+                    continue
+                self._note("fixation.shown", point=number, x=x, y=y)
+                left = round(step.seconds * self._rate_hz)
+                while left > 0 and not (self._held.by or self._wished_on()):
+                    yield
+                    left -= 1
+                self._note("fixation.over", point=number, done=left == 0)
+        self._enter("")
+
+    def _wished_on(self) -> bool:
+        """Whether somebody wants to go on to what comes next, or to end."""
+        return Order.SKIP in self._wishes or bool(self._held.ending)
+
     def _block(self, block: PlannedBlock) -> Ticks:
-        yield from self._gate(block.name)
+        if block.trials or block.owed:  # else only its last test is still to be judged
+            yield from self._gate(block.name)
         if self._held.ending:
             return
         about: dict[str, Value] = {"block": block.number, "block_name": block.name}
@@ -205,6 +231,7 @@ class Sequencer:
         for owed in block.owed:
             yield from self._ask(owed.questionnaire, owed.answered, owed.after)
         for trial in block.trials:
+            yield from self._judged(asked=bool(block.ask))
             if self._held.ending or (block.until and self._warm_up.over):
                 break  # also at once: it may have been begun for what was still to be asked
             chosen = self._ledger.chosen(block, trial)
@@ -213,12 +240,29 @@ class Sequencer:
             yield from self._trial(block, chosen)
             for name in block.ask if trial.planned.counted else ():
                 yield from self._ask(name, {}, trial)
+        yield from self._judged()
         if block.track is not None:
             where = self._ledger.stands(block.track)
             self._note("track.end", **about, track=block.track.name, **where.row)
         self._note("block.end", **about)
         if not self._held.ending and (verdict := self._warm_up.verdict(block)) is not None:
             self._note("practice.end", **about, **verdict)
+
+    def _judged(self, *, asked: bool = False) -> Ticks:
+        """Give the supervisor time to judge the test that has ended, unless it was judged.
+
+        A judgement does not end the wait: a slip can be mended, and an end be overridden too.
+        There was time already where something was ``asked`` after the test.
+        """
+        about = self._ledger.unjudged
+        if asked or not (self._waits and about) or self._held.ending:
+            return
+        self._enter("waiting")
+        self._note("judgement.awaited", **about)
+        while Order.START not in self._wishes and not self._held.ending:
+            yield
+        self._note("judgement.over", **about, done=not self._held.ending)
+        self._enter("")
 
     def _trial(self, block: PlannedBlock, trial: Trial) -> Ticks:
         task = self._study.tasks[block.task]
@@ -250,20 +294,20 @@ class Sequencer:
     def _ask(self, name: str, answered: Mapping[str, Value], after: Trial | None = None) -> Ticks:
         if self._held.ending:
             return
-        asking = self._asking = QuestionnaireRun(
+        questionnaire = self._questionnaire = QuestionnaireRun(
             self._study, self._plan, name, self._step, answered, after
         )
         self._enter("questionnaire")
-        for said in asking.begin(simulated=not self._waits):
+        for said in questionnaire.begin(simulated=not self._waits):
             self._say(*said)
         yield
-        while not (asking.over or Order.SKIP in self._wishes or self._held.ending):
+        while not (questionnaire.over or Order.SKIP in self._wishes or self._held.ending):
             yield
-        self._asking = None
-        for said in asking.end(skipped=Order.SKIP in self._wishes):
+        self._questionnaire = None
+        for said in questionnaire.end(skipped=Order.SKIP in self._wishes):
             self._say(*said)
         self._enter("")
-        if self._waits and asking.alarming:
+        if self._waits and questionnaire.alarming:
             self._held.hold(STOP)
         yield from self._decided()
 
@@ -289,13 +333,15 @@ class Sequencer:
     # Orders
 
     def _take(self, command: Command, request: Request) -> None:
-        asking = self._asking
+        questionnaire = self._questionnaire
         about: dict[str, Value] = {"by": given_by(command), **given_from(command)}
         match request:
             case Denial(why):
                 self._note("page.denied", why=why, **about)
-            case Answer() | Submission() if asking is not None and not asking.over:
-                self._say(*asking.handle(request, about))  # not handed in twice in one tick
+            case AnswerGiven() | Submission() if (
+                questionnaire is not None and not questionnaire.over
+            ):
+                self._say(*questionnaire.handle(request, about))  # not handed in twice in one tick
             case _:
                 # Every door has looked already; the loop must not fall when one has not.
                 beyond = beyond_limits(command)
@@ -310,8 +356,10 @@ class Sequencer:
     def _afterwards(self, request: Request) -> dict[str, Value]:
         """Return which trial an order is about that came after its end, before the next began."""
         match request:
-            case Control(Order.OVERRIDE) | Completion() if self._last and not self._attempt:
-                whose = self._last.about
+            case Control(Order.OVERRIDE) | Completion() if not self._attempt:
+                whose = self._last.about if self._last else self._before
+                if not whose:
+                    return {}
                 return {"trial": whose["trial"], "attempt": whose["attempt"], "after": True}
         return {}
 
@@ -354,9 +402,9 @@ class Sequencer:
                 return f"feedback {awaited} is awaited" if awaited else "nothing waits to start"
             case Control(Order.PAUSE) if EXAMINER in self._held:
                 return "the session is paused already"
-            case Answer() | Submission():
+            case AnswerGiven() | Submission():
                 return "no questionnaire is asked"
-            case Consent():
+            case ConsentGiven():
                 return "consent is given before the session begins"
             case Remark(order, text) if found := personal(text):
                 return f"a {order} must not hold {found}; write it without"
@@ -372,7 +420,8 @@ class Sequencer:
             if self._attempt is None:
                 return "no trial is running"
             return self._attempt.doubt(request.what) if isinstance(request, Sighting) else None
-        return None if self._last else "no trial is running, and none has ended"
+        judged = self._last or self._before
+        return None if judged else "no trial is running, and none has ended"
 
     @property
     def _paused(self) -> bool:

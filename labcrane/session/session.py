@@ -20,12 +20,12 @@ from labcrane.errors import DeviceError, PluginError, ProtocolError
 from labcrane.files.lock import held
 from labcrane.processes.real_time import real_time
 from labcrane.protocol.rig import Rig
-from labcrane.recording.crash_marker import CrashMarker, read_whereabouts
+from labcrane.recording.crash_marker import CrashMarker, clear, read_crash_marker
 from labcrane.recording.frame_log import BatchLog, FrameLog, columns, frame_bytes
 from labcrane.recording.journal import SessionJournal
 from labcrane.recording.participant_file.writer import consolidate
 from labcrane.recording.paths import journal_path, next_part, parts
-from labcrane.registry.proxies import hurried
+from labcrane.registry.proxies import loosely_watched
 from labcrane.session import loop
 from labcrane.session.commands import Console
 from labcrane.session.eligibility import Admission, check_eligibility, close_visit
@@ -192,7 +192,7 @@ def _record(
     carried = _carried(visit) if so_far is None else so_far.carried
     rig = Rig.build(study, simulated=visit.simulated)
     clock = _clock(visit, so_far)
-    died = read_whereabouts(visit.whereabouts) if visit.resumed else None
+    died = read_crash_marker(visit.crash_marker) if visit.resumed else None
     with (
         _scheduled(visit) as scheduling,
         _watching(visit, rig),
@@ -252,9 +252,9 @@ def _carried(visit: Visit) -> tuple[Response, ...]:
 
 def _watching(visit: Visit, rig: Rig) -> AbstractContextManager[None]:
     if visit.fast:
-        visit.whereabouts.unlink(missing_ok=True)  # of a process that died, and was read
-        return hurried((*rig.components, *rig.tasks.values()))
-    return visit.study.call_monitor.published(visit.whereabouts)
+        clear(visit.crash_marker)  # of a process that died, and was read
+        return loosely_watched((*rig.components, *rig.tasks.values()))
+    return visit.study.call_monitor.published(visit.crash_marker)
 
 
 @contextmanager

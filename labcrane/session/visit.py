@@ -11,7 +11,7 @@ from typing import Any
 from labcrane.errors import ProtocolError
 from labcrane.files.yaml import read_text
 from labcrane.protocol.study import Study, load
-from labcrane.recording.crash_marker import whereabouts_path
+from labcrane.recording.crash_marker import crash_marker_path
 from labcrane.recording.data_folder import DataFolder
 from labcrane.recording.journal import START
 from labcrane.recording.journal_reader import read_journal
@@ -77,9 +77,9 @@ class Visit:
         return journal_path(self.folder.path, self.session, "run")
 
     @property
-    def whereabouts(self) -> Path:
+    def crash_marker(self) -> Path:
         """The file that says in which component it is, while it runs and after it has died."""
-        return whereabouts_path(self.journal)
+        return crash_marker_path(self.journal)
 
     @property
     def streams_journal(self) -> Path:

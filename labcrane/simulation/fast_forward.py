@@ -22,7 +22,7 @@ EXTRA = "labcrane[fast]"
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class SimulatedBy:
     """By what a participant was simulated.
 
     Attributes
@@ -78,13 +78,15 @@ class FastForward:
         self._tasks: Mapping[Task, Twin] = {}
         self.way = self._find(rig)
 
-    def _find(self, rig: Rig) -> Way:
+    def _find(self, rig: Rig) -> SimulatedBy:
         if find_spec("numba") is None:
-            return Way(compiled=False, why=f"numba is not installed; {EXTRA} brings it")
+            return SimulatedBy(compiled=False, why=f"numba is not installed; {EXTRA} brings it")
         from labcrane.simulation.kernel import addresses, advance, same_arithmetic  # noqa: PLC0415
 
         if not same_arithmetic():
-            return Way(compiled=False, why="compiled arithmetic is not Python's on this computer")
+            return SimulatedBy(
+                compiled=False, why="compiled arithmetic is not Python's on this computer"
+            )
         parts: dict[str, Component] = {
             "operator": rig.input, "scheme": rig.controller, "dynamics": rig.dynamics,
             **{f"task {name!r}": task for name, task in rig.tasks.items()},
@@ -92,7 +94,7 @@ class FastForward:
         twins = {name: part.twin() for name, part in parts.items()}
         found = {name: twin for name, twin in twins.items() if twin is not None}
         if missing := [name for name in twins if name not in found]:
-            return Way(compiled=False, why=f"{', '.join(missing)} has no compiled twin")
+            return SimulatedBy(compiled=False, why=f"{', '.join(missing)} has no compiled twin")
         self._advance = advance
         operator, scheme, dynamics, *tasks = found.values()
         self._twins = (operator, scheme, dynamics)
@@ -104,7 +106,7 @@ class FastForward:
         most = sum(twin.changing for twin in found.values())
         self._kept = np.empty(most)
         compiler = f"numba {version('numba')}"
-        return Way(
+        return SimulatedBy(
             compiled=True, why=compiler, deviation=max(twin.deviation for twin in found.values())
         )
 

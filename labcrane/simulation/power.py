@@ -1,13 +1,16 @@
 """Power of a planned test: cohorts drawn from a pool of simulated participants."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from labcrane.analysis.quality import is_result
+from labcrane.analysis.report.factors import GROUP
+from labcrane.analysis.statistics.anova import word
 from labcrane.errors import ProtocolError
 from labcrane.simulation.share import share_of
 from labcrane.types import FloatArray
@@ -37,7 +40,8 @@ class Effect:
         The column it depends on. A number is tested for a linear trend over its levels, words for
         a difference between them; both by participants' means.
     between
-        The two words that are compared; empty for all there are.
+        The two levels that are compared, as they are written: the effect is the second less the
+        first. Empty for all there are, words then by the alphabet.
     size
         The effect that is put in place of the one that there is, in the measure's unit per step of
         a number or between two words; None takes the data as they were simulated.
@@ -151,32 +155,46 @@ class Pool:
     ----------
     means
         Participants' means at each level, shape ``(n_participants, n_levels)``; with groups,
-        shape ``(n_participants, 1)``.
+        shape ``(n_participants, 1)``. NaN for whoever is without a value at some level: they are
+        drawn as others are, and left out of the test, as people who drop out will be.
     weights
         How a participant's means make the number that is tested, shape ``(n_levels,)``: slope or
         difference.
-    steps
-        What a unit of the effect adds at each level, shape ``(n_levels,)``.
     groups
-        Each participant's group as a number from 0, where the factor is between participants.
+        Where the factor is between participants, each one's level: 0, 1, or -1 for a group that is
+        not compared.
+    strata
+        Of which group of the study each participant is, as a number from 0: as many are drawn of
+        each.
     left_out
-        Participants without a value at some level.
+        Participants without a value at some level, by name.
     """
 
     means: FloatArray
     weights: FloatArray
-    steps: FloatArray
     groups: npt.NDArray[np.intp] | None
+    strata: npt.NDArray[np.intp]
     left_out: tuple[str, ...]
 
 
-def make_pool(movements: "pd.DataFrame", effect: Effect) -> Pool:
+def make_pool(
+    movements: "pd.DataFrame", effect: Effect, people: Mapping[str, str] | None = None
+) -> Pool:
     """Return a pool from the movements of all participants.
+
+    Parameters
+    ----------
+    movements
+        Also those that are no results: whoever has no other is in the pool all the same.
+    people
+        Everybody who began, and their group, for those who have no movement either; without it
+        those who have some.
 
     Raises
     ------
     ProtocolError
-        The movements have no such measure or factor, or it has one level, or more than two words.
+        The movements have no such measure, factor or level, or the factor has one level, or more
+        than two words; or a logarithm is asked for of what has none.
     """
     import pandas as pd
 
@@ -185,30 +203,106 @@ def make_pool(movements: "pd.DataFrame", effect: Effect) -> Pool:
             raise ProtocolError(
                 f"movements have no {name!r}; they have {', '.join(map(str, movements))}"
             )
-    table = movements[["participant", effect.factor, effect.measure]].dropna()
+    results = movements[is_result(movements)]
+    table = results[["participant", effect.factor, effect.measure]].dropna()
+    cells = _cells(table, effect)
+    numeric = not effect.between and pd.api.types.is_numeric_dtype(cells.columns)
+    steps = cells.columns.to_numpy(float) if numeric else np.array([0.0, 1.0])
+    steps = steps - steps.mean()
+    own = pd.Series(dict(people or people_of(movements)), dtype=object).sort_index()
+    if (cells.notna().sum(axis=1) == 1).all():
+        return _between(movements, cells, effect, own)
+    whole = cells.dropna().reindex(own.index)
+    strata, _ = pd.factorize(own, sort=True)
+    weights = steps / (steps @ steps)
+    return Pool(whole.to_numpy(float), weights, None, strata, _without(whole.iloc[:, 0]))
+
+
+def people_of(movements: "pd.DataFrame") -> dict[str, str]:
+    """Return everybody who has a movement, and their group; "" where there are none."""
+    if GROUP not in movements:
+        return dict.fromkeys(movements["participant"].unique(), "")
+    return dict(movements.groupby("participant")[GROUP].first())
+
+
+def _cells(table: "pd.DataFrame", effect: Effect) -> "pd.DataFrame":
+    """Return participants' means at each level; of two that are compared, in their order."""
+    import pandas as pd
+
+    levels = sorted(table[effect.factor].unique())
     if effect.between:
-        table = table[table[effect.factor].isin(effect.between)]
+        levels = pair_of(effect, levels)
+        table = table[table[effect.factor].isin(levels)]
     if effect.log:
-        table[effect.measure] = np.log(table[effect.measure])
-    cells = table.groupby(["participant", effect.factor])[effect.measure].mean().unstack()
-    numeric = pd.api.types.is_numeric_dtype(cells.columns)
-    levels = len(cells.columns)
-    if levels < 2 or (levels > 2 and not numeric):  # noqa: PLR2004
+        values = _logarithms(table[effect.measure].to_numpy(float), effect)
+        table = table.assign(**{effect.measure: values})
+    numeric = pd.api.types.is_numeric_dtype(table[effect.factor])
+    if len(levels) < 2 or (len(levels) > 2 and not numeric):  # noqa: PLR2004
         raise ProtocolError(
-            f"{effect.factor!r} has {levels} levels here ({', '.join(map(str, cells.columns))}); "
+            f"{effect.factor!r} has {len(levels)} levels here ({', '.join(map(str, levels))}); "
             "the test is for a number with two or more, or for two words, as in "
             f"{effect.factor}[one,other]"
         )
-    steps = cells.columns.to_numpy(float) if numeric else np.array([0.0, 1.0])
-    steps = steps - steps.mean()
-    if (cells.notna().sum(axis=1) == 1).all():
-        labels = cells.notna().to_numpy().argmax(axis=1)
-        own = cells.mean(axis=1).to_numpy()[:, None]
-        return Pool(own, np.ones(1), steps, labels, ())
-    whole = cells.dropna()
-    weights = steps / (steps @ steps)
-    left_out = tuple(map(str, cells.index.difference(whole.index)))
-    return Pool(whole.to_numpy(float), weights, steps, None, left_out)
+    means = table.groupby(["participant", effect.factor])[effect.measure].mean()
+    return means.unstack().reindex(columns=levels)
+
+
+def pair_of(effect: Effect, levels: Sequence[object]) -> "list[object]":
+    """Return the two levels that are compared, of those that there are, in the effect's order.
+
+    Raises
+    ------
+    ProtocolError
+        One is not there, or both are the same.
+    """
+    # A level's name may have commas in it, and blanks beside them that were taken away.
+    written = ",".join(effect.between)
+    named = {_BLANKS.sub(r"\1", word(level)): level for level in levels}
+    for one, level in named.items():
+        if written.startswith(f"{one},") and (other := written[len(one) + 1 :]) in named:
+            if one == other:
+                raise ProtocolError(
+                    f"{effect.factor}[{written}] compares {one!r} with itself; name two of "
+                    f"{', '.join(named)}"
+                )
+            return [level, named[other]]
+    unknown = next((each for each in effect.between if each not in named), written)
+    raise ProtocolError(
+        f"{effect.factor} has no level {unknown!r}; it has {', '.join(map(word, levels))}"
+    )
+
+
+def _between(
+    movements: "pd.DataFrame", cells: "pd.DataFrame", effect: Effect, people: "pd.Series[str]"
+) -> Pool:
+    """Return a pool whose factor is between participants."""
+    import pandas as pd
+
+    if effect.factor == GROUP:
+        own = people
+    else:
+        known = movements.dropna(subset=[effect.factor]).groupby("participant")[effect.factor]
+        own = known.first().reindex(sorted(movements["participant"].unique()))
+        own = own[own.notna()]
+    strata, _ = pd.factorize(own, sort=True)
+    labels = cells.columns.get_indexer(pd.Index(own))
+    means = cells.mean(axis=1).reindex(own.index)
+    left_out = _without(means[labels >= 0])
+    return Pool(means.to_numpy(float)[:, None], np.ones(1), labels, strata, left_out)
+
+
+def _without(values: "pd.Series[float]") -> tuple[str, ...]:
+    """Return the participants who have none."""
+    return tuple(map(str, values.index[values.isna()]))
+
+
+def _logarithms(values: FloatArray, effect: Effect) -> FloatArray:
+    if none := int((values <= 0.0).sum()):
+        raise ProtocolError(
+            f"log({effect.measure}): {none} of {len(values)} values are 0 or less, which have no "
+            f"logarithm; write {effect.measure}~{effect.factor}"
+        )
+    return np.log(values)
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,7 +312,7 @@ class Power:
     Attributes
     ----------
     participants, cohorts
-        How many in a cohort, and how many cohorts.
+        How many in a cohort, those who drop out included, and how many cohorts.
     power, power_low, power_high
         Share of the cohorts with p below :data:`ALPHA`, and its 95 % interval
         (:func:`labcrane.simulation.share.share_of`).
@@ -350,11 +444,13 @@ def summarise(
 
 
 def _effect_of(pool: Pool) -> float:
-    """Return the effect in the whole pool, in its unit."""
+    """Return the effect in the whole pool, in its unit; of each group as many stand for it."""
     numbers = pool.means @ pool.weights
     if pool.groups is None:
-        return float(numbers.mean())
-    one, other = (float(numbers[pool.groups == group].mean()) for group in (0, 1))
+        there = np.isfinite(numbers)
+        weights = 1.0 / np.bincount(pool.strata)[pool.strata]
+        return float(np.average(numbers[there], weights=weights[there]))
+    one, other = (float(np.nanmean(numbers[pool.groups == group])) for group in (0, 1))
     return other - one
 
 
@@ -362,22 +458,21 @@ def _drawn(
     pool: Pool, size: int, cohorts: int, random: np.random.Generator
 ) -> npt.NDArray[np.intp]:
     """Draw cohorts with replacement, from each group as many; shape ``(cohorts, size)``."""
-    if pool.groups is None:
-        return random.integers(len(pool.means), size=(cohorts, size))
+    strata = int(pool.strata.max()) + 1
     parts = []
-    for group in range(len(pool.steps)):
-        members = np.flatnonzero(pool.groups == group)
-        count = (size + group) // len(pool.steps)
+    for stratum in range(strata):
+        members = np.flatnonzero(pool.strata == stratum)
+        count = (size + stratum) // strata
         parts.append(members[random.integers(len(members), size=(cohorts, count))])
     return np.concatenate(parts, axis=1)
 
 
 def _fresh(pool: Pool, size: int, cohorts: int) -> npt.NDArray[np.intp]:
-    there = min(cohorts, len(pool.means) // size)  # some participants have left
+    there = min(cohorts, len(pool.means) // size)
     if there < 2:  # noqa: PLR2004
         raise ProtocolError(
             f"two cohorts of {size} need {2 * size} participants, and the pool has "
-            f"{len(pool.means)} with a value at every level; simulate more of them"
+            f"{len(pool.means)}; simulate more of them"
         )
     return np.arange(there * size).reshape(there, size)
 
@@ -388,26 +483,43 @@ def _permuted(
     """Permute levels within each participant, or groups over participants."""
     if labels is None:
         return random.permuted(means, axis=2), None
-    return means, random.permuted(labels, axis=1)
+    compared = labels >= 0
+    by_chance = np.argsort(np.where(compared, random.random(labels.shape), 2.0), axis=1)
+    places = np.argsort(~compared, axis=1, kind="stable")
+    mixed = labels.copy()  # whoever is of a third group stays there
+    np.put_along_axis(mixed, places, np.take_along_axis(labels, by_chance, axis=1), axis=1)
+    return means, mixed
 
 
 def _tested(means: FloatArray, labels: npt.NDArray[np.intp] | None, pool: Pool) -> Tested:
     """Return the effect of each cohort: of one sample, or Welch's of two."""
     numbers = means @ pool.weights
     if labels is None:
-        count = numbers.shape[1]
-        error = numbers.std(axis=1, ddof=1) / np.sqrt(count)
+        count, mean, square = _moments(numbers)
+        error = np.sqrt(square)
         # A small cohort may be the same participant again and again: its error is rounding.
-        error = np.where(error < ROUNDING * np.abs(numbers).max(axis=1), np.nan, error)
-        return Tested(numbers.mean(axis=1), error, np.full(len(numbers), count - 1.0))
-    means_of, squares, freedoms = [], [], []
-    for group in (0, 1):
-        own = np.where(labels == group, numbers, np.nan)
-        count = np.isfinite(own).sum(axis=1)
-        means_of.append(np.nanmean(own, axis=1))
-        squares.append(np.nanvar(own, axis=1, ddof=1) / count)
-        freedoms.append(count - 1.0)
+        largest = np.abs(np.nan_to_num(numbers)).max(axis=1)
+        error = np.where(error < ROUNDING * largest, np.nan, error)
+        return Tested(mean, error, count - 1.0)
+    (_, one, _), (_, other, _) = both = [
+        _moments(np.where(labels == group, numbers, np.nan)) for group in (0, 1)
+    ]
+    squares, freedoms = [each[2] for each in both], [each[0] - 1.0 for each in both]
     with np.errstate(invalid="ignore", divide="ignore"):
-        both = squares[0] + squares[1]
-        freedom = both**2 / (squares[0] ** 2 / freedoms[0] + squares[1] ** 2 / freedoms[1])
-    return Tested(means_of[1] - means_of[0], np.sqrt(both), freedom)
+        total = squares[0] + squares[1]
+        freedom = total**2 / (squares[0] ** 2 / freedoms[0] + squares[1] ** 2 / freedoms[1])
+    return Tested(other - one, np.sqrt(total), freedom)
+
+
+def _moments(numbers: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return how many of each cohort have a number, their mean, and its squared standard error.
+
+    NaN where too few have one; shapes ``(cohorts,)``.
+    """
+    there = np.isfinite(numbers)
+    count = there.sum(axis=1).astype(float)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.where(there, numbers, 0.0).sum(axis=1) / count
+        apart = np.where(there, numbers - mean[:, None], 0.0)
+        square = (apart**2).sum(axis=1) / np.where(count > 1.0, count - 1.0, np.nan) / count
+    return count, mean, square

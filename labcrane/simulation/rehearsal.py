@@ -21,13 +21,13 @@ from labcrane.errors import LabcraneError, ProtocolError
 from labcrane.files.pseudonyms import pseudonyms
 from labcrane.files.yaml import Place
 from labcrane.protocol.components import ComponentSpec
-from labcrane.protocol.questions import Question
+from labcrane.protocol.questions import CheckQuestion
 from labcrane.protocol.rig import Rig
 from labcrane.protocol.study import Study
 from labcrane.recording.frame_log import BatchLog, columns
 from labcrane.recording.journal import SessionJournal
 from labcrane.registry.call_monitor import promised
-from labcrane.registry.proxies import hurried
+from labcrane.registry.proxies import loosely_watched
 from labcrane.session import loop
 from labcrane.session.commands import Command, Order
 from labcrane.session.metadata import context
@@ -68,7 +68,7 @@ class Rehearsed:
 
     sessions: int
     trials: int
-    questions: tuple[Question, ...]
+    questions: tuple[CheckQuestion, ...]
 
 
 def rehearse(study: Study) -> Rehearsed:
@@ -81,7 +81,7 @@ def rehearse(study: Study) -> Rehearsed:
     """
     study.check_installed(simulated=True, feedback=False)
     _build_displays(study)
-    questions: dict[str, Question] = {}
+    questions: dict[str, CheckQuestion] = {}
     wrong: list[str] = []
     sessions = trials = 0
     for name, slot in _one_of_each_group(study):
@@ -197,19 +197,19 @@ class _Examiner:
         self._session = plan.number - 1
         self._blocks = {block.number: block for block in plan.blocks}
         self._rate_hz = study.protocol.rate_hz
-        self.course: Sequencer | None = None
+        self.sequencer: Sequencer | None = None
         self._patience: float | None = None
         self._skipped = False
         self._running: PlannedBlock | None = None
         self.ended = 0
         self.ticks = 0
-        self.questions: list[Question] = []
+        self.questions: list[CheckQuestion] = []
 
     @property
     def place(self) -> Place:
         """Where the protocol has the step that runs; the session before the first."""
         session: Place = ("sessions", self._session)
-        left = self.course.step if self.course else 0
+        left = self.sequencer.step if self.sequencer else 0
         if not left:
             return session
         for at, step in enumerate(self._steps):
@@ -244,7 +244,7 @@ class _Examiner:
         took = seconds / max(1, self.ticks)
         if self.ticks >= FEWEST_TICKS and took > HELD * period:
             self.questions.append(
-                Question(
+                CheckQuestion(
                     "rehearsal.rate_hz",
                     ("rate_hz",),
                     f"rate_hz is {self._rate_hz:g} Hz, a tick every {1e3 * period:.3g} ms, and on "
@@ -258,7 +258,7 @@ class _Examiner:
             return
         took = "does not end it" if self._skipped else "runs out of time"
         self.questions.append(
-            Question(
+            CheckQuestion(
                 f"rehearsal.{block.name}",
                 self.place,
                 f"in a trial of block {block.name!r} the simulated operator {took}; is that meant?",
@@ -272,7 +272,7 @@ def _run(study: Study, plan: SessionPlan, examiner: _Examiner) -> None:
         visit = Visit(study, plan.participant, plan.number, Path(place), simulated=True, fast=True)
         rig = Rig.build(study, simulated=True)
         with (
-            hurried((*rig.components, *rig.tasks.values())),
+            loosely_watched((*rig.components, *rig.tasks.values())),
             rig.opened(study, plan.seed) as run,
         ):
             opening = Event("session.start", 0.0, context(visit, plan, rig, run))
@@ -283,10 +283,10 @@ def _run(study: Study, plan: SessionPlan, examiner: _Examiner) -> None:
             log = BatchLog(journal, run)
             try:
                 log.note(opening)
-                examiner.course = course = Sequencer(study, plan, rig, waits=False)
+                examiner.sequencer = sequencer = Sequencer(study, plan, rig, waits=False)
                 told = [drawing.draw, lambda frame: _tell(examiner, frame)]
                 began = time.thread_time()
-                loop.run(rig, run, course, ManualClock(), examiner, log, told)
+                loop.run(rig, run, sequencer, ManualClock(), examiner, log, told)
                 examiner.timed(time.thread_time() - began - drawing.took_s)
             finally:
                 log.close()

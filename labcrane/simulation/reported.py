@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -13,14 +13,17 @@ from labcrane.analysis.parallel import work
 from labcrane.analysis.quality import is_result
 from labcrane.analysis.report import outcomes
 from labcrane.analysis.report.factors import (
+    BLOCK,
+    DISTANCE,
     GROUP,
     PHASE,
     PLACE,
+    SESSION,
     Factors,
     factors_of,
     with_factors,
 )
-from labcrane.analysis.report.outcomes import DISTANCE, SEQUENCE
+from labcrane.analysis.report.outcomes import SEQUENCE
 from labcrane.analysis.statistics.anova import compare
 from labcrane.analysis.statistics.trends import linear_trend, mixed_model
 from labcrane.errors import ProtocolError
@@ -31,6 +34,8 @@ from labcrane.simulation.power import (
     Outcomes,
     Power,
     Tested,
+    pair_of,
+    people_of,
     summarise,
 )
 from labcrane.types import FloatArray
@@ -53,7 +58,7 @@ CHUNK = 25
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedTest:
     """A planned test of the report, and the movements of the participants who are drawn.
 
     Attributes
@@ -68,12 +73,22 @@ class Planned:
         Movements that are results, with the report's factors.
     factors
         What varies in the study.
+    people
+        Everybody who may be drawn, and their group: also who has no result, as who drops out.
     """
 
     kind: Kind
     effect: Effect
     results: "pd.DataFrame"
     factors: Factors
+    people: Mapping[str, str]
+
+    @cached_property
+    def pair(self) -> tuple[str, str]:
+        """The two levels of a contrast, as the report names them: the second less the first."""
+        levels = sorted(self.results[column(self.effect.factor, self.factors)].unique())
+        one, other = map(outcomes.word, pair_of(self.effect, levels))
+        return one, other
 
     @property
     def of_groups(self) -> bool:
@@ -83,7 +98,7 @@ class Planned:
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class ReportedTest:
     """What a test says of one cohort.
 
     Attributes
@@ -99,7 +114,7 @@ class Answer:
     error: float = np.nan
     freedom: float = np.nan
 
-    def moved(self, by: float) -> "Answer":
+    def moved(self, by: float) -> "ReportedTest":
         """Return the answer, uncorrected, where the effect is larger by so much.
 
         The estimate is linear in it, and its error is of how people differ: it stays.
@@ -108,19 +123,28 @@ class Answer:
 
         estimate = self.estimate + by
         p = float(2.0 * t.sf(abs(estimate) / self.error, self.freedom))
-        return Answer(p, estimate, self.error, self.freedom)
+        return ReportedTest(p, estimate, self.error, self.freedom)
 
 
-NOTHING = Answer(np.nan)
+NOTHING = ReportedTest(np.nan)
 
 
-def plan_test(kind: Kind, effect: Effect, movements: "pd.DataFrame", claim: Claim) -> Planned:
+def plan_test(
+    kind: Kind,
+    effect: Effect,
+    movements: "pd.DataFrame",
+    claim: Claim,
+    people: Mapping[str, str] | None = None,
+) -> PlannedTest:
     """Return a planned test, tried once on everybody.
 
     Parameters
     ----------
     movements
         Of all participants, those that are no results included.
+    people
+        Everybody who began, and their group, for those who have no movement either; without it
+        those who have some.
 
     Raises
     ------
@@ -145,8 +169,10 @@ def plan_test(kind: Kind, effect: Effect, movements: "pd.DataFrame", claim: Clai
     factors = factors_of(table)
     results = table[is_result(table)]
     wanted = ["participant", "pair", "distance", "difficulty", "far_side", SEQUENCE, GROUP, PHASE]
-    kept = [name for name in (*wanted, PLACE, effect.measure) if name in results]
-    planned = Planned(kind, effect, results[kept].reset_index(drop=True), factors)
+    wanted += [SESSION, BLOCK, PLACE]
+    kept = [name for name in (*wanted, effect.measure) if name in results]
+    everybody = dict(people or people_of(movements))
+    planned = PlannedTest(kind, effect, results[kept].reset_index(drop=True), factors, everybody)
     _check(planned)
     if np.isnan(ask(planned, planned.results).p):
         raise ProtocolError(
@@ -156,11 +182,16 @@ def plan_test(kind: Kind, effect: Effect, movements: "pd.DataFrame", claim: Clai
     return planned
 
 
-def _check(planned: Planned) -> None:
+def _check(planned: PlannedTest) -> None:
     kind, effect, results = planned.kind, planned.effect, planned.results
     if kind == "contrast" and not effect.between:
         raise ProtocolError(
             f"a contrast is of two levels; write {effect.measure}~{effect.factor}[ONE,OTHER]"
+        )
+    if kind != "contrast" and effect.between:
+        raise ProtocolError(
+            f"two levels, [{','.join(effect.between)}], are compared by --test contrast, or t; "
+            f"{kind} is over all of them: write {effect.measure}~{effect.factor}"
         )
     if kind == "trend" and (effect.factor != SEQUENCE or len(planned.factors.phases) > 1):
         raise ProtocolError(
@@ -174,14 +205,10 @@ def _check(planned: Planned) -> None:
             f"{', '.join(there) or 'none here'}"
         )
     if kind == "contrast":
-        levels = [outcomes.word(each) for each in sorted(results[column(effect.factor)].unique())]
-        if unknown := [each for each in effect.between if each not in levels]:
-            raise ProtocolError(
-                f"{effect.factor} has no level {unknown[0]!r}; it has {', '.join(levels)}"
-            )
+        pair_of(effect, sorted(results[column(effect.factor, planned.factors)].unique()))
 
 
-def names(planned: Planned) -> list[str]:
+def names(planned: PlannedTest) -> list[str]:
     """Return the effects of which the report has such a test, for this measure."""
     factors, results, measure = planned.factors, planned.results, planned.effect.measure
     match planned.kind:
@@ -199,43 +226,45 @@ def names(planned: Planned) -> list[str]:
     return [] if model is None else [str(each) for each in model.terms["term"][1:]]
 
 
-def column(factor: str) -> str:
+def column(factor: str, factors: Factors) -> str:
     """Return the column of a factor that the report calls ``factor``."""
-    return PHASE if factor in {"session", "block", "phase"} else factor
+    named = {outcomes.named_factor(name, factors): name for name in factors.over_phases}
+    return named.get(factor, factor)
 
 
-def ask(planned: Planned, results: "pd.DataFrame") -> Answer:
+def ask(planned: PlannedTest, results: "pd.DataFrame") -> ReportedTest:
     """Return what the report's test says of some participants' movements."""
-    return ASKED[planned.kind](planned, results)
+    return NOTHING if results.empty else ASKED[planned.kind](planned, results)
 
 
-def _anova(planned: Planned, results: "pd.DataFrame") -> Answer:
+def _anova(planned: PlannedTest, results: "pd.DataFrame") -> ReportedTest:
     for test in outcomes.tests(results, planned.effect.measure, planned.factors):
         if outcomes.named(test, planned.factors) == planned.effect.factor:
-            return Answer(test.p_gg)
+            return ReportedTest(test.p_gg)
     return NOTHING
 
 
-def _contrast(planned: Planned, results: "pd.DataFrame") -> Answer:
+def _contrast(planned: PlannedTest, results: "pd.DataFrame") -> ReportedTest:
     effect, factors = planned.effect, planned.factors
+    one, other = planned.pair
     within = [*factors.over_phases, *[name for name in (effect.factor,) if name == DISTANCE]]
-    asked = column(effect.factor)
+    asked = column(effect.factor, factors)
     for row in compare(results, effect.measure, asked, within, factors.between):
-        if {row.first, row.second} == set(effect.between):
+        if {row.first, row.second} == {one, other}:
             # Other minus one, as the effect is written; the report's is first minus second.
-            sign = -1.0 if row.second == effect.between[1] else 1.0
-            return Answer(row.p_holm, sign * row.difference, row.se, row.df)
+            sign = -1.0 if row.second == other else 1.0
+            return ReportedTest(row.p_holm, sign * row.difference, row.se, row.df)
     return NOTHING
 
 
-def _trend(planned: Planned, results: "pd.DataFrame") -> Answer:
+def _trend(planned: PlannedTest, results: "pd.DataFrame") -> ReportedTest:
     trend = linear_trend(results.assign(sequence=results[PLACE]), planned.effect.measure)
     if trend is None:
         return NOTHING
-    return Answer(trend.p, trend.slope, trend.slope / trend.t, trend.df)
+    return ReportedTest(trend.p, trend.slope, trend.slope / trend.t, trend.df)
 
 
-def _mixed(planned: Planned, results: "pd.DataFrame") -> Answer:
+def _mixed(planned: PlannedTest, results: "pd.DataFrame") -> ReportedTest:
     model = mixed_model(results.assign(sequence=results[PLACE]), planned.effect.measure)
     if model is None or not model.converged:
         return NOTHING
@@ -243,10 +272,10 @@ def _mixed(planned: Planned, results: "pd.DataFrame") -> Answer:
     if own.empty:
         return NOTHING
     p, estimate, error = own[["p", "estimate", "se"]].to_numpy(float)[0].tolist()
-    return Answer(p, estimate, error, np.inf)
+    return ReportedTest(p, estimate, error, np.inf)
 
 
-ASKED: Mapping[Kind, Callable[[Planned, "pd.DataFrame"], Answer]] = {
+ASKED: Mapping[Kind, Callable[[PlannedTest, "pd.DataFrame"], ReportedTest]] = {
     "anova": _anova, "contrast": _contrast, "trend": _trend, "mixed": _mixed,
 }  # fmt: skip
 """What each kind of test is asked by."""
@@ -255,19 +284,14 @@ ASKED: Mapping[Kind, Callable[[Planned, "pd.DataFrame"], Answer]] = {
 class Drawer:
     """Draws cohorts of participants with replacement, from each group as many."""
 
-    def __init__(self, planned: Planned) -> None:
+    def __init__(self, planned: PlannedTest) -> None:
         self._planned = planned
-        results = planned.results
-        self._rows = list(results.groupby("participant", sort=True).indices.values())
-        group = results[GROUP].to_numpy()
-        groups = planned.factors.groups or ("",)
+        rows = planned.results.groupby("participant").indices
+        self._rows = [rows.get(name, np.empty(0, np.intp)) for name in planned.people]
+        groups = planned.factors.groups
         self._members = [
-            [
-                at
-                for at, rows in enumerate(self._rows)
-                if group[rows[0]] == each or not planned.factors.groups
-            ]
-            for each in groups
+            [at for at, own in enumerate(planned.people.values()) if own == each or not groups]
+            for each in groups or ("",)
         ]
 
     def draw(self, size: int, random: np.random.Generator) -> npt.NDArray[np.intp]:
@@ -305,7 +329,7 @@ class Drawer:
 
 
 def power_of_report(
-    planned: Planned,
+    planned: PlannedTest,
     sizes: Sequence[int],
     cohorts: int,
     seed: int,
@@ -335,7 +359,7 @@ def power_of_report(
             Outcomes(_p(null, claim)),
             true if claim.kind == "difference" else 0.0,
             np.stack([one.drawn for one in tried]),
-            planned.results["participant"].nunique(),
+            len(planned.people),
         )
 
 
@@ -344,12 +368,12 @@ class Tried:
     """A cohort that was tested: who was drawn, and what the test says of it and of nothing."""
 
     drawn: npt.NDArray[np.intp]
-    found: Answer
-    null: Answer
+    found: ReportedTest
+    null: ReportedTest
 
 
 def _chunk(
-    planned: Planned, by: float | None, order: tuple[int, int, int, int]
+    planned: PlannedTest, by: float | None, order: tuple[int, int, int, int]
 ) -> tuple[int, list[Tried]]:
     """Test some cohorts, with the effect moved and with nothing to find; a worker's function."""
     size, seed, first, last = order
@@ -364,7 +388,7 @@ def _chunk(
     return first, tried
 
 
-def _found(planned: Planned, cohort: "pd.DataFrame", by: float | None) -> Answer:
+def _found(planned: PlannedTest, cohort: "pd.DataFrame", by: float | None) -> ReportedTest:
     """Return what the test says of a cohort in which the effect is larger by so much.
 
     A contrast is corrected with all others of its factor, which the second level is part of: its
@@ -375,11 +399,11 @@ def _found(planned: Planned, cohort: "pd.DataFrame", by: float | None) -> Answer
     if planned.kind != "contrast":
         return ask(planned, cohort).moved(by)
     effect = planned.effect
-    own = cohort[column(effect.factor)].map(outcomes.word) == effect.between[1]
+    own = cohort[column(effect.factor, planned.factors)].map(outcomes.word) == planned.pair[1]
     return ask(planned, cohort.assign(**{effect.measure: cohort[effect.measure] + by * own}))
 
 
-def _p(answers: Sequence[Answer], claim: Claim) -> FloatArray:
+def _p(answers: Sequence[ReportedTest], claim: Claim) -> FloatArray:
     if claim.kind == "difference":
         return np.array([each.p for each in answers])
     columns = ("estimate", "error", "freedom")

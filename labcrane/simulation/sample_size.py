@@ -156,6 +156,7 @@ def paragraph(
                 f"An effect that is found is then overstated by a factor of {found.type_m:.2f} on "
                 f"average, and has the wrong sign in {100 * found.type_s:.1f} % of cases."
             )
+    sentences.append("Participants are counted when they begin: whoever drops out is one of them.")
     sentences.append(
         "A pilot is small: its own chance is in these numbers."
         if recorded

@@ -33,7 +33,7 @@ from labcrane.session.commands import Command, Order
 from labcrane.session.sequencer import Sequencer
 from labcrane.session.session import ForwardMaker, record, run
 from labcrane.session.visit import Visit
-from labcrane.simulation.fast_forward import FastForward, Way
+from labcrane.simulation.fast_forward import FastForward, SimulatedBy
 from labcrane.simulation.population import read_population
 
 if TYPE_CHECKING:
@@ -206,10 +206,10 @@ def _record(visit: Visit, attendance: Attendance, forward: ForwardMaker | None) 
     record(visit, attendance, forward=forward)
 
 
-def _run(runner: Runner, visit: Visit, attendance: Attendance, loop: str) -> Way:
+def _run(runner: Runner, visit: Visit, attendance: Attendance, loop: str) -> SimulatedBy:
     if loop:
         runner(visit, attendance, None)
-        return Way(compiled=False, why=loop)
+        return SimulatedBy(compiled=False, why=loop)
     made: list[FastForward] = []
 
     def forward(rig: Rig, run: Run, sequencer: Sequencer, log: BatchLog) -> FastForward:

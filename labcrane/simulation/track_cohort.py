@@ -64,7 +64,7 @@ class Ability:
 
 
 @dataclass(frozen=True, slots=True)
-class Quality:
+class TrackQuality:
     """How well a track finds thresholds, in the levels' unit.
 
     Attributes
@@ -161,7 +161,7 @@ def observe(track: PlannedTrack, people: Sequence[Ability], seed: int) -> "pd.Da
     return pd.DataFrame(rows, columns=columns)
 
 
-def quality(track: PlannedTrack, found: "pd.DataFrame") -> Quality:
+def quality(track: PlannedTrack, found: "pd.DataFrame") -> TrackQuality:
     """Return bias and spread of a track's estimates."""
     from scipy.stats import t
 
@@ -176,14 +176,14 @@ def quality(track: PlannedTrack, found: "pd.DataFrame") -> Quality:
     bias, spread = float(errors.mean()), float(errors.std(ddof=1))
     reach = float(t.ppf(0.975, count - 1)) * spread / count**0.5
     end = int(count * END)
-    return Quality(
+    return TrackQuality(
         track.name, track.settings.by, len(found), len(found) - count, bias, bias - reach,
         bias + reach, spread, bias / spread, float(errors[:end].mean()),
         float(errors[-end:].mean()), float(found["trials"].mean()), float(found["ended"].mean()),
     )  # fmt: skip
 
 
-def paragraph(found: Sequence[Quality]) -> str:
+def paragraph(found: Sequence[TrackQuality]) -> str:
     """Return what an application to an ethics board says of tracks."""
     sentences = []
     for each in found:

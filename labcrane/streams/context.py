@@ -80,7 +80,9 @@ def _standing_after(now: SessionState, event: Event) -> SessionState:
             return replace(now, waiting=data["what"])
         case "break.start":
             return replace(now, waiting="break")
-        case "step.end" | "break.end":
+        case "judgement.awaited":
+            return replace(now, waiting="judgement")
+        case "step.end" | "break.end" | "judgement.over":
             return replace(now, waiting="")
         case "session.end":
             return replace(now, waiting="", over=data["reason"])
@@ -97,6 +99,10 @@ def _read_after(now: SessionState, event: Event) -> SessionState:
             return replace(now, questionnaire=data["title"])
         case "step.end" | "questionnaire.end":
             return replace(now, text="", questionnaire="")
+        case "fixation.shown":
+            return replace(now, waiting="", fixation=(data["x"], data["y"]))
+        case "fixation.over":
+            return replace(now, fixation=())
         case "order.hint" if data["refused"] is None:
             return replace(now, hint=data["text"], hint_time=event.time)
     return now

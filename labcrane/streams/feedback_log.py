@@ -15,7 +15,7 @@ import numpy as np
 from labcrane.core.records import Frame
 from labcrane.core.roles import Feedback
 from labcrane.core.signals import Layout
-from labcrane.streams.outlets import Samples, channel, source_id, stream_info
+from labcrane.streams.outlets import SampleOutlet, channel, source_id, stream_info
 from labcrane.types import FloatArray
 
 HEAD = (("frame.tick", "1"), ("frame.due", "s"), ("frame.skipped", "1"))
@@ -79,7 +79,7 @@ class FeedbackLog:
         for samples in self._samples.values():
             samples.close()
 
-    def _open(self, name: str, source: str, layout: Layout) -> Samples:
+    def _open(self, name: str, source: str, layout: Layout) -> SampleOutlet:
         info = stream_info(
             name,
             "Feedback",
@@ -90,4 +90,4 @@ class FeedbackLog:
         )
         for label, unit in (*HEAD, *zip(layout.columns, layout.units, strict=True)):
             channel(info, label=label, unit=unit, type="Feedback")
-        return Samples(info, len(HEAD) + layout.size)
+        return SampleOutlet(info, len(HEAD) + layout.size)

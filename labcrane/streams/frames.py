@@ -12,7 +12,7 @@ import numpy as np
 from labcrane.core.records import Frame, Run
 from labcrane.recording.frame_log import FrameRow, columns, sizes
 from labcrane.recording.journal import Column
-from labcrane.streams.outlets import Samples, channel, stream_info
+from labcrane.streams.outlets import SampleOutlet, channel, stream_info
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ class FrameOutlet:
             channel(info, label=_label(column), unit=column.unit, type="Frame")
         self._row = np.zeros(len(held))
         self._fill = FrameRow(sizes(run), wrote=False).fill
-        self._samples = Samples(info, len(held))
+        self._samples = SampleOutlet(info, len(held))
 
     @property
     def description(self) -> str:

@@ -7,6 +7,7 @@ import weakref
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from labcrane.errors import StreamError
 from labcrane.streams.search import Search, equal
 
 if TYPE_CHECKING:
@@ -21,9 +22,6 @@ SILENT_S = 5.0
 
 MOST = 4096
 MOST_A_TICK = 64
-
-Refusal = str
-"""Why a stream that was found is of no use, for people."""
 
 _open: "weakref.WeakSet[NewestSample]" = weakref.WeakSet()
 
@@ -40,14 +38,14 @@ class NewestSample:
         What the stream's description says, by property: ``{"name": "panel", "hostname": "lab-2"}``.
     accept
         Is given the description of a stream that was found, before it is received, in the thread.
-        It returns why it is of no use, or None.
+        It raises :class:`labcrane.StreamError` to say why the stream is of no use.
     buffer_s
         How much is kept while nobody pulls, in seconds.
 
     Attributes
     ----------
     complaint
-        What ``accept`` said of the stream that was found last; empty when it is received.
+        What ``accept`` raised of the stream that was found last; empty when it is received.
     info
         The description of the stream that is received, or was last; None before the first.
     """
@@ -55,7 +53,7 @@ class NewestSample:
     def __init__(
         self,
         wanted: Mapping[str, str],
-        accept: "Callable[[pylsl.StreamInfo], Refusal | None] | None" = None,
+        accept: "Callable[[pylsl.StreamInfo], None] | None" = None,
         buffer_s: int = 2,
     ) -> None:
         self.complaint = ""
@@ -167,21 +165,39 @@ class NewestSample:
         inlet = pylsl.StreamInlet(
             info, max_buflen=self._buffer_s, recover=False, processing_flags=0
         )
-        whole = info
         try:
             whole = inlet.info(timeout=OPEN_S)
-            refusal = self._accept(whole) if self._accept is not None else None
-            if refusal is None:
-                inlet.open_stream(timeout=OPEN_S)
-        except (pylsl.util.TimeoutError, pylsl.util.LostError) as error:
-            refusal = f"it was there and is gone again ({error})"
-        if refusal is not None:
-            self.complaint = refusal
+            if self._accept is not None:
+                self._accept(whole)
+            inlet.open_stream(timeout=OPEN_S)
+        except (StreamError, pylsl.util.TimeoutError, pylsl.util.LostError) as error:
+            refused = isinstance(error, StreamError)
+            self.complaint = str(error) if refused else f"it was there and is gone again ({error})"
             self._over.wait(LOOK_S)
             return
         self.complaint, self.info, self._came = "", whole, time.monotonic()
         self._inlet = inlet
         self._connected.set()
+
+
+def numeric_labels(info: "pylsl.StreamInfo") -> list[str]:
+    """Return the labels of the channels of a stream of numbers, in order; those that have one.
+
+    Raises
+    ------
+    StreamError
+        It is of text, or has more labels than channels.
+    """
+    import pylsl  # noqa: PLC0415
+
+    labels = [str(label) for label in info.get_channel_labels() or []]
+    of_text = info.channel_format() == pylsl.cf_string
+    if of_text or len(labels) > info.channel_count():
+        raise StreamError(
+            f"it has {info.channel_count()} channels of {'text' if of_text else 'numbers'}, and "
+            f"{len(labels)} labels; send numbers, and a label for each channel"
+        )
+    return labels
 
 
 @atexit.register

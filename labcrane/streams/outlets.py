@@ -78,8 +78,8 @@ class Outlets:
         import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
 
         self._labels = Labels()
-        self._state = Samples(state, run.state.size)
-        self._input = Samples(axes, run.axes.size)
+        self._state = SampleOutlet(state, run.state.size)
+        self._input = SampleOutlet(axes, run.axes.size)
         self._markers: pylsl.StreamOutlet | None = pylsl.StreamOutlet(markers)
         self._names: pylsl.StreamOutlet | None = pylsl.StreamOutlet(names)
         self._numbers: pylsl.StreamOutlet | None = pylsl.StreamOutlet(numbers)
@@ -104,7 +104,7 @@ class Outlets:
         self._markers = self._names = self._numbers = None
 
 
-class Samples:
+class SampleOutlet:
     """An outlet of float64 samples.
 
     liblsl is handed a buffer of our own: half the time of ``push_sample`` with a list, and a third

@@ -8,10 +8,12 @@ from contextlib import ExitStack, contextmanager
 from labcrane.core.records import Echo, Event, Frame, Run, Value
 from labcrane.core.roles import Trigger
 from labcrane.errors import PluginError
+from labcrane.limits import LIMITS
 from labcrane.streams.markers import CODES
 
 SENT, UNSENT, ECHO = "trigger.sent", "trigger.unsent", "trigger.echo"
 LOST, BACK = "trigger.lost", "trigger.back"
+FLOOD = "trigger.flood"
 HIGHEST = 255
 """Eight lines carry no more."""
 
@@ -20,6 +22,12 @@ LAST_S, BETWEEN_S = 0.25, 0.005
 
 WAITING = 64
 """Codes that are waited for at most; a line without echoes is waited for in vain."""
+
+LOOKED_AT = LIMITS["trigger echo"].most
+"""Codes of a tick that are looked at; a device that sends more is broken, or somebody else's."""
+
+STRAYS = 20
+"""Codes a second that were never sent, and are written down all the same."""
 
 
 class _Line:
@@ -38,6 +46,9 @@ class _Line:
         self.fault: str | None = None
         self.answers = False
         self.waiting: deque[tuple[int, float]] = deque(maxlen=WAITING)
+        self.strays = STRAYS
+        self.left_out = 0
+        self.second: int | None = None
 
 
 class Triggers:
@@ -83,6 +94,7 @@ class Triggers:
                     data["why"] = fault
                 self._write(SENT if fault is None else UNSENT, frame.tick.due, line, data)
             self._take(line, echoes)
+            self._tell_of_flood(line, frame.tick.due)
             self._look(line, frame)
 
     def finish(self) -> None:
@@ -93,12 +105,33 @@ class Triggers:
             time.sleep(BETWEEN_S)
             for line in owing:
                 self._take(line, line.trigger.send((), time.perf_counter()))
+        for line in self._lines:
+            line.second = -1
+            self._tell_of_flood(line, time.perf_counter())
 
     def _take(self, line: _Line, echoes: Sequence[Echo]) -> None:
-        for echo in echoes:
+        """Note what came back; of codes that nobody sent, so many as a record can bear."""
+        for echo in echoes[:LOOKED_AT]:
             line.answers = True
             delay_s = _delay(line.waiting, echo.code, echo.time)
+            if delay_s is None and line.strays <= 0:
+                line.left_out += 1
+                continue
+            line.strays -= delay_s is None
             self._write(ECHO, echo.time, line, {"code": echo.code, "delay_s": delay_s})
+        line.left_out += max(0, len(echoes) - LOOKED_AT)
+
+    def _tell_of_flood(self, line: _Line, now: float) -> None:
+        """Say once a second how many codes were left out."""
+        if line.second is None:
+            line.second = int(now)
+        if int(now) == line.second:
+            return
+        line.second, line.strays = int(now), STRAYS
+        if line.left_out:
+            why = f"{line.name} sent {line.left_out} codes that nobody asked for; they are left out"
+            line.left_out = 0
+            self._tell(self._write(FLOOD, now, line, {"why": why}))
 
     def _look(self, line: _Line, frame: Frame) -> None:
         """Say once that a line is lost, and once that it is back."""

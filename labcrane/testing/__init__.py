@@ -12,7 +12,7 @@ name the promise it breaks. Each contract opens it beside stand-ins for the othe
 from labcrane.testing.commands import CommandContract
 from labcrane.testing.components import PluginContract, check_closes_after_failed_open, check_soon
 from labcrane.testing.examinations import ExaminationContract
-from labcrane.testing.exporters import ExporterContract
+from labcrane.testing.exporters import PARTICIPANT_TRIALS, ExporterContract, make_participant
 from labcrane.testing.monitors import SignalMonitorContract
 from labcrane.testing.presentation import TARGETS, CueContract, FeedbackContract, make_target
 from labcrane.testing.questionnaires import QuestionnaireContract
@@ -37,6 +37,7 @@ from labcrane.testing.triggers import TriggerContract
 from labcrane.testing.twins import TwinContract
 
 __all__ = [
+    "PARTICIPANT_TRIALS",
     "RATE_HZ",
     "STICKS",
     "TARGETS",
@@ -62,6 +63,7 @@ __all__ = [
     "crane_at",
     "crane_state",
     "make_frame",
+    "make_participant",
     "make_run",
     "make_target",
     "make_trial",

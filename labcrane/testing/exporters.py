@@ -18,12 +18,13 @@ from labcrane.recording.participant_file.writer import consolidate
 
 RATE_HZ = 100.0
 MOVEMENT_S = 2.0
-TRIALS = 4
+PARTICIPANT_TRIALS = 4
+"""Trials of :func:`make_participant`."""
 
 POINT = ("x", "y", "z")
 
 
-def a_participant(folder: Path, name: str = "P001") -> Participant:
+def make_participant(folder: Path, name: str = "P001") -> Participant:
     """Return a made-up participant, whose slew goes to and fro four times, in a file in ``folder``.
 
     It goes as a minimum-jerk movement does; the sticks follow its speed.
@@ -41,7 +42,7 @@ def _write(path: Path, name: str) -> None:
     with SessionJournal(path, _columns(machine), RATE_HZ) as journal:
         journal.write_event(Event("session.start", 0.0, _context(name)), 0)
         tick, dt = 0, 1.0 / RATE_HZ
-        for trial in range(1, TRIALS + 1):
+        for trial in range(1, PARTICIPANT_TRIALS + 1):
             began = tick * dt
             journal.write_event(Event("trial.start", began, {"trial": trial, "attempt": 1}), tick)
             for number, row in enumerate(_movement(machine, outward=bool(trial % 2))):
@@ -114,7 +115,7 @@ def _row(trial: int, began: float) -> dict[str, float | int | str | bool | None]
         "block": 1,
         "practice": False,
         "counted": True,
-        "pair": "near" if trial <= TRIALS // 2 else "far",
+        "pair": "near" if trial <= PARTICIPANT_TRIALS // 2 else "far",
         "distance": 1.0,
         "width": 0.5,
         "difficulty": float(np.log2(3.0)),
@@ -137,7 +138,7 @@ class ExporterContract:
     def test_an_export_has_files_of_every_participant(
         self, exporter: Exporter, tmp_path: Path
     ) -> None:
-        people = [a_participant(tmp_path, name) for name in ("P001", "P002")]
+        people = [make_participant(tmp_path, name) for name in ("P001", "P002")]
         out = tmp_path / "out"
         out.mkdir()
         exporter.export(people, out)
@@ -151,7 +152,7 @@ class ExporterContract:
             )
 
     def test_participants_are_gone_through_once(self, exporter: Exporter, tmp_path: Path) -> None:
-        person = a_participant(tmp_path)
+        person = make_participant(tmp_path)
         out = tmp_path / "out"
         out.mkdir()
         asked: list[str] = []
@@ -168,7 +169,7 @@ class ExporterContract:
         )
 
     def test_recordings_are_not_touched(self, exporter: Exporter, tmp_path: Path) -> None:
-        person = a_participant(tmp_path)
+        person = make_participant(tmp_path)
         before = person.path.read_bytes()
         out = tmp_path / "out"
         out.mkdir()

@@ -4,8 +4,8 @@ import math
 from collections.abc import Mapping
 
 from labcrane.analysis.indicator import Performance, indicate
-from labcrane.analysis.indicator_settings import IndicatorSettings
-from labcrane.analysis.operator_tests import COUNTS, RATINGS, TIME, completion
+from labcrane.analysis.indicator_settings import COUNTS, TIME, IndicatorSettings
+from labcrane.analysis.operator_tests import DROPS, RATINGS, completion
 from labcrane.core.records import Event, Value
 
 SHARE = "score.share"
@@ -13,11 +13,14 @@ ORDERS = ("order.override", "order.completion")
 LIVE = {name: f"task.mistakes.{name}" for name in COUNTS}
 """The columns of a frame that hold what has been counted so far."""
 
+LIVE_DROPS = "task.mistakes.drop"
+
 WORDS = {
     "object": "objects hit",
     "body": "body hit",
     "overload_max": "overloads, max direction",
     "overload_min": "overloads, min direction",
+    "drop": "drops",
 }
 
 
@@ -94,9 +97,11 @@ class Assessment:
 
     def _measured(self, newest: Mapping[str, float]) -> tuple[float, dict[str, float]]:
         if self._row is None:
-            return newest["elapsed"], {name: newest[column] for name, column in LIVE.items()}
+            seen = LIVE | ({"drop": LIVE_DROPS} if LIVE_DROPS in newest else {})
+            return newest["elapsed"], {name: newest[column] for name, column in seen.items()}
         row = self._row
-        return _number(row[TIME]), {name: _number(row[column]) for name, column in COUNTS.items()}
+        ended = COUNTS | ({"drop": DROPS} if DROPS in row else {})
+        return _number(row[TIME]), {name: _number(row[column]) for name, column in ended.items()}
 
     def _heading(self, *, running: bool) -> str:
         about = self._about
@@ -135,6 +140,7 @@ class Assessment:
             overload_max=counts["overload_max"],
             overload_min=counts["overload_min"],
             completed=completed,
+            drop=counts.get("drop", 0),
             **ratings,
         )
         found = indicate(test, reference, settings)

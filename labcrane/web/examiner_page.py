@@ -9,7 +9,7 @@ from labcrane.web.page import PRIMARY, PageContext, keep_drafts, see_through, sp
 from labcrane.web.panels import Cameras, Reports
 from labcrane.web.participant_page import STYLE as FORM_STYLE
 from labcrane.web.room.snapshot import Snapshot
-from labcrane.web.scene import Scene
+from labcrane.web.scene import SceneView
 
 RATE_S = 0.25
 
@@ -61,7 +61,7 @@ def supervisor_page(context: PageContext) -> None:
     with room.add_slot("reports"):
         Reports(context, SUPERVISOR).build()
     with room.add_slot("machine"):
-        Scene(context).build()
+        SceneView(context).build()
     with room.add_slot("cameras"):
         Cameras(context).build()
 

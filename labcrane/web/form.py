@@ -47,7 +47,7 @@ class Form:
     def update(self) -> None:
         """Follow the record."""
         session = self._context.session
-        shown = session.form_version, session.stage.startswith("ended")
+        shown = session.form_version, session.over
         if shown != self._shown:
             self._shown = shown
             self._at = 0

@@ -12,7 +12,7 @@ from labcrane.errors import DeviceError
 from labcrane.processes.handle import Patience, ProcessHandle
 from labcrane.session.commands import Command
 from labcrane.web.service import Closed, Opened, PageConfig, Report, Streams, Used
-from labcrane.web.state import Ended
+from labcrane.web.state import SessionLeft
 
 MODULE = "labcrane.web.service"
 
@@ -89,7 +89,7 @@ class PageHandle:
             self._told.append(event)
             self._process.tell(event)
 
-    def close(self, ended: Ended) -> None:
+    def close(self, ended: SessionLeft) -> None:
         """Show the end until the supervisor has closed the page, and end the process.
 
         Where no browser has it, nobody is waited for. An interrupt at the terminal closes it too.

@@ -21,7 +21,7 @@ CAMERAS: Mapping[str, tuple[float, float, float]] = {
 """Where cameras stand, as shares of the machine's reach; any can be moved with the mouse."""
 
 
-class Scene:
+class SceneView:
     """Follows a session: pose, targets, cues and what stands around."""
 
     def __init__(self, context: PageContext) -> None:

@@ -21,7 +21,7 @@ from labcrane.processes.parent import Parent
 from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
 from labcrane.session.commands import Command, Order
-from labcrane.web.door.access import SCOPE, SUPERVISOR, Gate, Keys
+from labcrane.web.door.access import SCOPE, SUPERVISOR, AccessKeys, Gate
 from labcrane.web.door.denials import Denials
 from labcrane.web.door.serving import AWAY_S, MOST_HEAD, build_pages
 from labcrane.web.live import Live
@@ -29,7 +29,7 @@ from labcrane.web.page import PageContext
 from labcrane.web.pictures import Pictures
 from labcrane.web.room.earlier import Earlier, read_behind
 from labcrane.web.room.shown import ShownShapes
-from labcrane.web.state import Ended, SessionView
+from labcrane.web.state import SessionLeft, SessionView
 
 FORBIDDEN, NOT_FOUND = 403, 404
 NICENESS = 5
@@ -69,7 +69,7 @@ class PageConfig:
     cameras: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     certificate: Path | None = None
     key: Path | None = None
-    keys: Keys = field(default_factory=Keys)
+    keys: AccessKeys = field(default_factory=AccessKeys)
     recorded: bool = False
     data: Path | None = None
 
@@ -92,7 +92,7 @@ class Streams:
 class Report:
     """Said by the launcher at the end: what the session left behind."""
 
-    ended: Ended
+    ended: SessionLeft
 
 
 @dataclass(frozen=True, slots=True)

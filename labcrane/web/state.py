@@ -15,11 +15,41 @@ KEPT = 500
 RATES = 60
 """How many of the newest rates of each stream are kept."""
 
+
+@dataclass(frozen=True, slots=True)
+class SessionStage:
+    """Where a session stands by its record alone: what holds it or runs in it comes on top.
+
+    Attributes
+    ----------
+    state
+        ``"starting"``, ``"waiting"``, ``"break"``, ``"fixation"``, ``"judgement"``,
+        ``"between"`` or ``"ended"``.
+    text
+        The same in words.
+    what
+        What waits to be started, if something does.
+    """
+
+    state: str
+    text: str
+    what: str = ""
+
+
+STARTING, BETWEEN = SessionStage("starting", "starting"), SessionStage("between", "between steps")
+JUDGEMENT = SessionStage(
+    "judgement",
+    "the test has ended: say whether it is completed, or override its end, and go on; without a "
+    "word it counts as it ended",
+)
 STAGES = {
-    "consent.needed": "waits for the participant's consent",
-    "consent.given": "starting",
-    "trial.start": "trial",
-    **dict.fromkeys(("step.end", "questionnaire.end", "break.end"), "between steps"),
+    "consent.needed": SessionStage("waiting", "waits for the participant's consent"),
+    "consent.given": STARTING,
+    "trial.start": SessionStage("between", "trial"),
+    "judgement.awaited": JUDGEMENT,
+    **dict.fromkeys(
+        ("step.end", "questionnaire.end", "break.end", "fixation.over", "judgement.over"), BETWEEN
+    ),
 }
 """Where the session stands after an event that says nothing more of it."""
 
@@ -31,7 +61,7 @@ LOST = {
 
 
 @dataclass(frozen=True, slots=True)
-class Ended:
+class SessionLeft:
     """What a session left behind, as its page shows it.
 
     Attributes
@@ -98,7 +128,7 @@ class SessionView:
     def __init__(self) -> None:
         self.version = 0
         self.events: deque[Event] = deque(maxlen=KEPT)
-        self.stage = "starting"
+        self.stage = STARTING
         self.holds: set[str] = set()
         self.trial: Mapping[str, Value] = {}
         self.trials_done = 0
@@ -112,14 +142,19 @@ class SessionView:
         self.streams: Mapping[str, Any] = {}
         self.reported: list[str] = []
         self.rates: dict[str, deque[float | None]] = {}
-        self.faults: dict[str, str] = {}
+        self.faults: dict[tuple[str, str], str] = {}
         self.settings: dict[str, dict[str, Value]] = {}
         self.rows: list[Mapping[str, Value]] = []
-        self.ended: Ended | None = None
+        self.ended: SessionLeft | None = None
         self.last_trial: Mapping[str, Value] = {}
         self.alarm = ""
         self.consent: Mapping[str, Value] = {}
         self.assessment = Assessment()
+
+    @property
+    def over(self) -> bool:
+        """Whether the session has ended."""
+        return self.stage.state == "ended" or self.ended is not None
 
     def take(self, event: Event) -> None:
         """Take in the next event."""
@@ -163,7 +198,7 @@ class SessionView:
     def _fault(self, kind: str, what: str, data: Mapping[str, Value]) -> None:
         """Note what was lost, is back, or stands at another value."""
         name = str(data.get("what", ""))
-        key = f"{kind} {name or data.get('trigger', '')}".strip()
+        key = (kind, name or str(data.get("trigger", "")))
         if (kind, what) == ("feedback", "setting"):
             mine = self.settings.setdefault(str(data["feedback"]), {})
             mine[str(data["key"])] = data["value"]
@@ -177,15 +212,21 @@ class SessionView:
         self.stage = STAGES.get(event.name, self.stage)
         match event.name:
             case "waiting":
-                self.stage = f"waits to start: {event.data['what']}"
+                what = str(event.data["what"])
+                self.stage = SessionStage("waiting", f"waits to start: {what}", what)
             case "break.start":
-                self.stage = f"break of {event.data['seconds']} s"
+                self.stage = SessionStage("break", f"break of {event.data['seconds']} s")
+            case "fixation.shown":
+                text = f"eye tracker's check: point {event.data['point']}"
+                self.stage = SessionStage("fixation", text)
             case "questionnaire.start":
-                self.stage = f"questionnaire: {event.data['title']}"
+                self.stage = SessionStage("between", f"questionnaire: {event.data['title']}")
             case "session.end":
-                self.stage = f"ended: {event.data['reason']}"
+                self.stage = SessionStage("ended", f"ended: {event.data['reason']}")
             case "pause.end":
                 self.alarm = ""
+            case "judgement.awaited":
+                self.last_trial = self.last_trial or event.data  # it may have ended before a resume
             case "order.report" if event.data["refused"] is None:
                 self.reported.append(str(event.data["text"]))
 

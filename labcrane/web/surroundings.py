@@ -8,9 +8,9 @@ import numpy as np
 
 from labcrane.machines.human_figure import Geom, ShapeKind
 from labcrane.machines.jointed_body import Segment, beside, segments, stands
+from labcrane.machines.rotation import rotation_matrix
 from labcrane.machines.scene import PlacedObject
 from labcrane.machines.scene_codec import read_placed
-from labcrane.web.room.model import rotation
 
 if TYPE_CHECKING:
     from nicegui import ui
@@ -54,7 +54,7 @@ class Surroundings:
             turn = [newest.get(f"state.scene.{name}.orientation.{q}", math.nan) for q in "xyzw"]
             if all(map(math.isfinite, (*where, *turn))):
                 group.move(*where)
-                group.rotate_R(rotation(turn))
+                group.rotate_R(rotation_matrix(turn).tolist())
 
     def _draw(self, placed: PlacedObject, segment: Segment) -> "Group":
         first = segment.parts[0]

@@ -41,7 +41,10 @@ class Aiming(Task):
         Signal("reaction_time", "s"),  # from the trial's start to the movement's onset
         Signal("command_onset", "s"),  # from the trial's start to the first command
         Signal("movement_time", "s"),  # from onset to offset
-        Signal("circle_to_circle", "s"),  # from the trial's start, the end of the one before
+        Signal("onset_to_rest", "s"),  # from onset to the beginning of the rest it ended in
+        Signal("at_rest", "s"),  # how long that rest was when the trial ended; 0 while moving
+        Signal("circle_to_circle", "s"),  # from the trial's start, the end of the one before; NaN
+        # without an onset, as the times before it
         Signal("between_circles", "s"),  # from leaving the one circle to entering the other
         Signal("first_entry", "s"),  # from the trial's start to the first time inside
         Signal("entries", "1"),  # times the tip came into the circle
@@ -118,9 +121,9 @@ class Aiming(Task):
 
     def open(self, run: Run) -> None:
         # A protocol is checked, and a study planned, without loading numpy.
-        from labcrane_aiming.movement import Movement  # noqa: PLC0415
+        from labcrane_aiming.movement import AimedMovement  # noqa: PLC0415
 
-        self._movement_from = partial(Movement, self._settings)
+        self._movement_from = partial(AimedMovement, self._settings)
         self._tip = run.state.find("tip.position")
         self._velocity = run.state.find("tip.velocity")
         self._command = run.command.find("command")
@@ -144,7 +147,7 @@ class Aiming(Task):
         movement, state = self._movement, frame.state.tolist()
         movement.see(frame.elapsed, frame.tick.due, state[self._tip], state[self._velocity])
         events = self._moments(frame)
-        phase, end = self._phase(frame)
+        phase, end = self._phase(frame, events)
         if not phase.over:
             return TrialStatus(phase, self._values, tuple(events)) if events else self._going_on
         onset = movement.onset()
@@ -160,21 +163,23 @@ class Aiming(Task):
 
         from labcrane_aiming.compiled import CHANGING, evaluate  # noqa: PLC0415 - loads numba
 
-        own = np.zeros(16 + 7)
+        own = np.zeros(18 + 7)
         return Twin(evaluate, own, CHANGING, self._take_over, self._hand_back)
 
     def _take_over(self, own: "FloatArray", seen: Frame) -> bool:
         from labcrane_aiming.movement import ROUNDING_S  # noqa: PLC0415 - loads numpy
 
         settings, movement, command = self._settings, self._movement, self._command
-        own[:16] = (
+        own[:18] = (
             movement.rest_since, movement.inside, movement.entries, self._pressed,
+            max(movement.speed, default=0.0) > settings.onset_speed,
             not math.isnan(movement.command_onset), settings.rest_speed,
             settings.rest_s - ROUNDING_S, self._limit, settings.width / 2,
             END_RULES.index(settings.end), self._trigger or 0, settings.rest_after,
             self._tip.start, self._velocity.start, command.start, command.stop,
+            settings.onset_speed,
         )  # fmt: skip
-        own[16:] = self._values
+        own[18:] = self._values
         return True
 
     def _hand_back(self, own: "FloatArray", rows: "FloatArray", places: "Places") -> None:
@@ -203,22 +208,39 @@ class Aiming(Task):
                 events.append(Event("target.entered", due))
         return events
 
-    def _phase(self, frame: Frame) -> tuple[Phase, int | None]:
+    def _phase(self, frame: Frame, events: list[Event]) -> tuple[Phase, int | None]:
         movement = self._movement
         if self._trigger is not None:
             pressed = bool(frame.axes[self._trigger] > PRESSED)
             edge, self._pressed = pressed and not self._pressed, pressed
-            if edge:
+            if edge and self._is_tap(frame.elapsed):
                 return Phase.SUCCESS, movement.ticks - 1
+            if edge:
+                events.append(Event("tap.ignored", frame.tick.due, {"before": "movement.onset"}))
         elif movement.rested and self._arrived():
             return Phase.SUCCESS, movement.tick_at(movement.rest_since)
         if frame.elapsed >= self._limit:
             return Phase.TIMEOUT, None
         return RUNNING, None
 
+    def _is_tap(self, elapsed: float) -> bool:
+        """Whether a press now says where somebody meant to come to.
+
+        A second press or a bouncing button is none. Whoever is in the target without having moved,
+        as after a trial that is repeated, may say so, but not at once: the press may be the
+        last movement's.
+        """
+        settings, movement = self._settings, self._movement
+        return movement.begun or (movement.inside and elapsed >= settings.rest_s)
+
     def _arrived(self) -> bool:
-        anywhere = self._settings.end == "rest_anywhere"
-        return not anywhere or self._movement.done >= self._settings.rest_after
+        if self._settings.end != "rest_anywhere":
+            return True
+        movement = self._movement
+        # Where the last movement ended may be beyond that share of the way of a repeated one.
+        return movement.done >= self._settings.rest_after and (
+            movement.inside or movement.onset() is not None
+        )
 
 
 def _short(value: float) -> str:

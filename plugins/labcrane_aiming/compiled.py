@@ -5,12 +5,13 @@ import math
 from labcrane import FloatArray
 from labcrane.core import Places, compiled, twin
 
-RESTS_SINCE, INSIDE, ENTRIES, PRESSED = range(4)
-CHANGING = 4
+RESTS_SINCE, INSIDE, ENTRIES, PRESSED, FAST = range(5)
+CHANGING = 5
 COMMANDED, REST_SPEED, REST, LIMIT, HALF, RULE, TRIGGER, AFTER, TIP, VELOCITY, FIRST, LAST = range(
-    4, 16
+    5, 17
 )
-SHOWN = 16
+ONSET_SPEED = 17
+SHOWN = 18
 """The task's signals: target, radius and where the movement comes from."""
 
 REST_INSIDE, REST_ANYWHERE, BY_TRIGGER = range(3)
@@ -48,6 +49,8 @@ def evaluate(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray)
         own[RESTS_SINCE] = math.nan
     elif math.isnan(own[RESTS_SINCE]):
         own[RESTS_SINCE] = elapsed
+    if speed > own[ONSET_SPEED]:
+        own[FAST] = 1.0
     if own[COMMANDED] == 0.0:
         for k in range(
             places[twin.COMMAND] + int(own[FIRST]), places[twin.COMMAND] + int(own[LAST])
@@ -64,7 +67,9 @@ def evaluate(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray)
             return twin.DECLINED
         own[PRESSED] = 1.0 if pressed else 0.0
     elif elapsed - own[RESTS_SINCE] >= own[REST] and (
-        rule == REST_INSIDE or _done(own, row, tip) >= own[AFTER] - ROUNDING
+        # Before the tip was fast there is no onset; of others the task itself decides.
+        rule == REST_INSIDE
+        or ((inside or own[FAST] != 0.0) and _done(own, row, tip) >= own[AFTER] - ROUNDING)
     ):
         return twin.DECLINED
     if elapsed >= own[LIMIT]:

@@ -26,7 +26,7 @@ def none_yet() -> Numbers:
 
 
 @dataclass
-class Movement:
+class AimedMovement:
     """The path of the tip, tick by tick.
 
     Attributes
@@ -122,20 +122,28 @@ class Movement:
     def onset(self) -> int | None:
         """Return the tick at which the movement began, or None when it never did.
 
-        Searched back from the peak: the first tick of the stretch around the peak in which the
-        tip is faster than the onset speed, if that stretch is long enough.
+        The first tick of a stretch in which the tip is faster than the onset speed for long enough;
+        of several, of that with the highest speed.
         """
-        speed = np.array(self.speed)
-        peak = int(speed.argmax())
-        threshold = max(self.settings.onset_speed, self.settings.onset_share * speed[peak])
-        slow = np.flatnonzero(speed <= threshold)
-        before, after = slow[slow < peak], slow[slow > peak]
-        first = int(before[-1]) + 1 if before.size else 0
-        last = int(after[0]) - 1 if after.size else len(speed) - 1
-        if speed[peak] <= threshold:
-            return None
-        held = self.elapsed[last] - self.elapsed[first]
-        return first if held >= self.settings.onset_hold_s - ROUNDING_S else None
+        speed, elapsed = np.array(self.speed), np.array(self.elapsed)
+        threshold = max(self.settings.onset_speed, self.settings.onset_share * speed.max())
+        turns = np.flatnonzero(np.diff(speed > threshold, prepend=False, append=False))
+        first, last = turns[::2], turns[1::2] - 1
+        long = elapsed[last] - elapsed[first] >= self.settings.onset_hold_s - ROUNDING_S
+        peaks = [speed[a : b + 1].max() for a, b in zip(first[long], last[long], strict=True)]
+        return int(first[long][int(np.argmax(peaks))]) if peaks else None
+
+    @property
+    def begun(self) -> bool:
+        """Whether the movement has begun, and is not only how the one before it runs out.
+
+        What was fast already when the trial began, has begun when it has come nearer to the target
+        by the circle's radius.
+        """
+        onset = self.onset()
+        if onset == 0:
+            return self.distance[0] - self.distance[-1] >= self.settings.width / 2
+        return onset is not None
 
     def tick_at(self, elapsed: float) -> int:
         """Return the tick at a trial time."""
@@ -145,7 +153,7 @@ class Movement:
         """Return the results, ``end`` being the tick of the movement's offset.
 
         Without an offset (a time-out) the errors are those of the last tick, and the times that
-        end with it are NaN.
+        end with it are NaN. They are also without an onset: nobody made a movement then.
         """
         onset = self.onset()
         last = len(self.elapsed) - 1 if end is None else end
@@ -158,7 +166,9 @@ class Movement:
             "reaction_time": began,
             "command_onset": self.command_onset,
             "movement_time": math.nan if end is None else self.elapsed[end] - began,
-            "circle_to_circle": math.nan if end is None else self.elapsed[end],
+            "onset_to_rest": math.nan if end is None else self._rests_after(began),
+            "at_rest": 0.0 if math.isnan(self.rest_since) else self.elapsed[-1] - self.rest_since,
+            "circle_to_circle": math.nan if end is None or onset is None else self.elapsed[end],
             "between_circles": self.first_entry - self._left(),
             "first_entry": self.first_entry,
             "entries": self.entries,
@@ -169,6 +179,15 @@ class Movement:
             "path_length": float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()),
             "peak_speed": max(self.speed),
         }
+
+    def _rests_after(self, onset: float) -> float:
+        """Return how long after the onset the rest began that the end of the trial found, in s.
+
+        A rest is what it is for the rest rules, and by the end as long as they ask for; NaN while
+        the tip moved, or had not rested for long enough.
+        """
+        known = self.rested and self.rest_since >= onset
+        return self.rest_since - onset if known else math.nan
 
     def _left(self) -> float:
         """Return when the tip left the circle it came from, in seconds since the trial's start.

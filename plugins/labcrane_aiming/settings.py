@@ -16,7 +16,10 @@ from pydantic import (
 from labcrane import Machine, Settings
 from labcrane.core import AtMost, ButtonName, Names, Unit, was_run
 
-EVENTS = ("targets.shown", "target.entered", "command.onset", "movement.onset", "movement.offset")
+EVENTS = (
+    "targets.shown", "target.entered", "command.onset", "movement.onset", "movement.offset",
+    "tap.ignored",
+)  # fmt: skip
 """What a movement tells beside its beginning and end."""
 
 
@@ -49,7 +52,8 @@ class AimingSettings(Settings):
 
     end: Literal["rest_inside", "rest_anywhere", "trigger"] = "rest_inside"
     """What ends a movement: the tip at rest inside the circle, the tip at rest once most of the
-    way is done, or the trigger. With ``rest_inside`` an error cannot exceed the radius."""
+    way is done, or the trigger. With ``rest_inside`` an error cannot exceed the radius. A press
+    before anything has moved ends nothing, unless the tip is in the circle already."""
 
     trigger: ButtonName = "right.trigger"
     """The button that ends a movement when ``end`` is ``trigger``."""
@@ -86,7 +90,7 @@ class AimingSettings(Settings):
         if self.limit_s < needed:
             found["limit_s"] = (
                 f"is {self.limit_s:g} s, and at full speed the farthest movement takes more than "
-                f"{needed:.2g} s"
+                f"{_about(needed)} s"
             )
         for key, held_s, never in (
             ("onset_hold_s", self.onset_hold_s, "no movement has an onset or a reaction time"),
@@ -97,7 +101,7 @@ class AimingSettings(Settings):
         fastest = fastest_m_s(machine)
         for key, speed in (("onset_speed", self.onset_speed), ("rest_speed", self.rest_speed)):
             if speed >= fastest:
-                found[key] = f"is {speed:g} m/s, and the tip never reaches {fastest:.2g} m/s"
+                found[key] = f"is {speed:g} m/s, and the tip never reaches {_about(fastest)} m/s"
         return found
 
     @field_validator("distances")
@@ -139,3 +143,8 @@ def fastest_m_s(machine: Machine) -> float:
     lengths = [math.hypot(joint.a, joint.d) for joint in machine.joints]
     beyond = [sum(lengths[at:]) for at in range(len(lengths))]
     return float(sum(speed * arm for speed, arm in zip(machine.speeds, beyond, strict=True)))
+
+
+def _about(number: float) -> str:
+    """Return a number by its first two digits, as people write it: 100, and not 1e+02."""
+    return f"{float(f'{number:.2g}'):g}"

@@ -8,11 +8,8 @@ from pathlib import Path
 
 from labcrane import FloatArray, Machine, PluginError, Run
 from labcrane.core import Crane, CraneSettings, Twin, Value
-from labcrane.machines import urdf_of
+from labcrane.machines import GRAVITY, urdf_of
 from labcrane_bullet.engine import pybullet
-
-GRAVITY = 9.81
-"""In m/s²."""
 
 ITERATIONS = 400
 """Solver passes of a tick in which the solver is needed. A crane stretched out level under its own

@@ -10,6 +10,7 @@ import numpy as np
 
 from labcrane import FloatArray
 from labcrane.core import Places, compiled, twin
+from labcrane.machines import GRAVITY
 
 JOINTS, DELAY, DT, BASE_X, HEIGHT, DRIVE, CHANGES, IDEAL, SHARE = range(9)
 """Joints, ticks of dead time, length of a tick, the foot, the first command and where what changes
@@ -88,7 +89,6 @@ def step(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) -> 
 MASS, CENTRE, ALONG, ACROSS, UPRIGHT, EFFORT = range(6)
 """Of every link, behind the other tables: mass, centre of mass along it, moments of inertia about
 its axes; and its joint's torque."""
-GRAVITY = 9.81
 NEAR = 1e-3
 """Distance from a limit in rad within which the engine's solver pushes back."""
 ENOUGH = 0.999

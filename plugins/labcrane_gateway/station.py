@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane import FloatArray, Frame, InputDevice, Machine, Run, Signal, Tick
-from labcrane.streams import NewestSample
+from labcrane import FloatArray, Frame, InputDevice, Machine, Run, Signal, StreamError, Tick
+from labcrane.streams import NewestSample, numeric_labels
 from labcrane_gateway.settings import GatewaySettings
 
 if TYPE_CHECKING:
@@ -92,20 +92,12 @@ class Station(InputDevice):
         self._signals = [float(round(signal)) for signal in signals]
         self._came, self._complaint = now, ""
 
-    def _accept(self, info: "pylsl.StreamInfo") -> str | None:
-        """Return why a station's stream is of no use; None when it commands all joints."""
-        import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
-
-        labels = info.get_channel_labels() or []
-        if info.channel_format() == pylsl.cf_string or len(labels) > info.channel_count():
-            return (
-                f"it has {info.channel_count()} channels of format {info.channel_format()}, and "
-                f"{len(labels)} names; send numbers, and a name for each channel"
-            )
+    def _accept(self, info: "pylsl.StreamInfo") -> None:
+        """Take where each joint's command is in a station's stream."""
+        labels = numeric_labels(info)
         if missing := [joint for joint in self._joints if joint not in labels]:
-            return (
-                f"its channels are {', '.join(map(str, labels)) or 'not named'}; the machine also "
-                f"needs {', '.join(missing)}"
+            raise StreamError(
+                f"its channels are {', '.join(labels) or 'not named'}; the machine also needs "
+                f"{', '.join(missing)}"
             )
         self._order = [labels.index(joint) for joint in self._joints]
-        return None

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from labcrane import FloatArray, Frame, InputDevice, Run, Signal, Tick
+from labcrane import FloatArray, Frame, InputDevice, Run, Signal, StreamError, Tick
 from labcrane.core import Value
-from labcrane.streams import NewestSample
+from labcrane.streams import NewestSample, numeric_labels
 from labcrane_keyboard.settings import KeyboardSettings
 
 if TYPE_CHECKING:
@@ -103,20 +103,16 @@ class Keyboard(InputDevice):
         self._came, self._complaint = now, ""
         self._wanted = [newest[more] - newest[less] for less, more in self._pairs]
 
-    def _accept(self, info: "pylsl.StreamInfo") -> str | None:
-        """Return why a view's stream is of no use; None when it sends all the keys."""
-        import pylsl  # noqa: PLC0415 - liblsl reads its configuration when it is loaded
-
-        labels = info.get_channel_labels() or []
-        if info.channel_format() == pylsl.cf_string or len(labels) > info.channel_count():
-            return (
-                f"stream {self._stream!r} has {info.channel_count()} channels of format "
-                f"{info.channel_format()}, and {len(labels)} names; it is no view's"
-            )
+    def _accept(self, info: "pylsl.StreamInfo") -> None:
+        """Take where each key is in a view's stream."""
+        try:
+            labels = numeric_labels(info)
+        except StreamError as error:
+            raise StreamError(f"stream {self._stream!r} is no view's: {error}") from error
         sent = [label.removeprefix("key.") for label in labels if label.startswith("key.")]
         missing = [key for pair in self._settings.axes.values() for key in pair if key not in sent]
         if missing:
-            return (
+            raise StreamError(
                 f"view {self._settings.view!r} sends the keys {', '.join(sent)}; the keyboard also "
                 f"needs {', '.join(missing)}: write them under its keys"
             )
@@ -124,4 +120,3 @@ class Keyboard(InputDevice):
             (labels.index(f"key.{less}"), labels.index(f"key.{more}"))
             for less, more in self._settings.axes.values()
         ]
-        return None

@@ -65,7 +65,7 @@ class Episode:
 
 
 @dataclass(frozen=True)
-class Layout:
+class EpisodeLayout:
     """What the columns of all episodes are, which must be the same for everybody.
 
     Attributes
@@ -81,7 +81,7 @@ class Layout:
     units: Mapping[str, str]
 
 
-def layout_of(session: SessionRecord) -> Layout:
+def layout_of(session: SessionRecord) -> EpisodeLayout:
     """Return what the columns of a session's episodes are."""
     units = {
         f"{group}.{name}": unit
@@ -90,11 +90,11 @@ def layout_of(session: SessionRecord) -> Layout:
         for name, unit in session.streams[group].units.items()
     }
     seen = tuple(name for name in units if name.partition(".")[0] in SEEN)
-    return Layout(seen, tuple(name for name in units if name not in seen), units)
+    return EpisodeLayout(seen, tuple(name for name in units if name not in seen), units)
 
 
 def episodes_of(
-    participant: Participant, layout: Layout, words: str, every: int = 1
+    participant: Participant, layout: EpisodeLayout, words: str, every: int = 1
 ) -> Iterator[Episode]:
     """Yield a participant's episodes, in order, with every so manieth row; one in memory at a time.
 

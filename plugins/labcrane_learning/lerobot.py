@@ -13,8 +13,8 @@ import numpy as np
 
 from labcrane import RecordingError
 from labcrane.analysis import Exporter, Participant
-from labcrane_learning.episodes import Episode, Layout, episodes_of, layout_of
-from labcrane_learning.pictures import Histogram, Pictures, unpacked
+from labcrane_learning.episodes import Episode, EpisodeLayout, episodes_of, layout_of
+from labcrane_learning.pictures import EpisodePictures, Histogram, unpacked
 from labcrane_learning.settings import EpisodeSettings
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class _Book:
     """Everything that is known of the data set when its last episode is written."""
 
     settings: EpisodeSettings
-    layout: Layout | None = None
+    layout: EpisodeLayout | None = None
     rate_hz: float = 0.0
     cameras: tuple[str, ...] = ()
     machine: str = ""
@@ -135,7 +135,7 @@ class _Book:
         _write_json(meta / "stats.json", _together(self.episodes))
         _write_json(meta / "info.json", self._info(self.layout))
 
-    def _info(self, layout: Layout) -> dict[str, Any]:
+    def _info(self, layout: EpisodeLayout) -> dict[str, Any]:
         features: dict[str, Any] = {
             key: {
                 "dtype": "float32",
@@ -184,7 +184,7 @@ def _write_data(folder: Path, number: int, book: _Book, participant: Participant
     if book.layout is None:
         raise AssertionError("a participant that counts has a session")
     settings = book.settings
-    with Pictures(participant, settings) as pictures:
+    with EpisodePictures(participant, settings) as pictures:
         for episode in episodes_of(participant, book.layout, settings.task, settings.every):
             packed, seen = _packed(pictures.of(episode))
             table = _table(book.add(episode, (chunk, file), seen), packed)

@@ -18,7 +18,7 @@ from labcrane_learning.settings import EpisodeSettings
 Picture = npt.NDArray[np.uint8]
 
 
-class Pictures:
+class EpisodePictures:
     """Pictures of one participant's episodes.
 
     Those of a session are taken camera by camera when its first episode asks, and wait on disk.
@@ -30,7 +30,7 @@ class Pictures:
         self._folder: TemporaryDirectory[str] | None = None
         self._names: list[str] = []
 
-    def __enter__(self) -> "Pictures":
+    def __enter__(self) -> "EpisodePictures":
         return self
 
     def __exit__(self, *error: object) -> None:

@@ -12,8 +12,8 @@ import numpy as np
 
 from labcrane import RecordingError
 from labcrane.analysis import Exporter, Participant
-from labcrane_learning.episodes import Episode, Layout, episodes_of, layout_of
-from labcrane_learning.pictures import Pictures, unpacked
+from labcrane_learning.episodes import Episode, EpisodeLayout, episodes_of, layout_of
+from labcrane_learning.pictures import EpisodePictures, unpacked
 from labcrane_learning.settings import EpisodeSettings
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class Robomimic(Exporter):
                     layout = layout_of(session)
                     rate_hz = float(session.attrs["rate_hz"]) / self._settings.every
                     _describe(data, layout, participant, rate_hz)
-                with Pictures(participant, self._settings) as pictures:
+                with EpisodePictures(participant, self._settings) as pictures:
                     task, every = self._settings.task, self._settings.every
                     for episode in episodes_of(participant, layout, task, every):
                         name = f"demo_{count}"
@@ -66,7 +66,9 @@ class Robomimic(Exporter):
             file.create_dataset("mask/success", data=np.array(succeeded, "S"))
 
 
-def _describe(data: "h5py.Group", layout: Layout, participant: Participant, rate_hz: float) -> None:
+def _describe(
+    data: "h5py.Group", layout: EpisodeLayout, participant: Participant, rate_hz: float
+) -> None:
     context = participant.context
     about = {
         "env_name": "labcrane/Study-v0",
@@ -80,7 +82,7 @@ def _describe(data: "h5py.Group", layout: Layout, participant: Participant, rate
         data.attrs[f"{key}_units"] = json.dumps([layout.units[name] for name in names])
 
 
-def _write(demo: "h5py.Group", episode: Episode, layout: Layout) -> None:
+def _write(demo: "h5py.Group", episode: Episode, layout: EpisodeLayout) -> None:
     count = len(episode.action)
     demo.attrs["num_samples"] = count
     for name in ("participant", "session", "trial", "attempt", "task", "success", "skill"):

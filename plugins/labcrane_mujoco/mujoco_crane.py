@@ -10,11 +10,8 @@ import numpy as np
 
 from labcrane import FloatArray, Machine, Run
 from labcrane.core import Crane, CraneSettings, Value
-from labcrane.machines import urdf_of
+from labcrane.machines import GRAVITY, urdf_of
 from labcrane_mujoco.end_stops import stop_forces
-
-GRAVITY = 9.81
-"""In m/s²."""
 
 
 class MujocoCrane(Crane):

@@ -136,7 +136,7 @@ def _lab_file(name: str, info: ValidationInfo) -> Any:
         ) from None
 
 
-class Question(Settings):
+class QuestionSettings(Settings):
     """One question of a lab's own."""
 
     name: str = Field(pattern=NAME)
@@ -177,7 +177,7 @@ class Question(Settings):
         return choices
 
     @model_validator(mode="after")
-    def _can_be_answered(self, info: ValidationInfo) -> "Question":
+    def _can_be_answered(self, info: ValidationInfo) -> "QuestionSettings":
         if self.kind == "choice" and not self.choices:
             raise WrongKey(
                 f"question {self.name!r} is a choice and has no choices; list them",
@@ -243,7 +243,7 @@ class FreeSettings(Settings):
     rights: str = "the lab's own"
     """Where the words come from."""
 
-    questions: tuple[Question, ...] = Field(min_length=1)
+    questions: tuple[QuestionSettings, ...] = Field(min_length=1)
     """What is asked, in order."""
 
     sums: dict[str, Annotated[tuple[Number, ...], Field(min_length=1), Once()]] = Field(
@@ -271,7 +271,7 @@ class FreeSettings(Settings):
 
     @field_validator("questions")
     @classmethod
-    def _differ(cls, questions: tuple[Question, ...]) -> tuple[Question, ...]:
+    def _differ(cls, questions: tuple[QuestionSettings, ...]) -> tuple[QuestionSettings, ...]:
         names = [question.name for question in questions]
         if twice := sorted(set(_twice(names))):
             last = len(names) - 1 - names[::-1].index(twice[0])

@@ -1,7 +1,7 @@
 """Rescue scenarios: scenes with objects, a human figure and goals, run and judged."""
 
 from labcrane import InputDevice, Machine, Offer, Task, hookimpl, offer
-from labcrane_scenario.settings import OperatorSettings, ScenarioSettings
+from labcrane_scenario.settings import PanelOperatorSettings, ScenarioSettings
 
 labcrane_api = 1
 
@@ -18,9 +18,9 @@ def labcrane_tasks() -> list[Offer[Task]]:
 
 @hookimpl
 def labcrane_inputs() -> list[Offer[InputDevice]]:
-    def operator(settings: OperatorSettings, machine: Machine) -> InputDevice:
+    def operator(settings: PanelOperatorSettings, machine: Machine) -> InputDevice:
         from labcrane_scenario.operator import ScenarioOperator
 
         return ScenarioOperator(settings, machine)
 
-    return [offer("scenario_operator", OperatorSettings, operator)]
+    return [offer("scenario_operator", PanelOperatorSettings, operator)]

@@ -13,6 +13,9 @@ Point = tuple[float, float, float]
 ANY = -1.0
 """Opening of the jaws that does not matter."""
 
+NOT_ASKED, TO_TOUCH, TOUCHED = -1.0, 0.0, 1.0
+"""Whether something is to be touched, and was."""
+
 OPEN_WITHIN = 0.1
 """How near the jaws' opening must come to what a goal asks, as a share of their range."""
 
@@ -33,9 +36,15 @@ def check_goals(name: str, scene: Scene, state: Layout) -> None:
                 f"scene {name!r}: a goal is about {goal.what!r}, and the machine's state does not "
                 f"say where it is; it says of {', '.join(said) or 'nothing'}"
             )
+        if goal.touch is not None and goal.touch not in (felt := _of_things(state, "force")):
+            raise ProtocolError(
+                f"scene {name!r}: {goal.touch!r} is to be touched, and the machine's state has no "
+                f"force on it; it has one on {', '.join(felt) or 'nothing'}. What is fixed has one "
+                "where it has a limit_n"
+            )
 
 
-class Way:
+class GoalSequence:
     """Follows which goal is next."""
 
     def __init__(self, scene: Scene, placed: tuple[PlacedObject, ...], run: Run) -> None:
@@ -48,8 +57,12 @@ class Way:
         self._opening = run.machine.limits[-1]
         columns = run.state.columns
         self._grip = columns.index("grip.thing") if "grip.thing" in columns else None
+        self._felt = {
+            goal.touch: self._parts_of(goal.touch, run) for goal in scene.goals if goal.touch
+        }
         self._hold_rate = run.rate_hz
         self._held = 0
+        self._touched = False
         self.reached = 0
 
     @property
@@ -93,13 +106,16 @@ class Way:
         if self.done:
             return
         goal = self._goals[self.reached]
-        self._held = self._held + 1 if self._there(state) else 0
+        there = self._there(state)
+        if goal.touch is not None:
+            there = self._touched = there and self._touches(state, goal.touch)
+        self._held = self._held + 1 if there else 0
         if self._held > goal.hold_s * self._hold_rate:
-            self.reached, self._held = self.reached + 1, 0
+            self.reached, self._held, self._touched = self.reached + 1, 0, False
             yield Event("goal.reached", due, {"goal": self.reached, "what": goal.what})
 
-    def target(self, state: FloatArray) -> tuple[float, float, float, float, float, float]:
-        """Return where the tip should go, the region's radius, the jaws, and the goals reached.
+    def target(self, state: FloatArray) -> tuple[float, float, float, float, float, float, float]:
+        """Return where the tip should go, the region's radius, jaws, touch, and the goals reached.
 
         For a goal that something else must come to, the tip should go there by as much as is
         still missing.
@@ -110,7 +126,26 @@ class Way:
             at, tip = self.position(state, goal.what), self.position(state, "tip")
             x, y, z = x + tip[0] - at[0], y + tip[1] - at[1], z + tip[2] - at[2]
         jaws = ANY if goal.jaws is None else goal.jaws
-        return x, y, z, goal.radius, jaws, float(self.reached)
+        touch = NOT_ASKED if goal.touch is None else TOUCHED if self._touched else TO_TOUCH
+        return x, y, z, goal.radius, jaws, touch, float(self.reached)
+
+    def _parts_of(self, name: str, run: Run) -> list[tuple[int, float]]:
+        """Return where the force on each part of a thing is in the state, and its limit in N."""
+        limits = self._placed[name].limits
+        parts = dict.fromkeys(part.name for part in self._placed[name].parts)
+        places = {part: f"scene.{name}.force.{part}" for part in parts}
+        return [
+            (run.state.index(place), limits.get(part, math.inf))
+            for part, place in places.items()
+            if place in run.state.columns
+        ]
+
+    def _touches(self, state: FloatArray, name: str) -> bool:
+        """Whether a thing is touched now, or was before in this goal, and is not pressed hard."""
+        forces = [(state.item(place), limit) for place, limit in self._felt[name]]
+        if any(force > limit for force, limit in forces):
+            return False
+        return self._touched or any(force > 0.0 for force, _ in forces)
 
     def _there(self, state: FloatArray) -> bool:
         goal = self._goals[self.reached]

@@ -16,6 +16,11 @@ class Lapses:
     ----------
     seeds
         Of the participant and of the trial.
+
+    Attributes
+    ----------
+    overlooks, imagines
+        Whether it sees no deformity in this trial, and whether it sees one where there is none.
     """
 
     def __init__(self, settings: ErrorSettings, rate_hz: float, seeds: tuple[int, int]) -> None:
@@ -27,6 +32,9 @@ class Lapses:
         self._bump_left = self._press_left = 0  # ticks
         self._held = False
         self._sense = 1.0
+        looks = np.random.default_rng([*seeds, 0x5EE])
+        self.overlooks = bool(looks.random() < settings.misses)
+        self.imagines = bool(looks.random() < settings.false_reports)
 
     def tire(self, since_start: float) -> float:
         """Take the session's time in s; return which share of its speed the operator still has."""

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 
-class Episode:
+class ContactEpisode:
     """One force against its limit.
 
     An episode begins beyond the limit and ends when the force has been below a share of it for a

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 from labcrane import FloatArray, Run
 from labcrane.core import Event, Value
-from labcrane.machines import PlacedObject
-from labcrane_scenario.mistakes import Episode, Mistakes
+from labcrane.machines import GRAVITY, PlacedObject, segments
+from labcrane_scenario.mistakes import ContactEpisode, Mistakes
 from labcrane_scenario.settings import ScenarioSettings
 
-GRAVITY = 9.81
+SETTLE_S = 0.5
+"""Somebody is placed a little above the ground, and lies when this time has passed, in seconds."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +22,9 @@ class Watched:
     kind
         Of the mistake: an obstacle is an object too.
     against
-        What presses, as far as the scene knows: what moves, or what is fixed.
+        What presses, as far as the scene knows: what moves, what is fixed, or the ground.
+    rest
+        Force that is none of its own doing, in N: what the part weighs that lies on the ground.
     """
 
     thing: PlacedObject
@@ -31,10 +34,11 @@ class Watched:
     place: int
     support: int | None
     limit: float
-    episode: Episode
+    episode: ContactEpisode
+    rest: float = 0.0
 
 
-MOVING, FIXED = "moving", "fixed"
+MOVING, FIXED, GROUND = "moving", "fixed", "ground"
 
 
 class Observation:
@@ -43,7 +47,8 @@ class Observation:
     An object's limit also holds for what it is set down with: its support beyond its own weight,
     once for the whole of it, by the limit of its first part. A
     person's limits hold for what presses on a limb and for what is fixed and the limb is pressed
-    against; an obstacle's for what the machine presses on it with.
+    against; those of the ground for how hard it lands on what it lies on, beyond its weight. An
+    obstacle's hold for what the machine presses on it with.
     """
 
     def __init__(
@@ -60,12 +65,16 @@ class Observation:
                 run.state.index(f"scene.{thing.name}.{word}.{part}"),
                 _support(run, thing) if part == next(iter(thing.limits)) else None,
                 limit,
-                Episode(limit, settings.release, hold),
+                ContactEpisode(limit, settings.release, hold),
             )
             for thing in placed
             for part, limit in thing.limits.items()
             for word, against in ((("force", MOVING), ("hit", FIXED))[: 1 + thing.jointed])
         ]
+        self._grounded = [
+            watched for thing in placed for watched in _grounds(settings, run, thing, hold)
+        ]
+        self._settling = round(SETTLE_S * run.rate_hz)
         pressing = [each for each in run.state.signals if each.name == "contact.fixed"]
         self._links = pressing[0].components if pressing else ()
         self._pressing = run.state.find("contact.fixed") if pressing else None
@@ -75,12 +84,18 @@ class Observation:
         columns = run.state.columns
         self._drops_at = columns.index("grip.drops") if "grip.drops" in columns else None
         self._drops = 0.0
+        self._drop_m = settings.drop_m
+        self._held_at = columns.index("grip.thing") if "grip.height" in columns else None
+        self._height_at = columns.index("grip.height") if "grip.height" in columns else None
+        self._held, self._height = 0, 0.0
+        moving = [each.name.split(".")[1] for each in run.state.signals if _says_support(each.name)]
+        self._moving = ("", *moving)
 
     @property
     def peaks(self) -> Mapping[str, float]:
         """Largest force so far on objects and on bodies, in N."""
         found = {"object": 0.0, "body": 0.0}
-        for each in self._watched:
+        for each in (*self._watched, *self._grounded):
             found[each.kind] = max(found[each.kind], each.episode.peak)
         return found
 
@@ -88,13 +103,29 @@ class Observation:
         """Take a tick; yield what went wrong in it."""
         yield from self._contacts(state, due)
         yield from self._overloads(state, due)
-        if self._drops_at is not None and state.item(self._drops_at) > self._drops:
+        yield from self._dropped(state, due)
+
+    def _dropped(self, state: FloatArray, due: float) -> Iterator[Event]:
+        """Yield what slipped out of the jaws, or was let go above the largest height."""
+        slipped = self._drops_at is not None and state.item(self._drops_at) > self._drops
+        if slipped and self._drops_at is not None:
             self._drops = state.item(self._drops_at)
-            yield Event("drop", due, {"count": self.mistakes.add("drop")})
+        held = 0 if self._held_at is None else int(state.item(self._held_at))
+        let_go = self._held > 0 and held != self._held
+        if slipped or (let_go and self._height > self._drop_m):
+            about: dict[str, Value] = {"count": self.mistakes.add("drop")}
+            if let_go:
+                about |= {"thing": self._moving[self._held], "height": self._height}
+            yield Event("drop", due, {**about, "slipped": slipped})
+        self._held = held
+        if self._height_at is not None:
+            self._height = state.item(self._height_at)
 
     def _contacts(self, state: FloatArray, due: float) -> Iterator[Event]:
-        for each in self._watched:
-            force = state.item(each.place)
+        lies = self._settling == 0
+        self._settling = max(0, self._settling - 1)
+        for each in (*self._watched, *(self._grounded if lies else ())):
+            force = state.item(each.place) - each.rest
             if each.support is not None:
                 force = max(force, state.item(each.support) - each.thing.mass * GRAVITY)
             if each.episode.see(force):
@@ -126,6 +157,32 @@ class Observation:
                 about: dict[str, Value] = {"joint": self._names[joint], "direction": direction}
                 yield Event("overload", due, {**about, "count": count})
             self._over[joint] = direction
+
+
+def _grounds(
+    settings: ScenarioSettings, run: Run, thing: PlacedObject, hold: int
+) -> Iterator[Watched]:
+    """Yield what watches how hard each part of somebody lands, where the state says so."""
+    signal = f"scene.{thing.name}.ground"
+    if not any(each.name == signal for each in run.state.signals):
+        return
+    weight = {each.parts[0].name: each.mass * GRAVITY for each in segments(thing)}
+    for part, limit in thing.ground.items():
+        yield Watched(
+            thing,
+            part,
+            "body",
+            GROUND,
+            run.state.index(f"{signal}.{part}"),
+            None,
+            limit,
+            ContactEpisode(limit, settings.release, hold),
+            weight[part],
+        )
+
+
+def _says_support(name: str) -> bool:
+    return name.startswith("scene.") and name.endswith(".support")
 
 
 def _support(run: Run, thing: PlacedObject) -> int | None:

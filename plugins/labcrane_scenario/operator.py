@@ -17,10 +17,13 @@ from labcrane import (
 )
 from labcrane.core import Phase
 from labcrane_scenario.lapses import Lapses
-from labcrane_scenario.settings import OperatorSettings
+from labcrane_scenario.settings import PanelOperatorSettings
 
 NEAR = 0.6
 """Share of a goal's radius within which the tip is left alone while the jaws move."""
+
+GENTLE = 3.0
+"""Radii of a goal from its middle within which something is to be touched gently."""
 
 CLOSE_RAD = 0.02
 """The jaws are as far open as they should be when they come this close to it."""
@@ -33,7 +36,7 @@ class ScenarioOperator(InputDevice):
     settings say so they err.
     """
 
-    def __init__(self, settings: OperatorSettings, machine: Machine) -> None:
+    def __init__(self, settings: PanelOperatorSettings, machine: Machine) -> None:
         button = (Signal(settings.button, "1"),) if settings.button else ()
         self.signals = (
             *(Signal(name, "1") for name in settings.axes_of(machine)),
@@ -63,6 +66,11 @@ class ScenarioOperator(InputDevice):
             self._target = run.task.find("target.position")
             self._radius = run.task.index("target.radius")
             self._jaws = run.task.index("target.jaws")
+        self._touch = run.task.index("target.touch") if "target.touch" in names else None
+        self._away = None
+        if "deformity.distance" in names:
+            self._away = run.task.index("deformity.distance")
+        self._told = False
         columns = run.state.columns
         self._grip = columns.index("grip.thing") if "grip.thing" in columns else None
         self._wait = 0
@@ -71,6 +79,7 @@ class ScenarioOperator(InputDevice):
 
     def begin_trial(self, trial: Trial) -> None:
         self._trial = trial.number
+        self._told = False
         if self._settings.errs is not None:
             seeds = (self._run.participant_seed, trial.seed)
             self._lapses = Lapses(self._settings.errs, self._run.rate_hz, seeds)
@@ -83,7 +92,8 @@ class ScenarioOperator(InputDevice):
         going = seen.trial == self._trial and seen.phase is Phase.RUNNING and not seen.paused
         if not (self._shown and going) or math.isnan(seen.task.item(self._radius)):
             return out
-        if self._settings.button and any(event.name == "goal.reached" for event in seen.events):
+        pressed = bool(self._settings.button) and self._reports(seen)
+        if pressed:
             out[self._connected + 1] = 1.0
         if self._wait > 0:
             self._wait -= 1
@@ -94,20 +104,38 @@ class ScenarioOperator(InputDevice):
             self._first = tick.due
         lapses = self._lapses
         fresh = 1.0 if lapses is None else lapses.tire(tick.due - self._first)
-        if distance > NEAR * seen.task.item(self._radius):
+        radius = seen.task.item(self._radius)
+        touch = -1.0 if self._touch is None else seen.task.item(self._touch)
+        if touch == 0.0 or (touch < 0.0 and distance > NEAR * radius):
             settings = self._settings
-            speed = fresh * min(settings.gain_per_s * distance, settings.speed_m_s)
+            gently = touch == 0.0 and distance < GENTLE * radius
+            fastest = settings.touch_m_s if gently else settings.speed_m_s
+            speed = fresh * min(settings.gain_per_s * distance, fastest)
             asked = away / distance * speed
             if lapses is not None and (sinking := lapses.sinks()):
                 asked = np.array([0.0, 0.0, -sinking])
             out[:] = self._run.inverse(asked, seen.state)
             out[self._connected] = 1.0
+            if pressed:
+                out[self._connected + 1] = 1.0
             out[self._joint] = 0.0
-        if distance <= seen.task.item(self._radius):
+        if distance <= radius:
             self._move_jaws(seen, out)
         if lapses is not None and lapses.presses_on(held=self._holds(seen)):
             out[self._joint] = -self._turned * self._settings.signal
         return out
+
+    def _reports(self, seen: Frame) -> bool:
+        """Whether it presses the button for a deformity now: once in a trial, for a tick."""
+        if self._told or self._away is None:
+            return False
+        away, lapses = seen.task.item(self._away), self._lapses
+        if away >= 0.0:
+            overlooked = lapses is not None and lapses.overlooks
+            self._told = away <= self._settings.sees_m and not overlooked
+        elif lapses is not None and lapses.imagines:
+            self._told = any(event.name == "goal.reached" for event in seen.events)
+        return self._told
 
     def _holds(self, seen: Frame) -> bool:
         return self._grip is not None and seen.state.item(self._grip) > 0.0

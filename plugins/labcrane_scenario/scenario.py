@@ -9,27 +9,33 @@ import numpy as np
 from labcrane import FloatArray, Frame, Machine, ProtocolError, Run, Signal, Task, Trial
 from labcrane.core import Event, Phase, PlannedTrial, TrialStatus, Value
 from labcrane.machines import SCENE_PLACED, Scene, load_scene, place_objects, write_placed
-from labcrane_scenario.goals import Way, check_goals
+from labcrane_scenario.goals import GoalSequence, check_goals
 from labcrane_scenario.mistakes import KINDS
 from labcrane_scenario.observation import Observation
 from labcrane_scenario.settings import ScenarioSettings
 
 PRESSED = 0.5  # a button is 0 or 1
 DEFORMITY = "deformity"
+NOWHERE = -1.0
+"""Distance of a deformity that is not there."""
 
 
 class Scenario(Task):
     """One run in a scene is one trial: its goals in their order, and what went wrong on the way.
 
     ``target`` is the goal of the moment, ``target.jaws`` how far the jaws are to be open for it
-    (-1 when it does not matter), ``goals.reached`` how many are done.
+    (-1 when it does not matter), ``target.touch`` whether its thing was touched (1) or is to be (0;
+    -1 where nothing is to be touched), ``goals.reached`` how many are done, ``deformity.distance``
+    how far the tip is from the deformed limb (-1 where there is none).
     """
 
     signals = (
         Signal("target.position", "m", ("x", "y", "z")),
         Signal("target.radius", "m"),
         Signal("target.jaws", "1"),
+        Signal("target.touch", "1"),
         Signal("goals.reached", "1"),
+        Signal("deformity.distance", "m"),
         Signal("mistakes", "1", KINDS),
     )
 
@@ -40,6 +46,9 @@ class Scenario(Task):
         Signal("peak_force.object", "N"),
         Signal("peak_force.body", "N"),
         Signal("deformity_found", "s"),  # from the start; NaN when it was not, or there is none
+        Signal("deformity", "1"),  # whether there is one; NaN where the scene never has one
+        Signal("found", "1"),  # whether it was reported; 0 where there is none, NaN as above
+        Signal("false_reports", "1"),  # reports of none, or from too far away
         Signal("k", "1"),  # completion, as far as the run can tell; the supervisor's overrides it
     )
 
@@ -66,7 +75,7 @@ class Scenario(Task):
                     f"{len(machine.joints)} joints ({', '.join(machine.names)})",
                     at=("scenes", at),
                 )
-        self._values: FloatArray = np.zeros(6 + len(KINDS))
+        self._values: FloatArray = np.zeros(8 + len(KINDS))
 
     def factors(self) -> Mapping[str, Sequence[str]]:
         return {"scenes": tuple(self._scenes)}
@@ -87,12 +96,15 @@ class Scenario(Task):
         scene, settings = self._scenes[name], self._settings
         placed = place_objects(scene, trial.seed)
         self._watch = Observation(settings, self._run, placed)
-        self._way = Way(scene, placed, self._run)
+        self._way = GoalSequence(scene, placed, self._run)
         self._deformed = next((each for each in placed if each.deformed is not None), None)
         self._limb = (self._deformed and self._deformed.deformed) or ""
         self._limit = settings.limit_s or scene.limit_s
         self._most: float = settings.mistakes
+        self._asked = scene.figure is not None and scene.figure.deformity is not None
         self._found = math.nan
+        self._false = 0
+        self._down = False
         self._placed = write_placed(placed)
 
     def lift_limits(self) -> None:
@@ -114,7 +126,7 @@ class Scenario(Task):
             events.append(Event("mistakes.too_many", due, {"kind": kind, "most": self._most}))
         elif frame.elapsed >= self._limit:
             phase = Phase.TIMEOUT
-        self._values[:] = (*self._way.target(state), *mistakes.counts.values())
+        self._values[:] = (*self._way.target(state), self._away(state), *mistakes.counts.values())
         results = self._results(frame, phase) if phase.over else {}
         return TrialStatus(phase, self._values, tuple(events), results)
 
@@ -125,27 +137,40 @@ class Scenario(Task):
         limit = self._settings.limit_s or scene.limit_s
         return PlannedTrial({"scenario": name}, expected_s=limit / 2, start_pose=start)
 
-    def _findings(self, frame: Frame) -> Iterator[Event]:
-        if self._deformed is None or not math.isnan(self._found):
-            return
-        by, pressed = None, False
+    def _away(self, state: FloatArray) -> float:
+        """Return how far the tip is from the deformed limb, in m; -1 where there is none."""
+        if self._deformed is None:
+            return NOWHERE
+        return self._way.nearest(state, self._deformed.name, self._limb)
+
+    def _reports(self, frame: Frame) -> Iterator[str]:
+        """Yield who reports a deformity in this tick, once for each report."""
         for event in frame.events:
             text = str(event.data.get("text", ""))
             if event.name == "order.note" and text.lower().startswith("found"):
-                by = "supervisor"
+                yield "supervisor"
             elif event.name == "order.report" and event.data["refused"] is None:
-                pressed = pressed or event.data["by"] == "participant"
-                by = by if event.data["by"] == "participant" else "supervisor"
-        if self._button is not None and frame.axes.item(self._button) > PRESSED:
-            pressed = True
-        if pressed:
-            away = self._way.nearest(frame.state, self._deformed.name, self._limb)
-            if away <= self._settings.find_m:
-                by = "operator"
-        if by is not None:
-            self._found = frame.elapsed
-            about = {"by": by, "limb": self._limb}
-            yield Event("deformity.found", frame.tick.due, about)
+                yield "operator" if event.data["by"] == "participant" else "supervisor"
+        down = self._button is not None and frame.axes.item(self._button) > PRESSED
+        if down and not self._down:
+            yield "operator"
+        self._down = down
+
+    def _findings(self, frame: Frame) -> Iterator[Event]:
+        """Yield every report, what it is worth, and the first that finds the deformity."""
+        due = frame.tick.due
+        for by in self._reports(frame):
+            away = self._away(frame.state)
+            near = by == "supervisor" or away <= self._settings.find_m
+            worth = "far" if not near else "hit" if math.isnan(self._found) else "again"
+            if self._deformed is None:
+                worth = "none there"
+            self._false += worth in {"far", "none there"}
+            about: dict[str, Value] = {"by": by, "worth": worth, "false_reports": self._false}
+            yield Event("deformity.reported", due, {**about, "distance": away})
+            if worth == "hit":
+                self._found = frame.elapsed
+                yield Event("deformity.found", due, {"by": by, "limb": self._limb})
 
     def _results(self, frame: Frame, phase: Phase) -> dict[str, Value]:
         peaks = self._watch.peaks
@@ -156,6 +181,9 @@ class Scenario(Task):
             "peak_force.object": peaks["object"],
             "peak_force.body": peaks["body"],
             "deformity_found": self._found,
+            "deformity": float(self._deformed is not None) if self._asked else math.nan,
+            "found": float(not math.isnan(self._found)) if self._asked else math.nan,
+            "false_reports": float(self._false),
             "k": float(phase is Phase.SUCCESS),
         }
 

@@ -8,8 +8,8 @@ from labcrane import Machine, Settings
 from labcrane.core import ButtonName, InputAxis, JointName, Names, SceneFile, Usual
 
 EVENTS = (
-    "goal.reached", "mistakes.too_many", "deformity.found", "drop", "overload", "contact.object",
-    "contact.body", "scene.placed",
+    "goal.reached", "mistakes.too_many", "deformity.reported", "deformity.found", "drop",
+    "overload", "contact.object", "contact.body", "scene.placed",
 )  # fmt: skip
 """What a run tells beside its beginning and end."""
 
@@ -34,10 +34,16 @@ class ScenarioSettings(Settings):
     hold_s: NonNegativeFloat = 0.2
     """... for this time, in seconds. Until then it is one mistake."""
 
+    drop_m: Annotated[NonNegativeFloat, Usual(0.001, 5.0)] = 0.15
+    """Letting go of something that is higher than this above what is under it is a drop, like
+    something that slips out, in metres. Of somebody it is the limb in the jaws that counts."""
+
     find_axis: ButtonName | None = None
     """Button with which the operator reports a deformity, while the tip is near it; none by
-    default. Both pages have a button too; the participant's counts like this one, and the
-    supervisor's, or a note that begins with "found", wherever the tip is."""
+    default. It counts when it is pressed, not while it is held. Both pages have a button too; the
+    participant's counts like this one, and the supervisor's, or a note that begins with "found",
+    wherever the tip is. Where there is no deformity, or the tip is not near it, a report is false
+    and counted as such."""
 
     find_m: PositiveFloat = 0.5
     """How near the tip must be then to the middle of the limb, in metres."""
@@ -69,12 +75,18 @@ class ErrorSettings(Settings):
     over_grip_s: PositiveFloat = 3.0
     """For how long it presses on then, in seconds."""
 
+    misses: float = Field(default=0.0, ge=0.0, le=1.0)
+    """Probability of overlooking a deformity, in a trial."""
+
+    false_reports: float = Field(default=0.0, ge=0.0, le=1.0)
+    """Probability of reporting one where there is none, in a trial: at its first goal."""
+
     fatigue_per_min: Annotated[NonNegativeFloat, Usual(1e-5, 1.0)] = 0.0
     """Share of its speed that is lost in a minute of the session, and by which it errs more often:
     after t minutes it has exp(-fatigue t) of its speed, and 1 / that of its rates."""
 
 
-class OperatorSettings(Settings):
+class PanelOperatorSettings(Settings):
     """A simulated operator at a control panel. Its values are ours, and never a result."""
 
     gain_per_s: PositiveFloat = 1.2
@@ -82,6 +94,9 @@ class OperatorSettings(Settings):
 
     speed_m_s: PositiveFloat = 0.25
     """Largest tip speed asked for, in m/s."""
+
+    touch_m_s: PositiveFloat = 0.03
+    """Largest tip speed where something is to be touched, in m/s."""
 
     reaction_s: NonNegativeFloat = 0.4
     """Time from a new goal to the first movement, in seconds."""
@@ -98,8 +113,10 @@ class OperatorSettings(Settings):
 
     button: ButtonName | None = None
     """A button of the input that it has too, like the device it stands for (``float.base`` of a
-    panel); it presses it whenever it has reached a goal, and so reports a deformity that is near
-    enough."""
+    panel), with which it reports a deformity once it sees one."""
+
+    sees_m: PositiveFloat = 0.5
+    """How near the tip must come to a deformity for it to be seen, in metres."""
 
     errs: ErrorSettings | None = None
     """How it errs, so that counts and stop rules can be rehearsed; never, by default."""

@@ -51,6 +51,11 @@ def is_signal(channel: SignalChannel) -> bool:
     return not any(each in text for each in NO_SIGNAL for text in said)
 
 
+def signal_columns(stream: SignalStream) -> list[int]:
+    """Return the columns that measure something."""
+    return [at for at, channel in enumerate(stream.channels) if is_signal(channel)]
+
+
 def electrodes(stream: SignalStream) -> tuple[list[int], list[float]]:
     """Return the columns that hold voltages, and what one of their units is in microvolts."""
     columns, factors = [], []

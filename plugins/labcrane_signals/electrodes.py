@@ -6,18 +6,17 @@ noise of their amplifiers (Tenke and Kayser 2001, Clin. Neurophysiol. 112, 545-5
 picks up broad noise and hum that its neighbours do not have.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from labcrane import FloatArray, SignalMonitor
+from labcrane import FloatArray
 from labcrane.core import SignalFault, SignalStream
-from labcrane_signals.channels import electrodes, labels
+from labcrane_signals.channels import electrodes
 from labcrane_signals.rails import Rails
 from labcrane_signals.settings import ElectrodeSettings
-from labcrane_signals.windows import BoolArray, Streak, Windows
+from labcrane_signals.windows import BoolArray, Streak, WindowedMonitor
 
 MAINS_HZ = (50, 60)
 HUM_RATIO = 10.0
@@ -81,7 +80,7 @@ ECG = Expected(frozenset({"ecg", "ekg"}), 2.0, 10_000.0, 60.0)
 EMG = Expected(frozenset({"emg"}), 0.1, 10_000.0)
 
 
-class ElectrodeMonitor(SignalMonitor):
+class ElectrodeMonitor(WindowedMonitor):
     """Tells flat lines, rails, hum, open and bridged electrodes, and a wrong unit."""
 
     def __init__(self, settings: ElectrodeSettings, expected: Expected) -> None:
@@ -93,16 +92,11 @@ class ElectrodeMonitor(SignalMonitor):
         return known and bool(electrodes(stream)[0])
 
     def begin(self, stream: SignalStream) -> None:
-        self._columns, factors = electrodes(stream)
+        columns, factors = electrodes(stream)
         self._factors = np.array(factors)
-        self._labels = labels(stream, self._columns)
-        count = len(self._columns)
-        self._windows = Windows(stream.rate_hz, count)
-        self._rails = Rails(count)
-        self._streaks = {
-            kind: Streak(need, count, back=1 if kind == "railing" else 2)
-            for kind, need in WINDOWS.items()
-        }
+        self.watch(stream, columns, WINDOWS)
+        self._streaks["railing"] = Streak(WINDOWS["railing"], len(columns), back=1)
+        self._rails = Rails(len(columns))
         width = self._windows.width
         taper = np.hanning(width + 1)[:-1]
         self._taper = taper[:, None] * np.sqrt(2.0 / (stream.rate_hz * float(taper @ taper)))
@@ -113,16 +107,9 @@ class ElectrodeMonitor(SignalMonitor):
         mains = MAINS_HZ if self._settings.mains_hz is None else (self._settings.mains_hz,)
         self._lines = [(each, *_around(frequency, each)) for each in mains]
         self._lines = [line for line in self._lines if line[1].sum() >= 3 and line[2].any()]  # noqa: PLR2004 - all bins of the line itself lie below half the rate
-        self._faults: list[SignalFault] = []
-
-    def look(self, times: FloatArray, samples: FloatArray) -> Sequence[SignalFault]:
-        del times
-        for window in self._windows.feed(samples[:, self._columns] * self._factors):
-            self._faults = self._judge(window)
-        return self._faults
 
     def _judge(self, window: FloatArray) -> list[SignalFault]:
-        """Judge one window in microvolts, shape ``(width, n_channels)``."""
+        window = window * self._factors  # in microvolts
         sent = np.isfinite(window).all(axis=0)
         window = window if sent.all() else np.where(sent, window, 0.0)
         flat, rails = self._rails.evaluate(window)

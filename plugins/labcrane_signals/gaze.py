@@ -1,15 +1,14 @@
 """Gaze and pupils of an eye tracker."""
 
 import re
-from collections.abc import Sequence
 
 import numpy as np
 
-from labcrane import FloatArray, SignalMonitor
+from labcrane import FloatArray
 from labcrane.core import SignalFault, SignalStream
 from labcrane_signals.channels import word
 from labcrane_signals.settings import GazeSettings
-from labcrane_signals.windows import BoolArray, Streak, Windows
+from labcrane_signals.windows import BoolArray, WindowedMonitor
 
 MILLIMETRES = {
     "mm": 1.0,
@@ -47,7 +46,7 @@ ADVICE = {
 }
 
 
-class GazeMonitor(SignalMonitor):
+class GazeMonitor(WindowedMonitor):
     """Tells lost gaze, implausible pupils, and a wrong unit."""
 
     def __init__(self, settings: GazeSettings) -> None:
@@ -57,7 +56,7 @@ class GazeMonitor(SignalMonitor):
         return stream.type.lower() == "gaze" and stream.rate_hz > 0 and bool(_places(stream))
 
     def begin(self, stream: SignalStream) -> None:
-        self._labels = [channel.label for channel in stream.channels]
+        self.watch(stream, range(len(stream.channels)), NEED)
         self._units = [channel.unit.strip().lower() for channel in stream.channels]
         self._pairs = _places(stream)
         self._pupils = [at for at, channel in enumerate(stream.channels) if _is_pupil(at, stream)]
@@ -66,16 +65,6 @@ class GazeMonitor(SignalMonitor):
             for at, channel in enumerate(stream.channels)
             if "confidence" in word(channel.label) + word(channel.type)
         ]
-        count = len(self._labels)
-        self._windows = Windows(stream.rate_hz, count)
-        self._streaks = {kind: Streak(need, count) for kind, need in NEED.items()}
-        self._faults: list[SignalFault] = []
-
-    def look(self, times: FloatArray, samples: FloatArray) -> Sequence[SignalFault]:
-        del times
-        for window in self._windows.feed(samples):
-            self._faults = self._judge(window)
-        return self._faults
 
     def _judge(self, window: FloatArray) -> list[SignalFault]:
         count = window.shape[1]

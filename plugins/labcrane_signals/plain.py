@@ -1,15 +1,13 @@
 """Any regular stream of numbers, and force sensors."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from labcrane import FloatArray, SignalMonitor
+from labcrane import FloatArray
 from labcrane.core import SignalFault, SignalStream
-from labcrane_signals.channels import is_signal, labels
+from labcrane_signals.channels import signal_columns
 from labcrane_signals.rails import Rails
 from labcrane_signals.settings import ForceSettings
-from labcrane_signals.windows import BoolArray, Streak, Windows
+from labcrane_signals.windows import BoolArray, WindowedMonitor
 
 SPECIAL = frozenset(
     {"eeg", "ecg", "ekg", "emg", "gaze", "force", "joystick", "joysticks", "stick", "sticks"}
@@ -30,7 +28,7 @@ ADVICE = {
 }
 
 
-class PlainMonitor(SignalMonitor):
+class PlainMonitor(WindowedMonitor):
     """Tells flat lines, rails and missing values of any regular stream.
 
     Standing still is a fault of a channel that has moved all the time before, or of all channels
@@ -49,23 +47,13 @@ class PlainMonitor(SignalMonitor):
     def knows(self, stream: SignalStream) -> bool:
         kind = stream.type.lower()
         wanted = kind in self.types if self.types else kind not in SPECIAL
-        return wanted and stream.rate_hz > 0 and bool(_columns(stream))
+        return wanted and stream.rate_hz > 0 and bool(signal_columns(stream))
 
     def begin(self, stream: SignalStream) -> None:
-        self._columns = _columns(stream)
-        self._labels = labels(stream, self._columns)
-        count = len(self._columns)
-        self._windows = Windows(stream.rate_hz, count)
-        self._rails = Rails(count)
-        self._streaks = {kind: Streak(need, count) for kind, need in NEED.items()}
-        self._lively = np.zeros(count, dtype=np.int64)
-        self._faults: list[SignalFault] = []
-
-    def look(self, times: FloatArray, samples: FloatArray) -> Sequence[SignalFault]:
-        del times
-        for window in self._windows.feed(samples[:, self._columns]):
-            self._faults = self._judge(window)
-        return self._faults
+        columns = signal_columns(stream)
+        self.watch(stream, columns, NEED)
+        self._rails = Rails(len(columns))
+        self._lively = np.zeros(len(columns), dtype=np.int64)
 
     def _judge(self, window: FloatArray) -> list[SignalFault]:
         none: BoolArray = np.asarray(~np.isfinite(window).all(axis=0))
@@ -108,7 +96,3 @@ class ForceMonitor(PlainMonitor):
 
     def __init__(self, settings: ForceSettings) -> None:
         self.largest = settings.largest or np.inf
-
-
-def _columns(stream: SignalStream) -> list[int]:
-    return [at for at, channel in enumerate(stream.channels) if is_signal(channel)]

@@ -1,14 +1,12 @@
 """Axes of sticks that another program streams."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from labcrane import FloatArray, SignalMonitor
+from labcrane import FloatArray
 from labcrane.core import SignalFault, SignalStream
-from labcrane_signals.channels import is_signal, labels
+from labcrane_signals.channels import signal_columns
 from labcrane_signals.settings import StickSettings
-from labcrane_signals.windows import Streak, Windows
+from labcrane_signals.windows import WindowedMonitor
 
 TYPES = frozenset({"joystick", "joysticks", "stick", "sticks", "axes", "gamepad"})
 SHARES = frozenset({"", "1", "normalized", "normalised", "norm"})
@@ -25,7 +23,7 @@ ADVICE = {
 }
 
 
-class StickMonitor(SignalMonitor):
+class StickMonitor(WindowedMonitor):
     """Tells sticks that have died away from rest, and a wrong unit.
 
     One that stands exactly at rest may be let go of: that is no fault, unless its rest was seen to
@@ -36,25 +34,15 @@ class StickMonitor(SignalMonitor):
         del settings  # it has none yet
 
     def knows(self, stream: SignalStream) -> bool:
-        return stream.type.lower() in TYPES and stream.rate_hz > 0 and bool(_axes(stream))
+        return stream.type.lower() in TYPES and stream.rate_hz > 0 and bool(signal_columns(stream))
 
     def begin(self, stream: SignalStream) -> None:
-        self._columns = _axes(stream)
-        self._labels = labels(stream, self._columns)
-        count = len(self._columns)
+        columns = signal_columns(stream)
+        self.watch(stream, columns, NEED)
         self._shares = np.array(
-            [stream.channels[at].unit.strip().lower() in SHARES for at in self._columns]
+            [stream.channels[at].unit.strip().lower() in SHARES for at in columns]
         )
-        self._windows = Windows(stream.rate_hz, count)
-        self._streaks = {kind: Streak(need, count) for kind, need in NEED.items()}
-        self._trembling = np.zeros(count, dtype=np.int64)
-        self._faults: list[SignalFault] = []
-
-    def look(self, times: FloatArray, samples: FloatArray) -> Sequence[SignalFault]:
-        del times
-        for window in self._windows.feed(samples[:, self._columns]):
-            self._faults = self._judge(window)
-        return self._faults
+        self._trembling = np.zeros(len(columns), dtype=np.int64)
 
     def _judge(self, window: FloatArray) -> list[SignalFault]:
         low, high = window.min(axis=0), window.max(axis=0)
@@ -77,7 +65,3 @@ class StickMonitor(SignalMonitor):
             for kind, now in bad.items()
             for at in np.flatnonzero(self._streaks[kind].add(now))
         ]
-
-
-def _axes(stream: SignalStream) -> list[int]:
-    return [at for at, channel in enumerate(stream.channels) if is_signal(channel)]

@@ -1,11 +1,14 @@
-"""Sliding windows over samples that come in pieces, and faults that last."""
+"""Sliding windows over samples that come in pieces, faults that last, and monitors made of both."""
 
-from collections.abc import Iterator
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from labcrane import FloatArray
+from labcrane import FloatArray, SignalMonitor
+from labcrane.core import SignalFault, SignalStream
+from labcrane_signals.channels import labels
 
 WIDTH_S = 1.0
 HOP_S = 0.5
@@ -67,3 +70,33 @@ class Streak:
         self._count = np.clip(count, 0, self._need + 2)
         self.raised = (self._count >= self._need) | (self.raised & (self._count > 0))
         return self.raised
+
+
+class WindowedMonitor(SignalMonitor):
+    """Judges some channels of a stream window by window; a finding stands until the next one."""
+
+    def watch(self, stream: SignalStream, columns: Sequence[int], need: Mapping[str, int]) -> None:
+        """Begin with a stream.
+
+        Parameters
+        ----------
+        columns
+            Its channels that are judged, in order.
+        need
+            Bad windows until each kind of fault counts.
+        """
+        self._columns = list(columns)
+        self._labels = labels(stream, self._columns)
+        self._windows = Windows(stream.rate_hz, len(self._columns))
+        self._streaks = {kind: Streak(most, len(self._columns)) for kind, most in need.items()}
+        self._faults: list[SignalFault] = []
+
+    def look(self, times: FloatArray, samples: FloatArray) -> Sequence[SignalFault]:
+        del times
+        for window in self._windows.feed(samples[:, self._columns]):
+            self._faults = self._judge(window)
+        return self._faults
+
+    @abstractmethod
+    def _judge(self, window: FloatArray) -> list[SignalFault]:
+        """Return what is wrong after one more window, shape ``(width, n_columns)``."""

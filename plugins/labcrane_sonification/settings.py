@@ -3,10 +3,18 @@
 from collections.abc import Mapping
 from typing import Annotated, Literal
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+from pydantic import (
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from labcrane import Machine, Settings
-from labcrane.core import Names, Unit, WrongKey
+from labcrane.core import Names, Unit, WrongKey, was_run
 
 MOST_OVERTONES = 15
 LOWEST_HZ, HIGHEST_HZ = 40.0, 10_000.0
@@ -59,6 +67,16 @@ class SonificationSettings(Settings):
 
     device: int | None = None
     """Number of the output device, as PortAudio counts; the system's default by default."""
+
+    @field_validator("device")
+    @classmethod
+    def _is_counted(cls, device: int | None, info: ValidationInfo) -> int | None:
+        if device is not None and device < 0 and not was_run(info):
+            raise ValueError(
+                f"it is {device}, and devices are counted from 0; leave it out for the system's "
+                "default"
+            )
+        return device
 
     def reveals(self) -> str:
         return "how far the tip is from the target"

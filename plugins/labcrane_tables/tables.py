@@ -16,6 +16,7 @@ from labcrane.analysis import (
     answers_of,
     beside_trials,
     codebook_of,
+    fixations_of,
     measures_of,
     scores_of,
 )
@@ -40,6 +41,7 @@ class Tables(Exporter):
     ``annotations``      one row per mark that people made afterwards, where there is one
     ``questionnaires``   one row per answer
     ``scores``           one row per score of a questionnaire
+    ``fixations``        one row per point at which the eye tracker was checked, where it was
     ``streams/``         one file per participant, session and stream, one row per tick
     ``codebook.csv``     unit, meaning and source of every column
     ===================  ==============================================================
@@ -54,7 +56,8 @@ class Tables(Exporter):
         import pandas as pd
 
         (folder / "streams").mkdir()
-        people, trials, codebooks, answers, scores, marks = [], [], [], [], [], []
+        people, trials, codebooks, answers, scores = [], [], [], [], []
+        marks, looked_at = [], []
         events = _Growing(folder / "events")
         for participant in participants:
             people.append(_person(participant))
@@ -63,13 +66,15 @@ class Tables(Exporter):
             codebooks.append(codebook_of(participant, measures))
             answers.append(answers_of(participant))
             marks.append(annotations_of(participant))
+            looked_at.append(fixations_of(participant))
             scores.append(scores_of(participant))
             for number, session in participant.sessions():
                 events.add(_events(participant, number, session))
                 self._streams(participant, number, session, folder / "streams")
         events.close()
-        if any(map(len, marks)):
-            write_csv(joined(marks), folder / "annotations.csv")
+        for name, tables in (("annotations", marks), ("fixations", looked_at)):
+            if any(map(len, tables)):
+                write_csv(joined(tables), folder / f"{name}.csv")
         for name, tables in (("trials", trials), ("questionnaires", answers), ("scores", scores)):
             everything = joined(tables)
             write_csv(everything, folder / f"{name}.csv")

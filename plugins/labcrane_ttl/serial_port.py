@@ -2,10 +2,10 @@
 
 import math
 import os
-import queue
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,15 @@ if TYPE_CHECKING:
 
 LISTEN_S = 0.1
 """Longest time that a close waits for the one who listens."""
+
+AT_ONCE = 4096
+"""Bytes that are taken off the port at once."""
+
+FLOOD, REST_S = 64, 0.005
+"""So many bytes at once are no echoes: then the listener rests, and the loop has its time."""
+
+KEPT = 1024
+"""Echoes that wait for a tick; of a flood the newest stay."""
 
 
 def as_byte(code: int) -> bytes:
@@ -46,7 +55,7 @@ class SerialTrigger(Trigger):
         self._rest = rest
         self._pulse = Pulse(settings.pulse_s)
         self._port: serial.Serial | None = None
-        self._echoes: queue.SimpleQueue[Echo] = queue.SimpleQueue()
+        self._echoes: deque[Echo] = deque(maxlen=KEPT)
         self._listener: threading.Thread | None = None
         self._deaf: str | None = None
         self._closing = threading.Event()
@@ -82,7 +91,7 @@ class SerialTrigger(Trigger):
             return ()
         if self._deaf is not None:
             self.fault = self._deaf
-        return [self._echoes.get_nowait() for _ in range(self._echoes.qsize())]
+        return [self._echoes.popleft() for _ in range(len(self._echoes))]
 
     def close(self) -> None:
         self._closing.set()
@@ -110,12 +119,16 @@ class SerialTrigger(Trigger):
         while not self._closing.is_set():
             try:
                 came = port.read(1)
+                if came:
+                    came += port.read(min(port.in_waiting, AT_ONCE))
             except (OSError, TypeError) as error:  # gone, or closed under it
                 self._deaf = f"{self._settings.port} cannot be read: {error}"
                 return
             now = time.perf_counter()
-            if came and came[0]:  # not the echo of a line that was cleared
-                self._echoes.put(Echo(came[0], now))
+            # A zero is the echo of a line that was cleared.
+            self._echoes.extend(Echo(code, now) for code in came[-KEPT:] if code)
+            if len(came) > FLOOD:
+                self._closing.wait(REST_S)
 
 
 if sys.platform == "win32":

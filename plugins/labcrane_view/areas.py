@@ -7,9 +7,9 @@ import numpy as np
 
 from labcrane import FloatArray, Frame, Run
 from labcrane.core import Shape, Sphere
-from labcrane.machines import PlacedObject, Segment, read_placed, segments, stands
-from labcrane_view.placement import Piece
+from labcrane.machines import PlacedObject, Segment, read_placed, rotation_matrix, segments, stands
 from labcrane_view.scene.outline import of_body, of_segment
+from labcrane_view.screen.placement import Piece
 
 TIP = 0.12
 """Radius in metres of the tip's area of interest."""
@@ -189,7 +189,7 @@ class Areas:
 
     def _moved(self, name: str, state: FloatArray) -> FloatArray:
         """Return the pose that the state says, shape ``(4, 4)``."""
-        turn = rotation(state[self._state.find(f"{name}.orientation")])
+        turn = rotation_matrix(state[self._state.find(f"{name}.orientation")])
         return _pose(state[self._state.find(f"{name}.position")].tolist(), turn)
 
 
@@ -200,16 +200,4 @@ def _pose(position: Sequence[float], turn: FloatArray) -> FloatArray:
 
 
 def _turned(yaw: float) -> FloatArray:
-    return rotation(np.array([0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)]))
-
-
-def rotation(quaternion: FloatArray) -> FloatArray:
-    """Return the rotation of a unit quaternion x, y, z, w, shape ``(3, 3)``."""
-    x, y, z, w = quaternion.tolist()
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return rotation_matrix((0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)))

@@ -12,17 +12,19 @@ from panda3d import core
 from labcrane import FloatArray, Frame, Machine, ProtocolError
 from labcrane_view.areas import Projection, axes_of
 from labcrane_view.framing import framed
-from labcrane_view.placement import Piece
-from labcrane_view.scene.stage import Stage
+from labcrane_view.scene import cab
+from labcrane_view.scene.backdrop import Backdrop
+from labcrane_view.scene.stage import SCENERY, Stage
+from labcrane_view.screen.placement import Piece
+from labcrane_view.screen.window import SEEN, Window, hidden_picture
 from labcrane_view.settings import CameraSettings
-from labcrane_view.window import SEEN, Window, hidden_picture
 
 NEAR, FAR = 0.15, 170.0
 ROUNDING_S = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class Viewport:
     """The camera's part of the window, in pixels: ``left`` counts from the window's left edge.
 
     Attributes
@@ -40,7 +42,7 @@ class Part:
     pieces: tuple[Piece, ...]
 
 
-class Delay:
+class DelayLine:
     """Gives the frame of a while ago.
 
     Parameters
@@ -90,8 +92,9 @@ class Camera:
         self._machine = machine
         self._look: Sequence[float] = () if settings.look == "targets" else settings.look
         self._fov_deg = settings.fov_deg
-        self._delay = Delay(settings.delay_s)
+        self._delay = DelayLine(settings.delay_s)
         self._due = -math.inf
+        self._backdrops: list[Backdrop] = []
         self.boxes: list[float] = []
         self.seen = math.nan
 
@@ -114,7 +117,7 @@ class Camera:
         window: Window,
         stage: Stage,
         target: Any,
-        part: Part,
+        part: Viewport,
         back: Sequence[float],
         must_see: FloatArray,
     ) -> Any:
@@ -127,7 +130,8 @@ class Camera:
         if self.settings.look == "targets":
             width, height = part.picture
             place = np.array(self.settings.eye)
-            look, self._fov_deg = framed(self.settings.name, place, must_see, width / height)
+            clear = cab.CLEAR if self.settings.cab_frame else 1.0
+            look, self._fov_deg = framed(self.settings.name, place, must_see, width / height, clear)
             self._look = look.tolist()
         self._node = self._stage.root.attach_new_node(self.settings.name)
         picture = None
@@ -138,8 +142,21 @@ class Camera:
             self._buffer.set_active(False)
             target, left = self._buffer, part.left
         ground = (0.0, 0.0, 0.0) if deep else back
+        stands = self.settings.on is None and stage.has_scenery
+        self._backdrops = []
         for piece in part.pieces:
-            eye = core.Camera(self.settings.name, self._lens(piece))
+            lens = self._lens(piece)
+            eye = core.Camera(self.settings.name, lens)
+            mask = None if deep else stage.own_mask()
+            if mask is not None and stands:
+                self._backdrops.append(Backdrop(window, stage, self._node, lens, piece, mask))
+                eye.set_camera_mask(mask)
+            elif mask is not None:
+                eye.set_camera_mask(mask | SCENERY)
+            if mask is not None and self.settings.cab_frame:
+                half = math.tan(math.radians(self._fov_deg) / 2.0)
+                width, height = part.picture
+                stage.add_cab(self._node, cab.window(half, half * height / width), mask)
             region = _region(target, piece, left)
             region.set_clear_color_active(True)
             region.set_clear_color(core.LColor(*ground, 1.0))
@@ -160,6 +177,11 @@ class Camera:
         lens.set_film_offset(aside, up)
         lens.set_near_far(NEAR, FAR)
         return lens
+
+    def drawn(self) -> None:
+        """Be told that a picture was drawn."""
+        for backdrop in self._backdrops:
+            backdrop.drawn()
 
     def take(self, frame: Frame) -> Frame | None:
         """Take a frame; return the one to be drawn now, None while the last picture stands."""

@@ -1,15 +1,13 @@
 """Display examination: whether there is one, the monitor asked for, and a renderer."""
 
-import re
-import subprocess
-
 from labcrane import DeviceError
 from labcrane.core import Finding, Verdict
 from labcrane.registry import Prompt
+from labcrane_view.screen.monitors import refresh_rates
+from labcrane_view.screen.refresh import Refresh, refresh_of
+from labcrane_view.screen.window import open_window
 from labcrane_view.settings import ViewSettings
-from labcrane_view.window import open_window
 
-CURRENT = re.compile(r"([\d.]+)[ +]*\*")
 SLOW_HZ = 50.0
 
 
@@ -22,38 +20,32 @@ def examine(settings: ViewSettings, ask: Prompt | None) -> list[Finding]:
         return [Finding.failed(error)]
     size = window.output.size
     text = f"{window.driver} draws a window of {size[0]} x {size[1]} pixels"
+    refresh = refresh_of(settings, window)
     window.close()
     found = [Finding(Verdict.PASS, text)]
     if window.software:
         fix = "install the driver of the graphics card; software drawing is slow"
         found = [Finding(Verdict.WARN, text, fix)]
-    return found if settings.display == "hidden" else [*found, *monitors()]
+    return found if settings.display == "hidden" else [*found, _swap(refresh), *_monitors()]
 
 
-def monitors() -> list[Finding]:
-    """Return the monitors that are on and their refresh rates, as xrandr says."""
+def _monitors() -> list[Finding]:
+    """Return what is to be said of each monitor's refresh rate."""
     try:
-        done = subprocess.run(
-            ["xrandr"],  # noqa: S607 - wherever it is installed
-            capture_output=True,
-            encoding="utf-8",
-            check=True,
-        )
-    except (FileNotFoundError, subprocess.CalledProcessError):
+        rates = refresh_rates()
+    except DeviceError:
         fix = "install xrandr (Debian: x11-xserver-utils)"
         return [Finding(Verdict.WARN, "the monitors' refresh rates are not known", fix)]
-    return [_rate(name, rate) for name, rate in refresh_rates(done.stdout)]
+    return [_rate(name, rate) for name, rate in rates]
 
 
-def refresh_rates(text: str) -> list[tuple[str, float]]:
-    """Return each monitor and its refresh rate in Hz, from what xrandr prints."""
-    found, name = [], ""
-    for line in text.splitlines():
-        if " connected" in line:
-            name = line.split()[0]
-        elif current := CURRENT.search(line):
-            found.append((name, float(current[1])))
-    return found
+def _swap(refresh: Refresh) -> Finding:
+    """Return what is to be said of how pictures get onto the glass."""
+    text = f"tearing is {refresh.tearing}"
+    if refresh.buffers > 1 and refresh.waits is not False:
+        return Finding(Verdict.PASS, text)
+    fix = "switch on vertical synchronisation in the graphics driver, or a compositor that has it"
+    return Finding(Verdict.WARN, text, fix)
 
 
 def _rate(name: str, rate_hz: float) -> Finding:

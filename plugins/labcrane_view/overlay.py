@@ -5,7 +5,7 @@ from typing import Any
 
 from panda3d import core
 
-from labcrane_view.placement import Piece
+from labcrane_view.screen.placement import Piece
 from labcrane_view.settings import PatchSettings
 
 LINE = 0.034
@@ -93,9 +93,10 @@ class Overlay:
         card = self.root.attach_new_node(maker.generate())
         card.set_texture(picture)
 
-    def text(self, font: Any) -> "Text":
-        """Return a new block of text in the upper left corner."""
-        return Text(self, self._corner(self._pieces[0]), font, self._line)
+    def text(self, font: Any, aside: int = 0) -> "Text":
+        """Return a new block of text in the upper left corner, ``aside`` pixels from its edge."""
+        left, bottom, width, height = self._corner(self._pieces[0])
+        return Text(self, (left + aside, bottom, width - aside, height), font, self._line)
 
     def notice(self, font: Any) -> "Text":
         """Return a new block of text in the lower middle, for what is to be read now."""

@@ -17,7 +17,7 @@ Level = Literal["low", "medium", "high"]
 
 
 @dataclass(frozen=True, slots=True)
-class Quality:
+class RenderQuality:
     """What is drawn.
 
     Attributes
@@ -35,10 +35,10 @@ class Quality:
     samples: int
 
 
-LEVELS: Mapping[Level, Quality] = {
-    "high": Quality(shadow=2048, soft=True, samples=4),
-    "medium": Quality(shadow=1024, soft=False, samples=0),
-    "low": Quality(shadow=0, soft=False, samples=0),
+LEVELS: Mapping[Level, RenderQuality] = {
+    "high": RenderQuality(shadow=2048, soft=True, samples=4),
+    "medium": RenderQuality(shadow=1024, soft=False, samples=0),
+    "low": RenderQuality(shadow=0, soft=False, samples=0),
 }
 
 

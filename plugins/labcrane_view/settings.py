@@ -33,6 +33,7 @@ from labcrane.core import (
     WrongKey,
     was_run,
 )
+from labcrane_view.scene.daylight import Time
 
 Triple = tuple[float, float, float]
 
@@ -63,6 +64,10 @@ class CameraSettings(Settings):
 
     depth_m: tuple[PositiveFloat, PositiveFloat] = (0.5, 20.0)
     """Near and far end of a depth picture, in metres along the line of sight."""
+
+    cab_frame: bool = False
+    """Whether it looks out of a cab: pillars, the edge of the roof and a sill hide what is behind
+    them, and stay where they are in the picture. Areas of interest are not cut by them."""
 
     rate_hz: Annotated[PositiveFloat | None, Usual(1.0, 500.0)] = None
     """Pictures per second of the session's time; as many as the window shows by default."""
@@ -163,6 +168,24 @@ class PatchSettings(Settings):
     """Edge length, in pixels."""
 
 
+GAZE_MARKER_CELLS = 10
+"""Along an edge of a gaze marker: white margin, black frame, six bits, frame, margin."""
+
+GAZE_MARKER_CODES = 16
+"""Codes that there are: four for each of four monitors."""
+
+
+class GazeMarkerSettings(Settings):
+    """AprilTags in the corners of each monitor, by which a head-mounted eye tracker finds it."""
+
+    first: Annotated[NonNegativeInt, Field(lt=GAZE_MARKER_CODES)] = 0
+    """Number of the first marker, in the upper left corner; the others follow clockwise, then those
+    of the next monitor. A second window needs numbers of its own."""
+
+    size: Annotated[Pixels, Field(multiple_of=GAZE_MARKER_CELLS)] = 100
+    """Edge length with the white margin, in pixels: ten cells of whole pixels."""
+
+
 class SupervisorSettings(Settings):
     """Which pictures the supervisor's page shows."""
 
@@ -257,6 +280,10 @@ class ViewSettings(Settings):
     to it, lines on the ground a metre apart. Every group sees them: views have the same settings in
     all of them."""
 
+    daylight: Time = "day"
+    """``day``, ``evening`` with a low sun and long shadows, ``overcast`` with hardly any, or
+    ``dusk``: contrast and haze are those of the time of day."""
+
     delay_s: Annotated[NonNegativeFloat, Usual(0.001, 5.0)] = 0.0
     """How long ago what is shown happened: a teleoperator's delay, in seconds."""
 
@@ -272,6 +299,10 @@ class ViewSettings(Settings):
 
     patch: PatchSettings | None = None
     """Square for a photodiode; none by default."""
+
+    gaze_markers: GazeMarkerSettings | None = None
+    """Squares in the corners for a head-mounted eye tracker; ``{}`` for the usual ones, none by
+    default."""
 
     areas: Annotated[tuple[SceneObject, ...], Once()] = ("tip", "target", "other", "sphere")
     """What has a box for eye tracking: tip, targets, shapes of cues; links, the grapple and things
@@ -312,6 +343,18 @@ class ViewSettings(Settings):
                 "text_arcmin needs viewing_m, the distance from the eye to the screen; write it",
                 at=("text_arcmin",),
             )
+        markers, monitors = self.gaze_markers, max(1, len(self.all_screens))
+        if markers and markers.first + 4 * monitors > GAZE_MARKER_CODES:
+            raise WrongKey(
+                f"first is {markers.first}, and four markers on each of {monitors} monitors go "
+                f"beyond the last, {GAZE_MARKER_CODES - 1}; "
+                + (
+                    f"write {GAZE_MARKER_CODES - 4 * monitors} or less"
+                    if 4 * monitors <= GAZE_MARKER_CODES
+                    else "leave gaze_markers out, or fill four monitors at most"
+                ),
+                at=("gaze_markers", "first"),
+            )
         return self
 
     @property
@@ -326,6 +369,7 @@ class ViewSettings(Settings):
             "key": KEYS,
             "screen": [str(screen) for screen in self.all_screens],
             "key of that view": self.keys,
+            "audience": [self.seen_by],
         }
 
     def needs(self, machine: Machine) -> Names:
@@ -348,6 +392,11 @@ class ViewSettings(Settings):
             found["size"] = f"is {self.size[0]} by {self.size[1]} pixels, more than any screen has"
         if self.patch is not None and self.patch.size > min(self.size):
             found["patch.size"] = f"is {self.patch.size} pixels, and {min(self.size)} are there"
+        if self.gaze_markers is not None and 2 * self.gaze_markers.size > min(self.size):
+            found["gaze_markers.size"] = (
+                f"is {self.gaze_markers.size} pixels: two take more than the {min(self.size)} that "
+                "are there"
+            )
         if self.delay_s > LONGEST_DELAY_S:
             found["delay_s"] = f"is {self.delay_s:g} s: nobody steers by a picture so late"
         if self.rate_hz is not None and self.rate_hz < FEWEST_PICTURES_HZ:

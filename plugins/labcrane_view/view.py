@@ -14,17 +14,21 @@ from labcrane import DeviceError, Feedback, FloatArray, Frame, Machine, PluginEr
 from labcrane.core import CameraImage, Cylinder, SessionState, Shape, TargetFinder, Value
 from labcrane.machines import link_frames
 from labcrane_view.areas import Areas
-from labcrane_view.camera import Camera, Delay, Part
+from labcrane_view.camera import Camera, DelayLine, Viewport
+from labcrane_view.fixation import FixationTarget, disc_px
 from labcrane_view.framing import must_be_seen
+from labcrane_view.gaze_markers import GazeMarker, described, drawn, placed
 from labcrane_view.hud import WORDS, Hud, notice, standing
 from labcrane_view.keys import Keys
 from labcrane_view.overlay import Overlay, capital
-from labcrane_view.placement import Keeper, Piece, Span, monitor_of, per_metre
 from labcrane_view.quality import LEVELS, Level, chosen, picture_s
-from labcrane_view.scene.stage import HAZE, Stage
+from labcrane_view.scene.daylight import DAYLIGHT
+from labcrane_view.scene.stage import Stage
+from labcrane_view.screen.placement import PictureSpan, Piece, WindowPlacer, monitor_of, per_metre
+from labcrane_view.screen.refresh import Refresh, refresh_of
+from labcrane_view.screen.window import TURNED, Window, font, font_name, hidden_picture, open_window
 from labcrane_view.settings import ViewSettings
 from labcrane_view.shots import Shots
-from labcrane_view.window import TURNED, Window, font, font_name, hidden_picture, open_window
 
 BOX = ("left", "top", "right", "bottom")
 PREVIEW_S = 0.5
@@ -45,6 +49,7 @@ class View(Feedback):
         Signal("render.began", "s"),
         Signal("flip.time", "s"),  # the picture is handed to the screen; the photodiode knows more
         Signal("patch", "1"),
+        Signal("refresh.missed", "1"),  # refreshes that showed the picture before once more
         Signal("monitors.lost", "1"),  # of those that it fills: nobody sees what they would show
     )
 
@@ -66,11 +71,14 @@ class View(Feedback):
         self._machine = machine
         self._window: Window | None = None
         self._situation = SessionState()
-        self._delay = Delay(settings.delay_s)
+        self._delay = DelayLine(settings.delay_s)
         self._due = self._now = 0.0
         self._samples: dict[str, FloatArray] = {}
         self._letters: Any = None
         self._quality = ""
+        self._refresh = Refresh()
+        self._markers: list[GazeMarker] = []
+        self._px_per_m: float | None = None
         # Made before there is a window: a camera on a link that does not exist is refused at once.
         self._cameras = [Camera(camera, machine) for camera in cameras]
 
@@ -102,15 +110,16 @@ class View(Feedback):
             [view for view in self.before if isinstance(view, ViewSettings)],
             quality.samples,
         )
-        self._keeper = Keeper(settings, window.span.place)
+        self._placer = WindowPlacer(settings, window.span.place)
         if not window.shaders:
             self._check_simple()
         output = window.output
         self._size = (output.get_x_size(), output.get_y_size())
         scenery = settings.content == "scene"
         shadow = quality.shadow if settings.shadow is None else settings.shadow
+        daylight = DAYLIGHT[settings.daylight]
         self.stage = Stage(
-            run, shaders=window.shaders, shadow=shadow, scenery=scenery, soft=quality.soft
+            run, daylight, shaders=window.shaders, shadow=shadow, scenery=scenery, soft=quality.soft
         )
         if "ground_grid" in settings.depth_cues:
             self.stage.grid()
@@ -118,7 +127,7 @@ class View(Feedback):
             self.stage.root.set_antialias(core.AntialiasAttrib.M_multisample)
         self._hud = Hud(settings.hud_lines, settings.language, run)
         self._areas = Areas(settings.areas, run, self._size, settings.flip)
-        back = HAZE if scenery else (0.0, 0.0, 0.0)
+        back = daylight.haze if scenery else (0.0, 0.0, 0.0)
         target: Any = output
         if settings.flip != "none":
             target = self._turned_over(output)
@@ -133,13 +142,35 @@ class View(Feedback):
             picture = camera.open(window, self.stage, target, part, back, must_be_seen(run))
             if picture is not None:
                 overlay.picture((part.left, part.left + part.width), picture)
-        self._text = overlay.text(letters) if settings.hud_lines else None
+        self._markers = self._gaze_markers(overlay, parts[0].pieces)
+        aside = settings.gaze_markers.size if settings.gaze_markers else 0
+        self._text = overlay.text(letters, aside) if settings.hud_lines else None
         self._notice = overlay.notice(letters) if settings.notices else None
         told = settings.notices or settings.hud_lines
         self._paused = overlay.curtain(letters) if told else None
+        self._px_per_m = _px_per_m(settings)
+        self._fixation: FixationTarget | None = None
+        if settings.seen_by == "operator":
+            disc = disc_px(self._size[1], settings.viewing_m, self._px_per_m)
+            self._fixation = FixationTarget(overlay.root, self._size, disc)
         self._patch = overlay.patch(settings.patch) if settings.patch else None
         if self._keys:
             self._keys.open(output)
+        self._refresh = refresh_of(settings, window)
+        self._flipped = math.nan
+
+    def _gaze_markers(self, overlay: Overlay, pieces: Sequence[Piece]) -> list[GazeMarker]:
+        """Draw what a head-mounted eye tracker finds the picture by; return what and where."""
+        settings = self._settings
+        if settings.gaze_markers is None:
+            return []
+        if not settings.screens:  # of cameras side by side, the whole window
+            pieces = (Piece(0, 0, *self._size, 0, 0),)
+        height = self._size[1]
+        markers = placed(settings.gaze_markers, pieces, height, settings.patch)
+        for marker in markers:
+            drawn(marker, height).reparent_to(overlay.root)
+        return [marker.flipped(settings.flip, self._size) for marker in markers]
 
     def _check_simple(self) -> None:
         """Refuse what the software renderer would show as a white rectangle, or not at all."""
@@ -160,7 +191,7 @@ class View(Feedback):
 
     def close(self) -> None:
         if self._window is not None:
-            self._keeper.close()
+            self._placer.close()
             self._window.close()
             self._window = None
 
@@ -184,15 +215,19 @@ class View(Feedback):
             if not camera.apart:
                 self._look(camera, shown, shapes, poses)
         white = self._write(shown)
-        self._keeper.keep(window.output)
+        self._placer.keep(window.output)
         window.engine.render_frame()
         flipped = time.perf_counter()
         self.stage.drawn(window.output.get_gsg())
+        for camera in self._cameras:
+            camera.drawn()
         self._samples = {"areas": np.concatenate([camera.boxes for camera in self._cameras])}
         if self._keys:
             self._samples["keys"] = self._keys.rows()
-        lost = float(self._keeper.lost)
-        return np.array([shown.tick.number, began, flipped, white, lost])
+        lost, since = float(self._placer.lost), flipped - self._flipped
+        self._flipped = flipped
+        missed = math.nan if math.isnan(since) else self._refresh.missed(since)
+        return np.array([shown.tick.number, began, flipped, white, missed, lost])
 
     def samples(self) -> Mapping[str, FloatArray]:
         return self._samples
@@ -209,7 +244,13 @@ class View(Feedback):
             "renderer": f"{driver} (software: no graphics card takes part)" if software else driver,
             "size": self._size_in_words(),
             "quality": self._quality,
+            **self._refresh.facts(),
             "samples": 1 if window is None else self._samples_a_pixel(window),
+            **({"gaze_markers": described(self._markers)} if self._markers else {}),
+            "seen_by": self._settings.seen_by,
+            "flip": self._settings.flip,
+            **({} if self._px_per_m is None else {"px_per_m": self._px_per_m}),
+            **({} if self._settings.viewing_m is None else {"viewing_m": self._settings.viewing_m}),
             "font": font_name(self._settings.font, self._letters),
             "delay": "not measured",
         }
@@ -318,6 +359,8 @@ class View(Feedback):
         if self._paused is not None:
             state = standing(frame, self._situation)
             self._paused.show([WORDS[self._settings.language][state]] if state else [])
+        if self._fixation is not None:  # a pause is to be seen: what holds the session is on top
+            self._fixation.show(() if frame.paused else self._situation.fixation)
         if self._patch is None or self._settings.patch is None:
             return math.nan
         counts = self._situation.counts
@@ -326,17 +369,27 @@ class View(Feedback):
         return white
 
 
-def _parts(size: tuple[int, int], count: int, span: Span) -> list[Part]:
+def _parts(size: tuple[int, int], count: int, span: PictureSpan) -> list[Viewport]:
     """Return the parts of a window of ``size`` pixels, side by side, or its only one's pieces."""
     if count == 1:
         # A window manager may have made it smaller than it was asked for.
         only = len(span.pieces) == 1
         whole = (Piece(0, 0, *size, 0, 0),)
         picture = size if only else span.picture
-        return [Part(0, *size, picture, whole if only else span.pieces)]
+        return [Viewport(0, *size, picture, whole if only else span.pieces)]
     width = size[0] // count
     one = (width, size[1])
-    return [Part(at * width, *one, one, (Piece(at * width, 0, *one, 0, 0),)) for at in range(count)]
+    return [
+        Viewport(at * width, *one, one, (Piece(at * width, 0, *one, 0, 0),)) for at in range(count)
+    ]
+
+
+def _px_per_m(settings: ViewSettings) -> float | None:
+    """Return pixels in a metre of the glass; None where nobody says how large it is."""
+    try:
+        return per_metre(settings, monitor_of(settings))
+    except DeviceError:
+        return None
 
 
 def _line(settings: ViewSettings, letters: Any) -> float | None:

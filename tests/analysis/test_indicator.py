@@ -5,6 +5,7 @@ import math
 import os
 import subprocess
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from labcrane.analysis.advice import familiarity, fatigue, suggest
 from labcrane.analysis.cohort import find_cohort
 from labcrane.analysis.indicator import Indicator, Performance, indicate
 from labcrane.analysis.indicator_settings import IndicatorSettings, Weights
-from labcrane.analysis.operator_tests import OperatorTest, completion, operator_tests
+from labcrane.analysis.operator_tests import Detection, OperatorTest, completion, operator_tests
 from labcrane.analysis.report.workbook import advice, write_workbook
 from labcrane.cli.app import main
 from labcrane.core.records import Event
@@ -180,7 +181,7 @@ def trial(time: float, counts: tuple[int, int, int, int] = (0, 0, 0, 0), **more:
     return {"time": time, **dict(zip(names, counts, strict=True)), **more}
 
 
-def the_vectors() -> list[dict]:
+def vectors() -> list[dict]:
     reference = trial(60.0, reference=True)
     tests = [
         trial(60.0 * time, counts, ratings=ratings, completion=int(k))
@@ -190,7 +191,7 @@ def the_vectors() -> list[dict]:
 
 
 def test_the_vectors_come_out_of_recordings_too(tmp_path: Path) -> None:
-    record(tmp_path, "R001", the_vectors())
+    record(tmp_path, "R001", vectors())
     tests = scored(tmp_path)
     assert [test.indicator.raw for test in tests] == pytest.approx([v[4] for v in VECTORS])
     assert {test.reference_s for test in tests} == {60.0}
@@ -238,7 +239,7 @@ def test_totals_are_values_for_pandas_with_formulas_beside_them_and_a_csv_twin(
 ) -> None:
     import pandas as pd
 
-    record(tmp_path, "R001", the_vectors())
+    record(tmp_path, "R001", vectors())
     assert main(["score", str(tmp_path)]) == 0
     tests = scored(tmp_path)
     sheet = pd.read_excel(tmp_path / "evaluation.xlsx", sheet_name="Tests")
@@ -258,7 +259,7 @@ def test_totals_are_values_for_pandas_with_formulas_beside_them_and_a_csv_twin(
 def test_a_workbook_under_another_name_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
-    record(tmp_path / "data", "R001", the_vectors())
+    record(tmp_path / "data", "R001", vectors())
     assert main(["score", str(tmp_path / "data"), "--out", str(tmp_path / name)]) == 1
     said = " ".join(capsys.readouterr().err.split())
     assert "is no name of a workbook; give one that ends in .xlsx" in said
@@ -318,7 +319,7 @@ def converted(book: Path, sheet: int) -> list[list[str]]:
 
 
 def test_libreoffice_opens_the_workbook_and_its_totals_are_ours(tmp_path: Path) -> None:
-    record(tmp_path, "R001", the_vectors())
+    record(tmp_path, "R001", vectors())
     record(tmp_path, "R002", [trial(50.0, reference=True), trial(80.0, (2, 0, 1, 0))])
     record(tmp_path, "R002", [trial(64.0, (1, 0, 0, 0))], session=2)
     assert main(["score", str(tmp_path)]) == 0
@@ -386,6 +387,27 @@ def runs(percents: list[tuple[float, int]]) -> list[OperatorTest]:
     return tests
 
 
+def test_reports_of_deformities_are_in_the_workbook_as_hits_misses_and_false_alarms(
+    tmp_path: Path,
+) -> None:
+    import pandas as pd
+
+    nan = math.nan
+    seen = [(1, 1, 0), (1, 1, 2), (1, 0, 1), (0, 0, 0), (0, 0, 0), (0, 0, 3), (nan, nan, 1)]
+    tests = [
+        replace(test, detection=Detection(*map(float, each)))
+        for test, each in zip(runs([(60.0, 0)] * len(seen)), seen, strict=True)
+    ]
+    write_workbook(tests, tmp_path / "book.xlsx")
+    sheet = pd.read_excel(tmp_path / "book.xlsx", sheet_name="Tests")
+    columns = sheet[["deformity", "found", "false_reports"]].to_numpy(dtype=float)
+    np.testing.assert_array_equal(columns, np.array(seen, dtype=float))
+    (row,) = pd.read_excel(tmp_path / "book.xlsx", sheet_name="Deformities").to_dict("records")
+    assert row == {
+        "operator": "R001", "hits": 2, "misses": 1, "false alarms": 1, "correct rejections": 2
+    }  # fmt: skip
+
+
 def test_the_component_that_loses_most_is_practised_next() -> None:
     said = suggest(runs([(60.0, 3), (70.0, 4)]))
     assert said.verdict == "practise objects: keep clear of what is in the scene"
@@ -439,7 +461,7 @@ def test_one_test_of_each_scenario_tells_familiarity_and_fatigue_of_all_together
 
 def test_a_session_without_a_tick_does_not_take_the_others_with_it(tmp_path: Path) -> None:
     home = tmp_path / "P001"
-    record(tmp_path, "P001", the_vectors())
+    record(tmp_path, "P001", vectors())
     path = home / "ses-02_run.xdf"
     with SessionJournal(path, [Column("state", "joint.angle.boom", "rad")], 240.0) as journal:
         journal.write_event(Event("session.start", 1.0, {"participant": "P001"}), 0)

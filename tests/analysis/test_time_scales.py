@@ -139,3 +139,43 @@ def test_pairs_that_came_in_one_order_for_all_cannot_be_told_from_positions() ->
     same = movements.assign(pair=movements["place"].map(dict(enumerate("abcdefgh", start=1))))
     mine = taken_away(same, "movement_time")
     np.testing.assert_array_equal(mine, same["movement_time"])
+
+
+def test_what_goes_by_a_position_or_phase_that_somebody_lacks_is_not_made_of_its_neighbour() -> (
+    None
+):
+    curves = np.random.default_rng(7).uniform(2.0, 9.0, (PEOPLE, PHASES, PLACES))
+    rows = [
+        {
+            "participant": f"P{person:03}",
+            "group": "none",
+            "phase": f"{phase + 1} session",
+            "place": place + 1,
+            "movement_time": curves[person, phase, place],
+        }
+        for person in range(PEOPLE)
+        for phase in range(PHASES)
+        for place in range(PLACES)
+    ]
+    whole = pd.DataFrame(rows)
+    who, phase, place = whole["participant"], whole["phase"], whole["place"]
+    begins_late = (who == "P001") & (phase == "2 session") & (place == 1)
+    ends_early = (who == "P002") & (phase == "1 session") & (place == PLACES)
+    stays_away = (who == "P003") & (phase == "2 session")
+    found = quantities(whole[~(begins_late | ends_early | stays_away)], "movement_time")
+    own = {
+        name: {(row.phase[0], row.quantity) for row in part.itertuples()}
+        for name, part in found.groupby("participant")
+    }
+    everything = own["P000"]
+    assert len(everything) == 2 + 5 + 5
+    assert everything - own["P001"] == {("2", "gain"), ("2", "warm-up decrement")}
+    assert everything - own["P002"] == {
+        ("1", "gain"),
+        ("2", "warm-up decrement"),
+        ("2", "retention"),
+    }
+    # Neither is the third session compared with the first.
+    away = {(at, name) for at, name in everything if at == "2"}
+    away |= {("3", name) for name in ("change", "warm-up decrement", "retention")}
+    assert everything - own["P003"] == away

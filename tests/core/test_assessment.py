@@ -5,8 +5,7 @@ import random
 import pytest
 
 from labcrane.analysis.indicator import Performance, indicate
-from labcrane.analysis.indicator_settings import IndicatorSettings
-from labcrane.analysis.operator_tests import COUNTS
+from labcrane.analysis.indicator_settings import COUNTS, IndicatorSettings
 from labcrane.core.records import Event
 from labcrane.session.commands import Order
 from labcrane.web.assessment import LIVE, Assessment
@@ -105,6 +104,18 @@ def test_what_the_supervisor_decides_counts_until_the_next_test_begins() -> None
     followed.take(began(4, "carry"))
     (*_, last) = followed.lines(frame(4, 1.0, {}), SETTINGS)
     assert last.endswith("k 1 (if it is completed)")
+
+
+def test_drops_are_shown_and_too_many_of_them_make_the_completion_factor_zero() -> None:
+    start = began(9, "carry")
+    followed = following(*reference("carry", 20.0), start)
+    lines = followed.lines(frame(9, 20.0, {}) | {"task.mistakes.drop": 2.0}, SETTINGS)
+    assert "drops: 2 of 4" in lines
+    assert lines[-1].endswith("k 1 (if it is completed)")
+    followed.take(Event("trial.end", 0.0, ended(start, 20.0, {}).data | {"n_drop": 5.0}))
+    *_, drops, last = followed.lines({}, SETTINGS)
+    assert drops == "drops: 5 of 4"
+    assert last.endswith("k 0 (more than 4 mistakes of one kind)")
 
 
 def test_practice_and_tests_without_a_reference_have_no_indicator() -> None:

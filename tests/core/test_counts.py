@@ -36,7 +36,7 @@ def visit(tmp_path: Path) -> Visit:
     return Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=True)
 
 
-def the_plan(visit: Visit) -> SessionPlan:
+def planned(visit: Visit) -> SessionPlan:
     return plan_session(visit.study, visit.participant, visit.session)
 
 
@@ -62,7 +62,7 @@ def shown(counts: TrialCounts, events: list[Event]) -> list[str]:
 def test_the_lines_the_bar_the_page_and_the_view_count_alike(visit: Visit) -> None:
     console = ScriptedConsole()
     run(visit, console)
-    counts = TrialCounts.of(the_plan(visit))
+    counts = TrialCounts.of(planned(visit))
     lines = shown(counts, console.told)
     ends = [line.partition(":")[0] for line in lines if "trial " in line and ": success" in line]
     practice = [f"practice trial {number}" for number in range(1, len(counts.practice) + 1)]
@@ -79,7 +79,7 @@ def test_the_lines_the_bar_the_page_and_the_view_count_alike(visit: Visit) -> No
 
 def test_a_resumed_session_goes_on_counting_where_it_stopped(visit: Visit) -> None:
     stopped(visit)
-    counts = TrialCounts.of(the_plan(visit))
+    counts = TrialCounts.of(planned(visit))
     ahead = outlook(replace(visit, resumed=True), EXEMPT)
     assert ahead.done == 1
     rest = f"trials 2-{counts.total} of {counts.total}"
@@ -99,7 +99,7 @@ def test_the_record_keeps_the_numbers_of_its_trial_table(visit: Visit) -> None:
     stopped(visit)
     log, _ = read_journal([visit.journal])
     owed = next(event.data["owed"] for event in log.events if event.name == "session.end")
-    last = the_plan(visit).trials[-1].number
+    last = planned(visit).trials[-1].number
     assert owed.endswith(f"-{last}")
 
 

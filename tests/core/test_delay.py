@@ -163,12 +163,12 @@ def test_the_doctor_measures_the_delay_of_a_sensor(
 
 def the_record_says_it(protocol: Path) -> None:
     study = a_study(protocol.parent, STUDY.replace("feedback:\n  tone: {use: click}", ""))
-    crew = FeedbackProcesses(Visit(study, "P001", 1, protocol.parent, simulated=True))
+    processes = FeedbackProcesses(Visit(study, "P001", 1, protocol.parent, simulated=True))
     try:
-        assert crew.wait(lambda said: None, lambda: False)
-        (handle,) = crew.handles
+        assert processes.wait(lambda said: None, lambda: False)
+        (handle,) = processes.handles
     finally:
-        crew.stop()
+        processes.stop()
     assert re.search(r"delay 4\d\.\d ms \(sd 0\.\d ms, 6 changes, \d+-\d+-\d+\)$", handle.facts)
 
 

@@ -15,7 +15,7 @@ from labcrane.core import Event, Layout, SessionState, TargetFinder
 from labcrane.design.order import faded
 from labcrane.design.plan import plan_session
 from labcrane.feedback.processes import FeedbackProcesses
-from labcrane.protocol.questions import questions
+from labcrane.protocol.questions import CheckQuestion, questions
 from labcrane.protocol.study import Study
 from labcrane.recording.run_codec import read_run, write_run
 from labcrane.session.commands import Command, FeedbackLost, FeedbackReady, Order
@@ -51,11 +51,16 @@ def test_feedback_fades_part_by_part(count: int, shares: tuple[float, ...], expe
     assert "".join(str(int(on)) for on in faded(count, shares)) == expected
 
 
+def of_design(study: Study) -> list[CheckQuestion]:
+    """Return what is asked about who is given which feedback; this study has no view for cues."""
+    return [each for each in questions(study) if not each.key.startswith("feedback.")]
+
+
 def test_check_warns_of_a_block_that_gives_every_group_all_feedback_unsaid(tmp_path: Path) -> None:
-    (asked,) = questions(a_study(tmp_path, blocks("pairs: 1", "pairs: 1, feedback: group")))
+    (asked,) = of_design(a_study(tmp_path, blocks("pairs: 1", "pairs: 1, feedback: group")))
     assert asked.text.startswith("sessions: step 1 of ")
     assert "so that every group is given ball, tone; write feedback: group, none, all" in asked.text
-    said = questions(a_study(tmp_path, blocks("pairs: 1, feedback: all")))
+    said = of_design(a_study(tmp_path, blocks("pairs: 1, feedback: all")))
     assert [each.key for each in said] == [
         "design.groups",  # which then do the same
         "sessions.1.steps.1.block.feedback",
@@ -177,7 +182,7 @@ def test_feedback_that_cannot_start_refuses_the_session_or_is_left_out(
     viewed = SHORT + "views: {window: {use: view}}\n"
     for policy in ("restart", "continue"):
         study = a_study(tmp_path, viewed + f"on_fault: {{feedback_lost: {policy}}}\n")
-        crew = FeedbackProcesses(Visit(study, "P001", 1, tmp_path, simulated=True))
+        processes = FeedbackProcesses(Visit(study, "P001", 1, tmp_path, simulated=True))
         said: list[str] = []
         try:
             if policy == "restart":
@@ -185,13 +190,13 @@ def test_feedback_that_cannot_start_refuses_the_session_or_is_left_out(
                     DeviceError,
                     match="feedback 'window' cannot be started: there is no display for a window",
                 ):
-                    crew.wait(said.append, lambda: False)
+                    processes.wait(said.append, lambda: False)
             else:
-                assert crew.wait(said.append, lambda: False)
+                assert processes.wait(said.append, lambda: False)
                 assert "there is no display" in said[0]
                 assert said[0].endswith("it is left out")
         finally:
-            crew.stop()
+            processes.stop()
 
 
 def test_a_scene_comes_through_as_it_was() -> None:

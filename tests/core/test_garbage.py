@@ -4,8 +4,15 @@ import gc
 import weakref
 
 import pytest
+from left_out import as_in_a_program
 
 from labcrane.core.garbage import cleared, settled
+
+
+@pytest.fixture(autouse=True)
+def alone():
+    with as_in_a_program():
+        yield
 
 
 class Ring:

@@ -17,7 +17,7 @@ from labcrane import Frame, Tick
 from labcrane.core import Event
 from labcrane.errors import StreamError
 from labcrane.feedback import process
-from labcrane.feedback.config import FeedbackConfig, Part
+from labcrane.feedback.config import ComponentConfig, FeedbackConfig
 from labcrane.feedback.process import FeedbackProcess
 from labcrane.streams.context import CONTEXT, ContextOutlet
 from labcrane.streams.feedback_log import log_source
@@ -96,12 +96,12 @@ class Joined:
         self.session = Session(self.source)
         order = FeedbackConfig(
             "notes",
-            Part("notes", {"file": str(self.notes)}),
+            ComponentConfig("notes", {"file": str(self.notes)}),
             self.session.run,
             self.source,
             folder / "study.yaml",
             always=True,
-            cues={"ball": Part("sphere", {})},
+            cues={"ball": ComponentConfig("sphere", {})},
         )
         self.said: list[dict[str, Any]] = []
         self._process = FeedbackProcess(order, self.said.append)

@@ -9,7 +9,7 @@ import numpy as np
 import labcrane
 from labcrane import Feedback, Settings, Signal, offer
 from labcrane.core import Cylinder, SessionState, Sphere
-from labcrane.feedback.config import FeedbackConfig, Part
+from labcrane.feedback.config import ComponentConfig, FeedbackConfig
 from labcrane.feedback.presenter import Presenter
 from labcrane.registry.registry import discover
 from labcrane.testing import TARGETS, ch8, make_run, make_target
@@ -46,12 +46,12 @@ def presenter(*, always: bool) -> Presenter:
     registry.offers[Feedback]["notebook"] = book
     order = FeedbackConfig(
         "book",
-        Part("notebook", {}),
+        ComponentConfig("notebook", {}),
         make_run(ch8(), task=TARGETS),
         "test",
         Path("study.yaml"),
         always=always,
-        cues={"ball": Part("sphere", {"at": "tip"})},
+        cues={"ball": ComponentConfig("sphere", {"at": "tip"})},
     )
     again = FeedbackConfig.from_json(order.as_json())
     assert json.loads(again.as_json()) == json.loads(order.as_json())

@@ -99,6 +99,63 @@ def test_a_mistake_is_told_with_its_line(complaint, old: str, new: str, said: st
     assert told[0].split(":")[0] == str(1 + WRITTEN[: WRITTEN.index(old)].count("\n"))
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("labcrane: 1", "# as of old\n%YAML 1.1\n---\nlabcrane: 1",
+         "2:1: the file is to be read as YAML 1.1, in which no is false and 1:30 is 90; leave this line out"),
+        ("{pairs: shuffled}", "{pairs: shuffled}\n  groups: {1: [], '1': []}",
+         "16:19: it has the key '1' twice, with and without quotation marks; keep one"),
+        ("{pairs: shuffled}", "{pairs: shuffled}\n  groups: {a: [], ~: []}",
+         "16:19: it has nothing for a key; write a name, in quotation marks if it is one"),
+        ("{pairs: shuffled}", "{pairs: shuffled}\n  groups: {[a]: []}",
+         "16:12: it has a mapping or a list for a key; write a name, in quotation marks if it is one"),
+        ("{pairs: shuffled}", '{pairs: shuffled}\n  groups: {"a\\nb": []}',
+         "16:12: it has a line end in the key 'a\\nb'; write it in one line"),
+        ("{pairs: shuffled}", '{pairs: shuffled}\n  groups: {"a\\u202eb": []}',
+         "16:12: it has the character U+202E in the key 'a\\u202eb'; leave it out"),
+        ("{pairs: shuffled}", "{pairs: shuffled}\ntitle: !!binary aGVsbG8=", None),
+        ("- block: {task: aiming, repeat: 2}", "- block:\n        task: aiming\n        repeat: 2",
+         "22:9: 'task' is in one column with 'block', to which it belongs; indent it, and what follows, by two spaces more"),
+        ("- block: {task: aiming, repeat: 2}", "- block: {task:aiming, repeat: 2}",
+         "21:17: there is no space behind the colon of 'task'; add one"),
+        ("title: ", "title: 'A ",
+         "3:8: the quotation mark that opens here is closed in line 4 only; close it where the text ends"),
+        ("hello.md", '"hello.md', "19:23: the quotation mark that opens here is not closed; close it"),
+    ],
+)  # fmt: skip
+def test_what_yaml_lets_people_write_by_mistake_is_told_where_it_was_written(
+    complaint, old: str, new: str, said: str | None
+) -> None:
+    told = complaint((old, new))
+    assert len(told) == 1
+    assert said is None or told == [said]
+
+
+def test_a_quotation_that_takes_in_the_next_keys_is_told_where_it_opens(complaint) -> None:
+    opened = ("title: A study", "title: 'A study"), ("pattern: 'P\\d{3}', ", "")
+    assert complaint(*opened, ("input: {use: dual_joystick}", "input: {}'")) == [
+        "3:8: title has 'machine:' in it, which is a key of its own; close the quotation mark where "
+        "the text of title ends"
+    ]
+
+
+def test_a_protocol_without_sessions_is_told_that_it_needs_them(complaint) -> None:
+    assert complaint((WRITTEN[WRITTEN.index("sessions:") :], "")) == [
+        "1:1: the file needs 'sessions'"
+    ]
+
+
+def test_a_questionnaire_misspelt_is_told_with_that_of_the_protocol_itself(complaint) -> None:
+    own = "questionnaires: {workload: {use: nasa_tlx}}\nsessions:"
+    assert complaint(
+        ("sessions:", own), ("- break:", "- questionnaire: [workload, worklaod]\n      - break:")
+    ) == [
+        "23:35: there is no questionnaire 'worklaod'; did you mean 'workload'? the protocol has "
+        "workload"
+    ]
+
+
 def test_all_mistakes_are_told_at_once_in_the_order_of_the_file(complaint) -> None:
     told = complaint(
         ("rate_hz: 240", "rate_hz: 0"),

@@ -42,6 +42,7 @@ OWN = (
 )
 RULE = "{questionnaire: q, score: s, above: 5}"
 BALL = "feedback: {ball: {use: sphere}, tone: {use: sphere}}\nsessions:"
+SEEN = f"views: {{front: {{use: view}}}}\n{BALL}"
 GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
 
 
@@ -59,6 +60,14 @@ GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
         ([("sessions:", BALL), (BLOCK, BLOCK.replace("pairs", "feedback: [ball], pairs"))],
          "feedback.tone", "never switched on"),
         ([("sessions:", GROUPS)], "design.groups", "no block has feedback: group"),
+        ([("sessions:", BALL)], "feedback.ball", "the operator has none, so that nobody sees it"),
+        ([("sessions:", f"views: {{desk: {{use: view, seen_by: examiner, hud: []}}}}\n{BALL}")], "feedback.ball",
+         "add one, as views: {operator: {use: view}}"),
+        ([(BLOCK, f"      - fixation: {{}}\n{BLOCK}")], "sessions.1.steps.1.fixation",
+         "the operator has no view, so that nobody sees them"),
+        ([("sessions:", SEEN.replace("tone", "none"))], "feedback.none", "feedback is called 'none'"),
+        ([("movements: 2", "movements: 2, rest_s: 100")], "tasks.aiming.limit_s",
+         "takes more than 100 s"),
         ([("sessions:", f"participants: {{planned: 1}}\n{GROUPS}")], "participants.planned",
          "some have no participants"),
         ([("sessions:", f"participants: {{planned: 9}}\n{GROUPS}")], "participants.planned",
@@ -156,7 +165,9 @@ GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
 def test_a_number_that_nobody_means_is_asked_about_until_it_is_answered(
     tmp_path: Path, changes: list[tuple[str, str]], key: str, said: str
 ) -> None:
-    asked = {each.key: each.text for each in questions(a_study(tmp_path, *changes))}
+    asked: dict[str, str] = {}
+    for each in questions(a_study(tmp_path, *changes)):
+        asked[each.key] = f"{asked.get(each.key, '')}{each.text}"
     assert said in asked[key]
     assert asked[key].endswith("is that meant?")
     answer = ("sessions:", f"expected: [{', '.join(asked)}]\nsessions:")

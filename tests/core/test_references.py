@@ -72,7 +72,7 @@ def told(tmp_path: Path, registry: Registry):
         ("retrieval", "find_axis: float.base", "find_axis: valve.base", "32:16: tasks.retrieval.find_axis is 'valve.base', and there is no such button; did you mean 'float.base'?"),
         ("retrieval", "    scenes: *scenes", "    scenes: [scenes/carry.yaml, scenes/carry.yaml]", "30:33: two scenes are called 'carry'; list each once, or rename a file"),
         ("aiming", "machine: ch8", "machine: {urdf: arm.urdf, joints: [a, b, c], tip: t}", "10:17: machine file"),
-        ("retrieval", "button: float.base", "button: float.bas", "12:44: operator.button is 'float.bas', and there is no such button; did you mean 'float.base'?"),
+        ("retrieval", "button: float.base", "button: float.bas", "12:57: operator.button is 'float.bas', and there is no such button; did you mean 'float.base'?"),
         ("aiming", "camera: cab}", "camera: top, beside: [cap]}", "27:47: views.operator.beside[1]: there is no such camera as 'cap'; did you mean 'cab'? there is cab, cab_left, cab_right, free, top"),
         ("aiming", "camera: cab", "font: arial.ttf", "27:31: views.operator.font is 'arial.ttf', and there is no such file;"),
         ("aiming", "camera: cab", "keys: [a, lft]", "27:35: views.operator.keys[2] is 'lft', and there is no such key; did you mean 'lshift'?"),

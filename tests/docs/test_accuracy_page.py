@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 import pytest
+from streams.strangers import ALL
 from streams.unkind_score import score, table_line
-from streams.unkinder import ALL
 
 PAGE = (Path(__file__).parents[2] / "docs" / "accuracy.md").read_text(encoding="utf-8")
 LINES = re.findall(r"^\| .+ % \| .+ of \d+ \|$", PAGE, re.MULTILINE)

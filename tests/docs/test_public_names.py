@@ -115,9 +115,11 @@ def hints_of(what: object) -> dict[str, object]:
     import numpy.typing
     import pandas
     import pyarrow
+    import pylsl
 
     public = {name: getattr(module, name) for module in MODULES for name in module.__all__}
     others = {"pd": pandas, "np": numpy, "npt": numpy.typing, "pa": pyarrow, "mne": mne}
+    others["pylsl"] = pylsl
     return typing.get_type_hints(what, localns={**others, **public})
 
 

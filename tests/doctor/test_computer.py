@@ -8,7 +8,7 @@ from needs import needs
 
 from labcrane.core.findings import Finding, Verdict
 from labcrane.doctor import clock, disk, scheduling
-from labcrane.doctor.clock import Reading
+from labcrane.doctor.clock import ClockReading
 
 
 def verdicts(found: list[Finding]) -> set[Verdict]:
@@ -18,7 +18,10 @@ def verdicts(found: list[Finding]) -> set[Verdict]:
 def watched(ppm: float, step: float) -> list[Finding]:
     """Look at a clock that runs ``ppm`` fast while the wall clock is set by ``step`` seconds."""
     readings = iter(
-        [Reading(5.0, 7.0, 100.0), Reading(6.0, 8.0 + 1e-6 * ppm, 101.0 + 1e-6 * ppm + step)]
+        [
+            ClockReading(5.0, 7.0, 100.0),
+            ClockReading(6.0, 8.0 + 1e-6 * ppm, 101.0 + 1e-6 * ppm + step),
+        ]
     )
     return clock.examine(lambda: next(readings), lambda seconds: None)
 

@@ -21,7 +21,7 @@ from labcrane_can.examination import examine
 from labcrane_can.settings import CanSettings
 from labcrane_sonification import labcrane_feedback as sounds
 from labcrane_view import labcrane_feedback as views
-from labcrane_view.examination import refresh_rates
+from labcrane_view.screen.monitors import parse_rates
 from labcrane_view.settings import ViewSettings
 
 VALVES = {"boom": 1, "arm": 2}
@@ -129,6 +129,7 @@ def test_a_display_is_looked_at_with_what_draws(x_server: str) -> None:
     found = in_a_process("labcrane_view", DISPLAY=x_server)
     assert "draws a window of 1000 x 562 pixels" in found  # whole, on a screen of 1000 x 700
     assert "WARN" in found  # nothing but software draws on it
+    assert "tearing is not known: the monitor's refresh rate is not" in found
     assert "FAIL there is no display" in in_a_process("labcrane_view", DISPLAY="")
 
 
@@ -144,7 +145,7 @@ def test_the_refresh_rate_is_the_one_with_the_star() -> None:
         "   1920x1080    120.00    60.00    24.00* \n"
         "DP-1 disconnected (normal left inverted)\n"
     )
-    assert refresh_rates(listed) == [("eDP-1", 60.05), ("HDMI-1", 24.0)]
+    assert parse_rates(listed) == [("eDP-1", 60.05), ("HDMI-1", 24.0)]
 
 
 def test_a_sound_device_is_named_with_its_block(tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from labcrane.cli.app import main
 from labcrane.core.findings import Finding, Verdict
 from labcrane.doctor import apart, components
 from labcrane.doctor.checks import examine, keep_apart
-from labcrane.doctor.components import Look, of_everything, of_study
+from labcrane.doctor.components import ExaminedPart, of_everything, of_study
 from labcrane.doctor.report import Check, diagnosis, keep, latest
 from labcrane.errors import RecordingError
 from labcrane.processes.handle import ProcessHandle
@@ -100,7 +100,7 @@ def test_a_plugins_look_cannot_harm_the_doctor(
     text: str,
 ) -> None:
     monkeypatch.setattr(apart, "WAIT_S", 8.0 if does == "hangs" else 30.0)
-    look = Look("feedback lamp", "feedback", "lamp", lamp.model_validate({"does": does}))
+    look = ExaminedPart("feedback lamp", "feedback", "lamp", lamp.model_validate({"does": does}))
     (found,) = components.examine(look, move=False)
     assert (found.verdict, found.text) == (verdict, text)
 

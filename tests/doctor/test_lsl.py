@@ -155,6 +155,24 @@ def test_silence_is_a_firewall_and_a_refusal_is_a_missing_program() -> None:
     assert refused.text.endswith("lets LSL through, and no program sends a stream there")
 
 
+@pytest.mark.parametrize("said", [b"LSL:shortinfo\r\nuid\r\n36014 1\r\n", b"", b"\xff\r\n<info>"])
+def test_what_is_no_answer_of_a_stream_is_passed_over(said: bytes) -> None:
+    """Any program may send to the port that waits for answers; a question is sent back here."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind((HOST, 0))
+
+        def answer() -> None:
+            question = other.recv(4096).split(b"\r\n")
+            other.sendto(said, (HOST, int(question[2].split()[0])))
+
+        answering = threading.Thread(target=answer)
+        answering.start()
+        found = lsl.ask_peer(HOST, other.getsockname()[1], wait_s=1.0)
+        answering.join()
+    assert all("says" not in each.text and "stream '" not in each.text for each in found)
+    assert len(found) == 1
+
+
 def test_a_peer_that_answers_passes(outlet: pylsl.StreamOutlet) -> None:
     port = int(ElementTree.fromstring(outlet.get_info().as_xml()).findtext("v4service_port") or 0)
     found = lsl.ask_peer(HOST, port)

@@ -17,6 +17,7 @@ from results.recorded import record, study
 
 from labcrane import LabcraneError, RecordingError, open_recording
 from labcrane.cli.app import main
+from labcrane.recording.participant_file.containment import DEEPEST
 from labcrane.recording.participant_file.recover import recover
 from labcrane.recording.xdf.reader import XdfFile, read_xdf
 from labcrane.session.commands import Command, Order
@@ -28,10 +29,10 @@ SEAL_BYTES = 32
 def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two good recordings, one without a trial, one without a frame, one without a word."""
     root = tmp_path_factory.mktemp("lab")
-    data, the_study = root / "data", study(root)
-    record(the_study, data, "P001")
-    record(the_study, data, "P002")
-    record(the_study, data, "P003", orders={2: [Command(Order.END)]})
+    data, chosen = root / "data", study(root)
+    record(chosen, data, "P001")
+    record(chosen, data, "P002")
+    record(chosen, data, "P003", orders={2: [Command(Order.END)]})
     raw = (data / "P001" / "ses-01_run.xdf").read_bytes()
     first = raw.index(b"session.start")
     for name, cut in (("P004", raw.index(b"\x03\x00", raw.index(b"}", first))), ("P005", 1200)):
@@ -129,7 +130,29 @@ def bomb(file: h5py.File, outside: Path) -> None:
     file.create_dataset("ses-01/state/secret", (4_000_000,), "f8", chunks=(1000,))
 
 
-@pytest.mark.parametrize("change", [linked, soft, circle, raw_storage, virtual, bomb])
+def large_piece(file: h5py.File, outside: Path) -> None:
+    """Four million numbers in a piece for nine, which is unpacked whole for each of them."""
+    made = file.create_dataset(
+        "ses-01/state/secret",
+        (4_000_000,),
+        "f8",
+        maxshape=(None,),
+        chunks=(9_000_000,),
+        compression="gzip",
+    )
+    made[:] = np.arange(4_000_000) % 100
+    made.attrs["unit"], made.attrs["position"] = "1", 99.0
+
+
+def deep(file: h5py.File, outside: Path) -> None:
+    node = file["ses-01"]
+    for _ in range(600):  # each by itself: of 3,000 the way to each takes HDF5 the better part of
+        node = node.create_group("a")  # a minute, and what is too deep is too deep at 33
+
+
+@pytest.mark.parametrize(
+    "change", [linked, soft, circle, raw_storage, virtual, bomb, large_piece, deep]
+)
 def test_nothing_is_followed_out_of_a_participant_file_nor_kept_by_recover(
     lab: Path, tmp_path: Path, change: Callable[[h5py.File, Path], None]
 ) -> None:
@@ -370,3 +393,40 @@ def test_many_damaged_files(lab: Path, tmp_path: Path, name: str) -> None:
     good = lab / name / "ses-01_run.xdf"
     raw, seed = good.read_bytes(), 10 + int(name[1:])
     fuzz(raw, tmp_path / "damaged.xdf", ReadJournal(good), 750, seed, MOST_S)
+
+
+@pytest.mark.parametrize("named", [3, np.arange(4), h5py.Empty("S1"), np.bytes_(b"P001")], ids=repr)
+def test_a_participant_that_is_no_text_is_refused(lab: Path, tmp_path: Path, named: object) -> None:
+    path = tmp_path / "P001.h5"
+    path.write_bytes((lab / "P001" / "P001.h5").read_bytes()[:-SEAL_BYTES])
+    with h5py.File(path, "r+") as file:
+        file.attrs["participant"] = named
+    with pytest.raises(RecordingError, match=r"its participant is .*, no text"):
+        open_recording(path)
+
+
+def test_of_groups_nested_without_end_only_the_first_are_visited(
+    lab: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The way to a group costs as much as it is long: 3,000 of them took a minute."""
+    path = tmp_path / "P001.h5"
+    path.write_bytes((lab / "P001" / "P001.h5").read_bytes()[:-SEAL_BYTES])
+    with h5py.File(path, "r+") as file:
+        deep(file, path)
+        usual = sum(name.count("/") < DEEPEST for name in names_in(file))
+    visited: list[str] = []
+    visit = h5py.Group.visititems
+
+    def counted(self: h5py.Group, look: Callable[[str, object], object]) -> object:
+        return visit(self, lambda name, node: [visited.append(name), look(name, node)][1])
+
+    monkeypatch.setattr(h5py.Group, "visititems", counted)
+    with pytest.raises(RecordingError, match="nested deeper than labcrane writes them"):
+        open_recording(path)
+    assert 0 < len(visited) <= usual + 2
+
+
+def names_in(file: h5py.File) -> list[str]:
+    names: list[str] = []
+    file.visit(names.append)
+    return names

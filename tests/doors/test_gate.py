@@ -3,14 +3,14 @@
 import asyncio
 from typing import Any
 
-from labcrane.web.door.access import SCOPE, Gate, Keys
+from labcrane.web.door.access import SCOPE, AccessKeys, Gate
 
 
 class Door:
     """A gate before a page that says who may see it, and what the gate has said."""
 
     def __init__(self, port: int = 8080, *, secure: bool = False) -> None:
-        self.keys = Keys()
+        self.keys = AccessKeys()
         self.used: list[str] = []
         self.denied: list[str] = []
         self.gate = Gate(

@@ -25,9 +25,9 @@ ZERO_PAGE = 4096
 @pytest.fixture(scope="module")
 def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("lab")
-    data, the_study = root / "data", study(root)
+    data, chosen = root / "data", study(root)
     for name in ("P001", "P002", "P003"):
-        record(the_study, data, name)
+        record(chosen, data, name)
     return data
 
 

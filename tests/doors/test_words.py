@@ -164,16 +164,14 @@ def test_looking_for_persons_takes_time_that_grows_no_faster_than_the_text(piece
 
 def test_any_bytes_as_an_answer_leave_a_questionnaire_that_can_be_handed_in(study: Study) -> None:
     dice = random.Random(7)
-    inquiry = QuestionnaireForm(
-        "subjective_accuracy", study.questionnaires["subjective_accuracy"], {}
-    )
+    form = QuestionnaireForm("subjective_accuracy", study.questionnaires["subjective_accuracy"], {})
     for _ in range(2000):
         raw = bytes(dice.choices(b'{}[]":,0123456789eE+-.\\u itemvalueques', k=dice.randint(0, 80)))
-        name, _ = inquiry.take(raw.decode(), "participant")
+        name, _ = form.take(raw.decode(), "participant")
         assert name == "questionnaire.refused"
     good = {"questionnaire": "subjective_accuracy", "item": "rating", "value": 7}
-    inquiry.take(json.dumps(good), "participant")
-    assert inquiry.hand_in("participant")[1]["handed_in"]
+    form.take(json.dumps(good), "participant")
+    assert form.hand_in("participant")[1]["handed_in"]
 
 
 @given(st.text(max_size=50))

@@ -53,7 +53,7 @@ def run_through(protocol: Path) -> None:
     """Run fast, but write frames through and say where it is, as a session with people does."""
     session_module.BatchLog = FrameLog
     session_module._watching = lambda visit, rig: visit.study.call_monitor.published(
-        visit.whereabouts
+        visit.crash_marker
     )
     run_fast(protocol)
 

@@ -87,6 +87,9 @@ RESULTS = {"success", "failure", "timeout", "skipped"}
 RATE_HZ = 250.0
 CHUNK = 16
 """Samples that the device sends at once in one of its streams."""
+LABS = 6
+"""Laboratories among which the many kills are shared out: sessions wait in real time, so that
+``pytest -n 6`` takes far less than six times one."""
 BOTH_S = 1.0
 """What the death of both recorders at once may cost, in seconds of samples."""
 
@@ -273,11 +276,20 @@ def test_a_session_whose_processes_were_killed_comes_to_its_planned_end(
     assert kill_and_go_on(lab, tmp_path, victims, number) == set(victims)
 
 
+def shared_out(number: int) -> pytest.MarkDecorator:
+    """Return in which of the laboratories something is tried: each process of a run has its own."""
+    return pytest.mark.xdist_group(f"kills in laboratory {number % LABS}")
+
+
+def numbered(count: int) -> list:
+    return [pytest.param(number, marks=shared_out(number)) for number in range(count)]
+
+
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize(
     "seed",
     [pytest.param(0, marks=pytest.mark.long)]
-    + [pytest.param(seed, marks=pytest.mark.soak) for seed in range(1, 60)],
+    + [pytest.param(seed, marks=[pytest.mark.soak, shared_out(seed)]) for seed in range(1, 60)],
 )
 def test_a_session_that_is_killed_again_and_again_comes_to_its_planned_end(
     lab: Lab, tmp_path: Path, seed: int
@@ -297,7 +309,7 @@ def test_a_session_that_is_killed_again_and_again_comes_to_its_planned_end(
 @pytest.mark.soak
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("victim", VICTIMS)
-@pytest.mark.parametrize("number", range(60))
+@pytest.mark.parametrize("number", numbered(60))
 def test_sixty_kills_of_each_process(lab: Lab, tmp_path: Path, number: int, victim: str) -> None:
     kill_and_go_on(lab, tmp_path, (victim,), 1000 + number)
 
@@ -305,7 +317,7 @@ def test_sixty_kills_of_each_process(lab: Lab, tmp_path: Path, number: int, vict
 @pytest.mark.soak
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("pair", PAIRS, ids="-".join)
-@pytest.mark.parametrize("number", range(3))
+@pytest.mark.parametrize("number", numbered(3))
 def test_thirty_kills_of_two_processes(
     lab: Lab, tmp_path: Path, number: int, pair: tuple[str, str]
 ) -> None:

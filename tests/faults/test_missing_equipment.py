@@ -42,7 +42,7 @@ def bare_computer() -> Iterator[None]:
         yield
 
 
-def crew(folder: Path, text: str, policy: str) -> FeedbackProcesses:
+def processes(folder: Path, text: str, policy: str) -> FeedbackProcesses:
     (folder / "no.ttf").write_text("%! letters without a font", encoding="utf-8")
     study = a_study(folder, SHORT + text + f"on_fault: {{feedback_lost: {policy}}}\n")
     return FeedbackProcesses(Visit(study, "P001", 1, folder, simulated=True))
@@ -51,7 +51,7 @@ def crew(folder: Path, text: str, policy: str) -> FeedbackProcesses:
 def test_a_session_goes_on_without_what_is_missing_where_the_protocol_says_so(
     tmp_path: Path,
 ) -> None:
-    made = crew(tmp_path, STUDY, "continue")
+    made = processes(tmp_path, STUDY, "continue")
     said: list[str] = []
     try:
         assert made.wait(said.append, lambda: False)
@@ -75,7 +75,7 @@ def test_a_session_goes_on_without_what_is_missing_where_the_protocol_says_so(
 def test_a_session_is_refused_where_it_does_not(name: str, policy: str, tmp_path: Path) -> None:
     lines = [line for line in STUDY.splitlines() if f"  {name}:" in line]
     group = "feedback" if name == "tone" else "views"
-    made = crew(tmp_path, f"{group}:\n{lines[0]}\n", policy)
+    made = processes(tmp_path, f"{group}:\n{lines[0]}\n", policy)
     try:
         said = rf"^feedback '{name}' cannot be started: {MESSAGES[name]}"
         with pytest.raises(DeviceError, match=said):
@@ -87,7 +87,7 @@ def test_a_session_is_refused_where_it_does_not(name: str, policy: str, tmp_path
 HELD = """\
 from pathlib import Path
 from labcrane_view.settings import ViewSettings
-from labcrane_view.window import open_window
+from labcrane_view.screen.window import open_window
 
 def sockets():
     links = [link for link in Path("/proc/self/fd").iterdir() if link.is_symlink()]

@@ -17,7 +17,7 @@ from faults.faulty_study import (
 
 from labcrane import LabcraneError, open_recording
 from labcrane.cli.app import main
-from labcrane.feedback import handle as feedback_keeper
+from labcrane.feedback import handle as feedback_handle
 from labcrane.launcher.launcher import Launcher, Outcome
 from labcrane.recording.participant_file.reader import SessionRecord
 from labcrane.session.commands import QueueConsole
@@ -132,7 +132,7 @@ def present(protocol: Path, cue: str, views: list[str]) -> tuple[SessionRecord, 
 def test_feedback_that_fails_is_named_with_its_line_and_the_session_goes_on(
     spoil: Spoil, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(feedback_keeper, "SILENT_S", 30.0)  # a busy computer makes all of them slow
+    monkeypatch.setattr(feedback_handle, "SILENT_S", 30.0)  # a busy computer makes all of them slow
     protocol = spoil("nobody nothing 1 raising")
     views = ["raising", "short", "exiting", "nan", "slow"]
     session, why = present(protocol, "faulty_cue", views)

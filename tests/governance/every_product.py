@@ -66,7 +66,7 @@ def everything(folder: Path) -> Lab:
     command("plan", lab.protocol, "--export", elsewhere / "plan.csv")
     # One movement is too few for labcrane power --recordings, which writes in this way.
     of_three = pd.DataFrame({"participant": PEOPLE, "movement_time": [1.0, 2.0, 3.0]})
-    with simulate._written(elsewhere / "power", data, of_three) as to:
+    with simulate._written(elsewhere / "power", data, dict.fromkeys(PEOPLE, "")) as to:
         of_three.to_csv(to / "movements.csv", index=False)
     for name in PEOPLE:
         recording = data / name / f"{name}.h5"

@@ -148,3 +148,66 @@ def test_neither_data_beside_the_study_nor_the_labs_key_are_in_its_bundle_or_loc
     }
     with pytest.raises(ProtocolError, match="is there already; give the bundle a new folder"):
         bundle(load(protocol, registry), registry, tmp_path / "stick")
+
+
+def packed(folder: Path) -> Path:
+    """Return a bundle of a study that has a plugin, as far as it is looked at before it is used."""
+    (folder / "study" / "plugins").mkdir(parents=True)
+    shutil.copy(bundle_install.__file__, folder / "install.py")
+    here = {"system": sysconfig.get_platform(), "python": platform.python_version()}
+    (folder / "bundle.json").write_text(json.dumps({"protocol": "study/a.yaml", **here}))
+    (folder / "study" / "plugins" / "own.py").write_text("own = 1")
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    lines = [
+        f"{sha256(each.read_bytes()).hexdigest()}  {each.relative_to(folder)}" for each in files
+    ]
+    (folder / "SHA256SUMS").write_text("\n".join(lines) + "\n")
+    return folder
+
+
+SPOILT = {
+    "a plugin beside": (
+        "study/plugins/evil.py",
+        "import os",
+        "study/plugins/evil.py is no part",
+    ),
+    "a wheel beside": ("wheels/a.whl", "a wheel", "wheels/a.whl is no part of this bundle; remove"),
+    "half an about": ("bundle.json", '{"python": "3.1', "bundle.json is missing or damaged (JSOND"),
+    "an about of a list": ("bundle.json", "[]", "bundle.json is missing or damaged (TypeError"),
+    "a deep about": ("bundle.json", "[" * 100_000, "bundle.json is missing or damaged (Recursion"),
+    "no texts": (
+        "bundle.json",
+        '{"python": 3, "system": 1, "protocol": []}',
+        "bundle.json is damaged: it says no texts",
+    ),
+    "another place": (
+        "bundle.json",
+        '{"python": "3", "system": "1", "protocol": "../a.yaml"}',
+        "bundle.json names a protocol outside of the bundle",
+    ),
+    "sums that are none": ("SHA256SUMS", "\x00" * 9, " is missing; copy the bundle again"),
+}
+
+
+@pytest.mark.parametrize("case", SPOILT.values(), ids=SPOILT)
+def test_a_bundle_with_more_or_less_in_it_than_was_packed_is_not_installed(
+    case: tuple[str, str, str], tmp_path: Path
+) -> None:
+    name, text, why = case
+    folder = packed(tmp_path / "stick")
+    (folder / ".DS_Store").write_text("of a disk")
+    assert list(bundle_install._wrong(folder, tmp_path / "there")) == []
+    (folder / name).parent.mkdir(exist_ok=True)
+    (folder / name).write_text(text)
+    done = run(sys.executable, folder / "install.py", tmp_path / "there")
+    assert done.returncode == 1
+    assert why in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "there").exists()
+
+
+def test_a_link_in_a_bundle_is_refused(tmp_path: Path) -> None:
+    folder = packed(tmp_path / "stick")
+    (folder / "study" / "more.py").symlink_to("plugins/own.py")
+    [why] = bundle_install._wrong(folder, tmp_path / "there")
+    assert why == "study/more.py is a link, which no bundle holds; copy the bundle again"

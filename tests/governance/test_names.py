@@ -19,9 +19,9 @@ from labcrane.participants import recovery
 from labcrane.participants.enrolment import check_apart
 from labcrane.participants.erasure import mentions
 from labcrane.participants.folders import Places, keep_private
+from labcrane.participants.inventory import inventory
 from labcrane.participants.mentions import Mentions
 from labcrane.participants.register import Entry, Register, read
-from labcrane.participants.whereabouts import whereabouts
 
 LIKELY = st.text("PVp-_01a9", min_size=1, max_size=8)
 ANY = st.text(min_size=0, max_size=60)
@@ -102,6 +102,24 @@ def test_a_text_about_one_person_never_mentions_another(
         ):  # fmt: skip
             assert Mentions(people).of(text) == {name}, text
     assert len({twin_key(name) for name in people}) == len(people)
+
+
+@settings(max_examples=300)
+@given(
+    st.lists(
+        st.one_of(LIKELY, st.sampled_from(["P1-P1", "P1", "1", "01"])), min_size=1, max_size=4
+    ),
+    st.text("P01-_/. subÜ", max_size=30),
+)
+def test_searching_for_letters_first_finds_what_trying_at_every_sign_finds(
+    names: list[str], text: str
+) -> None:
+    named = Mentions(names)
+    for whole in (text, *(f"{text}{name}{text}sub-{name}" for name in names)):
+        tried = [(one.start(), one[0]) for one in named._pattern.finditer(whole)]
+        for start, stop in ((0, len(whole)), (3, len(whole) - 4)):
+            inside = [word for at, word in tried if start <= at < stop]
+            assert named.of(whole, start, stop) == {named._owners[word] for word in inside}
 
 
 @given(LIKELY, LIKELY, st.text("P01-_/. ", max_size=30))
@@ -217,7 +235,7 @@ def test_erasing_removes_links_and_never_what_is_behind_them(lab: Lab) -> None:
     recovery.erase(lab.places, "P007", REASON, TODAY)
     assert not raw.exists()
     assert (folder / "P007.txt").read_text(encoding="utf-8") == "P007"
-    assert mentions(lab.places, "P007") == []
+    assert mentions(lab.places, "P007") == ([], [])
 
 
 def test_a_link_in_the_place_of_a_recording_is_told_and_due_until_it_is_gone(lab: Lab) -> None:
@@ -231,7 +249,7 @@ def test_a_link_in_the_place_of_a_recording_is_told_and_due_until_it_is_gone(lab
     assert sorted(moved.iterdir()) == before
     assert raw.is_symlink()
     recovery.move(lab.places, store_of(lab))
-    assert [each.what for each in whereabouts(lab.places, "P007")].count("owed") == 1
+    assert [each.what for each in inventory(lab.places, "P007")].count("owed") == 1
     raw.unlink()
     recovery.move(lab.places, store_of(lab))
     assert read(lab.places).owed == []

@@ -12,8 +12,8 @@ import labcrane
 from labcrane import ProtocolError
 from labcrane.participants import recovery as unfinished
 from labcrane.participants.deviations import all_deviations
+from labcrane.participants.inventory import inventory
 from labcrane.participants.register import read
-from labcrane.participants.whereabouts import whereabouts
 from labcrane.recording.annotations import annotate
 from labcrane.recording.journal_reader import read_journal
 from labcrane.recording.xdf.reader import read_xdf
@@ -87,7 +87,7 @@ def test_marks_go_along_with_the_right_number_and_are_erased_with_it(lab: Lab) -
     assert after[["time", "until", "written"]].equals(before[["time", "until", "written"]])
     assert not stored.exists()
     assert (store_of(lab) / "rehearsal" / "P008" / stored.name).is_file()
-    assert str(folder) in {each.where for each in whereabouts(lab.places, "P008")}
+    assert str(folder) in {each.where for each in inventory(lab.places, "P008")}
     unfinished.erase(lab.places, "P008", "withdrew consent", TODAY)
     left = [path for root in (lab.places.root, store_of(lab))
             for path in root.rglob("*annotations*")]  # fmt: skip

@@ -6,7 +6,10 @@ import pytest
 from rehearsal import SHORT, a_study, rehearse
 
 from labcrane import ProtocolError
+from labcrane.protocol.study import load
+from labcrane.registry.registry import discover
 
+ROOT = Path(__file__).parents[2]
 ENOUGH = SHORT.replace(
     "steps:\n",
     "steps:\n      - consent\n"
@@ -61,3 +64,17 @@ def test_consent_is_a_step_of_the_record(tmp_path: Path) -> None:
 def test_a_step_that_makes_no_sense_is_told(tmp_path: Path, old: str, new: str, said: str) -> None:
     with pytest.raises(ProtocolError, match=said):
         a_study(tmp_path, ENOUGH.replace(old, new, 1))
+
+
+@pytest.mark.parametrize("variant", ["protocol", "joysticks", "keyboard"])
+def test_nobody_meets_a_scene_of_retrieval_first_where_it_is_measured(variant: str) -> None:
+    """As many successes as scenes end no practice before each scene has come once."""
+    study = load(ROOT / "protocols" / "retrieval" / f"{variant}.yaml", discover())
+    (session,) = study.protocol.sessions
+    kinds = [step.kind for step in session.steps]
+    (practice,) = [step.block for step in session.steps if step.kind == "practice"]
+    assert practice is not None
+    assert practice.until is not None
+    assert kinds.index("practice") < kinds.index("reference")
+    scenes = study.tasks[practice.task].factors()["scenes"]
+    assert practice.until.successes >= len(scenes) == len(set(scenes))

@@ -14,7 +14,7 @@ from labcrane.protocol.study import load
 from labcrane.registry.registry import discover
 from labcrane.web.handle import PageHandle, free_port
 from labcrane.web.service import PageConfig
-from labcrane.web.state import Ended
+from labcrane.web.state import SessionLeft
 
 HOST = "127.0.0.1"
 
@@ -55,5 +55,5 @@ def test_pages_show_a_session_whose_protocol_would_be_refused_today(tmp_path: Pa
         assert status == 200
         assert "P001" in shown
     finally:
-        pages.close(Ended("ok", "over"))
+        pages.close(SessionLeft("ok", "over"))
     assert pages.restarts == 0

@@ -31,7 +31,7 @@ from labcrane.web.room.shown import ShownShapes
 from labcrane.web.room.sliders import sliders
 from labcrane.web.room.snapshot import clock
 from labcrane.web.service import Opened, PageConfig
-from labcrane.web.state import Ended, SessionView
+from labcrane.web.state import SessionLeft, SessionView
 from labcrane_sonification.settings import SonificationSettings
 from labcrane_sphere.settings import SphereSettings
 
@@ -62,6 +62,7 @@ BEGUN = {
     "paused": (("trial.start", TRIAL), ("pause.start", {"by": "examiner"})),
     "fault": (("input.lost", {"why": "gone"}), ("pause.start", {"by": "input"})),
     "break": (("break.start", {"seconds": 60}),),
+    "fixation": (("fixation.shown", {"point": 2, "x": 0.15, "y": 0.15}),),
     "questionnaire": (
         ("questionnaire.start", {"questionnaire": "kss", "title": "Sleep", "kept": "{}"}),
     ),
@@ -69,6 +70,7 @@ BEGUN = {
         ("stop_rule.met", {"questionnaire": "ssq", "score": "x", "value": 9, "above": 5}),
         ("pause.start", {"by": "stop rule"}),
     ),
+    "judgement": (("judgement.awaited", {"trial": 1, "attempt": 1}),),
     "between": (("trial.start", TRIAL), ("step.end", {"step": 1})),
     "ended": (("session.end", {"reason": "complete", "owed": ""}),),
 }
@@ -95,6 +97,7 @@ def test_at_most_one_button_is_primary_and_those_that_lose_something_ask() -> No
         for name, events in BEGUN.items()
     }
     assert by_state["waiting"] == by_state["paused"] == by_state["decision"] == "order-start"
+    assert by_state["judgement"] == "order-start"
     assert by_state["running"] == by_state["break"] == "order-pause"
     assert by_state["ended"] == ""
 
@@ -220,7 +223,9 @@ def test_a_stream_that_is_asked_about_has_a_button_for_each_answer() -> None:
 def test_the_lamp_at_the_end_is_what_was_left_behind() -> None:
     view = after(*BEGUN["ended"])
     assert lamp_of(view, Punctual(), PERIOD_S).reason == "the session is being saved"
-    view.ended = Ended("warn", "The session is saved, and not complete: trial 3", "go on with: x")
+    view.ended = SessionLeft(
+        "warn", "The session is saved, and not complete: trial 3", "go on with: x"
+    )
     assert lamp_of(view, Punctual(), PERIOD_S) == Lamp(
         "warn", "The session is saved, and not complete: trial 3", "go on with: x"
     )
@@ -378,7 +383,7 @@ def test_a_browser_of_pages_that_died_is_not_waited_for_at_the_end(
         assert not pages._open()
     finally:
         pages._closed.set()
-        pages.close(Ended("ok", "over"))
+        pages.close(SessionLeft("ok", "over"))
 
 
 def test_times_are_minutes_and_seconds_and_hours_where_there_are_some() -> None:

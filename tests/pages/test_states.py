@@ -18,7 +18,7 @@ from labcrane.core.records import Event
 from labcrane.web.handle import PageHandle, free_port
 from labcrane.web.room.condition import STATES
 from labcrane.web.service import PageConfig
-from labcrane.web.state import Ended
+from labcrane.web.state import SessionLeft
 from labcrane.web.translations import WORDS
 
 pytestmark = pytest.mark.long
@@ -40,7 +40,7 @@ STOPPED = {
     "questionnaire": "load", "score": "overall", "value": 90.0, "above": 80.0,
 }  # fmt: skip
 ASKED = {"questionnaire": "person", "title": "About you", "kept": "{}"}
-ENDED = Ended(
+ENDED = SessionLeft(
     "warn", "The session is saved; look at its time stamps, and not complete: 3 trials",
     "go on with: labcrane resume study.yaml --participant P001 --session 1",
     ("participant file: data/P001/P001.h5 (12.3 MB)", "journal: data/P001/ses-01_run.xdf"),
@@ -117,7 +117,9 @@ BEGUN: dict[str, tuple[tuple[str, dict], ...]] = {
         ("pause.end", {"by": "stop rule"}),
         ("trial.end", {**TRIAL, "outcome": "success"}), ("step.end", {"step": 1}),
     ),
+    "judgement": (("judgement.awaited", {"trial": 1, "attempt": 1}),),
     "break": (("break.start", {"seconds": 300}),),
+    "fixation": (("fixation.shown", {"point": 2, "x": 0.15, "y": 0.15}),),
     "questionnaire": (("break.end", {"left": 0.0}), ("questionnaire.start", ASKED)),
     "ended": (
         ("questionnaire.end", {"questionnaire": "person"}),

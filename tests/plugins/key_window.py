@@ -4,7 +4,7 @@ import select
 import sys
 from pathlib import Path
 
-from labcrane.feedback.config import FeedbackConfig, Part
+from labcrane.feedback.config import ComponentConfig, FeedbackConfig
 from labcrane.feedback.presenter import Presenter
 from labcrane.registry.registry import discover
 from labcrane.streams.feedback_log import FeedbackLog
@@ -13,7 +13,9 @@ from labcrane.testing import TARGETS, ch8, make_run, make_target
 name = sys.argv[1]
 run = make_run(ch8(), task=TARGETS)
 settings = {"size": (400, 300), "keys": ("a", "d", "arrow_up", "arrow_down"), "hud": ()}
-order = FeedbackConfig(name, Part("view", settings), run, "a/test", Path("study.yaml"), always=True)
+order = FeedbackConfig(
+    name, ComponentConfig("view", settings), run, "a/test", Path("study.yaml"), always=True
+)
 presenter = Presenter(order, discover())
 presenter.open()
 log = FeedbackLog(name, "a/test", presenter)

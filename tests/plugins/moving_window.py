@@ -15,7 +15,7 @@ from windows import MACHINE, POSE, a_scene, make_frame
 
 from labcrane.core import SessionState
 from labcrane.testing import crane_at
-from labcrane_view import window
+from labcrane_view.screen import window
 from labcrane_view.settings import ViewSettings
 from labcrane_view.view import View
 

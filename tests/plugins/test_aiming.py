@@ -219,10 +219,132 @@ def test_a_trigger_held_from_before_ends_nothing() -> None:
     assert not Path(end="trigger").play(path, trigger=range(len(path)))[-1].phase.over
 
 
+@pytest.mark.parametrize("dwell", [0.3, 0.7])
+def test_the_time_to_rest_is_that_of_the_rest_rules_whenever_the_tap_comes(dwell: float) -> None:
+    seconds = 2.0
+    by_rest = Path().play(minimum_jerk(seconds))[-1].results
+    assert by_rest["onset_to_rest"] == by_rest["movement_time"]
+    assert by_rest["at_rest"] == pytest.approx(0.2, abs=1 / RATE_HZ)
+    offset = 0.5 + (1 - crossing(0.02 * seconds / 2.0)) * seconds
+    path = minimum_jerk(seconds)
+    by_tap = Path(end="trigger").play(path, trigger=ticks((offset + dwell, 3.4)))[-1].results
+    assert by_tap["onset_to_rest"] == by_rest["onset_to_rest"]
+    assert by_tap["at_rest"] == pytest.approx(dwell, abs=1.5 / RATE_HZ)
+    parts = by_tap["reaction_time"] + by_tap["onset_to_rest"] + by_tap["at_rest"]
+    assert parts == pytest.approx(by_tap["circle_to_circle"], rel=1e-12)
+
+
+@pytest.mark.parametrize(("dwell", "at_rest"), [(-0.5, 0.0), (0.1, 0.1)])
+def test_a_tap_before_a_rest_is_long_enough_leaves_its_time_open_and_says_why(
+    dwell: float, at_rest: float
+) -> None:
+    offset = 0.5 + (1 - crossing(0.02)) * 2.0
+    presses = ticks((offset + dwell, offset + dwell + 0.1))
+    last = Path(end="trigger").play(minimum_jerk(2.0), trigger=presses)[-1]
+    assert last.phase is Phase.SUCCESS
+    assert math.isnan(last.results["onset_to_rest"])
+    assert last.results["at_rest"] == pytest.approx(at_rest, abs=1.5 / RATE_HZ)
+
+
+def test_the_rest_is_the_one_that_the_tap_found_not_one_before_a_correction() -> None:
+    path = np.concatenate([0.8 * minimum_jerk(2.0), 0.8 + 0.2 * minimum_jerk(1.0, before=0.0)])
+    last = Path(end="trigger").play(path, trigger=ticks((5.0, 5.1)))[-1]
+    corrected = 3.5 + (1 - crossing(0.02 * 1.0 / 0.4)) * 1.0
+    began = last.results["reaction_time"]
+    assert last.results["onset_to_rest"] == pytest.approx(corrected - began, abs=2.5 / RATE_HZ)
+
+
+def ignored(judgements) -> list[tuple[float, object]]:
+    """Return when presses were ignored, and before what."""
+    events = [event for each in judgements for event in each.events]
+    return [(e.time, e.data["before"]) for e in events if e.name == "tap.ignored"]
+
+
+def ticks(*presses: tuple[float, float]) -> set[int]:
+    """Return the ticks of presses that last from one time in s to another."""
+    return {
+        tick
+        for start, end in presses
+        for tick in range(round(start * RATE_HZ), round(end * RATE_HZ))
+    }
+
+
+def test_a_second_press_before_anything_moves_ends_nothing_and_is_an_event() -> None:
+    # The tap that ended the movement before is let go at 0.1 s, and comes again 50 ms later.
+    presses = ticks((0.0, 0.1), (0.15, 0.25), (3.0, 3.1))
+    judgements = Path(end="trigger").play(minimum_jerk(2.0), trigger=presses)
+    assert judgements[-1].phase is Phase.SUCCESS
+    assert len(judgements) - 1 == 3.0 * RATE_HZ
+    assert judgements[-1].results["error"] < 0.01
+    ((when, before),) = ignored(judgements)
+    assert when == pytest.approx(0.15)
+    assert before == "movement.onset"
+
+
+def test_presses_at_random_before_the_onset_are_all_told_and_none_ends_a_movement() -> None:
+    random = np.random.default_rng(20)
+    for _ in range(20):
+        starts = 0.01 + np.cumsum(random.uniform(0.02, 0.1, random.integers(1, 6)))
+        presses = [(start, start + 0.01) for start in starts]
+        path = minimum_jerk(random.uniform(1.5, 3.0), before=0.7)
+        judgements = Path(end="trigger").play(path, trigger=ticks(*presses, (4.0, 4.1)))
+        seen = [time for time, _ in ignored(judgements)]
+        np.testing.assert_allclose(seen, starts, atol=1 / RATE_HZ)
+        assert judgements[-1].phase.over == (len(path) > 4.0 * RATE_HZ)
+
+
+def running_out(seconds: float, speed: float) -> np.ndarray:
+    """Fractions of a way of 2 m while the tip, slowing down, goes on beyond where it starts."""
+    t = np.arange(0, seconds, 1 / RATE_HZ)
+    return -speed * (t - t**2 / (2 * seconds)) / 2.0
+
+
+def test_a_bounce_while_the_last_movement_runs_out_ends_nothing() -> None:
+    out = running_out(0.5, 0.5)
+    way = out[-1] + (1.0 - out[-1]) * minimum_jerk(2.0, before=0.2)
+    presses = ticks((0.2, 0.3), (3.2, 3.3))
+    judgements = Path(end="trigger").play(np.concatenate([out, way]), trigger=presses)
+    assert [time for time, _ in ignored(judgements)] == [pytest.approx(0.2)]
+    assert len(judgements) - 1 == round(3.2 * RATE_HZ)
+    assert judgements[-1].results["error"] < 0.01
+
+
+def test_a_movement_slower_than_the_last_ones_short_end_has_an_onset() -> None:
+    out = running_out(0.06, 3.0)  # faster than all that follows, and shorter than an onset
+    way = out[-1] + (1.0 - out[-1]) * minimum_jerk(3.0)
+    last = Path(end="trigger").play(np.concatenate([out, way]), trigger=ticks((4.0, 4.1)))[-1]
+    assert last.phase is Phase.SUCCESS
+    peak = minimum_jerk_speed(0.5) * 2.0 / 3.0
+    assert last.results["peak_speed"] > peak
+    assert 0.55 < last.results["reaction_time"] < 1.0
+
+
+def test_who_is_in_the_circle_already_may_tap_without_a_movement_and_has_no_times() -> None:
+    path = np.ones(round(2 * RATE_HZ))  # a trial that is repeated begins where it ended
+    judgements = Path(end="trigger").play(path, trigger=ticks((0.05, 0.1), (1.0, 1.1)))
+    assert [time for time, _ in ignored(judgements)] == [pytest.approx(0.05)]
+    last = judgements[-1]
+    assert last.phase is Phase.SUCCESS
+    assert len(judgements) - 1 == RATE_HZ
+    for name in ("reaction_time", "movement_time", "circle_to_circle"):
+        assert math.isnan(last.results[name])
+
+
+def test_rest_anywhere_waits_for_a_movement_unless_the_tip_is_in_the_circle() -> None:
+    stands = np.full(round(1.5 * RATE_HZ), 0.7)  # 0.6 m before the centre
+    assert not Path(end="rest_anywhere").play(stands)[-1].phase.over
+    goes = np.concatenate([stands, 0.7 + 0.2 * minimum_jerk(1.0)])
+    last = Path(end="rest_anywhere").play(goes)[-1]
+    assert last.phase is Phase.SUCCESS
+    assert last.results["reaction_time"] > 1.5
+    assert Path(end="rest_anywhere").play(np.ones(100))[-1].phase is Phase.SUCCESS
+
+
 def test_a_time_out_is_an_outcome_of_its_own_with_its_error_and_no_movement_time() -> None:
     last = Path(limit_s=1.5).play(minimum_jerk(4.0))[-1]
     assert last.phase is Phase.TIMEOUT
     assert math.isnan(last.results["movement_time"])
+    assert math.isnan(last.results["onset_to_rest"])
     assert last.results["error"] > 1.0
 
 
@@ -248,3 +370,4 @@ def test_a_twitch_is_no_onset() -> None:
     twitch = np.concatenate([np.zeros(100), np.linspace(0, 0.01, 10), np.full(1000, 0.01)])
     last = Path(limit_s=2.0).play(twitch)[-1]
     assert math.isnan(last.results["reaction_time"])
+    assert math.isnan(last.results["circle_to_circle"])

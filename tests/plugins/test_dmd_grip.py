@@ -9,10 +9,11 @@ from cranes import needs_bullet
 from dmd_arms import RETRIEVAL, standing, step
 
 from labcrane import Dynamics, ProtocolError
+from labcrane.machines import load_scene, place_objects
 from labcrane.machines.library import load_machine
-from labcrane.testing import (
-    RATE_HZ,
-)
+from labcrane.testing import RATE_HZ, make_run
+from labcrane_scenario.observation import Observation
+from labcrane_scenario.settings import ScenarioSettings
 
 pytestmark = needs_bullet
 
@@ -113,6 +114,30 @@ def test_a_grip_breaks_above_the_slip_force_and_that_is_a_drop(tmp_path: Path) -
         grasp(arm)
         dropped = step(arm, 2.0, arm=-120)
         assert dropped[-1][state.index("grip.drops")] >= 1.0
+
+
+@pytest.mark.parametrize(("lift_s", "drops"), [(0.4, 0), (3.0, 1)])
+def test_letting_go_high_up_is_a_drop_and_setting_down_is_none(
+    lift_s: float, drops: int, tmp_path: Path
+) -> None:
+    with standing(GRASP.format(slip=300), tmp_path) as (arm, state):
+        run = make_run(load_machine("ied_arm.yaml", RETRIEVAL), state=state.signals)
+        settings = ScenarioSettings(scenes=(tmp_path / "scene.yaml",))
+        watch = Observation(settings, run, place_objects(load_scene(settings.scenes[0]), 0))
+        grasp(arm)
+        list(watch.see(arm.state(), 0.0))
+        states = [*step(arm, lift_s, arm=-120), *step(arm, 2.0), *step(arm, 3.0, jaws=150)]
+        events = [event for values in states for event in watch.see(values, 0.0)]
+    found = [event for event in events if event.name == "drop"]
+    held = [values for values in states if values[state.index("grip.thing")]]
+    fell = held[-1][state.index("scene.thing.position.z")] - 0.1  # it is 0.2 m high and upright
+    assert held[-1][state.index("grip.height")] == pytest.approx(fell, abs=0.03)
+    assert (fell > settings.drop_m) == bool(drops)
+    assert [(each.data["thing"], each.data["slipped"]) for each in found] == (
+        [("thing", False)] * drops
+    )
+    assert watch.mistakes.counts["drop"] == drops
+    assert all(each.data["height"] > settings.drop_m for each in found)
 
 
 def test_impossible_scenes_are_refused_in_words(tmp_path: Path) -> None:

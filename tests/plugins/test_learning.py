@@ -14,7 +14,7 @@ from needs import LEARNERS, missing, needs
 
 from labcrane import RecordingError
 from labcrane.analysis import Participant
-from labcrane.testing.exporters import a_participant
+from labcrane.testing.exporters import make_participant
 from labcrane_learning import lerobot as lerobot_module
 from labcrane_learning.episodes import episodes_of, layout_of
 from labcrane_learning.lerobot import LeRobot
@@ -47,7 +47,7 @@ print(len(read) == at, at)
 @pytest.fixture(scope="module")
 def people(tmp_path_factory: pytest.TempPathFactory) -> list[Participant]:
     folder = tmp_path_factory.mktemp("data")
-    return [a_participant(folder, name) for name in ("P001", "P002")]
+    return [make_participant(folder, name) for name in ("P001", "P002")]
 
 
 @pytest.fixture(scope="module")

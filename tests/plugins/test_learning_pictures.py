@@ -47,13 +47,13 @@ def expected(
     person: Participant, tmp_path_factory: pytest.TempPathFactory
 ) -> dict[str, dict[int, np.ndarray]]:
     """What a view shows while the session is replayed, at the ticks of the episodes' rows."""
-    the_study = study(tmp_path_factory.mktemp("again"), person.recording.session(1).protocol)
-    run = Rig.build(the_study, simulated=True).describe(the_study, participant_seed=0)
+    chosen = study(tmp_path_factory.mktemp("again"), person.recording.session(1).protocol)
+    run = Rig.build(chosen, simulated=True).describe(chosen, participant_seed=0)
     ticks = {tick for episode in episodes(person) for tick in episode.ticks.tolist()}
     found: dict[str, dict[int, np.ndarray]] = {}
     for camera in CAMERAS:
         bare = {"display": "hidden", "hud": (), "notices": False, "areas": ()}
-        view = View(ViewSettings(camera=camera, size=SIZE, **bare), the_study.machine)
+        view = View(ViewSettings(camera=camera, size=SIZE, **bare), chosen.machine)
         view.open(run)
         own: dict[int, np.ndarray] = {}
 

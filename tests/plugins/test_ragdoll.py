@@ -241,6 +241,51 @@ def test_every_limb_that_is_pressed_against_something_fixed_is_a_mistake_of_its_
         assert watch.mistakes.counts["body"] == len(events)
 
 
+def watched_on_the_ground(folder: Path, text: str, ticks: int, push=None) -> list[Event]:
+    """Return what is wrong with somebody on the ground; ``push`` presses after half a second."""
+    with lying(folder, text) as (doll, state):
+        run = make_run(load_machine("ied_arm.yaml", RETRIEVAL), state=state.signals)
+        watch, events = seen_by(run, place_objects(load_scene(folder / "scene.yaml"), 0))
+        for number in range(ticks):
+            if push is not None and number > RATE_HZ / 2:
+                doll.push(doll.link(push[0]), (0.0, 0.0, -push[1]))
+            values = doll.tick()
+            events += watch.see(values, number / RATE_HZ)
+        whole = values[state.find("scene.figure.ground")].sum()
+        assert whole == pytest.approx(values[state.index("scene.figure.support")])
+        assert watch.mistakes.counts["body"] == len(events)
+    return events
+
+
+def test_every_limb_that_is_pressed_onto_the_ground_is_a_mistake_and_lying_there_is_none(
+    tmp_path: Path,
+) -> None:
+    own = ", ".join(f"{name}: 250" for name in REGIONS)
+    text = text_of().replace("  limits_n", f"  ground_n: {{{own}}}\n  limits_n")
+    assert watched_on_the_ground(tmp_path, text, 360) == []
+    for region in ("torso", "pelvis", "head", "left_forearm", "right_thigh", "left_shank"):
+        events = watched_on_the_ground(tmp_path, text, 240, (region, 600.0))
+        assert region in {event.data["part"] for event in events}
+        assert {(event.name, event.data["against"]) for event in events} == {
+            ("contact.body", "ground")
+        }
+
+
+@pytest.mark.parametrize("carrier", ["", "stretcher"])
+def test_somebody_who_falls_is_hurt_by_the_ground_and_by_the_stretcher_under_them(
+    carrier: str, tmp_path: Path
+) -> None:
+    part = RETRIEVAL / "scenes" / "parts" / "stretcher.yaml"
+    things = f"bed: {{use: {part}, position: [2.4, 3.0, 0]}}" if carrier else ""
+    text = text_of(things=things).replace("3.0, 0.115]", "3.0, 2.0]")
+    events = watched_on_the_ground(tmp_path, text, 360)
+    assert {event.data["against"] for event in events} == {"ground"}
+    assert {"torso", "pelvis"} <= {event.data["part"] for event in events}
+    half = 0.5 * 75.0 * 9.81  # of the whole weight: what a limb may have by default
+    assert all(event.data["limit"] == pytest.approx(half) for event in events)
+    assert max(event.data["force"] for event in events) > half
+
+
 POST = """\
 labcrane_scene: 1
 title: a post in the way

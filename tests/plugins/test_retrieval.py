@@ -58,7 +58,7 @@ def test_all_six_scenarios_are_run_through_in_the_reference_and_in_the_block(ses
     trials = session.trials
     assert set(trials["outcome"]) == {"success"}
     learnt = session.events[session.events["name"] == "practice.end"]["data"].iloc[0]
-    assert (learnt["met"], learnt["wanted"]) == (True, 4)
+    assert (learnt["met"], learnt["wanted"]) == (True, len(SCENES))
     trials = trials[trials["practice"] == 0]
     for _, stage in trials.groupby("block"):
         assert sorted(stage["scenario"]) == sorted(SCENES)
@@ -179,7 +179,8 @@ def test_the_casualty_is_carried_three_metres_onto_the_stretcher_within_its_forc
     stretcher = SCENES["casualty"].things["stretcher"]
     heading = np.radians(stretcher.yaw_deg)
     along = np.array([np.cos(heading), np.sin(heading)])
-    rows = session.trials[session.trials["scenario"] == "casualty"]
+    trials = session.trials[session.trials["practice"] == 0]
+    rows = trials[trials["scenario"] == "casualty"]
     assert len(rows) == 2  # the reference and the test
     for _, row in rows.iterrows():
         # In the tick that ends a trial the next scene is set up already.
@@ -197,6 +198,54 @@ def test_the_casualty_is_carried_three_metres_onto_the_stretcher_within_its_forc
         for limb, limit in figure.limits_n.items():
             assert own[f"scene.figure.force.{limb}"].max() <= limit
             assert own[f"scene.figure.hit.{limb}"].max() <= limit
+
+
+def test_a_deformity_that_is_there_is_found_from_near_and_none_is_where_there_is_none(
+    session,
+) -> None:
+    trials, events = session.trials, session.events
+    asked = trials["scenario"] == "casualty"
+    assert trials["deformity"].notna().equals(asked)
+    assert (trials["false_reports"] == 0.0).all()
+    told = events[events["name"] == "deformity.reported"]
+    for _, row in trials[asked].iterrows():
+        assert row["found"] == row["deformity"]
+        own = told[told["trial"] == row["trial"]]["data"].tolist()
+        assert [each["worth"] for each in own] == ["hit"] * int(row["deformity"])
+        assert all(each["distance"] <= 1.2 for each in own)
+        if row["found"]:
+            assert row["deformity_found"] > 1.0  # not from the pose of the start
+    loop, task = session.streams["loop"].data, session.streams["task"].data
+    for number in trials["trial"][asked]:
+        first = task[(loop["trial"] == number).to_numpy()]["deformity.distance"].iloc[0]
+        assert first == -1.0 or first > 1.7
+
+
+TOUCHED = {"touch": "box", "reach_through": "rucksack", "reach_over": "parcel"}
+
+
+def test_what_is_to_be_touched_is_touched_and_pressed_no_harder_than_it_bears(session) -> None:
+    asked = {name: [goal.touch for goal in scene.goals] for name, scene in SCENES.items()}
+    assert {name: goals[-1] for name, goals in asked.items() if any(goals)} == TOUCHED
+    state, loop = session.streams["state"].data, session.streams["loop"].data
+    task = session.streams["task"].data
+    rows = session.trials[session.trials["scenario"].isin(TOUCHED)]
+    assert len(rows) >= 9  # practice, reference and test
+    for _, row in rows.iterrows():
+        ticks = (loop["trial"] == row["trial"]).to_numpy()
+        own, judged = state[ticks].iloc[:-1], task[ticks].iloc[:-1]
+        name = TOUCHED[row["scenario"]]
+        (thing,) = (
+            each
+            for each in labcrane.machines.place_objects(SCENES[row["scenario"]], 0)
+            if each.name == name
+        )
+        forces = own[[f"scene.{name}.force.{part}" for part in thing.limits]].max(axis=1)
+        touched = (judged["target.touch"] == 1.0).to_numpy()
+        assert forces[touched].iloc[0] > 0.0  # from the tick on in which it is felt
+        assert 48 <= touched.sum() <= 60  # for 0.2 s, and then the run ends
+        assert forces.max() < min(thing.limits.values())
+        assert row["n_object"] == 0.0
 
 
 def test_every_scenario_has_room_in_its_time(session) -> None:

@@ -56,6 +56,16 @@ def test_with_time_it_gets_slower_and_errs_more_often() -> None:
     assert tired / fresh == pytest.approx(math.e, rel=0.35)
 
 
+def test_deformities_are_overlooked_and_imagined_with_their_probabilities() -> None:
+    settings = ErrorSettings(misses=0.3, false_reports=0.1)
+    drawn = [Lapses(settings, RATE_HZ, (5, seed)) for seed in range(2000)]
+    for share, often in (
+        (0.3, sum(each.overlooks for each in drawn)),
+        (0.1, sum(each.imagines for each in drawn)),
+    ):
+        assert abs(often - 2000 * share) < 4.0 * math.sqrt(2000 * share * (1.0 - share))
+
+
 def test_the_same_seeds_give_the_same_lapses_and_others_do_not() -> None:
     settings = ErrorSettings(bumps_per_min=20.0)
 

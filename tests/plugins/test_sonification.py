@@ -201,6 +201,10 @@ def test_impossible_settings_are_refused() -> None:
         SonificationSettings(level=(0.0, 2.0))
     with pytest.raises(ValidationError, match="overtones must be 0 to 15, but are 0, 99"):
         SonificationSettings(overtones=(0, 99))
+    with pytest.raises(ValidationError, match="it is -3, and devices are counted from 0; leave it"):
+        SonificationSettings(device=-3)
+    recorded = SonificationSettings.model_validate({"device": -1}, context={"recorded": True})
+    assert recorded.device == -1
 
 
 def test_a_python_without_tkinter_says_nothing_of_it() -> None:

@@ -6,6 +6,7 @@ import select
 import threading
 import time
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 
@@ -16,7 +17,7 @@ from rehearsal import SHORT, ScriptedConsole, a_study
 import labcrane
 import labcrane_ttl
 from labcrane import DeviceError, PluginError, ProtocolError, Trigger
-from labcrane.core import Event
+from labcrane.core import Echo, Event
 from labcrane.core.clock import Tick
 from labcrane.registry.registry import discover
 from labcrane.session.session import Visit, run
@@ -24,7 +25,7 @@ from labcrane.streams.markers import CODES
 from labcrane.streams.triggers import Triggers
 from labcrane.testing import PluginContract, TriggerContract, ch8, make_frame, make_run, opened
 from labcrane_ttl.parallel_port import CLAIM, WRITE, ParallelTrigger
-from labcrane_ttl.serial_port import SerialTrigger, as_byte
+from labcrane_ttl.serial_port import KEPT, SerialTrigger, as_byte
 from labcrane_ttl.settings import BoxSettings, ParallelSettings, SerialSettings
 
 pytestmark = needs("terminals")
@@ -65,6 +66,13 @@ class Device:
         while len(found) < count and select.select([self._mine], [], [], 10.0)[0]:
             found += os.read(self._mine, count - len(found))
         return found
+
+    def flood(self, content: bytes) -> int:
+        """Send bytes that nobody asked for, as fast as they are taken."""
+        sent = 0
+        while sent < len(content):
+            sent += os.write(self._mine, content[sent:])
+        return sent
 
     def drain(self) -> None:
         """Read whatever has come."""
@@ -233,8 +241,6 @@ class Fixed(Trigger):
 
 
 def test_what_a_line_with_a_fault_was_to_send_is_not_noted_as_sent() -> None:
-    from labcrane.core import Echo
-
     notes, told, line = [], [], Fixed(trial_start=5, trial_end=6)
     triggers = Triggers({"box": line}, lambda event, tick: notes.append(event), told.append)
 
@@ -257,9 +263,49 @@ def test_what_a_line_with_a_fault_was_to_send_is_not_noted_as_sent() -> None:
     assert notes[5].data["delay_s"] is not None
 
 
-def test_every_event_that_has_a_code_is_sent_and_noted_in_its_tick() -> None:
-    from labcrane.core import Echo
+def test_a_device_that_floods_leaves_the_record_small_and_its_true_echoes_in_it() -> None:
+    """3,000 codes a tick at 240 Hz for two seconds: a loose line, or somebody else's device."""
+    notes, told, line = [], [], Fixed(trial_start=5)
+    triggers = Triggers({"box": line}, lambda event, tick: notes.append(event), told.append)
+    frame = make_frame(make_run(ch8()))
+    begin, ticks, each = 1000.0, 480, 3000
+    for number in range(ticks):
+        due = begin + number / 240.0
+        frame.tick, frame.events = Tick(number, due, due), (Event("trial.start", due),)
+        line.answers = [Echo(5, due), *[Echo(77, due)] * (each - 1)]
+        triggers(frame)
+    triggers.finish()
+    echoes = [event for event in notes if event.name == "trigger.echo"]
+    floods = [event for event in notes if event.name == "trigger.flood"]
+    ours = [event for event in echoes if event.data["code"] == 5]
+    assert len(ours) == ticks
+    assert len(echoes) - len(ours) == 20 * 2 == 40, "of what nobody sent, 20 a second"
+    counted = sum(int(str(event.data["why"]).split()[2]) for event in floods)
+    assert counted == ticks * each - len(echoes), "whatever is left out is counted"
+    assert len(floods) <= 3
+    assert [event for event in told if event.name == "trigger.flood"] == floods
+    assert floods[0].data["why"].startswith("box sent ")
 
+
+def test_a_flooding_port_is_read_in_pieces_and_keeps_the_newest_echoes(device: Device) -> None:
+    settings = SerialSettings(port=device.port, echo=True)
+    trigger = SerialTrigger(settings, as_byte, rest=bytes(1))
+    with opened(trigger, make_run(ch8())):
+        written = 0
+        for _ in range(40):
+            written += device.flood(b"\x07" * 4000)
+        written += device.flood(b"\x09")
+        found, until = [], time.perf_counter() + 30.0
+        while not (found and found[-1].code == 9) and time.perf_counter() < until:
+            came = trigger.send((), time.perf_counter())
+            assert len(came) <= KEPT
+            found += came
+    assert written == 160_001
+    assert found[-1].code == 9
+    assert all(one.time <= other.time for one, other in pairwise(found))
+
+
+def test_every_event_that_has_a_code_is_sent_and_noted_in_its_tick() -> None:
     made, notes, told = make_run(ch8()), [], []
     all_codes, own = Fixed(), Fixed(trial_start=5)
     triggers = Triggers(

@@ -27,7 +27,7 @@ from labcrane import DeviceError, Feedback, ProtocolError
 from labcrane.core import SessionState, Sphere
 from labcrane.machines.kinematics import Arm
 from labcrane.testing import FeedbackContract, crane_at
-from labcrane_view.monitors import parse
+from labcrane_view.screen.monitors import parse
 from labcrane_view.settings import CAMERAS, CameraSettings, ViewSettings
 from labcrane_view.view import View
 

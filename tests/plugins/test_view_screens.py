@@ -12,8 +12,8 @@ from windows import SIZE, a_view, an_x_server, centre_of, make_frame, projected
 
 from labcrane import DeviceError
 from labcrane.core import SessionState, Sphere
-from labcrane_view.monitors import Monitor
-from labcrane_view.placement import Keeper, span
+from labcrane_view.screen.monitors import Monitor
+from labcrane_view.screen.placement import WindowPlacer, span
 from labcrane_view.settings import CAMERAS, ViewSettings
 
 LEFT, RIGHT, EXAMINER = "left", "right", "examiner"
@@ -125,8 +125,8 @@ def test_the_state_stands_on_each_monitor_and_text_on_one() -> None:
 def test_a_window_goes_to_a_monitor_that_is_left_and_back_when_its_own_is_there() -> None:
     need("xwininfo")
     with a_view(display="window", screen=RIGHT, renderer="software") as view:
-        handle = view._keeper  # the thread that looks once a second is not waited for
-        assert isinstance(handle, Keeper)
+        handle = view._placer  # the thread that looks once a second is not waited for
+        assert isinstance(handle, WindowPlacer)
         handle.close()
         assert view.present(make_frame())[-1] == 0.0
         assert window_at("labcrane") == ((480, 0), (420, 400))

@@ -16,7 +16,7 @@ from plugins.whole_picture import counted
 from windows import a_view, an_x_server, make_frame
 
 from labcrane.testing import ch8
-from labcrane_view.placement import free_place
+from labcrane_view.screen.placement import free_place
 from labcrane_view.settings import ViewSettings
 
 GRABS = 40
@@ -173,7 +173,7 @@ def test_paused_covers_the_whole_picture() -> None:
 def test_digits_are_as_high_as_capitals_and_stand_on_the_line(digits: str) -> None:
     from panda3d import core
 
-    from labcrane_view.window import font
+    from labcrane_view.screen.window import font
 
     def extent(text: str) -> tuple[float, float]:
         node = core.TextNode("digits")

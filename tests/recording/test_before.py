@@ -24,9 +24,9 @@ BEFORE = Path(__file__).parent / "before"
 NAME = "P001-SIMULATED"
 OF_THE_COMPUTER = {"versions", "sync"}
 """What the start of a session says of the program: versions, and the limits that it judges by."""
-ADDED = {"done", "owed", "circle_to_circle", "between_circles"}
+ADDED = {"done", "owed", "circle_to_circle", "between_circles", "onset_to_rest", "at_rest"}
 """What events say since, beside all that they said: whether a step was done, what is owed, and at
-the end of an aiming movement, the times between circles."""
+the end of an aiming movement, the times between circles and those of rest."""
 ADDED_SETTINGS = {"axes": [], "button": None}
 """What the simulated operator can be told since, and what that is where it is not."""
 ABOUT_THE_FILE = {"README", "dataset_description", "CITATION"}
@@ -34,6 +34,8 @@ ABOUT_THE_FILE = {"README", "dataset_description", "CITATION"}
 ADDED_COLUMNS = {
     "ses-01/trials/circle_to_circle",
     "ses-01/trials/between_circles",
+    "ses-01/trials/onset_to_rest",
+    "ses-01/trials/at_rest",
     *ABOUT_THE_FILE,
 }
 OF_THE_JOURNAL = {"ses-01/journals/size", "ses-01/context"}

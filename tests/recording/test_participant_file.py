@@ -11,6 +11,7 @@ from recording.journals import COLUMNS, CONTEXT, frames, stamp, write
 
 from labcrane import RecordingError
 from labcrane.recording.journal import Column, SessionJournal
+from labcrane.recording.participant_file import writer
 from labcrane.recording.participant_file.reader import Recording, open_recording
 from labcrane.recording.participant_file.recover import recover
 from labcrane.recording.participant_file.writer import consolidate
@@ -66,6 +67,27 @@ def test_streams_hold_what_was_written(recording: Recording) -> None:
         assert list(stream.data.columns) == [COLUMNS[k].label for k in wanted]
         assert stream.units == {COLUMNS[k].label: COLUMNS[k].unit for k in wanted}
         np.testing.assert_array_equal(stream.time, [stamp(k) for k in range(COUNT)])
+
+
+def test_a_file_that_is_kept_open_is_looked_through_once_and_read_as_ever(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks: list[Path] = []
+    look = writer.check_containment
+    monkeypatch.setattr(
+        writer, "check_containment", lambda file, of: (looks.append(of), look(file, of))
+    )
+    read = [stream.data for stream in open_recording(path).session(1).streams.values()]
+    assert len(looks) > 5
+    looks.clear()
+    with writer.kept_open(path):
+        again = [stream.data for stream in open_recording(path).session(1).streams.values()]
+        assert looks == [path]
+        with pytest.raises(RecordingError, match="there is no participant file"):
+            open_recording(path.with_name("another.h5"))
+    assert all(one.equals(other) for one, other in zip(read, again, strict=True))
+    open_recording(path)
+    assert len(looks) > 1, "it is closed at the end"
 
 
 def test_events_hold_name_time_tick_trial_and_the_rest(recording: Recording) -> None:

@@ -16,12 +16,12 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three people, one of them without an end, a pilot, a simulation, an erased one, a wreck."""
     root = tmp_path_factory.mktemp("results")
     folder = root / "data"
-    the_study = study(root)
-    record(the_study, folder, "P001", gaze=True)
-    record(the_study, folder, "P002", gaze=True)
-    record(the_study, folder, "P003", orders={900: [Command(Order.END)]})
-    record(the_study, folder, "P001", pilot=True)
-    record(the_study, folder, "P005", simulated=True)
+    chosen = study(root)
+    record(chosen, folder, "P001", gaze=True)
+    record(chosen, folder, "P002", gaze=True)
+    record(chosen, folder, "P003", orders={900: [Command(Order.END)]})
+    record(chosen, folder, "P001", pilot=True)
+    record(chosen, folder, "P005", simulated=True)
     with changed(Places(folder)) as register:  # what erasing P006 has left
         stone = Tombstone(participant="P006", date="2026-05-01", reason="withdrew")
         register.tombstones.append(stone)

@@ -1,7 +1,7 @@
 """Participants recorded in seconds, real ones as far as their stamps go."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -59,28 +59,29 @@ def study(folder: Path, text: str = STUDY) -> Study:
 
 
 def record(
-    the_study: Study,
+    chosen: Study,
     data: Path,
     participant: str,
     *,
     simulated: bool = False,
     pilot: bool = False,
     orders: Mapping[int, Sequence[Command]] | None = None,
-    gaze: bool | Sequence[str] = False,
+    gaze: bool | Sequence[str] | Callable[[FloatArray], FloatArray] = False,
     eeg: bool = False,
 ) -> Path:
     """Record session 1; a program takes the controls, whatever the stamps say.
 
     ``gaze`` is of eyes that name what they look at; or, by the names of cameras, of eyes that look
-    somewhere in the window, beside the areas that a view has shown there.
+    somewhere in the window, beside the areas that a view has shown there; or, as a function of
+    times on the session's clock, of eyes whose place in the window is known, in pixels.
     """
-    visit = Visit(the_study, participant, 1, data, simulated=simulated, fast=True, pilot=pilot)
-    plan = plan_session(the_study, participant, 1)
+    visit = Visit(chosen, participant, 1, data, simulated=simulated, fast=True, pilot=pilot)
+    plan = plan_session(chosen, participant, 1)
     claim(visit)
-    rig = Rig.build(the_study, simulated=True)
+    rig = Rig.build(chosen, simulated=True)
     clock = ManualClock(start=100.0)
-    with rig.opened(the_study, plan.seed) as run:
-        sequencer = Sequencer(the_study, plan, rig, waits=False)
+    with rig.opened(chosen, plan.seed) as run:
+        sequencer = Sequencer(chosen, plan, rig, waits=False)
         with SessionJournal(visit.journal, columns(run), run.rate_hz) as journal:
             log = FrameLog(journal, run)
             log.note(Event("session.start", clock.now(), context(visit, plan, rig, run)))
@@ -91,6 +92,8 @@ def record(
         with XdfWriter(visit.streams_journal) as writer:
             if gaze is True:
                 _gaze(writer, clock.now())
+            elif callable(gaze):
+                _gaze_at(writer, clock.now(), gaze)
             elif gaze:
                 _gaze_in_window(writer, clock.now(), gaze)
             if eeg:
@@ -140,6 +143,14 @@ def _gaze_in_window(writer: XdfWriter, until: float, cameras: Sequence[str]) -> 
     )
     shown = np.arange(90.0, until, 1 / 60)
     _stream(writer, header, shown, 0.0, np.tile(boxes, (len(shown), 1)))
+
+
+def _gaze_at(writer: XdfWriter, until: float, where: Callable[[FloatArray], FloatArray]) -> None:
+    """Write eyes at 120 Hz by where in the window they look."""
+    px = (Channel("gaze_x", "px"), Channel("gaze_y", "px"))
+    header = StreamHeader("eyes", "Gaze", px, "double64", 120.0, source_id="eyes")
+    time = np.arange(90.0, until, 1.0 / 120.0)
+    _stream(writer, header, time, OFFSET_S, where(time))
 
 
 EEG_HZ = 250.0

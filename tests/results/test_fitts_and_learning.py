@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.optimize import curve_fit
 
 from labcrane.analysis.cohort import find_cohort
 from labcrane.analysis.measures import measures_of
@@ -117,6 +118,30 @@ def test_the_better_curve_is_the_one_the_learner_follows() -> None:
         for who, curve in zip(better["participant"], better["curve"], strict=True)
     ]
     assert np.mean(right) >= 0.9
+
+
+@pytest.mark.parametrize("curve", ["exponential", "power"])
+def test_no_other_start_of_the_search_finds_a_curve_that_fits_better(curve: str) -> None:
+    """Drawn learners, some of whom learn nothing: by curve_fit of scipy, from twelve starts."""
+    rng = np.random.default_rng(24)
+    for number in range(30):
+        n = np.arange(1.0, rng.integers(6, 40))
+        true = 5.0, rng.normal(0.0, 3.0) * (number % 3 > 0), 10.0 ** rng.uniform(-2.5, 0.8)
+        y = CURVES[curve](n, *true) + rng.normal(0.0, 0.4, len(n))
+        spread = np.ptp(y)
+        bounds = (
+            [y.min() - 2 * spread, -4 * spread, 1e-3],
+            [y.max() + 2 * spread, 4 * spread, 10.0],
+        )
+        fit = fit_curve(curve, n, y)
+        assert fit is not None
+        ours = ((fit.at(n) - y) ** 2).sum()
+        theirs = []
+        for rate in np.geomspace(0.002, 9.0, 12):
+            start = [y[-1], y[0] - y[-1], rate]
+            found, _ = curve_fit(CURVES[curve], n, y, start, bounds=bounds, max_nfev=2000)
+            theirs.append(((CURVES[curve](n, *found) - y) ** 2).sum())
+        assert ours <= min(theirs) * (1.0 + 1e-5), (number, true)
 
 
 def test_an_asymptote_that_data_do_not_show_is_not_identified() -> None:

@@ -11,17 +11,17 @@ from labcrane.analysis.measures import MeasureSettings, measure_session, measure
 from labcrane.analysis.movements import cut, groups, machine_of
 from labcrane.analysis.sticks import reversals
 from labcrane.analysis.tables.definitions import MEASURES
-from labcrane.testing.exporters import MOVEMENT_S, a_participant
+from labcrane.testing.exporters import MOVEMENT_S, make_participant
 
 
 def test_a_minimum_jerk_movement_has_its_closed_forms(tmp_path) -> None:
-    table = measures_of(a_participant(tmp_path))
+    table = measures_of(make_participant(tmp_path))
     assert len(table) == 4
     first = table.iloc[0]
     assert first["sub_movements"] == 1
     assert first["limit_hits"] == 0
     assert first["simultaneous"] == pytest.approx(first["bimanual"], abs=0.2)
-    _, session = next(a_participant(tmp_path / "..", "P002").sessions())
+    _, session = next(make_participant(tmp_path / "..", "P002").sessions())
     movement = next(iter(cut(groups(session), session.trials, 100.0)))
     x, y, _ = movement.tip[0]
     radius = math.hypot(x - machine_of(session).base_x, y)

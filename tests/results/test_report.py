@@ -10,15 +10,19 @@ import pytest
 from scipy.stats import ttest_ind, ttest_rel
 
 from labcrane.analysis.cohort import Cohort, Status, find_cohort
-from labcrane.analysis.measures import measures_of
+from labcrane.analysis.measures import measures_of, measures_of_trials
 from labcrane.analysis.quality import exclusions, is_result, loop_quality, sync_quality
+from labcrane.analysis.report import figures, report
 from labcrane.analysis.report.factors import factors_of, with_factors
-from labcrane.analysis.report.outcomes import gaze_tests
+from labcrane.analysis.report.html import Page
+from labcrane.analysis.report.outcomes import gaze_tests, measures_in
 from labcrane.analysis.report.report import write_report
 from labcrane.analysis.report.sample import in_words, sample
 from labcrane.analysis.report.words import STYLES, Results, paragraphs
+from labcrane.analysis.statistics.time_outs import time_outs
 from labcrane.cli.app import main
 from results.consumers import under
+from results.synthetic import cohort_of_36
 
 
 @pytest.fixture(scope="module")
@@ -124,11 +128,55 @@ def test_looks_are_an_outcome_that_is_tested_and_put_into_words(seed: int) -> No
     assert [row["f"], row["p_gg"]] == pytest.approx([t**2, p])
     nothing = pd.DataFrame()
     counts = pd.DataFrame({"trials": [32], "time_outs": [0], "others": [0]})
-    results = Results("", nothing, nothing, nothing, nothing, tests, nothing, counts, factors)
+    results = Results("", *[nothing] * 4, tests, nothing, counts, factors, 8, nothing)
     said = paragraphs(results, STYLES["html"])[-1]
     verb = "differed" if p < 0.05 else "did not detectably differ"
     begin = f"How long grapple was looked at during movements {verb} over distance"
     assert said.startswith(f"{begin}, F(1, 7) = {t**2:.2f}, p ")
+
+
+def test_time_outs_are_told_by_condition_with_a_median_in_which_they_take_longer() -> None:
+    """Of what is easy all is done; of what is hard 3 of 5, and of what is hardest 1 of 5."""
+    done = {2.0: [1, 2, 3, 4, 5], 4.0: [2, 3, 9], 6.0: [4]}
+    rows = [
+        {"participant": "P001", "practice": 0, "distance": distance, "started": 0.0,
+         "outcome": "success" if number < len(seconds) else "timeout",
+         "ended": float(seconds[number]) if number < len(seconds) else 10.0}
+        for distance, seconds in done.items() for number in range(5)
+    ]  # fmt: skip
+    counts = time_outs(pd.DataFrame(rows), ["distance"])
+    nothing = pd.DataFrame()
+    factors = factors_of(with_factors(pd.DataFrame(rows).assign(sequence=1)))
+    results = Results("", *[nothing] * 6, counts, factors, 1, nothing)
+    (said,) = paragraphs(results, STYLES["html"])
+    assert said.strip() == (
+        "Of 15 trials, 6 (40.0 %) ended by time-out. Successes alone look fast; in the medians a "
+        "time-out takes longer than it was allowed: "
+        "4 m: 2 of 5, mean of successes 4.67 s, median 9 s; "
+        "6 m: 4 of 5, mean of successes 4 s, over half given up."
+    )
+    (said,) = paragraphs(results, STYLES["tex"])
+    assert r"6 (40.0 \%) ended" in said
+
+
+def test_a_mean_of_two_people_has_no_bar_in_figures_and_its_interval_in_the_table() -> None:
+    """Theirs is thirteen times as wide as they are apart, and fills whatever is drawn."""
+    random = np.random.default_rng(5)
+    rows = [
+        {"participant": f"P{person:03}", "distance": 2.0 if person < 2 else 4.0, "sequence": place,
+         "movement_time": random.uniform(2.0, 5.0)}
+        for person in range(5) for place in (1, 2, 3)
+    ]  # fmt: skip
+    drawing = figures.by_distance(pd.DataFrame(rows))
+    (panel,) = drawing.panels
+    two, three = (one.reach for one in panel.series if one.kind != "dots")
+    assert (two == 0.0).all()
+    own = drawing.table[drawing.table["distance"] == 4.0]
+    assert three[0] == pytest.approx((own["mean"] - own["ci_low"]).to_numpy())
+    assert (three > 0.0).all()
+    few = drawing.table[drawing.table["distance"] == 2.0]
+    assert (few["ci_high"] > few["mean"]).all()
+    assert "where three or more are in it" in drawing.caption
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -180,6 +228,63 @@ def test_practice_is_no_result() -> None:
     )
     assert is_result(table).tolist() == [False, False, True]
     assert exclusions(table)["why"].tolist() == ["practice", "outcome timeout"]
+
+
+def one_that_never_moved() -> pd.DataFrame:
+    """Return the movements of 36 people, of whom P003's trial 17 was over before anything moved."""
+    table = cohort_of_36().assign(reaction_time=0.4, error=lambda t: t["absolute_error"])
+    table = table.assign(outcome="success", practice=0.0, session=1.0, attempt=1.0, block=1.0)
+    table = table.assign(pair=table["distance"].astype(str) + table["far_side"])
+    never = (table["participant"] == "P003") & (table["trial"] == 17)
+    table.loc[never, ["reaction_time", "movement_time"]] = np.nan
+    table.loc[never, ["error", "error_along"]] = 3.64, -3.64
+    return table.drop(columns=["sequence", "absolute_error"])
+
+
+def test_a_movement_without_an_onset_is_no_result_and_no_accuracy_and_is_listed() -> None:
+    table = one_that_never_moved()
+    measured = measures_of_trials(table)
+    out = exclusions(measured)
+    assert out[["participant", "trial", "why"]].to_numpy().tolist() == [
+        ["P003", 17, "outcome success, no onset"]
+    ]
+    missing = measured["absolute_error"].isna()
+    assert missing.sum() == measured["constant_error"].isna().sum() == 1
+    assert (missing == ~is_result(measured)).all()
+    assert measured.loc[missing, "error"].tolist() == [3.64]  # as it was recorded
+    given_up = table.assign(outcome="timeout")
+    assert set(exclusions(given_up)["why"]) == {"outcome timeout", "outcome timeout, no onset"}
+    other = table.drop(columns="error_along")  # a task whose trials are no aimed movements
+    assert is_result(other).all()
+
+
+def test_a_movement_without_an_onset_is_named_in_the_report(cohort: Cohort, tmp_path: Path) -> None:
+    measured = measures_of_trials(one_that_never_moved())
+    page = Page("A study", tmp_path / "report.html", tmp_path)
+    report._who(page, cohort, measured)
+    said = page.write().read_text(encoding="utf-8")
+    assert "In P003 trial 17 the movement has no onset" in said
+    (row,) = pd.read_csv(tmp_path / "tables" / "without_onset.csv").to_dict("records")
+    assert (row["participant"], row["trial"], row["outcome"]) == ("P003", 17, "success")
+    assert row["error"] == 3.64
+    counts = time_outs(measured.assign(started=0.0, ended=3.0), ["distance"])
+    assert counts[["successes", "others"]].sum().tolist() == [len(measured) - 1, 1]
+
+
+def test_a_time_to_rest_is_an_outcome_of_its_own_where_taps_end_movements() -> None:
+    table = cohort_of_36()
+    assert "onset_to_rest" not in measures_in(table)
+    by_rest = table.assign(onset_to_rest=table["movement_time"], at_rest=0.2)
+    assert measures_in(by_rest) == measures_in(table)  # the same numbers are no second outcome
+    by_tap = by_rest.assign(onset_to_rest=by_rest["movement_time"] - 0.4, at_rest=0.4)
+    assert measures_in(by_tap) == [*measures_in(table), "onset_to_rest"]
+    assert report._rests(by_tap).endswith("Every movement has it.")
+    by_tap.loc[:4, ["onset_to_rest", "at_rest"]] = np.nan, 0.0
+    by_tap.loc[5:6, ["onset_to_rest", "at_rest"]] = np.nan, 0.1
+    assert report._rests(by_tap).endswith(
+        "7 of 1152 movements have none: in 5 the tip still moved when they were ended, in 2 it had "
+        "not rested for as long as a rest is."
+    )
 
 
 def test_quality_is_that_of_the_record(cohort: Cohort) -> None:

@@ -132,7 +132,7 @@ def told(movements: pd.DataFrame, data: Path) -> dict[str, list[str]]:
     empty = pd.DataFrame()
     anova = anova_table(whole, factors)
     scores = pd.DataFrame(columns=list(SCORES))
-    results = Results("36 participants.", anova, *[empty] * 4, scores, empty, factors)
+    results = Results("36 participants.", anova, *[empty] * 4, scores, empty, factors, 36, empty)
     loops = pd.DataFrame({
         "late_ticks": [3, 0], "ticks": [1000, 1000], "lateness_worst_ms": [12.5, 1.0],
         "sync_verdict": ["WARN", "PASS"],
@@ -165,6 +165,16 @@ def test_the_answer_has_design_people_effects_quality_and_exclusions_with_their_
         f"1 of {len(lost)} movements count for no average (0.1%); each is listed with why."
     ]
     assert "Left out: " in found["Participants"][1]
+
+
+def test_the_answer_names_movements_without_an_onset(movements: pd.DataFrame, data: Path) -> None:
+    still = movements["participant"].isin(["P003", "P008"]) & (movements["trial"] == 17)
+    onset = np.where(still, np.nan, 0.4)
+    found = told(movements.assign(reaction_time=onset), data)
+    assert found["Exclusions"] == [
+        f"2 of {len(movements)} movements count for no average (0.2%); each is listed with why. "
+        "Without an onset: P003 trial 17, P008 trial 17."
+    ]
 
 
 def test_the_answer_stands_first_then_the_contents_and_tables_are_folded(

@@ -13,7 +13,7 @@ from labcrane.analysis.statistics.anova import analyse
 from labcrane.analysis.statistics.reported import Reported, check_reported
 from labcrane.analysis.statistics.time_outs import median_time
 from labcrane.analysis.statistics.trends import holm, linear_trend, mixed_model
-from results.consumers import needs_r, r, table
+from results.consumers import needs_emmeans, needs_r, r, table
 from results.synthetic import cohort_of_36
 
 AFEX = """
@@ -261,3 +261,184 @@ def test_half_of_what_was_given_up_has_no_median_and_ten_per_cent_shifts_it() ->
     assert np.isnan(median_time(times, np.array([1.0] * 4 + [0.0] * 5)))
     assert median_time(np.arange(1.0, 6.0), np.array([1.0, 1.0, 1.0, 1.0, 0.0])) == 3.0
     assert np.isnan(median_time(np.ones(3), np.zeros(3)))
+
+
+DRAWN = """
+suppressMessages({library(afex); library(emmeans)})
+d <- read.csv(commandArgs(TRUE)[1])
+d$distance <- factor(d$distance)
+say <- function(...) cat(..., sep = "|", fill = 10000)
+number <- function(...) sprintf("%.17g", c(...))
+dv <- "movement_time"
+for (within in list("phase", c("phase", "place"), c("phase", "distance"), c("phase", "far_side"),
+                    c("distance", "far_side"))) {
+  fit <- suppressMessages(suppressWarnings(aov_ez(
+    "participant", dv, d, within = within, between = "group", fun_aggregate = mean)))
+  plain <- anova(fit, es = "pes", correction = "none")
+  gg <- anova(fit, es = "pes", correction = "GG")
+  for (effect in rownames(plain)) {
+    inside <- setdiff(strsplit(effect, ":")[[1]], "group")
+    asked <- if ("far_side" %in% within & "distance" %in% within) length(inside) == 2 else
+      length(within) == 1 | within[length(within)] %in% inside
+    if (asked) say(paste("anova", effect), number(
+      plain[effect, "F"], plain[effect, "num Df"], plain[effect, "den Df"], gg[effect, "num Df"],
+      gg[effect, "den Df"], gg[effect, "Pr(>F)"], gg[effect, "pes"]))
+  }
+  compared <- c(if (length(within) == 1) c("phase", "group"),
+                if (identical(within, c("phase", "distance"))) "distance")
+  for (factor in compared) {
+    s <- summary(contrast(suppressMessages(emmeans(fit, factor, model = "multivariate")),
+                          "pairwise", adjust = "holm"))
+    say(paste("contrast", factor), number(s$estimate, s$SE, s$df, s$t.ratio, s$p.value))
+  }
+}
+"""
+
+
+def drawn_study(seed: int) -> pd.DataFrame:
+    """Return three groups of unequal size in two sessions, with time-outs and what nobody did.
+
+    Somebody lacks all movements at one position, and somebody else a whole session.
+    """
+    dice = np.random.default_rng(seed)
+    sizes = dice.choice(np.arange(6, 12), 3, replace=False)
+    people = [group for group, size in zip("abc", sizes, strict=True) for _ in range(size)]
+    pairs = [(distance, side) for distance in (2.0, 3.0, 6.0) for side in ("left", "right")]
+    rows = [
+        {
+            "participant": f"P{person:03}",
+            "group": group,
+            "session": session,
+            "session_name": ("acquisition", "retention")[session - 1],
+            "sequence": place,
+            "distance": pairs[at][0],
+            "far_side": pairs[at][1],
+            "pair": f"{pairs[at][0]:g} {pairs[at][1]}",
+            "outcome": "timeout" if dice.uniform() < 0.1 else "success",
+            "movement_time": math.exp(0.2 * pairs[at][0] - 0.1 * place + dice.normal(0.0, 0.3)),
+        }
+        for person, group in enumerate(people, start=1)
+        for session in (1, 2)
+        for place, at in enumerate(dice.permutation(len(pairs)), start=1)
+        for _ in range(3)
+    ]
+    table = pd.DataFrame(rows)
+    one, other = (f"P{number:03}" for number in dice.choice(len(people), 2, replace=False) + 1)
+    gone = (table["participant"] == one) & (table["session"] == 2) & (table["sequence"] == 2)
+    table.loc[gone, "outcome"] = "timeout"
+    table = table[~((table["participant"] == other) & (table["session"] == 2))]
+    table.loc[table["outcome"] == "timeout", "movement_time"] = math.nan
+    return table
+
+
+@needs_emmeans
+def test_drawn_studies_of_unequal_groups_and_missing_cells_are_those_of_afex_and_emmeans(
+    tmp_path: Path,
+) -> None:
+    seed = int(np.random.default_rng().integers(2**32))
+    whole = with_factors(drawn_study(seed))
+    factors = factors_of(whole)
+    done = whole[whole["outcome"] == "success"]
+    path = tmp_path / "movements.csv"
+    done.to_csv(path, index=False)
+    theirs = table(r(DRAWN, path))
+    assert len(theirs) == 3 + 3 * 4 + 2 + 3
+    tests = outcomes.anova_table(done, factors).set_index("factor")
+    contrasts = outcomes.contrast_table(done, factors).fillna({"at": ""})
+    contrasts = contrasts[contrasts["at"] == ""]
+    words = {"phase": "session", "place": "sequence"}
+    for key, values in theirs.items():
+        kind, effect = key.split(" ")
+        name = ":".join(words.get(part, part) for part in effect.split(":"))
+        if kind == "anova":
+            row = tests.loc[name]
+            corrected = [row["epsilon"] * row["df1"], row["epsilon"] * row["df2"]]
+            ours = [row["f"], row["df1"], row["df2"], *corrected, row["p_gg"], row["eta2p"]]
+        else:
+            own = contrasts[contrasts["factor"] == name]
+            columns = ["difference", "se", "df", "t", "p_holm"]
+            ours = own[columns].to_numpy(float).T.ravel()
+        said = f"{key}, seed {seed}"
+        np.testing.assert_allclose(ours, np.array(values, float), rtol=1e-6, err_msg=said)
+
+
+def cells_of(seed: int, sessions: int, groups: tuple[str, ...] = ("none",)) -> pd.DataFrame:
+    """Return one movement per pair and position, pairs in a drawn order for everybody."""
+    dice = np.random.default_rng(seed)
+    pairs = 5
+    adds = dice.normal(0.0, 3.0, pairs)
+    people = [group for group in groups for _ in range(int(dice.integers(4, 8)))]
+    rows = [
+        {
+            "participant": f"P{person:03}",
+            "group": group,
+            "phase": f"{session} session",
+            "place": place,
+            "pair": f"pair {pair}",
+            "movement_time": 9.0 + adds[pair] + person % 3 - 0.2 * place + dice.normal(0.0, 0.6),
+        }
+        for person, group in enumerate(people, start=1)
+        for session in range(1, sessions + 1)
+        for place, pair in enumerate(dice.permutation(pairs), start=1)
+    ]
+    return pd.DataFrame(rows)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_positions_beside_pairs_are_tested_as_a_linear_model_of_both_tests_them(seed: int) -> None:
+    """Few people: that what pairs add is estimated too costs freedom, and it is paid."""
+    formula = pytest.importorskip("statsmodels.formula.api")
+    cells = cells_of(seed, 1)
+    (ours,) = analyse(cells, "movement_time", ["place"], beside="pair")
+    both = formula.ols("movement_time ~ participant + pair + C(place)", cells).fit()
+    f, p, df1 = both.compare_f_test(formula.ols("movement_time ~ participant + pair", cells).fit())
+    found = [ours.f, ours.p, ours.df1, ours.df2]
+    np.testing.assert_allclose(found, [f, p, df1, both.df_resid], rtol=1e-9)
+    assert ours.df2 == (ours.n - 2) * 4.0
+    assert 1.0 / 4.0 <= ours.epsilon <= 1.0
+
+
+STRATA = """
+d <- read.csv(commandArgs(TRUE)[1], stringsAsFactors = TRUE)
+d$place <- factor(d$place)
+model <- if (nlevels(d$group) > 1)
+  movement_time ~ pair + group * phase * place + Error(participant / (phase * place)) else
+  movement_time ~ pair + phase * place + Error(participant / (phase * place))
+for (stratum in summary(aov(model, d))) {
+  s <- stratum[[1]]; effects <- trimws(rownames(s))
+  last <- tail(setdiff(effects, "Residuals"), 1)
+  if (length(last) && grepl("place", last)) cat(last, sprintf("%.17g", c(
+    s[effects == last, "F value"], s[effects == last, "Df"], s[effects == "Residuals", "Df"],
+    s[effects == last, "Pr(>F)"])), sep = "|", fill = 1000)
+}
+"""
+
+
+@needs_r
+@pytest.mark.parametrize("groups", [("none",), ("none", "slow", "fast")])
+def test_positions_beside_pairs_are_tested_in_the_strata_of_r(
+    groups: tuple[str, ...], tmp_path: Path
+) -> None:
+    seed = int(np.random.default_rng().integers(2**32))
+    cells = cells_of(seed, 2, groups)
+    cells.to_csv(tmp_path / "cells.csv", index=False)
+    theirs = table(r(STRATA, tmp_path / "cells.csv"))
+    between = ["group"] if len(groups) > 1 else []
+    tests = analyse(cells, "movement_time", ["phase", "place"], between, "pair")
+    ours = {test.factor: test for test in tests}
+    before = "group:" if between else ""
+    # In each stratum the last: R's terms come one after the other, and only the last beside all.
+    assert set(theirs) == {f"{before}place", f"{before}phase:place"}
+    for name, values in theirs.items():
+        found = [getattr(ours[name], what) for what in ("f", "df1", "df2", "p")]
+        said = f"{name}, seed {seed}"
+        np.testing.assert_allclose(found, np.array(values, float), rtol=1e-6, err_msg=said)
+
+
+def test_positions_that_cannot_be_told_from_pairs_are_not_tested_beside_them() -> None:
+    cells = cells_of(1, 1)
+    same = cells.assign(pair="pair " + cells["place"].astype(str))
+    assert analyse(same, "movement_time", ["place"], beside="pair") == []
+    (plain,) = analyse(same, "movement_time", ["place"])
+    (one,) = analyse(same.assign(pair="pair 1"), "movement_time", ["place"], beside="pair")
+    assert one == plain

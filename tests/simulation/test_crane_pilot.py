@@ -99,6 +99,10 @@ def test_a_simulated_participant_has_both_times_demographics_and_errors_that_not
     np.testing.assert_allclose(
         done["circle_to_circle"], done["reaction_time"] + done["movement_time"], rtol=1e-9
     )
+    rests = done["onset_to_rest"]
+    assert rests.notna().all()
+    assert (rests < done["movement_time"]).all()
+    np.testing.assert_allclose(rests + done["at_rest"], done["movement_time"], rtol=1e-9)
     # A trial begins with the tap that ends the one before, so the next tap is its end.
     np.testing.assert_allclose(done["circle_to_circle"], done["ended"] - done["started"], atol=0.02)
     assert (done["between_circles"].dropna() < done["circle_to_circle"]).all()

@@ -1,13 +1,14 @@
 """The power of planned tests, against the power that theory gives them."""
 
 from collections.abc import Callable
+from functools import partial
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import norm
+from scipy.stats import binom, nct, norm, t
 from statsmodels.stats.power import TTestIndPower, TTestPower
 from statsmodels.stats.proportion import proportion_confint
 
@@ -34,7 +35,7 @@ def within(slope: float, spread: float, participants: int = 4000, levels: int = 
     table = pd.DataFrame(rows, columns=["participant", "sequence"])
     table["movement_time"] = values.ravel()
     table["half"] = np.where(table["sequence"] <= levels / 2, "early", "late")
-    return table
+    return table.assign(outcome="success", practice=0.0)
 
 
 def groups(difference: float, participants: int = 4000) -> pd.DataFrame:
@@ -45,6 +46,8 @@ def groups(difference: float, participants: int = 4000) -> pd.DataFrame:
             "participant": [f"P{p:04}" for p in range(participants)],
             "group": np.array(["none", "visual"])[label],
             "movement_time": 5.0 + difference * label + random.normal(0.0, 1.0, participants),
+            "outcome": "success",
+            "practice": 0.0,
         }
     )
 
@@ -96,6 +99,168 @@ def test_the_power_between_groups_is_that_of_the_t_test(text: str) -> None:
         assert found.null == pytest.approx(0.05, abs=4.0 * np.sqrt(0.05 * 0.95 / COHORTS) + 0.005)
 
 
+LEAVES = 0.4
+"""Share of the participants who leave before the end."""
+
+
+def with_dropouts(theory: Callable[[int], float], size: int) -> float:
+    """Return the power of a cohort of whom each leaves by chance."""
+    stay = np.arange(2, size + 1)
+    return float(binom.pmf(stay, size, 1.0 - LEAVES) @ [theory(int(count)) for count in stay])
+
+
+def test_the_power_of_a_cohort_is_that_of_those_of_it_who_stay() -> None:
+    movements = within(slope=1.0, spread=2.0, levels=2)
+    effect = read_effect("movement_time~half")
+    pool = make_pool(movements, effect)
+    numbers = pool.means @ pool.weights
+    size = float(numbers.mean() / numbers.std())
+    leavers = {f"P{p:04}" for p in range(4000) if p % 10 < 10 * LEAVES}
+    gone = movements["participant"].isin(leavers) & (movements["half"] == "late")
+    ended = movements.assign(outcome=np.where(gone, "ended", "success"))
+    for table in (movements[~gone], ended):
+        pool = make_pool(table, effect)
+        assert set(pool.left_out) == leavers
+        theory = partial(TTestPower().power, size, alpha=0.05)
+        for found in power(pool, effect, SIZES, COHORTS, seed=6):
+            expected = with_dropouts(theory, found.participants)
+            assert found.power == pytest.approx(expected, abs=ERROR + 0.01)
+            of_all = TTestPower().power(size, found.participants, 0.05)
+            assert found.power < of_all - 0.03, "nobody who left is missed"
+            assert found.null == pytest.approx(0.05, abs=4.0 * np.sqrt(0.05 * 0.95 / COHORTS))
+
+
+def test_whoever_of_a_group_has_no_result_is_one_of_the_cohort() -> None:
+    movements, effect = groups(0.9), read_effect("movement_time~group")
+    gone = np.arange(4000) % 10 < 10 * LEAVES
+    pool = make_pool(movements.assign(outcome=np.where(gone, "timeout", "success")), effect)
+    assert len(pool.means) == 4000
+    assert len(pool.left_out) == gone.sum()
+    stayed = movements[~gone].groupby("group")["movement_time"]
+    size = float(stayed.mean().diff().iloc[-1] / stayed.std().mean())
+    for found in power(pool, effect, (16, 32), COHORTS, seed=7):
+        half = found.participants // 2
+        stay = np.arange(2, half + 1)
+        chance = binom.pmf(stay, half, 1.0 - LEAVES)
+        theory = [
+            [TTestIndPower().power(size, one, 0.05, other / one) for other in stay] for one in stay
+        ]
+        assert found.power == pytest.approx(float(chance @ theory @ chance), abs=ERROR + 0.02)
+
+
+def of_two_groups(
+    shift: float, counts: tuple[int, int], leave: tuple[float, float], claim: Claim
+) -> float:
+    """Return the power of a t test between groups of whom some leave, by the noncentral t.
+
+    ``shift`` is in standard deviations.
+    """
+    one, other = (np.arange(2, count + 1)[:, None] for count in counts)
+    chance = [
+        binom.pmf(n, count, 1.0 - gone)
+        for n, count, gone in zip((one, other), counts, leave, strict=True)
+    ]
+    freedom, error = one + other.T - 2.0, np.sqrt(1.0 / one + 1.0 / other.T)
+    if claim.kind == "difference":
+        reach = t.isf(0.025, freedom)
+        shown = nct.sf(reach, freedom, shift / error) + nct.cdf(-reach, freedom, shift / error)
+    else:  # one-sided: the side on which the margin is
+        beyond = (claim.margin - shift) * np.sign(claim.margin) / error
+        shown = nct.sf(t.isf(0.05, freedom), freedom, beyond)
+    return float(chance[0].T[0] @ shown @ chance[1][:, 0])
+
+
+@pytest.mark.parametrize("number", range(16))
+def test_drawn_studies_of_groups_have_the_power_that_the_noncentral_t_gives_them(
+    number: int,
+) -> None:
+    """Two groups of two or three, in either order, of unequal pools, from which people leave."""
+    random = np.random.default_rng([441, number])
+    names = ["a", "b", "c"][: 2 + number % 2]
+    levels = dict(zip(names, random.normal(5.0, 0.6, len(names)), strict=True))
+    leave = dict(zip(names, random.uniform(0.0, 0.5, len(names)), strict=True))
+    rows, people = [], {}
+    for name in names:
+        for at in range(int(random.integers(1000, 3000))):
+            person = f"{name}{at:04}"
+            people[person] = name
+            gone = random.random() < leave[name]
+            if gone and random.random() < 0.5:
+                continue  # left before there was anything to note
+            value = levels[name] + random.normal()
+            rows.append((person, name, np.nan if gone else value, "ended" if gone else "success"))
+    columns = ["participant", "group", "movement_time", "outcome"]
+    movements = pd.DataFrame(rows, columns=columns).assign(practice=0.0)
+    one, other = random.permutation(names)[:2].tolist()
+    put = [None, 0.7, -0.7][number % 3]
+    claim = [Claim(), Claim("non_inferiority", 0.5), Claim("non_inferiority", -0.5)][
+        number // 2 % 3
+    ]
+    text = f"movement_time~group[{one},{other}]" + ("" if put is None else f"={put}")
+    effect = read_effect(text)
+    stayed = movements[movements["outcome"] == "success"].groupby("group")["movement_time"]
+    shift = stayed.mean()[other] - stayed.mean()[one] if put is None else put
+    gone = {name: 1.0 - stayed.size()[name] / [*people.values()].count(name) for name in names}
+    pool = make_pool(movements, effect, people)
+    assert len(pool.means) == len(people)
+    for found in power(pool, effect, (18, 36), COHORTS, seed=number, claim=claim):
+        counts = [(found.participants + names.index(each)) // len(names) for each in (one, other)]
+        expected = of_two_groups(shift, tuple(counts), (gone[one], gone[other]), claim)
+        assert found.power == pytest.approx(expected, abs=ERROR + 0.02)  # of Welch's test
+        assert found.null == pytest.approx(0.05, abs=4.0 * np.sqrt(0.05 * 0.95 / COHORTS) + 0.015)
+        assert claim.margin or abs(shift) < 0.3 or found.type_s < 0.1
+
+
+@pytest.mark.parametrize(("text", "sign"), [("half[early,late]", 1), ("half[late,early]", -1)])
+def test_an_effect_is_the_second_level_less_the_first(text: str, sign: int) -> None:
+    movements = within(slope=1.0, spread=2.0)
+    claim = Claim("non_inferiority", sign * 1.0)
+    pool = make_pool(movements, read_effect(f"movement_time~{text}"))
+    assert float((pool.means @ pool.weights).mean()) * sign > 0.0
+    for put, shown in ((0.0, 0.9), (sign * 2.0, 0.02)):
+        effect = read_effect(f"movement_time~{text}={put}")
+        (found,) = power(pool, effect, (600,), 400, seed=3, claim=claim)
+        assert found.power > shown if put == 0.0 else found.power < shown
+
+
+def test_two_numbers_may_be_compared_as_two_words() -> None:
+    movements = within(slope=1.0, spread=2.0)
+    by_numbers = make_pool(movements, read_effect("movement_time~sequence[8,2]"))
+    first, second = (
+        movements[movements["sequence"] == level]["movement_time"].to_numpy()
+        for level in (8.0, 2.0)
+    )
+    assert by_numbers.means @ by_numbers.weights == pytest.approx(second - first)
+
+
+def test_a_level_may_have_commas_in_its_name() -> None:
+    movements = within(slope=1.0, spread=2.0, participants=20)
+    movements["half"] = movements["half"].map({"early": "1 one, a", "late": "2 two, b, c"})
+    pool = make_pool(movements, read_effect("movement_time~half[2 two, b, c, 1 one, a]"))
+    assert float((pool.means @ pool.weights).mean()) < 0.0
+
+
+def test_of_every_group_as_many_are_drawn_also_for_effects_within_people() -> None:
+    movements = within(slope=1.0, spread=1.0, participants=400)
+    group = np.where(movements["participant"] < "P0100", "few", "many")
+    steeper = (
+        movements["movement_time"] + np.where(group == "few", 6.0, 0.0) * movements["sequence"]
+    )
+    effect = read_effect("movement_time~sequence=0")
+    pool = make_pool(movements.assign(group=group, movement_time=steeper), effect)
+    for found in power(pool, effect, (12, 40), COHORTS, seed=5):
+        assert found.power < 0.05 + ERROR  # the estimate is of both groups alike
+        assert found.power < 0.03, "groups were drawn by chance"
+
+
+@pytest.mark.parametrize("text", ["log(movement_time)~sequence", "log(movement_time)~half"])
+def test_what_has_no_logarithm_is_refused(text: str) -> None:
+    movements = within(slope=0.1, spread=0.1, participants=6)
+    movements.loc[[3, 17], "movement_time"] = 0.0, -1.0
+    with pytest.raises(ProtocolError, match="2 of 48 values are 0 or less, which have no log"):
+        make_pool(movements, read_effect(text))
+
+
 def test_fresh_cohorts_share_no_participant() -> None:
     effect = read_effect("movement_time~sequence")
     pool = make_pool(within(slope=1.0, spread=2.0, participants=100), effect)
@@ -137,6 +302,8 @@ def test_what_is_no_effect_is_refused_with_examples(text: str) -> None:
     [
         ("speed~sequence", "movements have no 'speed'; they have participant"),
         ("movement_time~pair", r"'pair' has 3 levels here \(a, b, c\); the test is for"),
+        ("movement_time~pair[a,d]", "pair has no level 'd'; it has a, b, c"),
+        ("movement_time~pair[b,b]", r"pair\[b,b\] compares 'b' with itself; name two of a, b, c"),
     ],
 )
 def test_what_cannot_be_tested_is_said(text: str, message: str) -> None:
@@ -150,7 +317,7 @@ def normal_pool(effect: float, participants: int, seed: int) -> Pool:
     """Return differences between two words with a standard deviation of 1."""
     values = np.random.default_rng(seed).normal(effect, 1.0, participants)
     means = np.stack([np.zeros(participants), values], axis=1)
-    return Pool(means, np.array([-1.0, 1.0]), np.array([-0.5, 0.5]), None, ())
+    return Pool(means, np.array([-1.0, 1.0]), None, np.zeros(participants, np.intp), ())
 
 
 ONE = read_effect("movement_time~half")
@@ -171,7 +338,7 @@ def pool_of_groups(effect: float, participants: int, seed: int) -> Pool:
     """Return numbers of two groups with a standard deviation of 1."""
     labels = np.arange(participants) % 2
     values = np.random.default_rng(seed).normal(effect * labels, 1.0)
-    return Pool(values[:, None], np.ones(1), np.array([-0.5, 0.5]), labels, ())
+    return Pool(values[:, None], np.ones(1), labels, labels, ())
 
 
 @pytest.mark.parametrize(
@@ -309,6 +476,7 @@ def test_the_paragraph_says_sizes_intervals_and_what_was_tested() -> None:
     assert "and of the 4000 participants they were drawn from" in text
     assert "movement_time~half was tested" in text
     assert "overstated by a factor of 1." in text
+    assert "Participants are counted when they begin: whoever drops out is one of them." in text
 
 
 @pytest.mark.parametrize(

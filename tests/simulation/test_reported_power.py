@@ -1,12 +1,13 @@
 """Power of the report's own tests, against theory and against the tests themselves."""
 
 from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.stats import ttest_1samp, ttest_ind
+from scipy.stats import f_oneway, ttest_1samp, ttest_ind
 from simple_crane import CRANE
 from statsmodels.formula.api import ols
 from statsmodels.stats.multitest import multipletests
@@ -19,7 +20,7 @@ from labcrane.errors import ProtocolError
 from labcrane.simulation.power import Claim, read_effect
 from labcrane.simulation.reported import (
     Drawer,
-    Planned,
+    PlannedTest,
     ask,
     names,
     plan_test,
@@ -67,11 +68,14 @@ def movements(
 
 
 NOTHING = Claim()
+ALIKE = Claim("equivalence", 0.5)
 PLAIN = read_effect("movement_time~group")
 OF_GROUPS = read_effect("movement_time~group[none,visual]")
 
 
-def drawn(planned: Planned, size: int, seed: int) -> Iterator[tuple[pd.DataFrame, pd.DataFrame]]:
+def drawn(
+    planned: PlannedTest, size: int, seed: int
+) -> Iterator[tuple[pd.DataFrame, pd.DataFrame]]:
     """Yield each cohort that is tested, and the same with nothing in it."""
     drawer = Drawer(planned)
     for number in range(COHORTS):
@@ -191,20 +195,18 @@ def test_what_is_put_in_changes_a_term_of_the_mixed_model_as_if_everybody_had_it
     assert found.power == float(expected.p < 0.05)
 
 
-def test_where_a_mixed_model_has_nothing_to_find_groups_that_differ_are_no_matter() -> None:
-    table = movements(60, difference=2.5)
-    of_groups = "movement_time~group[T.visual]"
-    planned = plan_test("mixed", read_effect(of_groups), table, NOTHING)
-    (found,) = power_of_report(planned, [16], 20, seed=1)
-    assert found.power > 0.8
-    assert found.null <= 0.25
-    planned = plan_test("mixed", read_effect(f"{of_groups}=0.0001"), table, NOTHING)
-    (found,) = power_of_report(planned, [16], 20, seed=1)
-    assert found.power <= 0.25
-    alike = Claim("equivalence", 0.5)
-    planned = plan_test("mixed", read_effect(f"{of_groups}=0.0001"), table, alike)
-    (found,) = power_of_report(planned, [16], 20, seed=1, claim=alike)
-    assert found.power > 0.8
+@pytest.mark.parametrize("cohorts", [6, pytest.param(20, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    ("size", "claim", "lowest", "most"),
+    [("", NOTHING, 0.8, 1.0), ("=0.0001", NOTHING, 0.0, 0.25), ("=0.0001", ALIKE, 0.8, 1.0)],
+)
+def test_where_a_mixed_model_has_nothing_to_find_groups_that_differ_are_no_matter(
+    size: str, claim: Claim, lowest: float, most: float, cohorts: int
+) -> None:
+    effect = read_effect(f"movement_time~group[T.visual]{size}")
+    planned = plan_test("mixed", effect, movements(60, difference=2.5), claim)
+    (found,) = power_of_report(planned, [16], cohorts, seed=1, claim=claim)
+    assert lowest <= found.power <= most
     assert found.null <= 0.25
 
 
@@ -295,8 +297,92 @@ def test_who_drops_out_is_left_out_by_the_f_test_and_kept_by_the_mixed_model() -
     whole = plan_test("anova", sequence, table, NOTHING)
     assert ask(anova, anova.results).p != ask(whole, whole.results).p
     assert anova.results["participant"].nunique() == 30
-    (found,) = power_of_report(plan_test("mixed", sequence, left, NOTHING), [10], 20, seed=2)
+    (found,) = power_of_report(plan_test("mixed", sequence, left, NOTHING), [10], 6, seed=2)
     assert found.power > 0.5
+
+
+def test_who_has_no_result_at_all_is_one_of_a_cohort_and_of_no_test() -> None:
+    """By t tests of those who are left, of as many as were drawn."""
+    table = movements(60, difference=0.8)
+    gone = table["participant"].isin([f"P{n:03}" for n in range(60) if n % 5 < 2])
+    left = table.assign(outcome=np.where(gone, "ended", "success"))
+    planned = plan_test("contrast", OF_GROUPS, left, NOTHING)
+    (found,) = power_of_report(planned, [24], COHORTS, seed=4)
+    shown, tested = [], []
+    for cohort, _ in drawn(planned, 24, seed=4):
+        one, other = in_groups(cohort)
+        tested.append(len(one) + len(other))
+        shown.append(ttest_ind(one, other).pvalue < 0.05)
+    assert found.power == np.mean(shown)
+    assert np.mean(tested) == pytest.approx(24 * 0.6, abs=4 * np.sqrt(24 * 0.24 / COHORTS))
+    whole = plan_test("contrast", OF_GROUPS, table, NOTHING)
+    (of_all,) = power_of_report(whole, [24], COHORTS, seed=4)
+    assert found.power < of_all.power
+
+
+@pytest.mark.parametrize("number", range(2))
+def test_the_f_test_of_drawn_groups_finds_what_scipys_finds_in_each_cohort(number: int) -> None:
+    """Three or four groups of unequal pools, of whom some leave at once and some in a movement."""
+    random = np.random.default_rng([441, number])
+    groups = ("a", "b", "c", "d")[: 3 + number % 2]
+    table = movements(90, groups=groups, difference=float(random.uniform(0.4, 0.9)), seed=number)
+    of = dict(table.groupby("participant")["group"].first())
+    smaller = {who for who, group in of.items() if group == "b" and random.random() < 0.4}
+    people = {who: group for who, group in of.items() if who not in smaller}
+    gone = {who: random.random() for who in people if random.random() < 0.3}
+    at_once = {who for who, chance in gone.items() if chance < 0.5} | smaller
+    left = table[~table["participant"].isin(at_once)]
+    left = left.assign(outcome=np.where(left["participant"].isin(gone), "ended", "success"))
+    for kind, text in (("anova", "movement_time~group"), ("contrast", "movement_time~group[c,b]")):
+        planned = plan_test(kind, read_effect(text), left, NOTHING, people)
+        assert dict(planned.people) == people
+        (found,) = power_of_report(planned, [24], COHORTS, seed=number)
+        shown, tested = [], []
+        for cohort, _ in drawn(planned, 24, seed=number):
+            means = cohort.groupby(["group", "participant"])["movement_time"].mean()
+            own = [part.to_numpy() for _, part in means.groupby("group")]
+            tested.append(len(means))
+            if kind == "anova":
+                shown.append(f_oneway(*own).pvalue < 0.05)
+                continue
+            model = ols("movement_time ~ 0 + group", means.reset_index()).fit()
+            pairs = np.array(
+                [
+                    np.eye(len(own))[i] - np.eye(len(own))[j]
+                    for i, j in combinations(range(len(own)), 2)
+                ]
+            )
+            asked = [(i, j) for i, j in combinations(range(len(own)), 2)].index((1, 2))
+            p = multipletests(model.t_test(pairs).pvalue, method="holm")[1][asked]
+            shown.append(p < 0.05)
+        assert found.power == np.mean(shown)
+        share = 1.0 - len(gone) / len(people)
+        assert np.mean(tested) == pytest.approx(24 * share, abs=2.0)
+
+
+def test_a_contrast_is_the_second_level_less_the_first() -> None:
+    table = movements(60, groups=("a", "b", "c"), difference=1.5)
+    for text, sign in (("group[a,c]", 1.0), ("group[c,a]", -1.0)):
+        claim = Claim("non_inferiority", sign * 0.5)
+        planned = plan_test("contrast", read_effect(f"movement_time~{text}"), table, claim)
+        assert ask(planned, planned.results).estimate * sign > 1.0
+        (found,) = power_of_report(planned, [24], COHORTS, seed=4, claim=claim)
+        assert found.power < 0.1
+        put = read_effect(f"movement_time~{text}={-0.6 * sign}")
+        (found,) = power_of_report(
+            plan_test("contrast", put, table, claim), [24], COHORTS, 4, claim
+        )
+        assert found.power > 0.5
+
+
+def test_a_cohort_of_people_without_results_shows_nothing() -> None:
+    table = movements(30)
+    for kind, effect in (("contrast", OF_GROUPS), ("anova", PLAIN), ("mixed", "group[T.visual]")):
+        asked = effect if kind != "mixed" else read_effect(f"movement_time~{effect}")
+        planned = plan_test(kind, asked, table, NOTHING)
+        for few in (0, 1, 2):
+            people = planned.results["participant"].isin([f"P{n:03}" for n in range(few)])
+            assert np.isnan(ask(planned, planned.results[people]).p)
 
 
 def test_time_outs_are_no_results_and_their_places_still_are_places() -> None:
@@ -327,6 +413,24 @@ def test_cohorts_are_the_same_whoever_makes_them() -> None:
         ("anova", "movement_time~group", Claim("equivalence", 0.1), "an F test has no direction"),
         ("contrast", "movement_time~group", NOTHING, "write movement_time~group[ONE,OTHER]"),
         ("contrast", "movement_time~group[none,loud]", NOTHING, "no level 'loud'; it has none, v"),
+        (
+            "anova",
+            "movement_time~group[none,visual]",
+            NOTHING,
+            "compared by --test contrast, or t; a",
+        ),
+        (
+            "trend",
+            "movement_time~sequence[1,2]",
+            NOTHING,
+            "two levels, [1,2], are compared by --test",
+        ),
+        (
+            "contrast",
+            "movement_time~group[visual,visual]",
+            NOTHING,
+            "compares 'visual' with itself",
+        ),
         ("trend", "movement_time~distance", NOTHING, "trend is over the sequence of one session"),
         ("mixed", "log(movement_time)~group", NOTHING, "the mixed model always their logarithm"),
         ("mixed", "speed~group", NOTHING, "movements have no 'speed'"),
@@ -429,6 +533,24 @@ def test_power_makes_files_only_for_what_is_measured_in_frames(
     assert "DRAWN FROM RECORDINGS" in capsys.readouterr().out
     assert not (where / "pool").exists()
     assert len(pd.read_csv(where / "power.csv")) == 1
+
+
+def test_who_leaves_before_a_first_movement_is_named_and_drawn(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study.with_name("cohort.yaml").write_text("labcrane_cohort: 1\ndropout: 0.7\n")
+    where = tmp_path / "out"
+    effect = ["--effect", "movement_time~group[none,slow]", "--goal", "0.06"]
+    words = ["--participants", "6", "--pool", "14", "--cohorts", "20", "--out", str(where), *effect]
+    main(["power", str(study), *words])
+    said = " ".join(capsys.readouterr().out.split())
+    tables = {
+        path.name.partition("_")[0]: pd.read_parquet(path) for path in where.rglob("*.parquet")
+    }
+    gone = sorted(name for name, table in tables.items() if table.empty)
+    assert 0 < len(gone) < 14
+    assert f"without a movement that counts: {', '.join(gone)}; they are drawn as the" in said
+    assert "14 participants were simulated" in (where / "sample_size.md").read_text()
 
 
 @pytest.mark.parametrize(

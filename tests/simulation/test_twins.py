@@ -46,12 +46,12 @@ class TestCranes(TwinContract):
 
 
 class TestEngines(TwinContract):
-    @pytest.fixture(params=[{"lag_s": 0.5}, "hydraulic"])
+    @pytest.fixture(params=[{"lag_s": 0.5}, "hydraulic", "ideal"])
     def component(self, request: pytest.FixtureRequest) -> Component:
         need("pybullet")
         from labcrane_bullet.bullet_crane import BulletCrane
 
-        # Commands of this contract jump; only a drive with a lag has the torque to follow.
+        # Commands of this contract jump: what a drive has not the torque for the engine makes.
         settings = {"actuator": request.param}
         return BulletCrane(CraneSettings.model_validate(settings), ch8())
 

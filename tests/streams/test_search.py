@@ -11,7 +11,7 @@ import pytest
 from faults.sessions import unique, wait_for
 
 from labcrane.errors import StreamError
-from labcrane.streams import NewestSample
+from labcrane.streams import NewestSample, numeric_labels
 from labcrane.streams.search import PORTS, equal, find, known_stream
 
 SENDS = """
@@ -103,13 +103,30 @@ def test_the_newest_sample_is_of_whoever_sends_now() -> None:
 
 
 def test_a_stream_that_is_refused_says_why_and_is_not_received() -> None:
+    def refuse(info: pylsl.StreamInfo) -> None:
+        raise StreamError(f"it has {info.channel_count()}")
+
     name = unique("refused")
     process = sender(name, 1.0)
-    with closing(NewestSample({"name": name}, lambda info: f"it has {info.channel_count()}")) as it:
+    with closing(NewestSample({"name": name}, refuse)) as it:
         wait_for(lambda: it.complaint == "it has 2")
         assert not it.connected
         assert it.newest() is None
     end(process)
+
+
+def test_only_streams_of_numbers_have_labels_to_find_a_channel_by() -> None:
+    numbers = pylsl.StreamInfo("panel", "Test", 2, 0.0, "float32")
+    assert numeric_labels(numbers) == []
+    numbers.set_channel_labels(["slew", "lift"])
+    assert numeric_labels(numbers) == ["slew", "lift"]
+    text = pylsl.StreamInfo("notes", "Test", 1, 0.0, "string")
+    text.set_channel_labels(["note"])
+    with pytest.raises(StreamError) as refusal:
+        numeric_labels(text)
+    assert str(refusal.value) == (
+        "it has 1 channels of text, and 1 labels; send numbers, and a label for each channel"
+    )
 
 
 def test_a_stream_on_this_computer_is_received_by_its_description_without_a_search() -> None:

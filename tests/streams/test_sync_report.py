@@ -16,7 +16,7 @@ from labcrane.streams.sync.correction import Treatment, correct
 from labcrane.streams.sync.quality import Quality
 from labcrane.streams.sync.raw import LOCAL, RawStream
 from labcrane.streams.sync.report.certificate import Fault
-from labcrane.streams.sync.report.limits import Limit, Limits
+from labcrane.streams.sync.report.limits import Limits, WarnLimit
 from labcrane.streams.sync.report.stream_report import judge_stream
 from labcrane.streams.sync.report.sync_report import COLUMNS, SyncReport, judge_loop, never_came
 from labcrane.streams.sync.resync import columns_of, quality_of, resync, treatment_of
@@ -133,9 +133,9 @@ def test_samples_that_a_sources_counter_left_out_are_judged():
 
 
 def test_what_is_not_known_fails():
-    assert Limit(1.0, 2.0).judge(math.nan) is Verdict.FAIL
-    assert Limit(1.0, 2.0).judge(1.0) is Verdict.PASS
-    assert Limit(1.0, 2.0).judge(2.0) is Verdict.WARN
+    assert WarnLimit(1.0, 2.0).judge(math.nan) is Verdict.FAIL
+    assert WarnLimit(1.0, 2.0).judge(1.0) is Verdict.PASS
+    assert WarnLimit(1.0, 2.0).judge(2.0) is Verdict.WARN
 
 
 @pytest.mark.parametrize(("required", "verdict"), [(True, Verdict.FAIL), (False, Verdict.WARN)])

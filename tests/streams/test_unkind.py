@@ -4,13 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from streams.strangers import ALL as ROWS
+from streams.strangers import alike_to_both_sides, ramping
 from streams.unkind_score import Score, coverage, draw, misnamed, score, shortcomings, worse_rows
-from streams.unkinder import ALL as ROWS
 from streams.unkinder import quiet_at_last
 
 from labcrane.streams.sync.correction import correct
 from labcrane.streams.sync.offset import fit
 from labcrane.streams.sync.report.certificate import Fault, faults
+from labcrane.streams.sync.report.limits import Limits
+from labcrane.streams.sync.report.stream_report import judge_quality
 
 QUICK = (
     "the receiver's clock, a little off",
@@ -42,6 +45,14 @@ QUICK = (
     "a buffer that grows, a counter",
     "a buffer that shrinks",
     "chunks stamped by a wrong rate",
+    "every sample sent several times",
+    "chunks sent again",
+    "several samples of one stamp",
+    "ticks of an odd timer",
+    "stamps in single precision",
+    "a guest whose clock stands still and catches up",
+    "even samples stamped after one of two delays",
+    "even samples, two of one poll now and then",
 )
 
 
@@ -79,6 +90,29 @@ def test_a_sampler_that_is_uneven_keeps_its_stamps(seed: int) -> None:
     drawn = draw("a camera that takes longer in the dark", seed)
     corrected = correct(drawn.raw, drawn.treatment)
     assert np.array_equal(corrected.time, corrected.uneven)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_delays_that_nothing_tells_from_uneven_samples_do_not_pass(seed: int) -> None:
+    """Arrivals go with the stamps, and both scatter by chance: neither is shown to be wrong."""
+    drawn = alike_to_both_sides(np.random.default_rng(seed))
+    corrected = correct(drawn.raw, drawn.treatment)
+    assert np.abs(corrected.time - drawn.truth).max() > 1e-3
+    told = judge_quality(corrected.quality, 250.0, len(drawn.truth), Limits())
+    assert any("its samples are uneven, or late by as much" in each.text for each in told)
+    assert faults(corrected.quality, 250.0) == set()
+
+
+def test_delays_that_grow_slowly_and_pass_at_once_are_in_the_error_where_they_are_named() -> None:
+    """Each passing looked like a buffer that shrank, and as many of them added up."""
+    named = 0
+    for seed in range(6):
+        drawn = ramping(np.random.default_rng(seed))
+        corrected = correct(drawn.raw, drawn.treatment)
+        if Fault.SHIFTED in faults(corrected.quality, 250.0):
+            named += 1
+            assert np.mean(np.abs(corrected.time - drawn.truth) <= corrected.error) >= 0.95
+    assert named >= 3
 
 
 @pytest.mark.parametrize("seed", range(6))

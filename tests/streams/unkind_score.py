@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+from streams.strangers import ALL
 from streams.unkind import Drawn
-from streams.unkinder import ALL
 
 from labcrane.core.findings import Verdict, worst
 from labcrane.streams.sync.correction import correct

@@ -594,5 +594,3 @@ MORE: dict[str, Callable] = {
     "two hours, wandering": long,
     "steady, clean probes": clean_probes,
 }
-
-ALL = {**ROWS, **MORE}

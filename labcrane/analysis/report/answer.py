@@ -5,10 +5,27 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.cohort import Cohort
-from labcrane.analysis.quality import is_result
-from labcrane.analysis.report.factors import GROUP, PHASE, PLACE, Factors, with_factors
-from labcrane.analysis.report.outcomes import ADJUSTED, DISTANCE, SEQUENCE, SIDE
-from labcrane.analysis.report.words import LEVEL, NAMES, STYLES, UNITS, Results, f_test
+from labcrane.analysis.quality import is_result, without_onset
+from labcrane.analysis.report.factors import (
+    DISTANCE,
+    GROUP,
+    PLACE,
+    SIDE,
+    Factors,
+    with_factors,
+)
+from labcrane.analysis.report.outcomes import ADJUSTED, SEQUENCE, named_factor
+from labcrane.analysis.report.words import (
+    LEVEL,
+    LOOKED,
+    NAMES,
+    STYLES,
+    UNBALANCED,
+    UNITS,
+    Results,
+    f_test,
+    lacking,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,15 +77,16 @@ def _design(cohort: Cohort, everything: "pd.DataFrame", results: Results | None)
         if factors.groups
         else "There are no groups."
     )
-    return f"{said}. Within participants: {', '.join(within)}. {between}"
+    merged = f" {UNBALANCED}." if factors.unbalanced else ""
+    return f"{said}. Within participants: {', '.join(within)}. {between}{merged}"
 
 
 def _columns(factors: Factors) -> Iterator[tuple[str, str, str]]:
     """Yield the name of each factor in the tests, its column, and the unit of its levels."""
     if factors.groups:
         yield GROUP, GROUP, ""
-    if len(factors.phases) > 1:
-        yield factors.kind, PHASE, ""
+    for name in factors.over_phases:
+        yield named_factor(name, factors), name, ""
     yield DISTANCE, DISTANCE, " m"
     yield SIDE, SIDE, ""
     yield SEQUENCE, PLACE, ""
@@ -85,21 +103,26 @@ def _left_out(cohort: Cohort) -> list[str]:
 def _effects(everything: "pd.DataFrame", results: Results | None) -> list[str]:
     if results is None:
         return []
-    if not len(results.anova):
-        return [TESTED]
     whole = with_factors(everything)
     counted = whole[is_result(whole)]
     found = []
-    for measure in results.anova["measure"].unique():
-        rows = results.anova[results.anova["measure"] == measure].to_dict("records")
+    measures = [table["measure"] for table in (results.anova, results.shortfalls) if len(table)]
+    for measure in dict.fromkeys(name for names in measures for name in names):
+        if measure not in counted or str(measure).startswith(tuple(LOOKED)):
+            continue  # a questionnaire's, or of gaze
+        own = results.anova
+        rows = own[own["measure"] == measure].to_dict("records") if len(own) else []
         by_factor = {str(row["factor"]): {str(k): v for k, v in row.items()} for row in rows}
         said = [
-            _effect(row, counted, str(measure), column, unit)
+            _effect(row, counted, column, unit, results.people)
             for name, column, unit in _columns(results.factors)
             if (row := _test_of(name, by_factor)) is not None and column in counted
         ]
-        if said:
-            found.append(f"{NAMES.get(str(measure), str(measure))} {'; '.join(said)}.")
+        short = lacking(results.shortfalls, str(measure), STYLE)
+        if said or short:
+            effects = "; ".join(said) or "was tested by no analysis of variance"
+            about = f"{NAMES.get(str(measure), str(measure))} {effects}."
+            found.append(" ".join([about, *short]))
     return found or [TESTED]
 
 
@@ -109,10 +132,10 @@ def _test_of(name: str, rows: Mapping[str, Mapping[str, Any]]) -> Mapping[str, A
 
 
 def _effect(
-    row: Mapping[str, Any], counted: "pd.DataFrame", measure: str, column: str, unit: str
+    row: Mapping[str, Any], counted: "pd.DataFrame", column: str, unit: str, people: int
 ) -> str:
     """Return ``differed over distance (2 m: 3.21 s, 6 m: 5.40 s; F(1, 35) = 90.1, p < .001)``."""
-    name = str(row["factor"]).removesuffix(ADJUSTED)
+    name, measure = str(row["factor"]).removesuffix(ADJUSTED), str(row["measure"])
     said = "differed over" if row["p_gg"] < LEVEL else "did not detectably differ over"
     cells = counted.groupby([column, "participant"])[measure].mean().dropna()
     means = cells.groupby(level=0).mean()
@@ -124,7 +147,7 @@ def _effect(
         f"{mean:.3g} {UNITS.get(measure, '')}".rstrip()
         for level, mean in means.items()
     )
-    return f"{said} {name} ({levels}; {f_test(row, STYLE)})"
+    return f"{said} {name} ({levels}; {f_test(row, STYLE, people)})"
 
 
 def _quality(loops: "pd.DataFrame", syncs: "pd.DataFrame") -> Iterator[str]:
@@ -149,4 +172,23 @@ def _exclusions(everything: "pd.DataFrame") -> str:
     count = len(everything)
     out = count - int(is_result(everything).sum()) if count else 0
     share = f" ({out / count:.1%})" if count else ""
-    return f"{out} of {count} movements count for no average{share}; each is listed with why."
+    said = f"{out} of {count} movements count for no average{share}; each is listed with why."
+    still = everything[without_onset(everything)]
+    return f"{said} Without an onset: {listed(still)}." if len(still) else said
+
+
+NAMED = 12
+"""Movements named one by one in a sentence; a table has the others."""
+
+
+def listed(movements: "pd.DataFrame") -> str:
+    """Return movements by name: ``P003 trial 17, P008 session 2 trial 4 and 3 more``."""
+    several = movements["session"].nunique() > 1 if "session" in movements else False
+    names = [
+        f"{row['participant']} "
+        + (f"session {row['session']:g} " if several else "")
+        + f"trial {row['trial']:g}"
+        for row in movements.head(NAMED).to_dict("records")
+    ]
+    more = len(movements) - len(names)
+    return ", ".join(names) + (f" and {more} more" if more else "")

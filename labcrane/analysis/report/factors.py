@@ -1,12 +1,14 @@
 """Factors of a study as its report sees them: group, phase, place in it, distance, side."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import pandas as pd
 
 GROUP, PHASE, PLACE = "group", "phase", "place"
+SESSION, BLOCK = "of_session", "of_block"
+DISTANCE, SIDE = "distance", "far_side"
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +27,11 @@ class Factors:
         Positions of pairs of targets in each phase.
     practice
         Whether there was practice.
+    targets
+        Levels of distance and side that were to be done, where there are several.
+    crossed
+        Levels of session and block where both vary and each session has the same blocks; they are
+        two factors then, and otherwise phases are one.
     """
 
     groups: tuple[str, ...]
@@ -32,6 +39,8 @@ class Factors:
     kind: str
     places: dict[str, int]
     practice: bool
+    targets: dict[str, tuple[Any, ...]]
+    crossed: dict[str, tuple[Any, ...]]
 
     @property
     def between(self) -> list[str]:
@@ -40,8 +49,26 @@ class Factors:
 
     @property
     def over_phases(self) -> list[str]:
-        """Columns of what varies from phase to phase."""
+        """Columns of what varies from phase to phase: session and block, or the phase itself."""
+        return list(self.crossed) or self.by_phase
+
+    @property
+    def by_phase(self) -> list[str]:
+        """The column that tells phases apart, where there are several."""
         return [PHASE] if len(self.phases) > 1 else []
+
+    @property
+    def unbalanced(self) -> bool:
+        """Whether sessions have different blocks, so that phases are one factor of two."""
+        return self.kind == "phase" and not self.crossed
+
+    def levels(self, column: str) -> tuple[Any, ...]:
+        """Return the levels of a column that were to be done; a phase of few places has fewer."""
+        if column == PLACE:
+            return tuple(map(float, range(1, max(self.places.values(), default=0) + 1)))
+        return {GROUP: self.groups, PHASE: self.phases, **self.targets, **self.crossed}.get(
+            column, ()
+        )
 
     @property
     def alike(self) -> bool:
@@ -50,7 +77,7 @@ class Factors:
 
 
 def with_factors(movements: "pd.DataFrame") -> "pd.DataFrame":
-    """Return movements with the columns ``group``, ``phase`` and ``place``.
+    """Return movements with the columns ``group``, ``phase``, its two parts, and ``place``.
 
     A phase is a session, or a block where a session has several; a place is the position in it of a
     pair of targets, from 1. So positions of two sessions are never one. All movements are to be
@@ -65,8 +92,26 @@ def with_factors(movements: "pd.DataFrame") -> "pd.DataFrame":
             table[name] = usual
     counted = table["practice"].astype(float) == 0.0
     table[PHASE] = _names(table, counted)
+    _add_parts(table, counted)
     table[PLACE] = table.groupby(["participant", PHASE])["sequence"].rank(method="dense")
     return table
+
+
+def _add_parts(table: "pd.DataFrame", counted: "pd.Series[bool]") -> None:
+    """Add the session and the block of each movement by name and order; practice has none."""
+    keys = table[counted].drop_duplicates(["session", "block"]).sort_values(["session", "block"])
+    sessions = [own for _, own in keys.groupby("session")]
+    of_session: dict[tuple[float, float], str] = {}
+    of_block: dict[tuple[float, float], str] = {}
+    for number, blocks in enumerate(sessions, start=1):
+        for at, row in enumerate(blocks.to_dict("records"), start=1):
+            key = (row["session"], row["block"])
+            named = row["session_name"] or f"session {key[0]:g}"
+            of_session[key] = f"{number:0{len(str(len(sessions)))}} {named}"
+            of_block[key] = f"{at:0{len(str(len(blocks)))}} {row['block_name'] or 'block'}"
+    about = list(zip(table["session"], table["block"], counted, strict=True))
+    for name, parts in ((SESSION, of_session), (BLOCK, of_block)):
+        table[name] = [parts[(one, two)] if is_one else "practice" for one, two, is_one in about]
 
 
 def _names(table: "pd.DataFrame", counted: "pd.Series[bool]") -> list[str]:
@@ -98,7 +143,22 @@ def factors_of(table: "pd.DataFrame") -> Factors:
     kind = "session" if blocks == 1 else "block" if sessions == 1 else "phase"
     places = {str(name): int(own[PLACE].max()) for name, own in counted.groupby(PHASE)}
     several = groups if len(groups) > 1 else ()
-    return Factors(several, phases, kind, places, practice=len(counted) < len(table))
+    planned = {
+        name: tuple(sorted(counted[name].dropna().unique()))
+        for name in (DISTANCE, SIDE)
+        if name in counted
+    }
+    targets = {name: levels for name, levels in planned.items() if len(levels) > 1}
+    crossed = _crossed(counted)
+    return Factors(several, phases, kind, places, len(counted) < len(table), targets, crossed)
+
+
+def _crossed(counted: "pd.DataFrame") -> dict[str, tuple[Any, ...]]:
+    """Return the levels of session and block where each session has the same blocks."""
+    blocks = [tuple(sorted(own[BLOCK].unique())) for _, own in counted.groupby(SESSION)]
+    if len(blocks) < 2 or len(set(blocks)) > 1 or len(blocks[0]) < 2:  # noqa: PLR2004
+        return {}
+    return {SESSION: tuple(sorted(counted[SESSION].unique())), BLOCK: blocks[0]}
 
 
 def running(table: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":

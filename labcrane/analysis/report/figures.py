@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 WORDS = {
     "movement_time": "movement time (s)",
+    "onset_to_rest": "time from onset to rest (s)",
     "circle_to_circle": "time from circle to circle (s)",
     "absolute_error": "distance from the target's centre (m)",
     "simultaneous": "time with two or more axes (fraction)",
@@ -28,7 +29,13 @@ WORDS = {
 
 
 PLACE_WORDS = "position in the sequence"
-MEANS = "Points: means over participants' means, bars: 95 % confidence intervals (t),"
+MEANS = (
+    "Points: means over participants' means, bars: 95 % confidence intervals (t) where three or "
+    "more are in it,"
+)
+LEAST = 3
+"""Participants of a mean that has a bar: of two, its interval is a multiple of what they differ."""
+
 MOST_NAMED = 60
 """Participants that have their names in a figure; more of them would fill a page."""
 
@@ -280,7 +287,8 @@ def _aside(number: int, count: int) -> float:
 
 def _with_ci(table: "pd.DataFrame", colour: str, label: str = "") -> Series:
     below, above = table["mean"] - table["ci_low"], table["ci_high"] - table["mean"]
-    reach = np.nan_to_num(np.array([below, above], float))
+    few = np.asarray(table["participants"], float) < LEAST
+    reach = np.where(few, 0.0, np.nan_to_num(np.array([below, above], float)))
     return Series(
         _numbers(table["sequence"]), _numbers(table["mean"]), colour, label=label, reach=reach
     )

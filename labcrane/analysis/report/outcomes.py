@@ -1,13 +1,23 @@
 """Outcomes of a study in its design: tests, contrasts, time scales, questionnaires."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from labcrane.analysis.report.factors import GROUP, PHASE, PLACE, Factors
+from labcrane.analysis.quality import is_done
+from labcrane.analysis.report.factors import (
+    BLOCK,
+    DISTANCE,
+    GROUP,
+    PHASE,
+    PLACE,
+    SESSION,
+    SIDE,
+    Factors,
+)
 from labcrane.analysis.statistics.anova import Anova, Contrast, analyse, compare
 from labcrane.analysis.statistics.anova import word as word  # noqa: PLC0414 - of levels, here too
-from labcrane.analysis.statistics.time_scales import quantities, summary, taken_away
+from labcrane.analysis.statistics.time_scales import quantities, summary
 from labcrane.analysis.statistics.trends import holm, linear_trend
 
 if TYPE_CHECKING:
@@ -16,16 +26,58 @@ if TYPE_CHECKING:
 USUAL = ("movement_time", "absolute_error", "circle_to_circle")
 """What is tested of every study that recorded it, beside the protocol's primary outcomes."""
 
+TO_REST = "onset_to_rest"
+"""Tested too where a movement ends otherwise than by rest, and so is not the movement time."""
+
 ADJUSTED = " with pairs' means taken away"
 """Behind the name of an effect of positions, where pairs come in another order for everybody."""
 
-SEQUENCE, DISTANCE, SIDE = "sequence", "distance", "far_side"
+SEQUENCE = "sequence"
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A planned analysis of variance, and which of its effects are asked for.
+
+    Attributes
+    ----------
+    within
+        Columns of the factors within participants.
+    asked
+        Columns that an effect has to be of, all of them; without any, every effect is asked for.
+    beside
+        What pairs are told by, where the effect is tested beside them; otherwise empty.
+    phase
+        The only one whose movements are in it; empty for all.
+    """
+
+    within: tuple[str, ...]
+    asked: tuple[str, ...] = ()
+    beside: str = ""
+    phase: str = ""
+
+    @property
+    def suffix(self) -> str:
+        """What stands behind an effect's name: where and of what it is."""
+        return f" in {self.phase}" * bool(self.phase) + ADJUSTED * bool(self.beside)
+
+    def of(self, results: "pd.DataFrame") -> "pd.DataFrame":
+        """Return the movements that are in it."""
+        return results[results[PHASE] == self.phase] if self.phase else results
 
 
 def measures_in(results: "pd.DataFrame", primary: Sequence[str] = ()) -> list[str]:
     """Return the outcomes that there are, the primary ones first."""
-    names = dict.fromkeys([*primary, *USUAL])
+    names = dict.fromkeys([*primary, *USUAL, *([TO_REST] if rests_apart(results) else [])])
     return [name for name in names if name in results and results[name].notna().any()]
+
+
+def rests_apart(results: "pd.DataFrame") -> bool:
+    """Return whether movements end otherwise than by rest, so that rest has a time of its own."""
+    if not {TO_REST, "movement_time"} <= set(results):
+        return False
+    apart = results["movement_time"].notna() & (results[TO_REST] != results["movement_time"])
+    return bool(apart.any())
 
 
 def anova_table(
@@ -49,38 +101,36 @@ def named(test: Anova, factors: Factors) -> str:
 
 def named_factor(name: str, factors: Factors) -> str:
     """Return the name of a factor, or of several with colons, as the tables have it."""
-    words = {PHASE: factors.kind, PLACE: SEQUENCE}
+    words = {PHASE: factors.kind, PLACE: SEQUENCE, SESSION: "session", BLOCK: "block"}
     effect, separator, rest = name.partition(" ")
     return ":".join(words.get(part, part) for part in effect.split(":")) + separator + rest
 
 
-def tests(results: "pd.DataFrame", measure: str, factors: Factors) -> Iterator[Anova]:
-    """Yield the tests; what stands behind an effect's name says where and of what it is."""
-    between, phases = factors.between, factors.over_phases
+def plans(results: "pd.DataFrame", factors: Factors) -> Iterator[Plan]:
+    """Yield what is planned of every outcome."""
+    phases = tuple(factors.over_phases)
+    pair = next((name for name in ("pair", DISTANCE) if name in results), "")
     # First, because most participants are whole there.
-    yield from analyse(results, measure, phases, between)
-    if factors.alike:
-        yield from _of_places(analyse(results, measure, [*phases, PLACE], between), "")
-        adjusted = results.assign(**{measure: taken_away(results, measure)})
-        yield from _of_places(analyse(adjusted, measure, [*phases, PLACE], between), ADJUSTED)
-    else:  # positions of phases of unequal length have nothing to do with each other
-        adjusted = results.assign(**{measure: taken_away(results, measure)})
-        for phase in factors.phases:
-            here = results[PHASE] == phase
-            where = f" in {phase}"
-            tests = analyse(results[here], measure, [PLACE], between)
-            yield from _of_places(tests, where)
-            tests = analyse(adjusted[here], measure, [PLACE], between)
-            yield from _of_places(tests, where + ADJUSTED)
+    yield Plan(phases)
+    # Positions of phases of unequal length have nothing to do with each other.
+    for phase in ("",) if factors.alike else factors.phases:
+        within = (PLACE,) if phase else (*phases, PLACE)
+        yield Plan(within, (PLACE,), phase=phase)
+        if pair:
+            yield Plan(within, (PLACE,), pair, phase)
     for name in (DISTANCE, SIDE):
         if name in results:
-            yield from analyse(results, measure, [*phases, name], between)
+            yield Plan((*phases, name), (name,))
+    if {DISTANCE, SIDE} <= set(results):  # a pair of targets is a distance on a side
+        yield Plan((DISTANCE, SIDE), (DISTANCE, SIDE))
 
 
-def _of_places(tests: Sequence[Anova], suffix: str) -> Iterator[Anova]:
-    for test in tests:
-        if PLACE in test.factor.split(":"):
-            yield replace(test, factor=test.factor + suffix)
+def tests(results: "pd.DataFrame", measure: str, factors: Factors) -> Iterator[Anova]:
+    """Yield the tests; what stands behind an effect's name says where and of what it is."""
+    for plan in plans(results, factors):
+        for test in analyse(plan.of(results), measure, plan.within, factors.between, plan.beside):
+            if set(plan.asked) <= set(test.factor.split(":")):
+                yield replace(test, factor=test.factor + plan.suffix)
 
 
 def practice_table(
@@ -91,14 +141,20 @@ def practice_table(
 
     if not factors.practice:
         return pd.DataFrame()
-    done = everything[everything["outcome"] == "success"].copy()
-    done["practice"] = done["practice"].astype(float).map({0.0: "counted", 1.0: "practice"})
+    done = practised(everything)
     tests = [
         test
         for measure in measures_in(done, primary)
         for test in analyse(done, measure, ["practice"], factors.between)
     ]
     return _frame(tests)
+
+
+def practised(everything: "pd.DataFrame") -> "pd.DataFrame":
+    """Return what succeeded, in practice too, with that as a factor."""
+    done = everything[is_done(everything)].copy()
+    done["practice"] = done["practice"].astype(float).map({0.0: "counted", 1.0: "practice"})
+    return done
 
 
 def contrast_table(
@@ -111,9 +167,12 @@ def contrast_table(
     found: list[Contrast] = []
     for measure in measures_in(results, primary):
         found += compare(results, measure, GROUP, phases, between)
-        found += compare(results, measure, PHASE, phases, between)
-        if phases:
-            found += compare(results, measure, GROUP, phases, between, at=PHASE)
+        for name in phases:
+            found += compare(results, measure, name, phases, between)
+            found += compare(results, measure, GROUP, phases, between, at=name)
+            for other in phases:
+                if other != name:
+                    found += compare(results, measure, name, phases, between, at=other)
         found += compare(results, measure, DISTANCE, [*phases, DISTANCE], between)
     rows = [asdict(one) | {"factor": named_factor(one.factor, factors)} for one in found]
     return pd.DataFrame(rows)
@@ -174,7 +233,7 @@ def score_table(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame
     """Return means and spreads of every score, by group and occasion."""
     import pandas as pd
 
-    own = _occasions(scores, groups).dropna(subset=["value"])
+    own = occasions(scores, groups).dropna(subset=["value"])
     if own.empty:
         return pd.DataFrame()
     each = own.groupby(["outcome", GROUP, "occasion", "participant"])["value"].mean()
@@ -184,7 +243,7 @@ def score_table(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame
 
 def score_tests(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
     """Return the tests of every score over occasions and groups."""
-    own = _occasions(scores, groups)
+    own = occasions(scores, groups)
     between = [GROUP] if len({name for name in groups.values() if name}) > 1 else []
     tests = [
         test
@@ -196,7 +255,8 @@ def score_tests(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame
     return _frame(tests)
 
 
-def _occasions(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
+def occasions(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
+    """Return scores with their outcome, group and occasion."""
     own = scores.copy()
     own[GROUP] = own["participant"].map(groups).fillna("")
     own["outcome"] = own["questionnaire"] + " " + own["score"]
@@ -211,10 +271,10 @@ def gaze_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
     """Return means of how long each area was looked at, over participants' means."""
     import pandas as pd
 
-    columns = _of_gaze(results)
+    columns = of_gaze(results)
     if not columns:
         return pd.DataFrame()
-    by = [*factors.between, *factors.over_phases, DISTANCE]
+    by = [*factors.between, *factors.by_phase, DISTANCE]
     each = results.groupby([*by, "participant"])[columns].mean()
     return each.groupby(level=by).mean().reset_index()
 
@@ -224,13 +284,13 @@ def gaze_tests(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
     within = [*factors.over_phases, DISTANCE]
     tests = [
         replace(test, factor=named(test, factors))
-        for name in _of_gaze(results)
+        for name in of_gaze(results)
         for test in analyse(results, name, within, factors.between)
     ]
     return _frame(tests)
 
 
-def _of_gaze(results: "pd.DataFrame") -> list[str]:
+def of_gaze(results: "pd.DataFrame") -> list[str]:
     """Return the columns of gaze of which there is something to say."""
     names = [str(name) for name in results if str(name).startswith(("dwell_", "look_lead_"))]
     return [name for name in names if results[name].notna().any()]

@@ -6,12 +6,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from labcrane.analysis.cohort import Cohort, Participant, Status
+from labcrane.analysis.gaze import fixations_of
 from labcrane.analysis.measures import DEFAULTS, MeasureSettings, measures_of
 from labcrane.analysis.parallel import work
-from labcrane.analysis.quality import exclusions, is_result, loop_quality, sync_quality
+from labcrane.analysis.quality import (
+    exclusions,
+    is_result,
+    loop_quality,
+    sync_quality,
+    without_onset,
+)
 from labcrane.analysis.questionnaires import answers_of, scores_of
 from labcrane.analysis.report import figures, outcomes
-from labcrane.analysis.report.answer import answer
+from labcrane.analysis.report.answer import answer, listed
 from labcrane.analysis.report.factors import (
     GROUP,
     PLACE,
@@ -23,16 +30,18 @@ from labcrane.analysis.report.factors import (
 from labcrane.analysis.report.html import Page
 from labcrane.analysis.report.outcomes import measures_in
 from labcrane.analysis.report.sample import in_words, sample
+from labcrane.analysis.report.shortfalls import Made, shortfalls
 from labcrane.analysis.report.thresholds import Judge, add_thresholds, thresholds_of
-from labcrane.analysis.report.words import STYLES, Results, paragraphs
+from labcrane.analysis.report.words import STYLES, UNBALANCED, Results, paragraphs
 from labcrane.analysis.statistics.fitts import throughput
 from labcrane.analysis.statistics.learning import learning_curves
 from labcrane.analysis.statistics.time_outs import time_outs
+from labcrane.analysis.statistics.time_scales import QUANTITIES
 from labcrane.analysis.statistics.trends import mixed_model
 from labcrane.analysis.tables.annotations import annotations_of
 from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.errors import LabcraneError
-from labcrane.recording.participant_file.writer import DAMAGED
+from labcrane.recording.participant_file.writer import DAMAGED, kept_open
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -85,7 +94,7 @@ def write_report(
         if progress is not None:
             progress(len(found), len(cohort.included))
     in_order = [found[participant.name] for participant in cohort.included]
-    movements, loops, syncs, answers, scores, thresholds = zip(*in_order, strict=True)
+    movements, loops, syncs, answers, scores, thresholds, drifts = zip(*in_order, strict=True)
     everything = pd.concat(movements, ignore_index=True)
     page = Page(_title(cohort.included[0]), folder / "report.html", folder)
     _stamp(page, [participant.status for participant in cohort.included])
@@ -102,6 +111,7 @@ def write_report(
         primary = _primary(cohort)
         results = _study(page, everything, _joined(scores), groups, in_words(about), primary)
     add_thresholds(page, _joined(thresholds), judge)
+    _drifts(page, _joined(drifts))
     page.heading("Loop and clocks")
     quality = pd.concat(loops, ignore_index=True), pd.concat(syncs, ignore_index=True)
     page.table("loop_quality", quality[0])
@@ -135,22 +145,25 @@ def _one(
 ) -> "tuple[str, str, *tuple[pd.DataFrame, ...]]":
     """Write one participant's page; return name and tables.
 
-    These are movements, quality of loop and of clocks, answers, scores and thresholds. The second
-    of what is returned is why the data cannot be used, and then the tables are empty.
+    These are movements, quality of loop and of clocks, answers, scores, thresholds and drifts of
+    gaze. The second of what is returned is why the data cannot be used, and then the tables are
+    empty.
     """
     import pandas as pd
 
     try:
-        own = measures_of(participant, settings)
-        if GROUP not in own:  # trials say it where the study has groups
-            own.insert(0, GROUP, str(participant.context.get("group", "")))
-        asked = (answers_of(participant), scores_of(participant), thresholds_of(participant))
-        loop, sync = loop_quality(participant), sync_quality(participant)
-        _participant_page(participant, own, loop, sync, folder)
+        with kept_open(participant.path):
+            own = measures_of(participant, settings)
+            if GROUP not in own:  # trials say it where the study has groups
+                own.insert(0, GROUP, str(participant.context.get("group", "")))
+            asked = (answers_of(participant), scores_of(participant), thresholds_of(participant))
+            drifts = fixations_of(participant)
+            loop, sync = loop_quality(participant), sync_quality(participant)
+            _participant_page(participant, own, loop, sync, folder)
     except (LabcraneError, *DAMAGED) as error:  # one recording never stops a cohort
         nothing = pd.DataFrame()
-        return participant.name, _words(error), *([nothing] * 6)
-    return participant.name, "", own, loop, sync, *asked
+        return participant.name, _words(error), *([nothing] * 7)
+    return participant.name, "", own, loop, sync, *asked, drifts
 
 
 def _words(error: Exception) -> str:
@@ -189,6 +202,18 @@ def _who(page: Page, cohort: Cohort, everything: "pd.DataFrame") -> None:
     out = exclusions(everything)
     page.say(f"{len(out)} of {len(everything)} movements count for no average.")
     page.table("excluded_movements", out)
+    still = everything[without_onset(everything)]
+    if len(still):
+        page.say(
+            f"In {listed(still)} the movement has no onset: it was over before anything moved. "
+            "Their errors say where the machine stood; they count for no accuracy and no time."
+        )
+        page.table(
+            "without_onset",
+            still.reindex(
+                columns=["participant", "session", "trial", "attempt", "outcome", "error"]
+            ),
+        )
 
 
 def _study(
@@ -203,7 +228,7 @@ def _study(
     everything = with_factors(everything)
     factors = factors_of(everything)
     results = everything[is_result(everything)]
-    by = [*factors.between, *factors.over_phases, "distance"]
+    by = [*factors.between, *factors.by_phase, "distance"]
     counts = time_outs(everything, by)
     page.heading("Time-outs")
     page.say(
@@ -212,14 +237,29 @@ def _study(
     )
     page.table("time_outs", counts)
     _movements(page, running(results, factors), measures_in(results, primary))
-    said = _statistics(page, everything, results, factors, primary)
+    anovas, contrasts, trends, scales, practice = _statistics(
+        page, everything, results, factors, primary
+    )
     looked = _gaze(page, results, factors)
     tests = outcomes.score_tests(scores, groups)
     if len(scores):
         page.heading("Questionnaires")
         page.table("scores", outcomes.score_table(scores, groups))
         page.table("score_tests", tests)
-    found = Results(about, *said, looked, tests, counts, factors)
+    made = Made(anovas, trends, practice, looked, tests)
+    short = shortfalls(everything, scores, made, groups, primary)
+    page.heading("What was not tested")
+    if len(short):
+        page.say(
+            "Planned tests that could not be made, or not of every group or level: a test is of "
+            "those with a value in each of its cells."
+        )
+        page.table("shortfalls", short)
+    else:
+        page.say("Every planned test was made, of every group and level.")
+    found = Results(
+        about, anovas, contrasts, trends, scales, looked, tests, counts, factors, len(groups), short
+    )
     _in_words(page, found)
     return found
 
@@ -239,6 +279,8 @@ def _movements(page: Page, results: "pd.DataFrame", measures: Sequence[str]) -> 
     for measure in measures:
         page.draw(figures.by_sequence(results, measure))
     page.draw(figures.by_distance(results))
+    if outcomes.rests_apart(results):
+        page.say(_rests(results))
     page.table("errors", _errors(results))
     page.heading("Learning curves")
     in_phase = results.assign(sequence=results[PLACE])
@@ -253,6 +295,23 @@ def _movements(page: Page, results: "pd.DataFrame", measures: Sequence[str]) -> 
     page.draw(figures.throughputs(throughput(results)))
     page.heading("Use of the sticks")
     page.draw(figures.sticks(results))
+
+
+def _rests(results: "pd.DataFrame") -> str:
+    """Return of how many movements there is no time from onset to rest, and why."""
+    missing = results[results[outcomes.TO_REST].isna() & results["movement_time"].notna()]
+    moving = int((missing["at_rest"] == 0.0).sum())
+    said = (
+        "The time from onset to rest ends with the beginning of the rest in which the movement was "
+        "ended; movement time goes on to its end."
+    )
+    if not len(missing):
+        return f"{said} Every movement has it."
+    return (
+        f"{said} {len(missing)} of {len(results)} movements have none: in {moving} the tip still "
+        f"moved when they were ended, in {len(missing) - moving} it had not rested for as long as "
+        "a rest is."
+    )
 
 
 def _errors(results: "pd.DataFrame") -> "pd.DataFrame":
@@ -275,15 +334,17 @@ def _statistics(
     results: "pd.DataFrame",
     factors: Factors,
     primary: Sequence[str],
-) -> "tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame, pd.DataFrame]":
-    """Add the tests; return those of effects, contrasts, trends and time scales."""
+) -> "tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame, pd.DataFrame, pd.DataFrame]":
+    """Add the tests; return those of effects, contrasts, trends, time scales and practice."""
     page.heading("Statistics")
-    varies = [factors.kind] if len(factors.phases) > 1 else []
+    varies = [outcomes.named_factor(name, factors) for name in factors.over_phases]
     page.say(
         f"Within participants: {', '.join([*varies, 'sequence', 'distance', 'far_side'])}. Groups "
         f"between participants: {', '.join(factors.groups) or 'none'}. A sequence begins anew with "
         "each session or block."
     )
+    if factors.unbalanced:
+        page.say(f"{UNBALANCED}.")
     measures = measures_in(results, primary)
     page.say(_of_primary(primary, measures))
     anovas = outcomes.anova_table(results, factors, primary)
@@ -292,29 +353,40 @@ def _statistics(
     scales, scales_by_group = outcomes.time_scale_tables(results, factors, primary)
     if anovas.empty:
         page.say("Tests need three or more participants with a value in every cell.")
-        return anovas, contrasts, trends, scales
-    page.say(
-        "Analysis of variance over participants' means (type III); p_gg is corrected after "
-        "Greenhouse and Geisser. It says that some levels differ, not in which direction. Pairs of "
-        "circles come in another order for everybody: with pairs' means taken away, a position is "
-        "compared with what its pair takes on average."
-    )
-    page.table("anova", anovas)
+    else:
+        page.say(
+            "Analysis of variance over participants' means (type III); p_gg is corrected after "
+            "Greenhouse and Geisser. It says that some levels differ, not in which direction. "
+            "Pairs of circles come in another order for everybody: with pairs' means taken away, a "
+            "position is compared with what its pair takes on average, which is estimated too and "
+            "costs degrees of freedom."
+        )
+        page.table("anova", anovas)
     if len(contrasts):
         page.say("Differences two by two; p_holm is corrected within a factor, at one level.")
         page.table("contrasts", contrasts)
-    page.say("Linear trends over the sequence; p_holm is corrected over those of primary outcomes.")
-    page.table("trends", trends)
-    page.say("Two time scales: within a session or block, and from one to the next.")
+    if len(trends):
+        page.say(
+            "Linear trends over the sequence; p_holm is corrected over those of primary outcomes."
+        )
+        page.table("trends", trends)
+    page.say(
+        "Two time scales: within a session or block, and from one to the next. Here pairs' means "
+        "are taken away, so that a slope is not quite that of the trends above; whoever lacks a "
+        "first or last position or a session is left out of what goes by it. "
+        + "; ".join(f"{name}: {words}" for name, words in QUANTITIES.items())
+        + "."
+    )
     page.table("time_scales", scales)
     if len(scales_by_group):
         page.table("time_scales_by_group", scales_by_group)
-    if len(practised := outcomes.practice_table(everything, factors, primary)):
+    practice = outcomes.practice_table(everything, factors, primary)
+    if len(practice):
         page.say("Practice against what counts.")
-        page.table("practice", practised)
+        page.table("practice", practice)
     for measure in measures:
         _mixed(page, results.assign(sequence=results[PLACE]), measure)
-    return anovas, contrasts, trends, scales
+    return anovas, contrasts, trends, scales, practice
 
 
 def _of_primary(primary: Sequence[str], measures: Sequence[str]) -> str:
@@ -341,6 +413,32 @@ def _gaze(page: Page, results: "pd.DataFrame", factors: Factors) -> "pd.DataFram
         if len(tests):
             page.table("gaze_tests", tests)
     return tests
+
+
+def _drifts(page: Page, looked: "pd.DataFrame") -> None:
+    """Add how far gaze was from the points at which the eye tracker was checked."""
+    if not len(looked):
+        return
+    page.heading("Drift of gaze")
+    page.say(
+        "How far gaze was from points that were to be looked at, in each check of the eye tracker: "
+        "medians of the points' offsets and of their precision, and the worst point."
+    )
+    by = looked.groupby(["participant", "session", "step"], as_index=False)
+    page.table(
+        "drifts",
+        by.agg(
+            points=("point", "count"),
+            right_deg=("right_deg", "median"),
+            down_deg=("down_deg", "median"),
+            deg=("deg", "median"),
+            worst_deg=("deg", "max"),
+            spread_deg=("spread_deg", "median"),
+            right_px=("right_px", "median"),
+            down_px=("down_px", "median"),
+            valid=("valid", "min"),
+        ),
+    )
 
 
 def _mixed(page: Page, results: "pd.DataFrame", measure: str) -> None:

@@ -4,9 +4,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
 
     from labcrane.recording.participant_file.reader import SessionRecord
+
+MOST_IN_A_COLUMN = 16
+"""Trials under one another in the legend."""
 
 
 def draw(session: "SessionRecord", path: Path) -> None:
@@ -25,15 +29,29 @@ def draw(session: "SessionRecord", path: Path) -> None:
     figure.savefig(path, dpi=110)
 
 
+def names(trials: "pd.DataFrame") -> list[str]:
+    """Return what people call the trials of a table, a row each: ``3``, or ``practice 1``.
+
+    The record also numbers the ways to trials; what people read counts the trials alone, and one
+    that was repeated keeps its number.
+    """
+    found = []
+    for number, practice in zip(trials["trial"], trials["practice"], strict=True):
+        alike = trials.loc[trials["practice"] == practice, "trial"]
+        place = alike[alike <= number].nunique()
+        found.append(f"practice {place}" if practice else str(place))
+    return found
+
+
 def _draw_from_above(session: "SessionRecord", axes: "Axes") -> None:
     from matplotlib.patches import Circle
 
     state = session.streams["state"]
-    for _, trial in session.trials.iterrows():
+    for name, (_, trial) in zip(names(session.trials), session.trials.iterrows(), strict=True):
         moving = (state.time >= trial["started"]) & (state.time <= trial["ended"])
         x = state.data["tip.position.x"][moving]
         y = state.data["tip.position.y"][moving]
-        axes.plot(-y, x, lw=1.2, label=f"{trial['trial']:.0f}")
+        axes.plot(-y, x, lw=1.2, label=name)
         axes.add_patch(
             Circle(
                 (-trial["target_y"], trial["target_x"]), trial["width"] / 2, fill=False, color="0.3"
@@ -42,7 +60,14 @@ def _draw_from_above(session: "SessionRecord", axes: "Axes") -> None:
     axes.plot(0, 0, "ks", ms=8)
     axes.annotate("crane", (0, 0), textcoords="offset points", xytext=(8, -3))
     axes.set(xlabel="to the right (m)", ylabel="ahead (m)", title="tip from above", aspect="equal")
-    axes.legend(title="trial", fontsize="small", loc="center left", bbox_to_anchor=(1.02, 0.5))
+    columns = -(-len(session.trials) // MOST_IN_A_COLUMN)
+    axes.legend(
+        title="trial",
+        fontsize="small",
+        loc="center left",
+        bbox_to_anchor=(1.02, 0.5),
+        ncols=max(1, columns),
+    )
     axes.grid(alpha=0.3)
 
 

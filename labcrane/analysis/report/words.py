@@ -5,7 +5,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from labcrane.analysis.report.factors import Factors
+from labcrane.analysis.report.factors import GROUP, PHASE, Factors
+from labcrane.analysis.statistics.time_scales import LEAST
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -15,16 +16,27 @@ LEVEL = 0.05
 
 NAMES = {
     "movement_time": "Movement time, from onset to offset,",
+    "onset_to_rest": "The time from onset to rest",
     "circle_to_circle": "The time from circle to circle, with reaction and dwell,",
     "absolute_error": "The distance from the target's centre",
 }
-UNITS = {"movement_time": "s", "circle_to_circle": "s", "absolute_error": "m"}
+UNITS = {
+    "movement_time": "s",
+    "onset_to_rest": "s",
+    "circle_to_circle": "s",
+    "absolute_error": "m",
+}
 LOOKED = {
     "dwell_before_": "How long {} was looked at before onset",
     "dwell_during_": "How long {} was looked at during movements",
     "look_lead_": "How long before onset {} was looked at first",
 }
 SMALLEST = 0.001
+
+UNBALANCED = (
+    "Sessions do not have the same blocks: each block of each session is a level of one factor, "
+    "phase, and no effect of session is told from one of block"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +110,10 @@ class Results:
         Counts by condition.
     factors
         What varies.
+    people
+        Participants of the sample; a test of others tells its own number.
+    shortfalls
+        What planned tests lack.
     """
 
     sample: str
@@ -109,24 +125,47 @@ class Results:
     scores: "pd.DataFrame"
     time_outs: "pd.DataFrame"
     factors: Factors
+    people: int
+    shortfalls: "pd.DataFrame"
 
 
 def paragraphs(results: Results, style: Style) -> list[str]:
     """Return the results as paragraphs in one format."""
     found = [style.plain(results.sample) + " " + _given_up(results.time_outs, style)]
-    for measure in _measures(results.anova):
-        sentences = [_effect(row, style) for row in _of(results.anova, measure)]
-        name = NAMES.get(measure, measure)
-        text = f"{style.plain(name)} " + "; ".join(sentences) + "."
-        more = [_trend(row, style) for row in _of(results.trends, measure)]
-        more += [_scale(row, style) for row in _of(results.scales, measure)]
-        more += [_contrast(row, style) for row in _of(results.contrasts, measure)]
-        found.append(" ".join([text, *filter(None, more)]))
-    for table in (results.gaze, results.scores):
-        for outcome in _measures(table):
-            sentences = [_effect(row, style) for row in _of(table, outcome)]
-            found.append(f"{style.plain(_looked(outcome))} " + "; ".join(sentences) + ".")
+    if results.factors.unbalanced:
+        found[0] += f" {UNBALANCED}."
+    tests = (results.anova, results.gaze, results.scores, results.shortfalls)
+    for measure in dict.fromkeys(name for table in tests for name in _measures(table)):
+        effects = [row for table in tests[:3] for row in _of(table, measure)]
+        name = style.plain(NAMES.get(measure, _looked(measure)))
+        sentences = [_effect(row, style, results.people) for row in effects]
+        text = "; ".join(sentences) or "was tested by no analysis of variance"
+        more = lacking(results.shortfalls, measure, style)
+        for table, words in (
+            (results.trends, _trend), (results.scales, _scale), (results.contrasts, _contrast),
+        ):  # fmt: skip
+            more += [words(row, style, results.people) for row in _of(table, measure)]
+        found.append(" ".join([f"{name} {text}.", *filter(None, more)]))
     return found
+
+
+def lacking(shortfalls: "pd.DataFrame", measure: str, style: Style) -> list[str]:
+    """Return in sentences what planned tests of a measure lack: each reason once."""
+    factors: dict[tuple[str, str], list[str]] = {}
+    for row in _of(shortfalls, measure):
+        factors.setdefault((str(row["without"]), str(row["why"])), []).append(str(row["factor"]))
+    found = []
+    for (without, why), names in factors.items():
+        over = ", ".join(" and ".join(name.split(":")) for name in names)
+        begin = f"Without {without}, tested" if without else "Not tested"
+        found.append(style.plain(f"{begin} over {over}: {why}."))
+    return found
+
+
+def of_people(row: Mapping[str, Any], style: Style, people: int) -> str:
+    """Return ``, n = 33 of 36 people`` where a test is not of the whole sample."""
+    number = int(row["n"])
+    return "" if number == people else f", {style.symbol('n')} = {number} of {people} people"
 
 
 def _looked(outcome: str) -> str:
@@ -153,33 +192,55 @@ def _given_up(table: "pd.DataFrame", style: Style) -> str:
     others = int(table["others"].sum())
     share = f" ({100.0 * out / trials:.1f} {style.percent})" if trials else ""
     told = f"Of {trials} trials, {out}{share} ended by time-out"
-    return told + (f" and {others} in another way without success." if others else ".")
+    told += f" and {others} in another way, without success or without an onset." if others else "."
+    rows = [
+        {str(name): value for name, value in row.items()}
+        for row in table[table["time_outs"] > 0].to_dict("records")
+    ]
+    if not rows:
+        return told
+    told += " Successes alone look fast; in the medians a time-out takes longer than it was allowed"
+    return f"{told}: {'; '.join(_slow(row, style) for row in rows)}."
 
 
-def f_test(row: Mapping[str, Any], style: Style) -> str:
-    """Return ``F(5.27, 184.33) = 2.43, p = .034, ηp² = .06``, corrected where it matters."""
+def _slow(row: Mapping[str, Any], style: Style) -> str:
+    """Return the time-outs of one condition, and its mean and median time."""
+    where = [style.plain(str(row[name])) for name in (GROUP, PHASE) if row.get(name)]
+    if "distance" in row:
+        where.append(f"{row['distance']:g} m")
+    middle, mean = row["median_with_time_outs_s"], row["mean_of_successes_s"]
+    median = "over half given up" if math.isnan(middle) else f"median {middle:.3g} s"
+    successes = "no success" if math.isnan(mean) else f"mean of successes {mean:.3g} s"
+    return f"{', '.join(where)}: {row['time_outs']} of {row['trials']}, {successes}, {median}"
+
+
+def f_test(row: Mapping[str, Any], style: Style, people: int) -> str:
+    """Return ``F(5.27, 184.33) = 2.43, p = .034, ηp² = .06``, corrected where it matters.
+
+    Behind it stands how many of the sample's people are in it, where not all of them are.
+    """
     whole = row["epsilon"] == 1.0
     df = [row["epsilon"] * row["df1"], row["epsilon"] * row["df2"]]
     free = ", ".join(f"{value:.0f}" if whole else f"{value:.2f}" for value in df)
     return (
         f"{style.symbol('F')}({free}) = {row['f']:.2f}, {_p(row['p_gg'], style)}, "
-        f"{style.eta} = {_share(row['eta2p'], 2)}"
+        f"{style.eta} = {_share(row['eta2p'], 2)}{of_people(row, style, people)}"
     )
 
 
-def _effect(row: Mapping[str, Any], style: Style) -> str:
+def _effect(row: Mapping[str, Any], style: Style, people: int) -> str:
     effect, _, rest = str(row["factor"]).partition(" ")
     found = row["p_gg"] < LEVEL
     where = f" {style.plain(rest)}" if rest else ""
     if ":" in effect:
         names = style.plain(" and ".join(effect.split(":")))
         said = "there was an interaction" if found else "no interaction was found"
-        return f"{said} of {names}{where}, {f_test(row, style)}"
+        return f"{said} of {names}{where}, {f_test(row, style, people)}"
     said = "differed" if found else "did not detectably differ"
-    return f"{said} over {style.plain(effect)}{where}, {f_test(row, style)}"
+    return f"{said} over {style.plain(effect)}{where}, {f_test(row, style, people)}"
 
 
-def _trend(row: Mapping[str, Any], style: Style) -> str:
+def _trend(row: Mapping[str, Any], style: Style, people: int) -> str:
     unit = UNITS.get(row["measure"], "")
     phase = next((str(row[kind]) for kind in ("session", "block", "phase") if kind in row), "")
     word = "fell" if row["slope"] < 0 else "rose"
@@ -187,22 +248,31 @@ def _trend(row: Mapping[str, Any], style: Style) -> str:
     low, high = _number(row["slope_low"], style), _number(row["slope_high"], style)
     return (
         f"Over the positions of {style.plain(phase)} it {word} by {abs(row['slope']):.3g} {unit} "
-        f"each, 95 {style.percent} CI [{low}, {high}], {_t(row, style)}{holm}."
+        f"each, 95 {style.percent} CI [{low}, {high}], {_t(row, style)}{holm}"
+        f"{of_people(row, style, people)}."
     )
 
 
-def _scale(row: Mapping[str, Any], style: Style) -> str:
-    """Return what happened from one phase to the next, over all participants."""
-    spoken = {"change": "Mean change to", "warm-up decrement": "Warm-up decrement at the start of"}
-    spoken["retention"] = "Difference of the last positions, to"
-    if row["group"] != "all" or row["quantity"] not in spoken or math.isnan(row["t"]):
+def _scale(row: Mapping[str, Any], style: Style, people: int) -> str:
+    """Return what happened within a phase and from one to the next, over all participants."""
+    spoken = {
+        "slope": "With pairs' means taken away, change with each position of",
+        "change": "Mean change to",
+        "warm-up decrement": "Warm-up decrement at the start of",
+        "retention": "Difference of the last positions, to",
+    }
+    if row["group"] != "all" or row["quantity"] not in spoken:
         return ""
     unit, mean = UNITS.get(row["measure"], ""), _number(row["mean"], style)
-    said = f"{spoken[row['quantity']]} {style.plain(str(row['phase']))}: {mean} {unit}"
-    return f"{said}, {_t(row, style)}."
+    said = f"{spoken[row['quantity']]} {style.plain(str(row['phase']))}:"
+    if math.isnan(row["t"]):
+        number = int(row["n"])
+        why = f"{number} of {people} people have it" if number < LEAST else "all have the same"
+        return f"{said} not tested, {why}."
+    return f"{said} {mean} {unit}, {_t(row, style)}{of_people(row, style, people)}."
 
 
-def _contrast(row: Mapping[str, Any], style: Style) -> str:
+def _contrast(row: Mapping[str, Any], style: Style, people: int) -> str:
     if math.isnan(row["t"]):
         return ""  # all are alike
     at = f" in {style.plain(str(row['at']))}" if row["at"] else ""
@@ -214,7 +284,8 @@ def _contrast(row: Mapping[str, Any], style: Style) -> str:
     return (
         f"{first} minus {second}{at}: {_number(row['difference'], style)} {unit}, "
         f"95 {style.percent} CI [{low}, {high}], {style.symbol('t')}({row['df']:.0f}) = "
-        f"{_number(row['t'], style, '.2f')}, Holm-corrected {_p(row['p_holm'], style)}."
+        f"{_number(row['t'], style, '.2f')}, Holm-corrected {_p(row['p_holm'], style)}"
+        f"{of_people(row, style, people)}."
     )
 
 

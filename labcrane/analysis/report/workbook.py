@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from labcrane.analysis.advice import Advice, familiarity, fatigue, suggest
 from labcrane.analysis.indicator import FORMULA, OBJECTIVE, SUBJECTIVE
-from labcrane.analysis.operator_tests import OperatorTest
+from labcrane.analysis.operator_tests import DETECTION, OperatorTest
 
 if TYPE_CHECKING:
     from openpyxl import Workbook
@@ -23,6 +23,8 @@ COUNTS = ("object", "body", "overload_max", "overload_min", "accuracy", "awarene
 HEAD = (
     *FACTS,
     *(f"n_{name}" if name in OBJECTIVE else f"s_{name}" for name in COUNTS),
+    "n_drop",
+    *DETECTION,
     "k",
     "k because",
     *(f"points {name}" for name in COMPONENTS),
@@ -42,6 +44,14 @@ SUMMARY = (
     "raw (formula)",
     "percent (formula)",
 )
+KINDS = {
+    "hits": "hit",
+    "misses": "miss",
+    "false alarms": "false alarm",
+    "correct rejections": "correct rejection",
+}
+"""What a test can be of which a deformity was asked."""
+
 WIDTH = 14
 NO_RATING = "no rating"
 
@@ -58,6 +68,7 @@ def write_workbook(tests: Sequence[OperatorTest], path: Path) -> None:
     _fill(summary, SUMMARY, _operators(tests))
     _fill(book.create_sheet("Tests"), HEAD, map(_row, tests, range(2, len(tests) + 2)))
     _trend(book, tests)
+    _fill(book.create_sheet("Deformities"), ("operator", *KINDS), _detections(tests))
     _fill(
         book.create_sheet("Advice"),
         ("operator", "about", "verdict", "evidence"),
@@ -110,6 +121,8 @@ def _row(test: OperatorTest, number: int) -> tuple[Cell, ...]:
         performance.duration_s,
         test.reference_s,
         *(_number(getattr(performance, name)) for name in COUNTS),
+        performance.drop,
+        *(_known(getattr(test.detection, name)) for name in DETECTION),
         int(indicator.completed),
         test.why,
         *points,
@@ -216,6 +229,18 @@ def _safe(value: Cell) -> Cell:
     """Return a text of others so that no spreadsheet takes it for a formula."""
     written = isinstance(value, str) and value[:1] in {"+", "-", "@"}
     return f"'{value}" if written else value
+
+
+def _detections(tests: Sequence[OperatorTest]) -> Iterator[tuple[Cell, ...]]:
+    """Yield how often each operator was right and wrong about deformities."""
+    for operator in dict.fromkeys(test.operator for test in tests):
+        own = [test.detection.kind for test in tests if test.operator == operator]
+        if any(own):
+            yield (operator, *(own.count(kind) for kind in KINDS.values()))
+
+
+def _known(value: float) -> Cell:
+    return None if math.isnan(value) else int(value)
 
 
 def _number(value: float | None) -> Cell:

@@ -19,6 +19,9 @@ LEAST = 3
 NO_VARIANCE = 1e-20
 """Share of all squares that rounding leaves where participants are all alike."""
 
+LEAST_SHARE = 1e-9
+"""Of what a level adds, and of the largest singular value; what is below it comes of rounding."""
+
 
 @dataclass(frozen=True, slots=True)
 class Anova:
@@ -78,6 +81,8 @@ class Contrast:
         The two-sided t test, with a variance of its own within participants.
     p_holm
         The same corrected for the differences of one family: those of a factor, at one level.
+    n
+        Participants.
     """
 
     measure: str
@@ -93,10 +98,11 @@ class Contrast:
     t: float
     p: float
     p_holm: float
+    n: int
 
 
 @dataclass(frozen=True)
-class Design:
+class FactorialDesign:
     """Participants' means in the cells of a design, and the model between participants.
 
     Attributes
@@ -109,6 +115,8 @@ class Design:
         Intercept and sum-to-zero columns of the factors between, one row per participant.
     terms
         Which columns of the model are whose; ``()`` is the intercept.
+    beside
+        Shares of what is adjusted for in each cell, sum-to-zero: participants, cells, columns.
     left_out
         Participants who lack a cell.
     """
@@ -118,6 +126,7 @@ class Design:
     between: dict[str, tuple[Any, ...]]
     model: FloatArray
     terms: dict[tuple[str, ...], list[int]]
+    beside: FloatArray
     left_out: tuple[str, ...]
 
     @property
@@ -127,35 +136,81 @@ class Design:
 
 
 def design(
-    table: "pd.DataFrame", measure: str, within: Sequence[str], between: Sequence[str]
-) -> Design | None:
+    table: "pd.DataFrame",
+    measure: str,
+    within: Sequence[str],
+    between: Sequence[str],
+    beside: str = "",
+) -> FactorialDesign | None:
     """Return the cells of a design; None where fewer than three whole participants are left.
 
     A participant's value in a cell is the mean over their rows there. A factor of one level is no
     factor.
     """
-    import pandas as pd
-
     known = table.dropna(subset=[measure])
-    within = [name for name in within if known[name].nunique() > 1]
-    if within:
-        levels = {name: tuple(sorted(known[name].unique())) for name in within}
-        cells = known.groupby(["participant", *within])[measure].mean().unstack(within)
-        names = list(product(*levels.values()))
-        every = pd.MultiIndex.from_tuples(names, names=within)
-        wide = cells.reindex(columns=every if len(within) > 1 else every.get_level_values(0))
-    else:
-        levels, wide = {}, known.groupby("participant")[measure].mean().to_frame()
+    levels = _levels(known, within)
+    wide = _cells(known, known[measure], levels)
     whole = wide.dropna()
     left_out = tuple(map(str, wide.index.difference(whole.index)))
     who = known.groupby("participant")[list(between)].first().loc[whole.index]
     groups = {name: tuple(sorted(who[name].unique())) for name in between}
     groups = {name: own for name, own in groups.items() if len(own) > 1}
     model, terms = _model(who, groups)
-    found = Design(whole.to_numpy(float), levels, groups, model, terms, left_out)
+    shares = _shares(known, beside, levels, whole.index)
+    found = FactorialDesign(whole.to_numpy(float), levels, groups, model, terms, shares, left_out)
     rank = int(np.linalg.matrix_rank(model)) if len(whole) else 0
     whole_enough = len(whole) >= LEAST and found.free >= 1 and rank == model.shape[1]
     return found if whole_enough else None
+
+
+def whole_people(
+    table: "pd.DataFrame", measure: str, within: Sequence[str]
+) -> tuple[list[str], list[tuple[Any, ...]]]:
+    """Return who has a value in every cell of a design, and the cells in which nobody has one.
+
+    Of levels at which nobody has a value, and of factors of one level, there are no cells.
+    """
+    known = table.dropna(subset=[measure])
+    wide = _cells(known, known[measure], _levels(known, within))
+    empty: list[Any] = [cell for cell in wide.columns if len(wide) and wide[cell].isna().all()]
+    cells = [cell if isinstance(cell, tuple) else (cell,) for cell in empty]
+    return [str(name) for name in wide.dropna().index], cells
+
+
+def _levels(known: "pd.DataFrame", within: Sequence[str]) -> dict[str, tuple[Any, ...]]:
+    """Return the levels of factors that have more than one."""
+    levels = {name: tuple(sorted(known[name].unique())) for name in within}
+    return {name: own for name, own in levels.items() if len(own) > 1}
+
+
+def _cells(
+    known: "pd.DataFrame", values: "pd.Series[float]", levels: dict[str, tuple[Any, ...]]
+) -> "pd.DataFrame":
+    """Return means of participants, which are rows, in cells, which are columns."""
+    import pandas as pd
+
+    within = list(levels)
+    means = values.groupby([known["participant"], *(known[name] for name in within)]).mean()
+    if not within:
+        return means.to_frame()
+    every = pd.MultiIndex.from_tuples(list(product(*levels.values())), names=within)
+    columns = every if len(within) > 1 else every.get_level_values(0)
+    return means.unstack(within).reindex(columns=columns)
+
+
+def _shares(
+    known: "pd.DataFrame", beside: str, levels: dict[str, tuple[Any, ...]], who: "pd.Index[Any]"
+) -> FloatArray:
+    """Return sum-to-zero shares of the levels of a column in each cell, the last level left out."""
+    kinds = sorted(known[beside].unique()) if beside else []
+    parts = [
+        _cells(known, (known[beside] == kind).astype(float), levels).loc[who].to_numpy(float)
+        for kind in kinds
+    ]
+    if len(parts) < 2:  # noqa: PLR2004 - one level adds nothing
+        cells = int(np.prod([len(own) for own in levels.values()]))
+        return np.empty((len(who), cells, 0))
+    return np.stack([part - parts[-1] for part in parts[:-1]], axis=2)
 
 
 def _model(
@@ -188,6 +243,7 @@ def analyse(
     measure: str,
     within: Sequence[str] = (),
     between: Sequence[str] = (),
+    beside: str = "",
 ) -> list[Anova]:
     """Test every effect of a design within, between or mixed; none where it cannot be.
 
@@ -201,30 +257,52 @@ def analyse(
         One row per movement or answer, with a column ``participant``.
     within, between
         Columns that vary within and between participants.
+    beside
+        A column whose levels add something of their own, which every effect is tested beside: an
+        analysis of covariance in each stratum. What cannot be told from it is not tested.
     """
-    cells = design(table, measure, within, between)
+    cells = design(table, measure, within, between, beside)
     if cells is None:
         return []
     found = []
     for inside in _subsets(list(cells.within)):
-        seen = cells.values @ _contrasts(cells, inside)
-        inverse = np.linalg.inv(cells.model.T @ cells.model)
-        weights = inverse @ cells.model.T @ seen
-        rest = seen - cells.model @ weights
+        made = _contrasts(cells, inside)
+        seen = cells.values @ made
+        adds = np.einsum("pcq,cd->pdq", cells.beside, made)
+        rest, free = _rest(cells.model, seen, adds)
         error = rest.T @ rest
-        if np.trace(error) <= NO_VARIANCE * float((cells.values**2).sum()):
+        if free < 1 or np.trace(error) <= NO_VARIANCE * float((cells.values**2).sum()):
             continue  # all are alike: nothing to compare with
         for outside, own in cells.terms.items():
             if not (inside or outside):
                 continue
-            asked = weights[own]
-            effect = asked.T @ np.linalg.inv(inverse[np.ix_(own, own)]) @ asked
+            without, more_free = _rest(np.delete(cells.model, own, axis=1), seen, adds)
+            if more_free - free < len(own) * len(error):
+                continue
+            effect = float((without**2).sum()) - float(np.trace(error))
             name = ":".join((*outside, *inside))
-            found.append(_test(measure, name, effect, error, len(own), cells))
+            found.append(_test(measure, name, effect, error, (more_free - free, free), cells))
     return found
 
 
-def _contrasts(cells: Design, inside: tuple[str, ...]) -> FloatArray:
+def _rest(model: FloatArray, seen: FloatArray, adds: FloatArray) -> tuple[FloatArray, int]:
+    """Return what a model between participants leaves, beside what is adjusted for; its freedom.
+
+    What is adjusted for adds the same to every contrast and participant, by least squares.
+    """
+    people, contrasts, size = adds.shape
+    outside = np.eye(people) - model @ np.linalg.pinv(model)
+    rest = outside @ seen
+    free = (people - model.shape[1]) * contrasts
+    columns = np.einsum("op,pdq->odq", outside, adds).reshape(people * contrasts, size)
+    if not size:
+        return rest, free
+    columns[np.abs(columns) < LEAST_SHARE] = 0.0  # shares are of 1
+    weights, _, rank, _ = np.linalg.lstsq(columns, rest.ravel(), rcond=LEAST_SHARE)
+    return rest - (columns @ weights).reshape(rest.shape), free - int(rank)
+
+
+def _contrasts(cells: FactorialDesign, inside: tuple[str, ...]) -> FloatArray:
     """Return orthonormal contrasts of an effect within participants, shape ``(cells, d)``."""
     made = np.ones((1, 1))
     for name, levels in cells.within.items():
@@ -239,13 +317,18 @@ def _contrasts(cells: Design, inside: tuple[str, ...]) -> FloatArray:
 
 
 def _test(
-    measure: str, name: str, effect: FloatArray, error: FloatArray, rows: int, cells: Design
+    measure: str,
+    name: str,
+    effect: float,
+    error: FloatArray,
+    free: tuple[int, int],
+    cells: FactorialDesign,
 ) -> Anova:
     from scipy.stats import f as distribution
 
     size = len(error)
-    df1, df2 = float(rows * size), float(cells.free * size)
-    f = (float(np.trace(effect)) / df1) / (float(np.trace(error)) / df2)
+    df1, df2 = map(float, free)
+    f = (effect / df1) / (float(np.trace(error)) / df2)
     epsilon = float(np.trace(error) ** 2 / (size * (error**2).sum()))
     return Anova(
         measure,
@@ -291,6 +374,7 @@ def compare(
     if cells is None or factor not in {**cells.within, **cells.between}:
         return []
     places = cells.within.get(at, (None,))
+    people = len(cells.values)
     found = []
     for place in places:
         chosen = {} if place is None else {at: place}
@@ -309,7 +393,9 @@ def compare(
             rows.append((first, second, _difference(cells, seen, asked)))
         corrected = holm([one[-1] for _, _, one in rows])
         found += [
-            Contrast(measure, factor, word(place), word(first), word(second), *one, p_holm)
+            Contrast(
+                *(measure, factor, word(place), word(first), word(second)), *one, p_holm, people
+            )
             for (first, second, one), p_holm in zip(rows, corrected, strict=True)
         ]
     return found
@@ -320,7 +406,7 @@ def word(level: Any) -> str:
     return "" if level is None else f"{level:g}" if isinstance(level, float) else str(level)
 
 
-def _mean(cells: Design, chosen: dict[str, Any]) -> FloatArray:
+def _mean(cells: FactorialDesign, chosen: dict[str, Any]) -> FloatArray:
     """Return weights of the cells for the mean over all that have the chosen levels."""
     made = np.ones(1)
     for name, levels in cells.within.items():
@@ -330,7 +416,7 @@ def _mean(cells: Design, chosen: dict[str, Any]) -> FloatArray:
 
 
 def _difference(
-    cells: Design, seen: FloatArray, asked: FloatArray
+    cells: FactorialDesign, seen: FloatArray, asked: FloatArray
 ) -> tuple[float, float, float, float, float, float, float]:
     from scipy.stats import t as distribution
 

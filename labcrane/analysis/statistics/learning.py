@@ -38,6 +38,15 @@ CURVES: dict[str, Callable[[FloatArray, float, float, float], FloatArray]] = {
     "power": power,
 }
 
+RUNS: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "exponential": lambda n: n - 1.0,
+    "power": np.log,
+}
+"""What a curve's gain falls along: both are asymptote + gain · exp(-rate · run)."""
+
+RATES = np.geomspace(*RATE_BOUNDS, 60)
+"""Rates at which a search looks first."""
+
 
 @dataclass(frozen=True, slots=True)
 class LearningCurve:
@@ -82,7 +91,8 @@ class LearningCurve:
 def fit_curve(curve: str, n: FloatArray, values: FloatArray) -> LearningCurve | None:
     """Fit one curve by least squares with bounds; None with fewer points than parameters + 1.
 
-    Gains may be negative: who gets worse is fitted as well. The search starts at several rates.
+    Gains may be negative: who gets worse is fitted as well. The search starts at the best of many
+    rates, as at each the other two follow from a straight line.
     """
     from scipy.optimize import least_squares
 
@@ -90,19 +100,25 @@ def fit_curve(curve: str, n: FloatArray, values: FloatArray) -> LearningCurve | 
     x, y = np.asarray(n, float)[known], np.asarray(values, float)[known]
     if len(x) <= PARAMETERS:
         return None
-    model, spread = CURVES[curve], float(np.ptp(y)) or 1.0
+    run, spread = RUNS[curve](x), float(np.ptp(y)) or 1.0
     lower = [float(y.min()) - 2 * spread, -4 * spread, RATE_BOUNDS[0]]
     upper = [float(y.max()) + 2 * spread, 4 * spread, RATE_BOUNDS[1]]
-    tries = [
-        least_squares(
-            lambda p: model(x, *p) - y,
-            [float(y[-1]), float(y[0] - y[-1]), rate],
-            bounds=(lower, upper),
-            x_scale=[spread, spread, 1.0],
-        )
-        for rate in (0.05, 0.3, 1.0)
-    ]
-    best = min(tries, key=lambda found: float(found.cost))
+
+    def misses(p: FloatArray) -> FloatArray:
+        missed: FloatArray = p[0] + p[1] * np.exp(-p[2] * run) - y
+        return missed
+
+    def slopes(p: FloatArray) -> FloatArray:
+        fall = np.exp(-p[2] * run)
+        return np.column_stack([np.ones_like(run), fall, -p[1] * run * fall])
+
+    best = least_squares(
+        misses,
+        _start(run, y, np.array(lower), np.array(upper)),
+        slopes,
+        bounds=(lower, upper),
+        x_scale=[spread, spread, 1.0],
+    )
     errors = _errors(best.jac, 2.0 * float(best.cost), len(x))
     asymptote, gain, rate = map(float, best.x)
     inside = RATE_BOUNDS[0] * 1.01 < rate < RATE_BOUNDS[1] * 0.99
@@ -116,6 +132,18 @@ def fit_curve(curve: str, n: FloatArray, values: FloatArray) -> LearningCurve | 
         identified=inside and errors[0] < float(y.std(ddof=1)),
         n=len(x),
     )
+
+
+def _start(run: FloatArray, y: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
+    """Return asymptote, gain and rate of the best curve within bounds at any of :data:`RATES`."""
+    falls = np.exp(-np.outer(RATES, run))
+    apart = falls - falls.mean(axis=1, keepdims=True)
+    squares = (apart**2).sum(axis=1)
+    gains = np.clip((apart @ (y - y.mean())) / squares, lower[1], upper[1])
+    asymptotes = np.clip(y.mean() - gains * falls.mean(axis=1), lower[0], upper[0])
+    costs = ((asymptotes[:, None] + gains[:, None] * falls - y) ** 2).sum(axis=1)
+    at = int(np.argmin(costs))
+    return np.array([asymptotes[at], gains[at], RATES[at]])
 
 
 def _errors(jacobian: FloatArray, squares: float, n: int) -> tuple[float, float, float]:

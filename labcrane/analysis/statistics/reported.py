@@ -56,13 +56,13 @@ def check_reported(test: Reported) -> Consistency:
     """Recompute p and partial eta squared of a printed F test, rounding allowed for."""
     from scipy.stats import f as distribution
 
-    (f_low, f, f_high), (a_low, a, a_high), (b_low, b, b_high) = map(
+    (f_low, f, f_high), (df1_low, a, df1_high), (df2_low, b, df2_high) = map(
         _printed, (test.f, test.df1, test.df2)
     )
-    corners = [(x, y) for x in (a_low, a_high) for y in (b_low, b_high)]
+    corners = [(x, y) for x in (df1_low, df1_high) for y in (df2_low, df2_high)]
     p_low = min(float(distribution.sf(f_high, x, y)) for x, y in corners)
     p_high = max(float(distribution.sf(f_low, x, y)) for x, y in corners)
-    eta_low, eta_high = _eta2p(f_low, a_low, b_high), _eta2p(f_high, a_high, b_low)
+    eta_low, eta_high = _eta2p(f_low, df1_low, df2_high), _eta2p(f_high, df1_high, df2_low)
     return Consistency(
         p=float(distribution.sf(f, a, b)),
         p_low=p_low,

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from labcrane.analysis.quality import is_done
 from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def time_outs(movements: "pd.DataFrame", by: Sequence[str]) -> "pd.DataFrame":
 
     There is at least one column to go ``by``. ``seconds`` count from the trial's start, pauses left
     out. Practice and repeated attempts are not in it; trials that were skipped or ended by somebody
-    are counted as neither.
+    are counted as neither, and so are successes in which nothing moved.
     """
     import pandas as pd
 
@@ -58,7 +59,7 @@ def time_outs(movements: "pd.DataFrame", by: Sequence[str]) -> "pd.DataFrame":
     own["seconds"] = trial_seconds(own)
     rows = []
     for level, part in own.groupby(list(by)):
-        done, out = part["outcome"] == "success", part["outcome"] == "timeout"
+        done, out = is_done(part), part["outcome"] == "timeout"
         judged = part[done | out]
         rows.append(
             {
@@ -71,7 +72,7 @@ def time_outs(movements: "pd.DataFrame", by: Sequence[str]) -> "pd.DataFrame":
                 "mean_of_successes_s": float(part.loc[done, "seconds"].mean()),
                 "median_with_time_outs_s": median_time(
                     judged["seconds"].to_numpy(float),
-                    np.asarray(judged["outcome"] == "success", np.float64),
+                    np.asarray(is_done(judged), np.float64),
                 ),
             }
         )

@@ -14,8 +14,8 @@ QUANTITIES = {
     "slope": "change per position within it, least squares",
     "gain": "its last position minus its first",
     "change": "its mean minus that of the one before",
-    "warm-up decrement": "its first position minus the last of the one before",
-    "retention": "its last position minus the last of the one before",
+    "warm-up decrement": "its first position minus the last of the session before",
+    "retention": "its last position minus the last of the session before",
 }
 """What is worked out of each participant's session or block."""
 
@@ -65,32 +65,48 @@ def _dummies(labels: "np.typing.NDArray[np.integer[Any]]") -> "np.typing.NDArray
 def quantities(movements: "pd.DataFrame", measure: str) -> "pd.DataFrame":
     """Return each participant's :data:`QUANTITIES`, one row per participant, phase and quantity.
 
+    Whoever lacks a first or last position has nothing that goes by it, and whoever lacks a phase
+    nothing that goes from it to the next: what stands beside them is no stand-in.
+
     Parameters
     ----------
     movements
-        With the columns ``phase`` (a session or block, in order) and ``place`` (position in it).
+        With the columns ``phase`` (a session or block, in order) and ``place`` (position in it),
+        and ``session`` where a session has several phases: only its first has a warm-up decrement
+        and retention, against the last phase of the session before. Without it each phase is one.
     """
     import pandas as pd
 
     own = movements.assign(value=taken_away(movements, measure))
+    known = own.dropna(subset=["value"])
+    ends = known.groupby("phase")["place"].agg(["min", "max"])
+    cells = known.groupby(["participant", "phase", "place"])["value"].mean()
+    groups = known.groupby("participant")["group"].first()
+    of = "session" if "session" in known else "phase"
+    sessions = dict(known.drop_duplicates("phase").set_index("phase", drop=False)[of])
     rows = []
-    for participant, mine in own.groupby("participant"):
+    for participant, mine in cells.groupby(level="participant"):
         before: pd.Series[float] | None = None
-        for phase, part in mine.groupby("phase"):
-            means = part.groupby("place")["value"].mean().dropna().sort_index()
-            if means.empty:
-                continue
+        last_before, session_before = np.nan, None
+        for phase, (at_first, at_last) in ends.iterrows():
+            means = mine[mine.index.get_level_values("phase") == phase].droplevel([0, 1])
+            first, last = (float(means.get(place, np.nan)) for place in (at_first, at_last))
             found = {}
             if len(means) > 1:
                 found["slope"] = float(np.polyfit(means.index.to_numpy(float), means, 1)[0])
-                found["gain"] = float(means.iloc[-1] - means.iloc[0])
+                found["gain"] = last - first
             if before is not None:
                 found["change"] = float(means.mean() - before.mean())
-                found["warm-up decrement"] = float(means.iloc[0] - before.iloc[-1])
-                found["retention"] = float(means.iloc[-1] - before.iloc[-1])
-            about = {"participant": participant, "group": part["group"].iloc[0], "phase": phase}
-            rows += [{**about, "quantity": name, "value": value} for name, value in found.items()]
-            before = means
+            if session_before not in {None, sessions[phase]}:
+                found["warm-up decrement"] = first - last_before
+                found["retention"] = last - last_before
+            about = {"participant": participant, "group": groups[participant], "phase": phase}
+            rows += [
+                {**about, "quantity": name, "value": value}
+                for name, value in found.items()
+                if np.isfinite(value)
+            ]
+            before, last_before, session_before = means, last, sessions[phase]
     return pd.DataFrame(rows, columns=["participant", "group", "phase", "quantity", "value"])
 
 

@@ -5,8 +5,14 @@ from collections.abc import Mapping
 MEASURES: Mapping[str, tuple[str, str]] = {
     "sequence": ("1", "position in the session of the pair of targets, from 1"),
     "position": ("1", "position in the session of the movement among the counted ones, from 1"),
-    "constant_error": ("m", "signed error along the task axis, positive for too far"),
-    "absolute_error": ("m", "distance of the tip from the target's centre at the end"),
+    "constant_error": (
+        "m",
+        "signed error along the task axis, positive for too far; NaN where nothing moved",
+    ),
+    "absolute_error": (
+        "m",
+        "distance of the tip from the target's centre at the end; NaN where nothing moved",
+    ),
     "amplitude": ("m", "way made along the task axis, from onset to offset"),
     "path_ratio": ("1", "length of the way over the straight distance between its ends"),
     "peak_speed_tip": ("m/s", "largest speed of the tip between onset and offset"),

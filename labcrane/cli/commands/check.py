@@ -14,7 +14,7 @@ from labcrane.errors import LabcraneError
 if TYPE_CHECKING:
     from labcrane.design.plan import PlannedBlock, PlannedStep, SessionPlan
     from labcrane.design.tracks import PlannedTrack
-    from labcrane.protocol.questions import Question
+    from labcrane.protocol.questions import CheckQuestion
     from labcrane.protocol.study import Study
 
 
@@ -66,7 +66,9 @@ def check(
     )
 
 
-def examined(protocol: Path, *, simulated: bool = False) -> "tuple[Study, tuple[Question, ...]]":
+def examined(
+    protocol: Path, *, simulated: bool = False
+) -> "tuple[Study, tuple[CheckQuestion, ...]]":
     """Return a study, and what is asked of it: the same for a terminal, a program and an editor.
 
     Raises
@@ -234,6 +236,8 @@ def _other(step: "PlannedStep") -> str:
     """Return what a step is that has no trials."""
     if step.kind == "break":
         return f"break of {step.seconds:g} s"
+    if step.kind == "fixation":
+        return f"fixation: {len(step.points)} points of {step.seconds:g} s"
     if step.questionnaires:
         return f"questionnaire: {', '.join(step.questionnaires)}"
     from textwrap import shorten

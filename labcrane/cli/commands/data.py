@@ -17,9 +17,9 @@ def where(participant: Someone, data: Data = HERE) -> None:
     """List every place that holds a participant's data."""
     from labcrane.cli.output import whole_table
     from labcrane.participants.folders import Places
-    from labcrane.participants.whereabouts import whereabouts
+    from labcrane.participants.inventory import inventory
 
-    found = whereabouts(Places(data), participant)
+    found = inventory(Places(data), participant)
     if not found:
         out.print(f"nothing of {participant} is in {data}, nor known to its register", markup=False)
         return
@@ -39,6 +39,10 @@ def erase(participant: Someone, reason: Reason, data: Data = HERE) -> None:
     _say(done.reach)
     for path in done.mentions:
         out.print(f"still mentions {participant}: {path}", markup=False)
+    for what in done.unsearched:
+        out.print(
+            f"cannot be searched for {participant}; open it yourself, and see: {what}", markup=False
+        )
     out.print(f"{participant} is erased. {BEYOND}", markup=False)
 
 

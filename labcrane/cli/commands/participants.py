@@ -47,6 +47,7 @@ def consent(protocol: ProtocolPath, participant: Someone, data: DataBeside = Non
     from labcrane.approval.decision import verify
     from labcrane.participants.enrolment import confirm_consent
     from labcrane.participants.folders import Places
+    from labcrane.participants.register import read
     from labcrane.protocol.study import load
     from labcrane.registry.registry import discover
 
@@ -55,6 +56,7 @@ def consent(protocol: ProtocolPath, participant: Someone, data: DataBeside = Non
     lock = verify(study, registry, today())
     text = (lock.approval["consent"], lock.consent_version)
     places = Places(data_folder(data, protocol))
+    lock.check_before(read(places).locks)
     entry = confirm_consent(places, study, participant, text, today())
     group = f", group {entry.group}" if entry.group else ""
     out.print(

@@ -227,6 +227,12 @@ def replay(
     measures: Annotated[
         Path | None, typer.Option(help="write the measures of what was replayed as CSV")
     ] = None,
+    run_recorded_code: Annotated[
+        bool,
+        typer.Option(
+            "--run-recorded-code", help="import plugins that are in the file: trust who made it"
+        ),
+    ] = False,
 ) -> None:
     """Run a recorded session again from its input, and compare every number."""
     from labcrane.replay.replay import replay_session as run_again
@@ -234,13 +240,21 @@ def replay(
     if speed is not None and not speed > 0.0:
         raise ProtocolError(f"a speed of {speed:g} shows nothing; give one above 0")
     if show:
-        _show(recording, session, protocol, 1.0 if speed is None else speed, begin)
+        pace = 1.0 if speed is None else speed
+        _show(recording, session, protocol, pace, begin, run_code=run_recorded_code)
         return
     if begin:
         raise ProtocolError("--from is where to show it from; give --show too")
     if speed is not None:
         stay_on_this_computer()
-    done = run_again(recording, session, protocol=protocol, machine=machine, speed=speed)
+    done = run_again(
+        recording,
+        session,
+        protocol=protocol,
+        machine=machine,
+        speed=speed,
+        run_code=run_recorded_code,
+    )
     for part in done.parts:
         out.print(f"differs: {part}", markup=False)
     if measures is not None:
@@ -256,21 +270,26 @@ def replay(
     )
 
 
-def _show(recording: Path, session: int, protocol: Path | None, speed: float, begin: float) -> None:
+def _show(
+    recording: Path,
+    session: int,
+    protocol: Path | None,
+    speed: float,
+    begin: float,
+    *,
+    run_code: bool,
+) -> None:
     """Show a recorded session in the views and sounds of its study."""
     from tempfile import TemporaryDirectory
 
     from labcrane.feedback.playback import play
-    from labcrane.protocol.study import load
     from labcrane.recording.participant_file.reader import open_recording
-    from labcrane.registry.registry import discover
-    from labcrane.replay.restore import restore
+    from labcrane.replay.restore import restored_study
 
     stay_on_this_computer()
     record = open_recording(recording).session(session)
     with TemporaryDirectory(prefix="labcrane-show-") as folder:
-        path = restore(record, Path(folder), protocol, None)
-        study = load(path, discover(study=protocol or path), recorded=True)
+        study = restored_study(record, Path(folder), protocol, run_code=run_code)
         play(study, record, speed=speed, start_s=begin, say=out.print)
 
 

@@ -210,7 +210,7 @@ def _launch(visit: "Visit", *, page: bool) -> None:
     from labcrane.design.plan import plan_session
     from labcrane.launcher.launcher import Launcher
     from labcrane.launcher.pages import pages
-    from labcrane.processes.real_time import a_core_left
+    from labcrane.processes.real_time import reserved_core
     from labcrane.registry.offers import LAB, not_installed
     from labcrane.session.commands import QueueConsole
 
@@ -225,7 +225,7 @@ def _launch(visit: "Visit", *, page: bool) -> None:
     shown, counts = out.console, TrialCounts.of(plan)
     with (
         # Before any other process is started: they are to leave that core alone.
-        a_core_left() if visit.real_time else nullcontext() as core,
+        reserved_core() if visit.real_time else nullcontext() as core,
         Terminal(console, shown, counts, keys=keys, questionnaires=asked) as terminal,
     ):
         visit = replace(visit, core=core)

@@ -18,7 +18,7 @@ from labcrane.cli.options import ProtocolPath, stay_on_this_computer
 from labcrane.cli.output import out
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     import pandas as pd
 
@@ -167,30 +167,32 @@ def power(
         )
     kind = _kind(test)
     if recordings is not None:
-        everything = _recorded(recordings, include, workers, scheduler)
+        everyone = _recorded(recordings, include, workers, scheduler)
     else:
         count = pool or POOL_TIMES * max(sizes)
         if resimulate is not None:
             count, cohorts = resimulate * max(sizes), resimulate
         names = pseudonyms(study.protocol.participants.pattern, count)
-        everything = _simulated(
+        everyone = _simulated(
             protocol, folder / "pool", names, cohort, study, tested, workers, scheduler
         )
     by = _Drawn(study.protocol.study, sizes, cohorts, to_show, recordings is not None, folder)
-    with _written(folder, recordings, everything) as to:
+    with _written(folder, recordings, everyone.people) as to:
+        movements = everyone.movements
         if kind is not None:
-            everything.to_csv(to / "movements.csv", index=False)
-            _power_of_report(to, everything, tested, effect, kind, goals, by, workers, scheduler)
+            movements.to_csv(to / "movements.csv", index=False)
+            _power_of_report(to, everyone, tested, effect, kind, goals, by, workers, scheduler)
             return
-        movements = everything[is_result(everything)]
-        movements.to_csv(to / "movements.csv", index=False)
-        _print_power(to, by, movements, tested, fresh=resimulate is not None)
+        movements[is_result(movements)].to_csv(to / "movements.csv", index=False)
+        _print_power(to, by, everyone, tested, fresh=resimulate is not None)
         if goals:
-            _search(to, by, movements, effect, goals)
+            _search(to, by, everyone, effect, goals)
 
 
 @contextmanager
-def _written(folder: Path, recordings: Path | None, movements: "pd.DataFrame") -> "Iterator[Path]":
+def _written(
+    folder: Path, recordings: Path | None, people: "Mapping[str, str]"
+) -> "Iterator[Path]":
     """Hand out the folder to write into; what is drawn from recordings is people's, and kept."""
     from labcrane.cli.commands.approval import today
     from labcrane.files.atomic import make_folder
@@ -200,9 +202,16 @@ def _written(folder: Path, recordings: Path | None, movements: "pd.DataFrame") -
         make_folder(folder)
         yield folder
         return
-    names = sorted(map(str, movements["participant"].unique()))
-    with product(recordings, "power", folder, names, today(), whole=True) as made:
+    with product(recordings, "power", folder, sorted(people), today(), whole=True) as made:
         yield made.folder
+
+
+@dataclass(frozen=True)
+class _Everyone:
+    """Whom cohorts are drawn from: their movements, and everybody's group, also without any."""
+
+    movements: "pd.DataFrame"
+    people: "Mapping[str, str]"
 
 
 @dataclass(frozen=True)
@@ -239,39 +248,45 @@ def _simulated(
     effect: "Effect",
     workers: int | None,
     scheduler: str | None,
-) -> "pd.DataFrame":
-    """Return the movements of a pool; files are made only where frames are asked for."""
-    import pandas as pd
-
+) -> _Everyone:
+    """Return a simulated pool; files are made only where frames are asked for."""
     from labcrane.analysis.measures import OF_TRIALS
     from labcrane.approval.codebook import codebook
+    from labcrane.design.plan import plan_session
+    from labcrane.recording.data_folder import DataFolder
     from labcrane.simulation.simulation import simulate_tables
 
+    people = {
+        DataFolder(folder, name, pilot=False, simulated=True).name: plan_session(
+            study, name, 1
+        ).group
+        for name in names
+    }
     there = {each.name for each in codebook(study) if each.table == "trials"} | {*OF_TRIALS}
     if effect.measure not in there:
         simulate_all(protocol, folder, names, cohort, workers, scheduler)
-        return _movements(folder, names, workers, scheduler)
+        return _movements(folder, people, workers, scheduler)
     orders = _orders(protocol, folder, names, cohort)
     with progress_bar("simulate", len(orders)) as advance:
         tables = []
         for table in simulate_tables(orders, workers, scheduler):
             tables.append(table)
             advance()
-    everything = pd.concat(tables, ignore_index=True)
-    return everything.sort_values("participant", kind="stable", ignore_index=True)
+    return _together(tables, people)
 
 
 def _recorded(
     folder: Path, include: "list[str] | None", workers: int | None, scheduler: str | None
-) -> "pd.DataFrame":
-    """Return the movements of everybody who counts in a data folder."""
+) -> _Everyone:
+    """Return everybody who counts in a data folder."""
     cohort = cohort_of(folder.resolve() if scheduler else folder, include)
-    return _measured(cohort.included, workers, scheduler)
+    people = {each.name: str(each.context.get("group", "")) for each in cohort.included}
+    return _measured(cohort.included, people, workers, scheduler)
 
 
 def _power_of_report(
     folder: Path,
-    movements: "pd.DataFrame",
+    everyone: _Everyone,
     effect: "Effect",
     written: str,
     kind: "Kind",
@@ -286,7 +301,7 @@ def _power_of_report(
     from labcrane.simulation.reported import NAMES, plan_test, power_of_report
     from labcrane.simulation.sample_size import paragraph, smallest_cohort
 
-    planned = plan_test(kind, effect, movements, by.claim)
+    planned = plan_test(kind, effect, everyone.movements, by.claim, everyone.people)
     seed = derive(by.study, "power")
 
     def power_at(size: int) -> Power:
@@ -301,7 +316,7 @@ def _power_of_report(
     _write_power(folder, found, by)
     if goals:
         searched = [smallest_cohort(power_at, goal) for goal in goals]
-        people = movements["participant"].nunique()
+        people = len(everyone.people)
         text = paragraph(
             written, by.claim, people, searched, test=NAMES[kind], recorded=by.recorded
         )
@@ -332,7 +347,7 @@ def _goals(text: str) -> list[float]:
 
 
 def _search(
-    folder: Path, by: _Drawn, movements: "pd.DataFrame", effect: str, goals: "Sequence[float]"
+    folder: Path, by: _Drawn, everyone: _Everyone, effect: str, goals: "Sequence[float]"
 ) -> None:
     from labcrane.design.seeds import derive
     from labcrane.files.atomic import write_text
@@ -340,7 +355,8 @@ def _search(
     from labcrane.simulation.sample_size import paragraph, sample_size
 
     tested = read_effect(effect)
-    pool, seed = make_pool(movements, tested), derive(by.study, "sample size")
+    pool = make_pool(everyone.movements, tested, everyone.people)
+    seed = derive(by.study, "sample size")
     found = [sample_size(pool, tested, goal, by.cohorts, seed, by.claim) for goal in goals]
     _print_sizes(found)
     text = paragraph(effect, by.claim, len(pool.means), found, recorded=by.recorded)
@@ -371,44 +387,65 @@ def _sizes(text: str) -> list[int]:
 
 
 def _movements(
-    folder: Path, names: "Sequence[str]", workers: int | None, scheduler: str | None
-) -> "pd.DataFrame":
-    """Return the movements of the participants of a pool, who may be more in its folder."""
+    folder: Path, people: "Mapping[str, str]", workers: int | None, scheduler: str | None
+) -> _Everyone:
+    """Return the participants of a pool, who may be more in its folder."""
     from labcrane.analysis.cohort import find_cohort
-    from labcrane.recording.data_folder import DataFolder
 
-    people = find_cohort(folder.resolve(), ["simulated"]).included
-    wanted = [person for person in people if DataFolder.pseudonym(person.name) in names]
-    return _measured(wanted, workers, scheduler)
+    there = find_cohort(folder.resolve(), ["simulated"]).included
+    wanted = [person for person in there if person.name in people]
+    return _measured(wanted, people, workers, scheduler)
 
 
 def _measured(
-    people: "Sequence[Participant]", workers: int | None, scheduler: str | None
-) -> "pd.DataFrame":
-    import pandas as pd
-
+    there: "Sequence[Participant]",
+    people: "Mapping[str, str]",
+    workers: int | None,
+    scheduler: str | None,
+) -> _Everyone:
     from labcrane.analysis.measures import measures_of
     from labcrane.analysis.parallel import work
 
-    with progress_bar("measure", len(people)) as advance:
+    with progress_bar("measure", len(there)) as advance:
         tables = []
-        for table in work(measures_of, people, workers, scheduler):
+        for table in work(measures_of, there, workers, scheduler):
             tables.append(table)
             advance()
+    return _together(tables, people)
+
+
+def _together(tables: "Sequence[pd.DataFrame]", people: "Mapping[str, str]") -> _Everyone:
+    """Return everybody's movements in one table, and say who has none."""
+    import pandas as pd
+
     everything = pd.concat(tables, ignore_index=True)
-    return everything.sort_values("participant", kind="stable", ignore_index=True)
+    there = set() if everything.empty else set(everything["participant"])
+    if missing := [name for name in people if name not in there]:
+        out.print(
+            f"without a movement that counts: {', '.join(missing)}; they are drawn as the others "
+            "are, and are in no test",
+            markup=False,
+        )
+    if not everything.empty:
+        everything = everything.sort_values("participant", kind="stable", ignore_index=True)
+    return _Everyone(everything, people)
 
 
 def _print_power(
-    folder: Path, by: _Drawn, movements: "pd.DataFrame", tested: "Effect", *, fresh: bool
+    folder: Path, by: _Drawn, everyone: _Everyone, tested: "Effect", *, fresh: bool
 ) -> None:
     from labcrane.design.seeds import derive
     from labcrane.simulation.power import make_pool
     from labcrane.simulation.power import power as power_of
 
-    pool = make_pool(movements, tested)
-    if pool.left_out:
-        out.print(f"left out, without a value at some level: {', '.join(pool.left_out)}")
+    pool = make_pool(everyone.movements, tested, everyone.people)
+    there = set(everyone.movements["participant"])  # the others were told of before
+    if left_out := [name for name in pool.left_out if name in there]:
+        out.print(
+            f"without a value at some level: {', '.join(left_out)}; they are drawn as the "
+            "others are, and left out of the test",
+            markup=False,
+        )
     seed = derive(by.study, "power")
     found = power_of(pool, tested, by.sizes, by.cohorts, seed, fresh=fresh, claim=by.claim)
     _write_power(folder, list(found), by)

@@ -54,7 +54,7 @@ class Mass:
 
 
 @dataclass(frozen=True)
-class Look:
+class LinkMesh:
     """Mesh of a link.
 
     Attributes
@@ -98,7 +98,7 @@ class Axis:
     speed: float
     effort: float
     carries: Mass
-    look: Look | None = None
+    look: LinkMesh | None = None
 
 
 def machine_fields(
@@ -238,7 +238,7 @@ def _far_end(along: FloatArray, across: FloatArray, at: FloatArray) -> FloatArra
     return pose
 
 
-def _mesh(look: Look, far: FloatArray) -> dict[str, Any]:
+def _mesh(look: LinkMesh, far: FloatArray) -> dict[str, Any]:
     """Return a mesh as a machine's YAML has it: turned about x, y, then z, in the far frame."""
     pose = np.linalg.inv(far) @ look.pose
     turn = pose[:3, :3]

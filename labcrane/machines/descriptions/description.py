@@ -132,4 +132,4 @@ class MachineDescription(StrictModel):
             return UrdfFile(path, folder, meshes=self.meshes)
         from labcrane.machines.descriptions.mjcf_file import MjcfFile  # noqa: PLC0415
 
-        return MjcfFile(path)
+        return MjcfFile(path, folder)

@@ -12,11 +12,17 @@ import numpy as np
 
 from labcrane.errors import nearest
 from labcrane.machines.descriptions.chain import Axis, ChainError, Mass, together
+from labcrane.machines.descriptions.robot_xml import check_robot
 from labcrane.types import FloatArray
 
 
 class MjcfFile:
     """What an MJCF file says.
+
+    Parameters
+    ----------
+    folder
+        Of the study: whatever the file names lies in it.
 
     Raises
     ------
@@ -24,7 +30,8 @@ class MjcfFile:
         MuJoCo is not installed, or refuses the file; the message has its words.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, folder: Path) -> None:
+        check_robot(path, folder)
         try:
             import mujoco  # noqa: PLC0415 - an engine, which not everybody has
         except ImportError as error:

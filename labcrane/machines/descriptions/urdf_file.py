@@ -14,10 +14,14 @@ import numpy as np
 
 from labcrane.errors import nearest
 from labcrane.files.system import is_file
-from labcrane.machines.descriptions.chain import Axis, ChainError, Look, Mass, together
+from labcrane.machines.descriptions.chain import Axis, ChainError, LinkMesh, Mass, together
+from labcrane.machines.descriptions.robot_xml import check_robot
 from labcrane.types import FloatArray
 
 TURNING = ("revolute", "continuous")
+MOST_LINKS = 500
+"""Of a robot; a person with all fingers has a fifth of them."""
+
 WHOLE_TURN = (-math.pi, math.pi)
 
 
@@ -39,15 +43,17 @@ class UrdfFile:
 
     def __init__(self, path: Path, folder: Path, *, meshes: bool = True) -> None:
         self._path, self._folder, self._meshes = path.resolve(), folder.resolve(), meshes
-        try:
-            root = ElementTree.parse(path).getroot()  # noqa: S314 - expat refuses entity bombs
-        except (ElementTree.ParseError, OSError, ValueError) as error:
-            raise ChainError(f"it cannot be read: {error}") from error
+        root = check_robot(path, folder)
         if root.tag != "robot":
             raise ChainError(f"it is no URDF: its root is <{root.tag}>, and must be <robot>")
         self.title = root.get("name", path.stem)
         self._links = {_name(each): each for each in root.findall("link")}
         self._joints = {_name(each): each for each in root.findall("joint")}
+        if len(self._links) > MOST_LINKS:
+            raise ChainError(
+                f"it has {len(self._links)} links; the most are {MOST_LINKS}: leave out what does "
+                "not move"
+            )
         self._above: dict[str, str] = {}
         for name, joint in self._joints.items():
             child, parent = _link(joint, "child"), _link(joint, "parent")
@@ -133,7 +139,7 @@ class UrdfFile:
             self._look(_link(joint, "child")) if self._meshes else None,
         )
 
-    def _look(self, link: str) -> Look | None:
+    def _look(self, link: str) -> LinkMesh | None:
         """Return the first mesh of a link; None of one that is drawn of simple shapes."""
         for visual in self._links[link].findall("visual"):
             mesh = visual.find("geometry/mesh")
@@ -146,7 +152,7 @@ class UrdfFile:
                     "same along x, y and z; or write meshes: false"
                 )
             file = self._found(mesh.get("filename", ""), link)
-            return Look(file, float(scale[0]), self._poses[link] @ _origin(visual))
+            return LinkMesh(file, float(scale[0]), self._poses[link] @ _origin(visual))
         return None
 
     def _found(self, written: str, link: str) -> str:

@@ -2,6 +2,7 @@
 
 import base64
 import binascii
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -19,6 +20,7 @@ from labcrane.machines.meshes.surface import (
     check_triangles,
     doubles,
 )
+from labcrane.machines.rotation import rotation_matrix
 from labcrane.types import FloatArray
 
 MAGIC, VERSION = b"glTF", 2
@@ -282,15 +284,10 @@ def _matrix(node: _Node) -> FloatArray:
     square = x * x + y * y + z * z + w * w
     if not SINGULAR < square < 1.0 / SINGULAR:
         raise MeshError("has a node whose rotation is none")
-    # The rotation of a quaternion of any length: Shoemake (1985), Animating rotation, eq. for M.
-    s = 2.0 / square
-    turn = [
-        [1.0 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
-        [s * (x * y + z * w), 1.0 - s * (x * x + z * z), s * (y * z - x * w)],
-        [s * (x * z - y * w), s * (y * z + x * w), 1.0 - s * (x * x + y * y)],
-    ]
+    length = math.sqrt(square)
     matrix = np.eye(4)
-    matrix[:3, :3] = np.array(turn) * np.array(node.scale)
+    turn = rotation_matrix((x / length, y / length, z / length, w / length))
+    matrix[:3, :3] = turn * np.array(node.scale)
     matrix[:3, 3] = node.translation
     return matrix
 

@@ -22,6 +22,10 @@ DEEPEST = 32
 MOST_PACKED = 1100
 """Bytes that one byte of gzip can become, and a little more."""
 
+MOST_CHUNK_BYTES = 1 << 26
+"""Of one packed piece of a column, which is unpacked whole for the first of its values: labcrane
+writes none beyond a sixty-fourth of it."""
+
 SMALL_BYTES = 1 << 16
 """What a column may hold beyond that: one without chunks of its own has no packed size."""
 
@@ -139,9 +143,12 @@ def _columns_in(file: "h5py.File") -> list[_Span]:
     spans: list[_Span] = []
     sizes: list[bool] = []
 
-    def look(_: str, node: "h5py.HLObject") -> None:
+    def look(name: str, node: "h5py.HLObject") -> bool | None:
+        if name.count("/") > DEEPEST:  # the way to each costs as much as it is long
+            sizes.append(False)
+            return True
         if not isinstance(node, h5py.Dataset) or node.compression != "gzip":
-            return
+            return None
         most = math.prod(node.chunks) * int(node.dtype.itemsize)
 
         def add(chunk: "h5py.h5d.StoreInfo") -> None:
@@ -151,6 +158,7 @@ def _columns_in(file: "h5py.File") -> list[_Span]:
             sizes.append(chunk.size <= most + most // 100 + 64)
 
         node.id.chunk_iter(add)
+        return None
 
     file.visititems(look)
     return spans if all(sizes) else []
@@ -269,6 +277,9 @@ class _Walk:
             raise self._refused(
                 where, f"says it holds {size} values of {width} bytes in {packed} bytes"
             )
+        chunk = math.prod(dataset.chunks or ()) * width
+        if chunk > MOST_CHUNK_BYTES:
+            raise self._refused(where, f"is packed in pieces of {chunk} bytes")
         if dataset.dtype.kind == "O" and dataset.chunks is None and size:
             self._texts(dataset, where, size)
 

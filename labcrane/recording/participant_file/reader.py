@@ -423,7 +423,11 @@ class Recording:
             self.attrs: Mapping[str, Any] = _attributes(file)
             found = (_SESSION.fullmatch(name) for name in file)
             self.sessions: list[int] = sorted(int(match[1]) for match in found if match)
-            self.participant: str = self.attrs["participant"]
+            if not isinstance(named := self.attrs["participant"], str):
+                raise RecordingError(
+                    f"{path} is not as labcrane writes it: its participant is {named!r}, no text"
+                )
+            self.participant: str = named
 
     def session(self, number: int) -> SessionRecord:
         """Return a session by its number."""

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from labcrane.errors import RecordingError
-from labcrane.recording.crash_marker import read_whereabouts, whereabouts_path
+from labcrane.recording.crash_marker import crash_marker_path, read_crash_marker
 from labcrane.recording.participant_file.columns import texts_of
 from labcrane.recording.participant_file.writer import (
     Conclude,
@@ -62,7 +62,7 @@ def recover(folder: Path, conclude: Conclude | None = None) -> list[Recovery]:
 
 def _recover(folder: Path, session: int, conclude: Conclude | None) -> Recovery:
     path, journals = participant_path(folder), _journals_of(folder, session)
-    where = str(read_whereabouts(whereabouts_path(journal_path(folder, session, "run"))) or "")
+    where = str(read_crash_marker(crash_marker_path(journal_path(folder, session, "run"))) or "")
     try:
         if is_recovered(folder, session):
             return Recovery(path, session, where=where)

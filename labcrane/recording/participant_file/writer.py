@@ -7,6 +7,7 @@ the old one, which is brought to the disk, read again, and only then takes the o
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,6 +36,9 @@ if TYPE_CHECKING:
 
 FORMAT = "labcrane participant file"
 VERSION = "1"
+
+_HELD: ContextVar[tuple[Path, "h5py.File"] | None] = ContextVar("held", default=None)
+"""The participant file that is kept open."""
 
 Conclude = Callable[["h5py.Group"], object]
 """Works something out of a session's group in a participant file, and writes it there."""
@@ -272,7 +276,11 @@ def reading(path: Path, *, cached: bool = True) -> Iterator["h5py.File"]:
     RecordingError
         It cannot be read, is none, or is damaged where it was read.
     """
+    held = _HELD.get()
     try:
+        if held is not None and held[0] == path and cached:
+            yield held[1]
+            return
         with opened(path, cached=cached) as file:
             yield file
     # h5py, numpy, pandas and json raise what they like of damaged files.
@@ -281,6 +289,26 @@ def reading(path: Path, *, cached: bool = True) -> Iterator["h5py.File"]:
             f"{path} is damaged: {error!r}; move it away, and labcrane recover {path.parent} "
             "makes it anew of the journals, if they are there"
         ) from error
+
+
+@contextmanager
+def kept_open(path: Path) -> Iterator[None]:
+    """Read a participant file, while the block lasts, from one opening of it.
+
+    Each opening looks through the whole file for links out of it, which takes longer than most of
+    what is read then.
+
+    Raises
+    ------
+    RecordingError
+        It cannot be read, or is none.
+    """
+    with opened(path) as file:
+        before = _HELD.set((path, file))
+        try:
+            yield
+        finally:
+            _HELD.reset(before)
 
 
 def _refuse_less(path: Path, old: "h5py.File", session: _Session) -> None:

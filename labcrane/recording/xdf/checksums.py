@@ -84,7 +84,7 @@ class CheckLog:
         return boundary + checks
 
 
-class Span(NamedTuple):
+class ByteSpan(NamedTuple):
     """A stretch of a file, in bytes."""
 
     start: int
@@ -113,8 +113,8 @@ class FileState(NamedTuple):
         Up to where the file is covered by checks, in bytes.
     """
 
-    damaged: list[Span]
-    unchecked: list[Span]
+    damaged: list[ByteSpan]
+    unchecked: list[ByteSpan]
     checked: int
 
 
@@ -125,8 +125,8 @@ def verify(data: FileBytes) -> FileState:
         return FileState([], [], 0)
     if data.crc(0, last.start) == last.crcs[-1]:
         return FileState([], [], last.stop)
-    damaged: list[Span] = []
-    unchecked: list[Span] = []
+    damaged: list[ByteSpan] = []
+    unchecked: list[ByteSpan] = []
     end, crc, follows = 0, 0, 0
     for block in _blocks(data):
         bad = _mismatches(data, block, end, crc)
@@ -137,7 +137,7 @@ def verify(data: FileBytes) -> FileState:
     return FileState(damaged, unchecked, last.stop)
 
 
-def _mismatches(data: FileBytes, block: _Block, end: int, crc: int) -> list[Span]:
+def _mismatches(data: FileBytes, block: _Block, end: int, crc: int) -> list[ByteSpan]:
     """Return the spans of a block that differ from their checks; ``crc`` is known up to ``end``."""
     if data.crc(end, block.start, crc) == block.crcs[-1]:
         return []
@@ -145,7 +145,7 @@ def _mismatches(data: FileBytes, block: _Block, end: int, crc: int) -> list[Span
     ends = itertools.pairwise([end, *block.ends])
     for span, (before, after) in zip(ends, itertools.pairwise([crc, *block.crcs]), strict=True):
         if data.crc(*span, before) != after:
-            bad.append(Span(*span))
+            bad.append(ByteSpan(*span))
     return bad
 
 

@@ -14,7 +14,7 @@ BEHIND = WINDOW // 8
 """Bytes before what is asked for: whoever compares a stretch with its check goes back to it."""
 
 
-class Window(NamedTuple):
+class FileWindow(NamedTuple):
     """Bytes of a file, and where the first of them lies in it."""
 
     data: bytes
@@ -37,7 +37,7 @@ class FileBytes:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._window = Window(b"", 0)
+        self._window = FileWindow(b"", 0)
         try:
             self._size = path.stat().st_size
         except OSError as error:
@@ -54,12 +54,12 @@ class FileBytes:
         data, at = self.window(start, stop)
         return data[start - at : stop - at]
 
-    def window(self, start: int, stop: int) -> Window:
+    def window(self, start: int, stop: int) -> FileWindow:
         """Return bytes that hold ``start`` to ``stop``, and mostly more; both are in the file."""
         at, end = self._window.start, self._window.start + len(self._window.data)
         if not at <= start <= stop <= end:
             first = max(start - BEHIND, 0)
-            self._window = Window(self._read(first, max(stop, first + WINDOW)), first)
+            self._window = FileWindow(self._read(first, max(stop, first + WINDOW)), first)
             if stop > first + len(self._window.data):
                 raise RecordingError(f"{self._path} has become shorter while it was read")
         return self._window

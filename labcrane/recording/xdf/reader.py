@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.errors import RecordingError
-from labcrane.recording.xdf.checksums import CHECK_ID, FileState, Span, verify
+from labcrane.recording.xdf.checksums import CHECK_ID, ByteSpan, FileState, verify
 from labcrane.recording.xdf.chunk import MAGIC, Tag
 from labcrane.recording.xdf.file_bytes import FileBytes
 from labcrane.recording.xdf.header import StreamHeader
@@ -23,7 +23,7 @@ from labcrane.recording.xdf.samples import Texts, numbers, unpack
 from labcrane.recording.xdf.scanner import Chunk, ChunkScanner
 from labcrane.types import FloatArray
 
-__all__ = ["Span", "Texts", "XdfFile", "XdfStream", "read_xdf"]
+__all__ = ["ByteSpan", "Texts", "XdfFile", "XdfStream", "read_xdf"]
 
 _ID = struct.Struct("<I")
 _OFFSET = struct.Struct("<dd")
@@ -103,8 +103,8 @@ class XdfFile:
     header: str
     streams: list[XdfStream]
     torn: int
-    damaged: list[Span]
-    unchecked: list[Span]
+    damaged: list[ByteSpan]
+    unchecked: list[ByteSpan]
     checked: int
     nameless: list[int]
 
@@ -181,7 +181,7 @@ def _sort(data: FileBytes, walk: ChunkScanner) -> _Parts:
             parts.file_header = data[chunk.body : chunk.stop].decode(errors="replace")
         elif chunk.tag != Tag.BOUNDARY:
             if chunk.stop - chunk.body < _ID.size:
-                walk.skipped.append(Span(chunk.start, chunk.stop))
+                walk.skipped.append(ByteSpan(chunk.start, chunk.stop))
                 continue
             (stream,) = _ID.unpack(data[chunk.body : chunk.body + _ID.size])
             if stream != CHECK_ID:
@@ -190,7 +190,7 @@ def _sort(data: FileBytes, walk: ChunkScanner) -> _Parts:
 
 
 def _sort_in(
-    parts: _Parts, data: FileBytes, chunk: Chunk, stream: int, skipped: list[Span]
+    parts: _Parts, data: FileBytes, chunk: Chunk, stream: int, skipped: list[ByteSpan]
 ) -> None:
     content = slice(chunk.body + _ID.size, chunk.stop)
     if chunk.tag == Tag.SAMPLES:
@@ -199,7 +199,7 @@ def _sort_in(
         try:
             header = StreamHeader.from_xml(data[content].decode(errors="replace"))
         except RecordingError:
-            skipped.append(Span(chunk.start, chunk.stop))
+            skipped.append(ByteSpan(chunk.start, chunk.stop))
         else:
             parts.headers.setdefault(stream, header)
     elif chunk.tag == Tag.STREAM_FOOTER:
@@ -207,4 +207,4 @@ def _sort_in(
     elif chunk.stop - content.start == _OFFSET.size:
         parts.offsets[stream].append(_OFFSET.unpack(data[content]))
     else:
-        skipped.append(Span(chunk.start, chunk.stop))
+        skipped.append(ByteSpan(chunk.start, chunk.stop))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from labcrane.recording.xdf.checksums import Span
+from labcrane.recording.xdf.checksums import ByteSpan
 from labcrane.recording.xdf.chunk import sample_dtype
 from labcrane.recording.xdf.file_bytes import WINDOW, FileBytes
 from labcrane.recording.xdf.header import StreamHeader
@@ -30,7 +30,7 @@ class Samples(NamedTuple):
 
 
 def unpack(
-    data: FileBytes, header: StreamHeader, chunks: Iterable[Chunk], skipped: list[Span]
+    data: FileBytes, header: StreamHeader, chunks: Iterable[Chunk], skipped: list[ByteSpan]
 ) -> Samples:
     """Unpack the stamps and texts of one stream; chunks that do not fit its header are skipped.
 
@@ -49,7 +49,7 @@ def unpack(
             else:
                 times, _ = _numbers(window, here, header, header.dtype, last)
         except (struct.error, ValueError):
-            skipped.append(Span(chunk.start, chunk.start + chunk.count * _size(chunk)))
+            skipped.append(ByteSpan(chunk.start, chunk.start + chunk.count * _size(chunk)))
             continue
         if len(times):
             last = float(times[-1])

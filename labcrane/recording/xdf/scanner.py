@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labcrane.recording.xdf.checksums import Span
+from labcrane.recording.xdf.checksums import ByteSpan
 from labcrane.recording.xdf.chunk import BOUNDARY, Tag
 from labcrane.recording.xdf.file_bytes import WINDOW, FileBytes
 
@@ -57,23 +57,23 @@ class ChunkScanner:
     """
 
     def __init__(
-        self, data: FileBytes, damaged: Sequence[Span] = (), unchecked: Sequence[Span] = ()
+        self, data: FileBytes, damaged: Sequence[ByteSpan] = (), unchecked: Sequence[ByteSpan] = ()
     ) -> None:
-        self.skipped: list[Span] = list(damaged)
+        self.skipped: list[ByteSpan] = list(damaged)
         self.torn = 0
         self._data = data
         # A chunk is known to start behind every such span, whatever came before.
         starts = [0, *(span.stop for span in (*damaged, *unchecked))]
         stops = [*(span.start for span in damaged), *(span.stop for span in unchecked), len(data)]
         self._stretches = [
-            Span(a, b) for a, b in zip(sorted(starts), sorted(stops), strict=True) if a < b
+            ByteSpan(a, b) for a, b in zip(sorted(starts), sorted(stops), strict=True) if a < b
         ]
 
     def __iter__(self) -> Iterator[Chunk]:
         for stretch in self._stretches:
             yield from self._walk(stretch)
 
-    def _walk(self, stretch: Span) -> Iterator[Chunk]:
+    def _walk(self, stretch: ByteSpan) -> Iterator[Chunk]:
         position, stop = stretch
         if position == 0:
             position = 4  # the magic
@@ -108,9 +108,9 @@ class ChunkScanner:
             if stop == len(self._data):
                 self.torn = stop - position
             else:
-                self.skipped.append(Span(position, stop))
+                self.skipped.append(ByteSpan(position, stop))
             return stop
-        self.skipped.append(Span(position, found))
+        self.skipped.append(ByteSpan(position, found))
         return found + len(BOUNDARY)
 
     def _extend(self, chunk: Chunk, stop: int) -> Chunk:

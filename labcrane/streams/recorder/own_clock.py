@@ -15,7 +15,7 @@ PPM = 65536.0
 """The kernel counts frequencies in 2**-16 parts per million."""
 
 
-class Reading(NamedTuple):
+class ClockPair(NamedTuple):
     """Both clocks at one moment, in the order in which it is stored.
 
     Attributes
@@ -58,7 +58,7 @@ NANO = 0x2000
 """Of the status: the offset is in nanoseconds."""
 
 
-def read_own_clock() -> Reading | None:
+def read_own_clock() -> ClockPair | None:
     """Return how the clocks stand now; None on a system without one that nothing turns."""
     if sys.platform.startswith("linux"):
         pairs = []
@@ -70,8 +70,8 @@ def read_own_clock() -> Reading | None:
         _, now, raw = min(pairs)
         asked = _Timex()
         if ctypes.CDLL(None).adjtimex(ctypes.byref(asked)) < 0:
-            return Reading(now, raw, float("nan"), float("nan"), float("nan"))
+            return ClockPair(now, raw, float("nan"), float("nan"), float("nan"))
         unit = 1e-9 if asked.status & NANO else 1e-6
-        return Reading(now, raw, asked.freq / PPM, float(asked.tick), unit * asked.offset)
+        return ClockPair(now, raw, asked.freq / PPM, float(asked.tick), unit * asked.offset)
     else:  # noqa: RET505 - mypy takes what follows a return for unreachable elsewhere
         return None

@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from labcrane.core.signals import SignalChannel, SignalStream
 from labcrane.limits import LIMITS
+from labcrane.processes.handle import SAFELY
 from labcrane.recording.foreign_streams import MONITORS, SIGNAL
 from labcrane.recording.xdf.header import StreamHeader
 from labcrane.streams.request import OURS
@@ -114,7 +115,13 @@ class SignalFeed:
         self._hang_s = hang_s
         self.fault: str | None = None
         self.left_out = 0
-        self._command = [sys.executable, "-m", "labcrane.monitoring.process", json.dumps(config)]
+        self._command = [
+            sys.executable,
+            *SAFELY,
+            "-m",
+            "labcrane.monitoring.process",
+            json.dumps(config),
+        ]
         self._taps: list[SignalTap] = []
         self._queue: queue.SimpleQueue[tuple[int, Samples] | None] = queue.SimpleQueue()
         self._waiting = 0

@@ -24,14 +24,15 @@ import numpy as np
 import numpy.typing as npt
 
 from labcrane.errors import RecordingError
+from labcrane.streams.sync import repeats
 from labcrane.streams.sync.dejitter import Dejitter, even, even_line, follow_sample_clock, left_open
 from labcrane.streams.sync.epochs import epochs
 from labcrane.streams.sync.own_clock import OwnClock
-from labcrane.streams.sync.placement import Placement, place
+from labcrane.streams.sync.placement import Placement, moving, place
 from labcrane.streams.sync.quality import (
     Basis,
+    ClockSegment,
     Quality,
-    Segment,
     clock_changes,
     probe_age,
     worst_second,
@@ -83,7 +84,7 @@ ENOUGH = 2000
 """So many samples tell a rate well enough to see it change from one clock to the next."""
 
 _Followed = tuple[FloatArray, FloatArray]
-_Sampled = tuple[Segment, Sampling, _Followed | None]
+_Sampled = tuple[ClockSegment, Sampling, _Followed | None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +108,7 @@ class Corrected:
     time: FloatArray
     error: FloatArray
     uneven: FloatArray
-    segments: tuple[Segment, ...] = field(default_factory=tuple)
+    segments: tuple[ClockSegment, ...] = field(default_factory=tuple)
     quality: Quality = field(default_factory=Quality)
 
     @property
@@ -133,6 +134,21 @@ def correct(raw: RawStream, treatment: Treatment, end: float | None = None) -> C
             f"a least transport delay of {treatment.transport_s} s needs dejitter 'envelope', "
             "which finds the least delayed samples; give the mean delay as latency otherwise"
         )
+    of = repeats.first_of(raw.stamps, treatment.rate_hz) if treatment.rate_hz > 0.0 else None
+    if of is None:
+        return _on_our_clock(raw, treatment, end)
+    found = _on_our_clock(repeats.left_out(raw, of), treatment, end)
+    where = repeats.place_of(of)
+    return Corrected(
+        found.time[where],
+        found.error[where],
+        found.uneven[where],
+        repeats.put_back(found.segments, of),
+        replace(found.quality, repeated=int(np.count_nonzero(of != np.arange(len(of))))),
+    )
+
+
+def _on_our_clock(raw: RawStream, treatment: Treatment, end: float | None) -> Corrected:
     own = OwnClock.of(raw)
     if own is None:
         return _correct(raw, treatment, end)
@@ -162,8 +178,8 @@ def _correct(raw: RawStream, treatment: Treatment, end: float | None) -> Correct
 def _examined(raw: RawStream, placed: Placement, *, regular: bool) -> list[_Sampled]:
     """Return how each clock's samples were sampled, and their even times where these help."""
     arrival, times = raw.arrival(), placed.time
-    if placed.frozen:  # what stood still says nothing of how samples were taken
-        own = np.flatnonzero(np.r_[True, np.diff(raw.stamps) != 0.0])
+    if placed.long_frozen:  # what stood still says nothing of how samples were taken
+        own = moving(raw.stamps)
         times = np.interp(np.arange(len(times)), own, times[own])
     found: list[_Sampled] = []
     for segment in placed.segments:
@@ -207,10 +223,14 @@ def _evened(
         part = slice(segment.start, segment.stop)
         # Nothing tells cut stamps from rounded ones, and so whether they are half a unit early.
         error[part] += sampling.grid_s / 2.0
+        if sampling.strayed is not None:
+            error[part] += sampling.strayed
         if sampling.shifted is not None:
             count = segment.stop - segment.start
-            error[part] += sampling.shifted.late(count)
-            if way is Dejitter.AUTO and segment.basis is Basis.PROBES:
+            repeated = sampling.shifted.again_and_again
+            least = float(np.abs(sampling.shifted.by_s).max(initial=0.0)) if repeated else 0.0
+            error[part] += np.maximum(sampling.shifted.late(count), least)
+            if not repeated and way is Dejitter.AUTO and segment.basis is Basis.PROBES:
                 time[part] -= sampling.shifted.late(count, DELAY_S)
         if way is Dejitter.AUTO and followed is not None and segment.basis is Basis.PROBES:
             time[part], doubt = followed
@@ -235,7 +255,7 @@ def _rates(each: list[Sampling]) -> tuple[float, float]:
     """
     known = [one for one in each if len(one.index) >= ENOUGH and not one.late_stamps]
     ends = [one.rates_hz or (one.rate_hz, one.rate_hz) for one in known]
-    if not any(one.rates_hz for one in each) and not any(
+    if not any(one.rates_hz for one in known or each) and not any(
         abs(after[0] / before[1] - 1.0) > RATE_CHANGE for before, after in itertools.pairwise(ends)
     ):
         return np.nan, np.nan
@@ -283,13 +303,19 @@ def _summed(
         unsure=sum(segment.unsure for segment in segments),
         unprobed=sum(s.stop - s.start for s in segments if s.basis is not Basis.PROBES),
         whose=placed.whose,
-        frozen=placed.frozen,
+        frozen=_frozen(placed, sampled),
         ahead_s=placed.ahead_s,
         **_trips(raw),
         backward=_backward(time) if regular else 0,
         **_errors(time, error, placed.time),
         **_flow(placed, sampled, regular=regular),
     )
+
+
+def _frozen(placed: Placement, sampled: list[_Sampled]) -> int:
+    """Return how many samples repeat a stamp, unless polls or programs got several at once."""
+    scattered = any(one.late_stamps or one.uneven_s > 0.0 for _, one, _ in sampled)
+    return placed.long_frozen if scattered else placed.frozen
 
 
 def _backward(time: FloatArray) -> int:
@@ -320,11 +346,13 @@ def _flow(placed: Placement, sampled: list[_Sampled], *, regular: bool) -> dict[
     """Return what the segments' sampling says together."""
     each = [sampling for _, sampling, _ in sampled]
     shifts = [one.shifted.by_s for one in each if one.shifted is not None]
+    strays = [one.strayed for one in each if one.strayed is not None]
     told = {
         "dropped": sum(one.missing for one in each),
         "disordered": sum(one.disordered for one in each),
         "stalls": sum(one.stalls for one in each),
         "longest_stall_s": max((one.longest_stall_s for one in each), default=0.0),
+        "strayed": sum(int(np.count_nonzero(one)) for one in strays),
         "shifts": sum(len(one) for one in shifts),
         "shift_s": max((float(np.abs(one).max()) for one in shifts if len(one)), default=0.0),
         "grid_s": max((one.grid_s for one in each), default=0.0),
@@ -347,5 +375,6 @@ def _flow(placed: Placement, sampled: list[_Sampled], *, regular: bool) -> dict[
         "gaps": sum(one.gaps for one in each) + len(pauses),
         "longest_gap_s": max([*(one.longest_gap_s for one in each), *pauses]),
         "noise_s": most.noise_s,
+        "uneven_s": most.uneven_s,
         "late_stamps": int(most.late_stamps),
     }

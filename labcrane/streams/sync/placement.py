@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from labcrane.streams.sync.epochs import Epoch
 from labcrane.streams.sync.offset import SURE, OffsetCurve, fit
-from labcrane.streams.sync.quality import Basis, Segment
+from labcrane.streams.sync.quality import Basis, ClockSegment
 from labcrane.streams.sync.raw import REMOTE, RawStream
 from labcrane.streams.sync.sampling import coarse_unit
 from labcrane.streams.sync.smoother import smooth
@@ -59,6 +59,9 @@ DRIFTED_S = 0.002
 FROZEN_SHARE = 0.2
 """Where more samples repeat a stamp, chunks have one each."""
 
+LONG_STAND = 4
+"""So many samples of one stamp are more than a poll hands over now and then."""
+
 ARRIVAL_SCATTERS_S = (0.0005, 0.002, 0.01, 0.05)
 
 
@@ -79,19 +82,21 @@ class Placement:
     whose
         What the stamps are of where they are not of the clock that was probed: "receiver" or
         "foreign"; empty where they are.
-    frozen
-        Samples that have the stamp of the one before, though others have their own.
+    frozen, long_frozen
+        Samples that have the stamp of the one before, though others have their own; and those of
+        them that several others repeat, too.
     ahead_s
         By how much irregular samples came before they happened, by their stamps; 0 if none did.
     """
 
     time: FloatArray
     error: FloatArray
-    segments: tuple[Segment, ...] = field(default_factory=tuple)
+    segments: tuple[ClockSegment, ...] = field(default_factory=tuple)
     curves: tuple[OffsetCurve, ...] = ()
     least_lag: float = np.nan
     whose: str = ""
     frozen: int = 0
+    long_frozen: int = 0
     ahead_s: float = 0.0
 
 
@@ -110,7 +115,8 @@ def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> Placement
     known = raw, arrival, stretches
     time, error, segments = _placed(known, curves, least, whose, regular=regular)
     if arrival is not None and np.isfinite(least) and not whose:
-        lags = _lags(time, error, arrival, coarse_unit(raw.stamps), regular=regular)
+        unit = coarse_unit(raw.stamps, regular=regular)
+        lags = _lags(time, error, arrival, unit, regular=regular)
         if lags is None:
             whose = "foreign"
             time, error, segments = _placed(known, curves, least, whose, regular=regular)
@@ -120,8 +126,8 @@ def place(raw: RawStream, stretches: list[Epoch], *, regular: bool) -> Placement
     if whose:
         curves = [None] * len(stretches)
     probed = tuple(curve for curve in curves if curve is not None)
-    frozen = _hold_frozen(raw.stamps, time, error) if regular else 0
-    return Placement(time, error, segments, probed, least, whose, frozen, ahead)
+    frozen = _hold_frozen(raw.stamps, time, error) if regular else (0, 0)
+    return Placement(time, error, segments, probed, least, whose, *frozen, ahead)
 
 
 def _ahead(lag: FloatArray, error: FloatArray) -> float:
@@ -139,11 +145,22 @@ def _came_early(lag: FloatArray, error: FloatArray) -> bool:
     return int(np.count_nonzero(lag + error < -SOONER_S)) >= max(2, 0.02 * len(lag))
 
 
-def _hold_frozen(stamps: FloatArray, time: FloatArray, error: FloatArray) -> int:
-    """Let samples of one stamp be anywhere until the next stamp; return how many repeat one."""
+def moving(stamps: FloatArray) -> npt.NDArray[np.intp]:
+    """Return the samples that do not repeat, with several others, the stamp of the one before."""
+    starts = np.flatnonzero(np.r_[True, np.diff(stamps) != 0.0])
+    counts = np.diff(np.r_[starts, len(stamps)])
+    first = np.repeat(starts, counts) == np.arange(len(stamps))
+    return np.flatnonzero(first | (np.repeat(counts, counts) < LONG_STAND))
+
+
+def _hold_frozen(stamps: FloatArray, time: FloatArray, error: FloatArray) -> tuple[int, int]:
+    """Let samples of one stamp be anywhere until the next stamp; return how many repeat one.
+
+    And how many do so with several others.
+    """
     same = np.diff(stamps) == 0.0
     if not same.any() or same.mean() > FROZEN_SHARE:
-        return 0
+        return 0, 0
     starts = np.r_[0, np.flatnonzero(~same) + 1]
     stops = np.r_[starts[1:], len(stamps)]
     several = stops - starts > 1
@@ -151,7 +168,8 @@ def _hold_frozen(stamps: FloatArray, time: FloatArray, error: FloatArray) -> int
         after = time[min(stop, len(time) - 1)] - time[start]
         before = time[start] - time[max(start - 1, 0)]
         error[start:stop] += max(abs(after), abs(before))
-    return int(np.count_nonzero(same))
+    more = stops - starts - 1
+    return int(more.sum()), int(more[more >= LONG_STAND - 1].sum())
 
 
 def _placed(
@@ -161,7 +179,7 @@ def _placed(
     whose: str,
     *,
     regular: bool,
-) -> tuple[FloatArray, FloatArray, tuple[Segment, ...]]:
+) -> tuple[FloatArray, FloatArray, tuple[ClockSegment, ...]]:
     """Return times, errors and segments, where it is known whose clock the stamps are of."""
     raw, arrival, stretches = known
     if whose:
@@ -502,7 +520,7 @@ def _spread(stamps: FloatArray, arrival: FloatArray) -> FloatArray:
 
 def _segment(
     start: int, stop: int, epoch: Epoch, curve: OffsetCurve | None, *, known: bool
-) -> Segment:
+) -> ClockSegment:
     first = start == epoch.start
     unsure, step, unheard = (
         (epoch.unsure, epoch.step_s, epoch.unheard_s) if first else (0, 0.0, 0.0)
@@ -510,14 +528,18 @@ def _segment(
     told = first and epoch.told
     if curve is None:
         basis = Basis.ARRIVALS if known else Basis.NOTHING
-        return Segment(start, stop, basis, unsure=unsure, step_s=step, told=told, unheard_s=unheard)
+        return ClockSegment(
+            start, stop, basis, unsure=unsure, step_s=step, told=told, unheard_s=unheard
+        )
     drift = -curve.slope / (1.0 + curve.slope) * 1e6
     residual = 1.4826 * float(np.median(np.abs(curve.residuals)))
     probes = len(curve.probes)
-    return Segment(start, stop, Basis.PROBES, probes, unsure, drift, residual, step, told, unheard)
+    return ClockSegment(
+        start, stop, Basis.PROBES, probes, unsure, drift, residual, step, told, unheard
+    )
 
 
-def _blur_steps(segments: tuple[Segment, ...], error: FloatArray) -> None:
+def _blur_steps(segments: tuple[ClockSegment, ...], error: FloatArray) -> None:
     """Let samples that may be of the clock before be as uncertain as the step is large."""
     for before, after in itertools.pairwise(segments):
         if after.unsure:

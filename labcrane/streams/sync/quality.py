@@ -23,7 +23,7 @@ class Basis(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Segment:
+class ClockSegment:
     """Samples ``start`` to ``stop`` of one clock, and how well it is known.
 
     ``unsure`` counts samples that may belong to the clock before. ``drift_ppm`` is positive for a
@@ -81,12 +81,16 @@ class Quality:
         How often samples came in a burst after a pause, and how late.
     noise_s
         By how much stamps scatter that were not taken with the samples, at 95 %.
+    uneven_s
+        By how much stamps scatter about a steady clock, at 95 %, that are taken to be right.
     grid_s
         Unit that stamps are cut or rounded to; 0 where they are not.
     late_stamps
         1 where chunks are stamped when they are sent.
     shifts, shift_s
         How often stamps are later, or sooner, from one sample on, by the largest shift.
+    strayed
+        Samples that are stamped beside their even count for a while.
     moved_p95_s, moved_max_s
         By how much evening moved samples.
     steps, restarts, sleeps, slews
@@ -105,6 +109,8 @@ class Quality:
         Whose clock the stamps are of, where it is not the probed one: "receiver" or "foreign".
     frozen
         Samples of regular streams that repeat the stamp of the one before.
+    repeated
+        Samples of regular streams that were sent again, with the stamp that they had.
     backward
         Samples of regular streams that are placed before one that came earlier.
     ahead_s
@@ -132,10 +138,12 @@ class Quality:
     stalls: int = 0
     longest_stall_s: float = 0.0
     noise_s: float = 0.0
+    uneven_s: float = 0.0
     grid_s: float = 0.0
     late_stamps: int = 0
     shifts: int = 0
     shift_s: float = 0.0
+    strayed: int = 0
     moved_p95_s: float = 0.0
     moved_max_s: float = 0.0
     steps: int = 0
@@ -149,6 +157,7 @@ class Quality:
     unprobed: int = 0
     whose: str = ""
     frozen: int = 0
+    repeated: int = 0
     backward: int = 0
     ahead_s: float = 0.0
 
@@ -162,7 +171,7 @@ def worst_second(time: FloatArray, error: FloatArray) -> tuple[float, float]:
     return float(error[k]), float(np.floor(time[k]))
 
 
-def probe_age(stamps: FloatArray, segments: Sequence[Segment], known: FloatArray) -> float:
+def probe_age(stamps: FloatArray, segments: Sequence[ClockSegment], known: FloatArray) -> float:
     """Return the longest time from a sample to a probe of its clock; NaN without probes."""
     probed = [segment for segment in segments if segment.basis is Basis.PROBES]
     if not len(known) or not probed:
@@ -177,7 +186,7 @@ def probe_age(stamps: FloatArray, segments: Sequence[Segment], known: FloatArray
     return float(max(ages))
 
 
-def clock_changes(segments: Sequence[Segment], time: FloatArray) -> tuple[int, int, int]:
+def clock_changes(segments: Sequence[ClockSegment], time: FloatArray) -> tuple[int, int, int]:
     """Return how often the clock stepped, its program began anew, its computer slept.
 
     While a computer sleeps its clock stands still: it falls behind by as long as nothing comes, be

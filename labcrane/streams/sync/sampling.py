@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from labcrane.streams.sync.stamping import receipt, shifts
+from labcrane.streams.sync.stamping import receipt, shifts, strays, units
 from labcrane.streams.sync.stamping.late_chunks import lost_before, lost_between, slope, soonest
 from labcrane.types import FloatArray
 
@@ -37,9 +37,6 @@ PIECES = 8
 """So many pieces at least tell a changing rate."""
 
 LEAST_NOISE_S = 5e-5
-GRIDS_S = (1.0, 0.1, 1.0 / 64.0, 0.01, 1e-3, 1e-4)
-"""Units of coarse clocks: decimal ones, and that of a Windows timer."""
-
 WITHIN = 0.75
 """Stamps on a grid scatter by half of its unit; what scatters by more was not taken evenly."""
 
@@ -52,7 +49,6 @@ BEHIND_S = 1e-6
 UNLIKE = 0.3
 STALL_S = 0.75
 SEVERAL = 3
-MOST_SEEN = 2000
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +89,12 @@ class Sampling:
         How often samples came in a burst after a pause, and the longest delay.
     index
         Which sample each one is, shape ``(n,)``; counts on over those that are missing.
+    uneven_s
+        By how much stamps scatter about a steady clock, at 95 %, that are taken to be right: as
+        samples of an uneven sampler are, and those which are late by delays to both sides alike.
+    strayed
+        By how much each sample is stamped beside its count for a while, shape ``(n,)``; None where
+        none is.
     """
 
     period: float = np.nan
@@ -112,6 +114,8 @@ class Sampling:
     stalls: int = 0
     longest_stall_s: float = 0.0
     index: FloatArray = field(default_factory=lambda: np.empty(0))
+    uneven_s: float = 0.0
+    strayed: FloatArray | None = None
 
     @property
     def rate_hz(self) -> float:
@@ -169,7 +173,7 @@ def examine(
     behind = int(np.count_nonzero(np.diff(np.maximum.accumulate(time)) == 0.0))
     sorted_steps = np.diff(time[order])
     disordered = behind if _is_shuffled(np.diff(time), sorted_steps) else 0
-    grid = coarse_unit(stamps)
+    grid = coarse_unit(stamps, regular=True)
     if disordered:
         counts = index if counter is None else counter[order]  # who has none counts as they stand
         found = _steps(time[order], counts, grid, counted=counter is not None)
@@ -194,14 +198,15 @@ def examine(
                 longest_stall_s=longest,
                 index=index,
             )
-    noise, late, by_grid = _noise(time, arrival, found, grid)
+    noise, late, by_grid, uneven = _noise(time, arrival, found, grid)
     rates = _rates(found)
     steady = (noise > LEAST_NOISE_S or by_grid) and not disordered and not rates
     uncounted = late and found.missing > 0 and counter is None
     return Sampling(
         found.period, found.missing, found.gaps, found.longest, disordered, rates, noise, grid,
         _reach(found), late, steady, uncounted, None, found.shifted, stalls, longest,
-        found.index if not disordered else index,
+        found.index if not disordered else index, uneven,
+        found.strayed if not disordered and not rates else None,
     )  # fmt: skip
 
 
@@ -220,7 +225,7 @@ def examine_irregular(
     """
     index = np.arange(len(time), dtype=np.float64) if counter is None else counter
     behind = time < np.maximum.accumulate(time) - BEHIND_S
-    grid = coarse_unit(stamps) if len(stamps) >= FEW else 0.0
+    grid = coarse_unit(stamps, regular=False) if len(stamps) >= FEW else 0.0
     parts = np.round(np.diff(stamps) / grid) if grid else np.zeros(0)
     cut = np.count_nonzero(parts != np.median(parts)) >= SEVERAL if grid else False
     stalls, longest = _stalls(time, arrival, alone=False)
@@ -250,13 +255,14 @@ class _Steps:
     clumped: bool
     balance: float
     shifted: shifts.Shifts | None
+    strayed: FloatArray | None
 
 
 def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -> _Steps:
     steps, counts = np.diff(time), np.maximum(np.diff(index), 1.0)
     local = _local(steps / counts)
     typical = _typical(time, index)
-    clumped = bool(np.median(local) < CLUMPED * typical)
+    clumped = bool(np.median(local) < CLUMPED * typical or not local.min() > 0.0)
     if clumped:
         local = np.full(len(steps), typical)
     whole = counts if counted else np.maximum(np.round(steps / local), 1.0)
@@ -303,9 +309,12 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
             position = position + np.repeat(before, np.diff(np.r_[first, len(time)]))
             missing += max(int(before[-1]), 1)
     longest = float(steps[gaps].max(initial=0.0))
+    strayed = strays.find(flowed, position, usual, scatter) if exact and not grid else None
+    if strayed is not None:
+        mean = slope(position[strayed == 0.0], flowed[strayed == 0.0])
     return _Steps(
         time, mean, local, position, missing, int(gaps.sum()), longest, exact, computed, clumped,
-        balance, shifted,
+        balance, shifted, strayed,
     )  # fmt: skip
 
 
@@ -340,6 +349,9 @@ def _is_shuffled(steps: FloatArray, in_order: FloatArray) -> bool:
 def _rates(found: _Steps) -> tuple[float, ...]:
     """Return the rates at first and at last where they differ by more than stamps scatter."""
     edges = np.linspace(0, len(found.time) - 1, 41).astype(int)
+    if found.strayed is not None:
+        own = np.flatnonzero(found.strayed == 0.0)
+        edges = np.unique(own[np.minimum(np.searchsorted(own, edges), len(own) - 1)])
     blurred = 0.0
     if found.computed:
         edges, blurred = soonest(found.time, found.period, found.index)
@@ -361,10 +373,11 @@ def _rates(found: _Steps) -> tuple[float, ...]:
 
 def _noise(
     time: FloatArray, arrival: FloatArray | None, found: _Steps, grid: float
-) -> tuple[float, bool, bool]:
+) -> tuple[float, bool, bool, float]:
     """Return by how much the stamps scatter that were not taken so, and why.
 
-    The second is whether they are late, the third whether only their grid lets them scatter.
+    The second is whether they are late, the third whether only their grid lets them scatter, the
+    last by how much those scatter that were taken so, for all that is known.
 
     Stamps that are computed, of a coarse clock, or unlike the arrivals of their samples were not
     taken when the samples were.
@@ -380,11 +393,16 @@ def _noise(
     apart = np.abs(rest - level)
     spread = float(np.quantile(apart, 0.95))
     if found.computed:
-        return float(np.quantile(apart, 0.975)) + abs(float(np.mean(rest - level))), True, False
+        return (
+            float(np.quantile(apart, 0.975)) + abs(float(np.mean(rest - level))),
+            True,
+            False,
+            0.0,
+        )
     if grid and spread <= WITHIN * grid:
-        return 0.0, False, True
+        return 0.0, False, True, 0.0
     if spread < max(LEAST_NOISE_S, 0.005 * found.period):
-        return 0.0, False, False
+        return 0.0, False, False, 0.0
     if arrival is not None and len(arrival) == len(rest) and found.time is time:
         late = arrival - time + (rest - level)  # what arrival does on top of a steady clock
         own = rest - level
@@ -392,8 +410,8 @@ def _noise(
         share = float(own[near] @ (late - late.mean())[near]) / float(own[near] @ own[near])
         doubt = float(late.std()) / (float(own[near].std()) * np.sqrt(near.sum()))
         if share + 3.0 * doubt < 1.0 - UNLIKE and share < UNLIKE:
-            return spread, False, False
-    return 0.0, False, False
+            return spread, False, False, 0.0
+    return 0.0, False, False, spread
 
 
 def _reach(found: _Steps) -> float:
@@ -416,22 +434,20 @@ def _boundaries(found: _Steps) -> int:
     return int(np.count_nonzero(np.abs(steps - found.local) > EQUAL_S))
 
 
-def coarse_unit(stamps: FloatArray) -> float:
+def coarse_unit(stamps: FloatArray, *, regular: bool) -> float:
     """Return the unit of a coarse clock of which stamps are whole ones apart; 0 if there is none.
 
-    A program may have added a constant to what its clock read.
+    Or the ticks that are told in it, if these are longer.
     """
-    blur = 4.0 * float(np.spacing(np.abs(stamps).max()))
-    for unit in GRIDS_S:
-        if blur < 0.1 * unit and all(
-            _whole((some - stamps[0]) / unit, blur / unit) for some in (stamps[:MOST_SEEN], stamps)
-        ):
-            return unit
-    return 0.0
-
-
-def _whole(parts: FloatArray, blur: float) -> bool:
-    return bool((np.abs(parts - np.round(parts)) < 1e-3 + blur).all())
+    unit = units.find(stamps)
+    if not unit:
+        return 0.0
+    if not regular:
+        return units.tick(stamps, unit, 0.0)
+    period = _typical(np.sort(stamps), np.arange(float(len(stamps))))
+    if abs(unit / period - 1.0) < RATE_CHANGE:  # all steps are of one sample, or of some
+        return 0.0
+    return units.tick(stamps, unit, period)
 
 
 def _on_grid(found: _Steps, stamps: FloatArray, grid: float) -> bool:

@@ -37,7 +37,7 @@ STUDY = "study"
 
 
 @dataclass
-class Keys:
+class AccessKeys:
     """The secrets of one run; they end with it.
 
     Attributes
@@ -69,7 +69,7 @@ class Gate:
     def __init__(
         self,
         inner: Callable[..., Any],
-        keys: Keys,
+        keys: AccessKeys,
         used: Callable[[str], None],
         denied: Callable[[str], None],
         port: int,

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from labcrane.limits import LIMITS
-from labcrane.web.door.access import Gate, Keys
+from labcrane.web.door.access import AccessKeys, Gate
 
 HOST = "127.0.0.1"
 MOST_HEAD = 16_384
@@ -24,7 +24,7 @@ def serve_here(app: Any, page: str, port: int, say: Callable[[str], None]) -> No
 
     from labcrane.web.door.guard import BoundedProtocol, Guard  # noqa: PLC0415
 
-    keys = Keys({page: secrets.token_urlsafe(24)}, {page: secrets.token_urlsafe(24)})
+    keys = AccessKeys({page: secrets.token_urlsafe(24)}, {page: secrets.token_urlsafe(24)})
     link = f"http://{HOST}:{port}/{page}?token={keys.tokens[page]}"
     config = uvicorn.Config(
         Guard(Gate(app, keys, lambda _: None, say, port), HOST, port, say),

@@ -41,9 +41,12 @@ STARTS: Mapping[str, str] = {
     "paused": "Go on",
     "decision": "Go on all the same",
     "fault": "Go on",
+    "judgement": "Go on",
 }
 NOT_YET = "the session waits for its streams and feedback, and begins by itself"
-PAUSABLE = {"waiting", "running", "break", "questionnaire", "between", "fault"}
+PAUSABLE = {"waiting", "running", "break", "fixation", "questionnaire", "between", "fault",
+            "judgement"}  # fmt: skip
+SKIPPABLE = {"break", "fixation", "questionnaire"}
 NO_TRIAL = "no trial is running"
 
 
@@ -72,12 +75,12 @@ def buttons(view: SessionView) -> list[Button]:
     over = "the session has ended" if state == "ended" else ""
     startable = (state in STARTS and state != "fault") or EXAMINER in view.holds
     idle = NOT_YET if state == "starting" else "nothing waits to start"
-    waits = view.stage.partition(": ")[2] if state == "waiting" else ""
+    waits = view.stage.what if state == "waiting" else ""
     start = f"{STARTS.get(state, 'Start')}{': ' + waits if waits else ''}"
     pause = "" if state in PAUSABLE and EXAMINER not in view.holds else "nothing to pause"
     judged = "" if view.trial or view.last_trial else NO_TRIAL
     running = "" if view.trial else NO_TRIAL
-    skips = "" if view.trial or state in {"break", "questionnaire"} else "nothing to skip"
+    skips = "" if view.trial or state in SKIPPABLE else "nothing to skip"
     return [
         Button(
             "order-start", Order.START, "", start, "Space",

@@ -12,8 +12,8 @@ SILENT_S = 1.0
 """A running session sends frames all the time; after so long without one it is said."""
 
 STATES = (
-    "starting", "consent", "waiting", "running", "paused", "fault", "break", "questionnaire",
-    "decision", "between", "ended",
+    "starting", "consent", "waiting", "running", "paused", "fault", "break", "fixation",
+    "questionnaire", "decision", "judgement", "between", "ended",
 )  # fmt: skip
 """What a session can be doing; the page has a look for each."""
 
@@ -40,7 +40,7 @@ REMEDIES: Mapping[str, str] = {
 
 def state_of(view: SessionView) -> str:
     """Return which of :data:`STATES` a session is in."""
-    if view.stage.startswith("ended") or view.ended is not None:
+    if view.over:
         return "ended"
     if view.consent:
         return "consent"
@@ -54,8 +54,7 @@ def state_of(view: SessionView) -> str:
         return "questionnaire"
     if view.trial:
         return "running"
-    begins = {"waits": "waiting", "break": "break", "starting": "starting"}
-    return begins.get(view.stage.partition(" ")[0], "between")
+    return view.stage.state
 
 
 def lamp_of(view: SessionView, live: Live, period_s: float, trouble: str = "") -> Lamp:
@@ -67,8 +66,8 @@ def lamp_of(view: SessionView, live: Live, period_s: float, trouble: str = "") -
         return _at_the_end(view)
     if view.alarm:
         return Lamp("bad", view.alarm, "decide with the participant")
-    for fault, why in view.faults.items():
-        return Lamp("bad", why, REMEDIES.get(fault.partition(" ")[0], ""))
+    for (kind, _), why in view.faults.items():
+        return Lamp("bad", why, REMEDIES.get(kind, ""))
     silent = live.silent_s
     if view.trial and silent is not None and silent > SILENT_S:
         return Lamp(

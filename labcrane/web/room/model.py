@@ -9,6 +9,7 @@ import numpy as np
 from labcrane.core.primitives import Cylinder, Shape, Sphere
 from labcrane.machines.kinematics import link_frames
 from labcrane.machines.machine import Body, Machine
+from labcrane.machines.rotation import rotation_matrix
 
 if TYPE_CHECKING:
     from nicegui import ui
@@ -58,7 +59,7 @@ class MachineModel:
                 known = all(map(math.isfinite, (*where, *turn)))
                 group.visible(known)
                 if known:
-                    group.move(*where).rotate_R(rotation(turn))
+                    group.move(*where).rotate_R(rotation_matrix(turn).tolist())
             else:
                 pose = frames[body.frame]
                 group.move(*pose[:3, 3].tolist())
@@ -129,13 +130,3 @@ def along_y(way: "np.ndarray") -> list[list[float]]:
     across = float(np.linalg.norm(side))
     x = side / across if across > UPRIGHT else np.array([1.0, 0.0, 0.0])
     return [list(row) for row in np.column_stack([x, y, np.cross(x, y)]).tolist()]
-
-
-def rotation(turn: Sequence[float]) -> list[list[float]]:
-    """Return the rotation of a unit quaternion x, y, z, w."""
-    x, y, z, w = turn
-    return [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]

@@ -31,8 +31,10 @@ STATES: Mapping[str, str] = {
     "paused": "Paused",
     "fault": "Stopped by a fault",
     "break": "Break",
+    "fixation": "Eye tracker's check",
     "questionnaire": "Questionnaire",
     "decision": "A decision is needed",
+    "judgement": "Waits for your judgement",
     "between": "Between two steps",
     "ended": "Ended",
 }
@@ -71,7 +73,7 @@ class Snapshot:
             ])),
             "state": state,
             "now": self._running() if state == "running" else STATES.get(state, ""),
-            "stage": session.stage + held,
+            "stage": session.stage.text + held,
             "next": self._next(),
             "facts": " · ".join(self._facts()),
             "left": self._left(state),
@@ -126,7 +128,7 @@ class Snapshot:
 
     def _next(self) -> str:
         session, plan = self._context.session, self._context.plan
-        if session.ended or session.stage.startswith("ended"):
+        if session.over:
             return "nothing: the session is over"
         if session.trials_done < len(plan.trials):
             running = session.trial.get("trial") if session.trial else None

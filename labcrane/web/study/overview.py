@@ -30,7 +30,7 @@ WORST = ("ok", "warn", "bad")
 
 
 @dataclass(frozen=True, slots=True)
-class Planned:
+class PlannedSession:
     """One session of the protocol.
 
     Attributes
@@ -139,7 +139,7 @@ class Overview:
 
     study: str
     folder: Path
-    planned: tuple[Planned, ...]
+    planned: tuple[PlannedSession, ...]
     people: tuple[Person, ...]
     groups: Mapping[str, tuple[int, int]]
     approval: str
@@ -298,10 +298,10 @@ class Reader:
         return f"approved by {about['board']}, {about['reference']}, until {about['valid_until']}"
 
 
-def _planned(text: Mapping[str, Any]) -> tuple[Planned, ...]:
+def _planned(text: Mapping[str, Any]) -> tuple[PlannedSession, ...]:
     sessions = text.get("sessions") or ()
     return tuple(
-        Planned(number, str(each.get("name", number)), _window(each.get("after_days")))
+        PlannedSession(number, str(each.get("name", number)), _window(each.get("after_days")))
         for number, each in enumerate(sessions, 1)
         if isinstance(each, dict)
     )
@@ -353,7 +353,7 @@ def _quality(
 
 
 def _due(
-    planned: Sequence[Planned], person: Person, entry: Entry | None, today: date
+    planned: Sequence[PlannedSession], person: Person, entry: Entry | None, today: date
 ) -> Due | None:
     """Return somebody's next session; None for who has had all, was excluded or is no real one."""
     if DataFolder.pseudonym(person.name) != person.name or person.status in {

@@ -1,6 +1,7 @@
 """Element of a NiceGUI page that draws a recording's time line; importing it loads NiceGUI."""
 
 import asyncio
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -44,10 +45,16 @@ class Timeline(Element, component="viewer.js"):
 
     async def _asked(self, event: events.GenericEventArguments) -> None:
         asked = event.args
-        key, ident, kind = str(asked["key"]), int(asked["ident"]), str(asked["kind"])
+        try:
+            key, ident, kind = str(asked["key"]), int(asked["ident"]), str(asked["kind"])
+            second = float(asked["t"]) if kind == "second" else 0.0
+        except (KeyError, OverflowError, TypeError, ValueError):
+            return  # no page of ours asks so
+        if kind not in self._answers or not math.isfinite(second):
+            return
         if ident not in self._given:
             self._given[ident] = None
-            why = self._show(float(asked["t"])) if kind == "second" else ""
+            why = self._show(second) if kind == "second" else ""
             # Beside everything else: an hour of a signal is read, and a jump waits for nobody.
             try:
                 found = await asyncio.to_thread(self._answers[kind], asked)

@@ -6,7 +6,7 @@ from importlib.metadata import version
 from labcrane import Dynamics, FloatArray, Machine, PluginError, ProtocolError, Run, Trial
 from labcrane.core import Value
 from labcrane.machines import Body, PlacedObject, load_scene, place_objects
-from labcrane_dmd.arm.contacts import Window
+from labcrane_dmd.arm.contacts import ContactWindow
 from labcrane_dmd.arm.drive import drives
 from labcrane_dmd.arm.overload import overloads
 from labcrane_dmd.arm.settings import ArmSettings
@@ -116,7 +116,7 @@ class DmdArm(Dynamics):
             watch.reset()
         # As forces are: the tick in which a drive sets its joint in motion is no overload.
         ticks = max(1, round(self._settings.window_s / self._dt))
-        self._loads = [Window(ticks) for _ in angles]
+        self._loads = [ContactWindow(ticks) for _ in angles]
         self._disconnect()
         self._world = World(self._settings, self._machine, self._dt, angles, self._standing())
         self._pose = angles

@@ -5,7 +5,7 @@ from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from labcrane_dmd.arm.engine import pybullet
-from labcrane_dmd.arm.scene_bodies import Standing
+from labcrane_dmd.arm.scene_bodies import StandingBody
 
 Key = tuple[str, str]
 """A thing and one of its parts."""
@@ -16,7 +16,7 @@ BODY_B, LINK_A, LINK_B, NORMAL_FORCE = 2, 3, 4, 9
 """Places in the engine's contact points."""
 
 
-class Window:
+class ContactWindow:
     """The mean of the last ticks of one force, in N."""
 
     def __init__(self, ticks: int) -> None:
@@ -38,8 +38,9 @@ class Contacts:
 
     ``pressed`` is by the machine and by things that move, on what is fixed by the machine alone;
     ``support`` by the ground and obstacles. ``hits`` is what presses on the parts of jointed
-    figures where they touch obstacles, but for those that carry them. Contact points at a distance
-    have no force; the engine lists them all the same.
+    figures where they touch obstacles, but for those that carry them; ``grounds`` is what presses
+    on the same parts where they lie: on the ground, and on what carries them. Contact points at a
+    distance have no force; the engine lists them all the same.
 
     ``by_link`` is the force of each of the arm's links on each thing, ``fixed`` that of each on
     whatever is fixed and has a limit. All in N.
@@ -55,7 +56,7 @@ class Contacts:
     """
 
     def __init__(
-        self, standing: Sequence[Standing], arm: int, ground: int, client: int, ticks: int
+        self, standing: Sequence[StandingBody], arm: int, ground: int, client: int, ticks: int
     ) -> None:
         self._client = client
         self._things = [each for each in standing if each.placed.kind != "obstacle"]
@@ -74,12 +75,14 @@ class Contacts:
         self._hits = self._windows(
             (each.placed.name, part) for each in jointed for part in _names(each)
         )
+        self._grounds = self._windows(self._hits)
         self._pressed = self._windows(keys)
         self._support = self._windows(each.placed.name for each in self._things)
-        self._links: dict[tuple[str, int], Window] = {}
-        self._fixed: dict[int, Window] = {}
+        self._links: dict[tuple[str, int], ContactWindow] = {}
+        self._fixed: dict[int, ContactWindow] = {}
         self.pressed: Mapping[Key, float] = dict.fromkeys(keys, 0.0)
         self.hits: Mapping[Key, float] = dict.fromkeys(self._hits, 0.0)
+        self.grounds: Mapping[Key, float] = dict.fromkeys(self._grounds, 0.0)
         self.support: Mapping[str, float] = dict.fromkeys(self._support, 0.0)
         self.by_link: Mapping[tuple[str, int], float] = {}
         self.fixed: Mapping[int, float] = {}
@@ -90,6 +93,7 @@ class Contacts:
         for key, force in squeezed.items():
             pressed[key] += force
         hits = dict.fromkeys(self._hits, 0.0)
+        grounds = dict.fromkeys(self._grounds, 0.0)
         support = dict.fromkeys(self._support, 0.0)
         by_link: dict[tuple[str, int], float] = {}
         for each in self._things:
@@ -101,8 +105,9 @@ class Contacts:
                 part = each.parts[point[LINK_A]]
                 if other in self._still:
                     support[name] += force
-                    if other in self._hard and each.placed.jointed:
-                        hits[name, part] += force
+                    if each.placed.jointed:
+                        met = hits if other in self._hard else grounds
+                        met[name, part] += force
                 else:
                     pressed[name, part] += force
                 if other == self._arm:
@@ -116,6 +121,7 @@ class Contacts:
                 fixed[link] = fixed.get(link, 0.0) + force
         self.pressed = _added(self._pressed, pressed)
         self.hits = _added(self._hits, hits)
+        self.grounds = _added(self._grounds, grounds)
         self.support = _added(self._support, support)
         self.by_link = self._grown(self._links, by_link)
         self.fixed = self._grown(self._fixed, fixed)
@@ -124,21 +130,23 @@ class Contacts:
         found: tuple[Any, ...] = pybullet.getContactPoints(**bodies, physicsClientId=self._client)
         return found
 
-    def _windows(self, keys: Iterable[KeyT]) -> dict[KeyT, Window]:
-        return {key: Window(self._ticks) for key in keys}
+    def _windows(self, keys: Iterable[KeyT]) -> dict[KeyT, ContactWindow]:
+        return {key: ContactWindow(self._ticks) for key in keys}
 
     def _grown(
-        self, windows: dict[KeyT, Window], forces: Mapping[KeyT, float]
+        self, windows: dict[KeyT, ContactWindow], forces: Mapping[KeyT, float]
     ) -> Mapping[KeyT, float]:
         """Add forces of what may press for the first time."""
         for key in forces.keys() | windows.keys():
-            windows.setdefault(key, Window(self._ticks)).add(forces.get(key, 0.0))
+            windows.setdefault(key, ContactWindow(self._ticks)).add(forces.get(key, 0.0))
         return {key: window.force for key, window in windows.items()}
 
 
-def _added(windows: Mapping[KeyT, Window], forces: Mapping[KeyT, float]) -> Mapping[KeyT, float]:
+def _added(
+    windows: Mapping[KeyT, ContactWindow], forces: Mapping[KeyT, float]
+) -> Mapping[KeyT, float]:
     return {key: windows[key].add(force) for key, force in forces.items()}
 
 
-def _names(standing: Standing) -> list[str]:
+def _names(standing: StandingBody) -> list[str]:
     return list(dict.fromkeys(standing.parts.values()))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from labcrane import Machine, ProtocolError
 from labcrane.machines import Joint
 from labcrane_dmd.model.interpolation import FULL
-from labcrane_dmd.model.model import Model, Segment
+from labcrane_dmd.model.model import Model, SegmentModel
 
 SHUT = 0.25
 """Opening, in steps of 0.4 %, that is none: a lag never quite gets there."""
@@ -21,7 +21,7 @@ class SegmentDrive:
     the model has for the signal of that opening (docs/decisions/0050).
     """
 
-    def __init__(self, segment: Segment, dt: float) -> None:
+    def __init__(self, segment: SegmentModel, dt: float) -> None:
         self._segment = segment
         self._directions = (segment.extend, segment.retract)
         self._longest = max(round(each.dead_time / dt) for each in self._directions)

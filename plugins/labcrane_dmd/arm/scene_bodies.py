@@ -32,7 +32,7 @@ DISTANCE = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class StandingBody:
     """A thing in the engine: its number there, and what is behind its links.
 
     Attributes
@@ -57,12 +57,12 @@ def add_ground(client: int) -> int:
     return ground
 
 
-def add(placed: PlacedObject, client: int) -> Standing:
+def add(placed: PlacedObject, client: int) -> StandingBody:
     """Put a thing into the engine; what is jointed moves in its joints, all else as one piece."""
     return _add_jointed(placed, client) if placed.jointed else _add_rigid(placed, client)
 
 
-def _add_rigid(placed: PlacedObject, client: int) -> Standing:
+def _add_rigid(placed: PlacedObject, client: int) -> StandingBody:
     """Put a thing into the engine: its first part is the body, the others are fixed to it."""
     shapes = [_shape(part, client) for part in placed.parts]
     mass = 0.0 if placed.kind == "obstacle" else placed.mass
@@ -92,10 +92,10 @@ def _add_rigid(placed: PlacedObject, client: int) -> Standing:
     )
     _surface(placed, body, count, client)
     names = {number - 1: part.name for number, part in enumerate(placed.parts)}
-    return Standing(placed, body, names)
+    return StandingBody(placed, body, names)
 
 
-def _add_jointed(placed: PlacedObject, client: int) -> Standing:
+def _add_jointed(placed: PlacedObject, client: int) -> StandingBody:
     """Put a jointed figure into the engine, with friction in its hinges and stops at their ends."""
     doll = ragdoll(placed)
     at, yaw = stands(placed, placed.parts[0])
@@ -125,7 +125,7 @@ def _add_jointed(placed: PlacedObject, client: int) -> Standing:
             force=hinge.friction,
             physicsClientId=client,
         )
-    return Standing(
+    return StandingBody(
         placed,
         body,
         {links.get(name, -1): part for name, part in doll.parts.items()},
@@ -163,7 +163,7 @@ def _shares(placed: PlacedObject) -> list[float]:
     return [size / sum(sizes) for size in sizes]
 
 
-def check_apart(standing: list[Standing], arm: int, client: int) -> None:
+def check_apart(standing: list[StandingBody], arm: int, client: int) -> None:
     """Refuse a scene in which things stand in each other or in the arm.
 
     What is fixed may stand in what is fixed, as rubble does.

@@ -39,9 +39,9 @@ Parts = Mapping[str, Felt]
 LIMIT_RAD = 1e-3
 """A joint this close to the end of its range stands there."""
 
-GRIP = (("thing", "1"), ("force", "N"), ("drops", "1"))
-"""Which thing is held, counted from 1 in the order of the state, what pulls at it, and how often
-something slipped out."""
+GRIP = (("thing", "1"), ("force", "N"), ("drops", "1"), ("height", "m"))
+"""Which thing is held, counted from 1 in the order of the state, what pulls at it, how often
+something slipped out, and how high what the jaws have hold of is above what is under it."""
 
 
 NOWHERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -111,6 +111,7 @@ def _thing_signals(name: str, felt: Felt) -> Iterator[Signal]:
     yield Signal(f"scene.{name}.support", "N")
     if felt.segments:
         yield Signal(f"scene.{name}.hit", "N", felt.parts)
+        yield Signal(f"scene.{name}.ground", "N", felt.parts)
     for segment in felt.segments:
         yield from _pose_signals(segment)
 
@@ -192,6 +193,7 @@ class ArmState:
             values += [*position, *orientation, *pressed, contacts.support[name]]
             if felt.segments:
                 values += [contacts.hits.get((name, part), 0.0) for part in felt.parts]
+                values += [contacts.grounds.get((name, part), 0.0) for part in felt.parts]
             for segment in felt.segments:
                 if segment in standing.segments:
                     position, orientation = world.segment(standing, segment)
@@ -203,9 +205,9 @@ class ArmState:
             values += [fixed.get(number, 0.0) for number in range(len(self._links))]
         grip = world.grip
         if grip is None:
-            return [*values, 0.0, 0.0, 0.0]
+            return [*values, 0.0, 0.0, 0.0, 0.0]
         held = self._order[grip.held.standing.placed.name] if grip.held else 0
-        return [*values, float(held), grip.force, float(grip.drops)]
+        return [*values, float(held), grip.force, float(grip.drops), grip.height]
 
 
 def _absent(felt: Felt) -> list[float]:
@@ -215,7 +217,7 @@ def _absent(felt: Felt) -> list[float]:
         return forces
     values = [*NOWHERE, *forces, 0.0]
     if felt.segments:
-        values += forces
+        values += [*forces, *forces]
     for _ in felt.segments:
         values += NOWHERE
     return values

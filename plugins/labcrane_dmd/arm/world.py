@@ -6,16 +6,13 @@ from functools import partial
 from pathlib import Path
 
 from labcrane import Machine, PluginError
-from labcrane.machines import PlacedObject
+from labcrane.machines import GRAVITY, PlacedObject
 from labcrane_dmd.arm.contacts import Contacts
 from labcrane_dmd.arm.engine import pybullet
 from labcrane_dmd.arm.grip import Grip
-from labcrane_dmd.arm.scene_bodies import Standing, add, add_ground, check_apart
+from labcrane_dmd.arm.scene_bodies import StandingBody, add, add_ground, check_apart
 from labcrane_dmd.arm.settings import ArmSettings
 from labcrane_dmd.arm.urdf import urdf_of
-
-GRAVITY = 9.81
-"""In m/s²."""
 
 ITERATIONS = 400
 """Solver passes per tick; with the engine's 50, joints creep under their own weight."""
@@ -139,7 +136,7 @@ class World:
         )
         return found
 
-    def segment(self, standing: Standing, name: str) -> tuple[Sequence[float], Sequence[float]]:
+    def segment(self, standing: StandingBody, name: str) -> tuple[Sequence[float], Sequence[float]]:
         """Return where a jointed thing's segment is, and its orientation; as :meth:`where`."""
         link, centre = standing.segments[name]
         state = pybullet.getLinkState(standing.body, link, physicsClientId=self._client)

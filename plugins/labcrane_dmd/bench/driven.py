@@ -13,7 +13,7 @@ from labcrane_dmd.arm.settings import ArmSettings, JawsSettings
 from labcrane_dmd.fit.fitting import LAGS, curve_at
 from labcrane_dmd.fit.recordings import JointRun, SegmentRecording
 from labcrane_dmd.fit.validation import Level, validation_signals
-from labcrane_dmd.model.model import Model, Segment
+from labcrane_dmd.model.model import Model, SegmentModel
 
 LONGER = 1.1
 """A slower arm is waited for this much longer than the recorded one needed."""
@@ -137,7 +137,7 @@ class _Bench:
     def close(self) -> None:
         self._arm.close()
 
-    def run(self, segment: Segment, recorded: JointRun) -> tuple[JointRun, float]:
+    def run(self, segment: SegmentModel, recorded: JointRun) -> tuple[JointRun, float]:
         """Drive one joint as it was recorded; return its angles, and the engine's worst error."""
         joint = self._machine.names.index(segment.name)
         pose = list(self._machine.rest)
@@ -169,7 +169,7 @@ class _Bench:
 
 
 def _level(
-    bench: _Bench, segment: Segment, recording: SegmentRecording, signal: int
+    bench: _Bench, segment: SegmentModel, recording: SegmentRecording, signal: int
 ) -> DrivenLevel:
     run, worst = bench.run(segment, recording.at(signal)[0])
     direction = segment.direction(signal)

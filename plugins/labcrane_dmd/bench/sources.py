@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from labcrane import DeviceError, RecordingError
-from labcrane.streams import NewestSample
+from labcrane import DeviceError, RecordingError, StreamError
+from labcrane.streams import NewestSample, numeric_labels
 from labcrane_dmd.bench.steps import ANGLE, SAMPLE, SIGNAL, Sample
 from labcrane_dmd.model.interpolation import FULL
 
@@ -244,23 +244,24 @@ class _Channel:
         """Let go of the stream."""
         self._samples.close()
 
-    def _accept(self, info: "pylsl.StreamInfo") -> str | None:
-        """Take which channel it is and its unit, or say why it is of no use."""
-        labels = [str(each) for each in info.get_channel_labels() or []]
+    def _accept(self, info: "pylsl.StreamInfo") -> None:
+        """Take which channel it is, and its unit."""
+        labels = numeric_labels(info)
         if self._label not in labels:
-            return (
+            raise StreamError(
                 f"it has no channel {self._label!r}, it has "
                 f"{', '.join(labels) or 'none with a label'}; write STREAM:CHANNEL"
             )
         self._index = labels.index(self._label)
         if self._units is None:
-            return None
+            return
         units = [str(each) for each in info.get_channel_units() or []]
         unit = units[self._index] if units else ""
         if unit not in self._units:
-            return f"its angle has unit {unit!r}; its description must say {', '.join(self._units)}"
+            raise StreamError(
+                f"its angle has unit {unit!r}; its description must say {', '.join(self._units)}"
+            )
         self._factor = self._units[unit]
-        return None
 
 
 def read_raw(path: Path) -> Iterator[Sample]:

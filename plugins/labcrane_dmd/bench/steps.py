@@ -35,7 +35,7 @@ class Sample:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class ValveStep:
     """A stretch of one signal.
 
     Attributes
@@ -55,7 +55,7 @@ class Step:
     left_out: str = ""
 
 
-def cut(samples: Iterable[Sample]) -> tuple[Step, ...]:
+def cut(samples: Iterable[Sample]) -> tuple[ValveStep, ...]:
     """Return all steps of a log, in order; the longest rest becomes a run at 0.
 
     A row is a sample of the angle, with the last signal before it.
@@ -125,8 +125,8 @@ def _step(
     signal: FloatArray,
     angle: FloatArray,
     why: str = "",
-) -> Step:
-    return Step(level, time[part] - time[part.start], signal[part], angle[part], why)
+) -> ValveStep:
+    return ValveStep(level, time[part] - time[part.start], signal[part], angle[part], why)
 
 
 def _why_not(level: int, lasts: float, rest: float) -> str:
@@ -137,7 +137,7 @@ def _why_not(level: int, lasts: float, rest: float) -> str:
     return ""
 
 
-def write_runs(steps: Sequence[Step], folder: Path, segment: str) -> Path:
+def write_runs(steps: Sequence[ValveStep], folder: Path, segment: str) -> Path:
     """Write the runs into ``SEGMENT.csv``, and all steps into ``steps/SEGMENT.csv``.
 
     Raises

@@ -11,7 +11,7 @@ from labcrane_dmd.fit.fitting import LAGS, curve_at
 from labcrane_dmd.fit.recordings import SegmentRecording
 from labcrane_dmd.fit.validation import Level
 from labcrane_dmd.model.interpolation import FULL
-from labcrane_dmd.model.model import Model, Segment
+from labcrane_dmd.model.model import Model, SegmentModel
 from labcrane_dmd.model.output import written
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def draw_model(model: Model, path: Path) -> None:
         figure.savefig(path, dpi=110)
 
 
-def _draw_layers(segment: Segment, axes: "Axes") -> None:
+def _draw_layers(segment: SegmentModel, axes: "Axes") -> None:
     for layer in segment.layers():
         angle = np.linspace(*layer.covers, 100)
         speed = np.degrees([layer.speed(place) for place in angle.tolist()])
@@ -47,7 +47,7 @@ def _draw_layers(segment: Segment, axes: "Axes") -> None:
     axes.grid(alpha=0.3)
 
 
-def _draw_signals(segment: Segment, axes: "Axes") -> None:
+def _draw_signals(segment: SegmentModel, axes: "Axes") -> None:
     signals = np.linspace(-FULL, FULL, 501)
     for share in (0.1, 0.5, 0.9):
         angle = segment.limits[0] + share * (segment.limits[1] - segment.limits[0])

@@ -12,7 +12,7 @@ from labcrane_dmd.fit.recordings import JointRun, SegmentRecording
 from labcrane_dmd.fit.speeds import SpeedCurve, moves, speed_curve
 from labcrane_dmd.fit.step_response import identify
 from labcrane_dmd.model.interpolation import Layer
-from labcrane_dmd.model.model import Direction, Model, Segment, Source
+from labcrane_dmd.model.model import Direction, Model, SegmentModel, Source
 from labcrane_dmd.model.settings import FitSettings
 
 FIRST_RUN_UP_S = 0.8
@@ -49,7 +49,7 @@ def fit_model(recordings: Sequence[SegmentRecording], settings: FitSettings) -> 
     )
 
 
-def fit_segment(recording: SegmentRecording, settings: FitSettings) -> Segment:
+def fit_segment(recording: SegmentRecording, settings: FitSettings) -> SegmentModel:
     """Fit one segment in both directions."""
     known = {*settings.levels, *settings.edge} - set(settings.validation)
     runs = tuple(run for run in recording.runs if abs(run.signal) in known)
@@ -64,7 +64,7 @@ def fit_segment(recording: SegmentRecording, settings: FitSettings) -> Segment:
         min(float(np.median(run.angle[-5:])) for run in runs),
         max(float(np.median(run.angle[-5:])) for run in runs),
     )
-    return Segment(
+    return SegmentModel(
         recording.name,
         limits,
         extend=_direction(seen, 1, limits, settings),

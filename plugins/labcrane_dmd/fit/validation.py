@@ -10,7 +10,7 @@ import numpy as np
 from labcrane import FloatArray, RecordingError
 from labcrane_dmd.fit.fitting import LAGS, curve_at
 from labcrane_dmd.fit.recordings import SegmentRecording
-from labcrane_dmd.model.model import Model, Segment
+from labcrane_dmd.model.model import Model, SegmentModel
 from labcrane_dmd.model.output import written
 
 
@@ -78,7 +78,7 @@ def validate(model: Model, recordings: Sequence[SegmentRecording]) -> tuple[Leve
     return tuple(level for name in model for level in _levels(model, model[name], named[name]))
 
 
-def _levels(model: Model, segment: Segment, recording: SegmentRecording) -> Iterator[Level]:
+def _levels(model: Model, segment: SegmentModel, recording: SegmentRecording) -> Iterator[Level]:
     for signal in validation_signals(model, recording):
         yield _level(segment, recording, signal)
 
@@ -102,7 +102,7 @@ def validation_signals(model: Model, recording: SegmentRecording) -> tuple[int, 
     return signals
 
 
-def _level(segment: Segment, recording: SegmentRecording, signal: int) -> Level:
+def _level(segment: SegmentModel, recording: SegmentRecording, signal: int) -> Level:
     direction = segment.direction(signal)
     curve = curve_at(recording, signal, direction.dead_time + LAGS * direction.lag)
     if curve is None:  # the joint stood still: the model should say so anywhere

@@ -55,7 +55,7 @@ class Direction:
 
 
 @dataclass(frozen=True, slots=True)
-class Segment:
+class SegmentModel:
     """One segment of the machine.
 
     Attributes
@@ -123,7 +123,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Model(Mapping[str, Segment]):
+class Model(Mapping[str, SegmentModel]):
     """The segments by name, and how they came to be.
 
     Attributes
@@ -138,12 +138,12 @@ class Model(Mapping[str, Segment]):
         Version that fitted it.
     """
 
-    segments: Mapping[str, Segment]
+    segments: Mapping[str, SegmentModel]
     sources: Mapping[str, Source]
     settings: FitSettings
     labcrane: str
 
-    def __getitem__(self, name: str) -> Segment:
+    def __getitem__(self, name: str) -> SegmentModel:
         return self.segments[name]
 
     def __iter__(self) -> Iterator[str]:

@@ -12,7 +12,7 @@ from ruamel.yaml import YAML
 from labcrane import ProtocolError, Settings
 from labcrane.core import read_settings
 from labcrane_dmd.model.interpolation import FULL, Layer
-from labcrane_dmd.model.model import Direction, Model, Segment, Source
+from labcrane_dmd.model.model import Direction, Model, SegmentModel, Source
 from labcrane_dmd.model.output import written
 from labcrane_dmd.model.settings import Between, FitSettings
 
@@ -177,10 +177,10 @@ def save(model: Model, path: Path) -> None:
         path.write_text(HEADER + out.getvalue(), encoding="utf-8")
 
 
-def _segment(name: str, text: SegmentText, between: Between) -> Segment:
+def _segment(name: str, text: SegmentText, between: Between) -> SegmentModel:
     lowest, highest = map(math.radians, text.range_deg)
     extend, retract = _direction(text.extend), _direction(text.retract)
-    return Segment(name, (lowest, highest), extend, retract, between)
+    return SegmentModel(name, (lowest, highest), extend, retract, between)
 
 
 def _direction(text: DirectionText) -> Direction:

@@ -7,8 +7,7 @@ import numpy as np
 
 from labcrane import FloatArray
 from labcrane.machines import Body, Geom, PlacedObject
-from labcrane_view.scene.mesh import bevelled_box
-from labcrane_view.scene.mesh_reader import read_mesh
+from labcrane_view.scene.body import body_mesh
 from labcrane_view.scene.things import pieces
 
 DIRECTIONS = 1024
@@ -18,9 +17,7 @@ thousandth of the size."""
 
 def of_body(body: Body) -> FloatArray:
     """Return those of a body of the machine, in its frame, in metres, shape ``(n, 3)``."""
-    if body.mesh is not None:
-        return outermost(read_mesh(body.mesh).points)
-    return outermost(bevelled_box(body.size, body.centre).points)
+    return outermost(body_mesh(body).points)
 
 
 def of_segment(thing: PlacedObject, parts: Sequence[Geom]) -> FloatArray:

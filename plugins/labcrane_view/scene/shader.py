@@ -30,17 +30,7 @@ void main() {
 """
 )
 
-FRAGMENT = (
-    """
-in vec3 world; in vec3 normal; in vec3 seen; in vec3 still; in vec3 moving;
-uniform vec4 rgba; uniform float glow;
-uniform vec3 sun; uniform vec3 eye; uniform vec3 haze; uniform float thickness;
-uniform sampler2D noise;
-"""
-    + LIGHTS
-    + """
-out vec4 colour;
-
+TAPPED = """
 float tapped(sampler2DShadow map, vec3 p) {
   if (any(lessThan(p, vec3(0.0))) || any(greaterThan(p, vec3(1.0)))) return 1.0;
   p.z -= 0.0012;
@@ -55,13 +45,29 @@ float tapped(sampler2DShadow map, vec3 p) {
   return 0.25 * s;
 #endif
 }
+"""
 
+FRAGMENT = (
+    """
+in vec3 world; in vec3 normal; in vec3 seen; in vec3 still; in vec3 moving;
+uniform vec4 rgba; uniform float glow;
+uniform vec3 sun; uniform vec3 sunlight; uniform vec3 above; uniform vec3 below;
+uniform vec3 eye; uniform vec3 haze; uniform float thickness;
+uniform sampler2D noise;
+uniform vec2 sunshine;  // how bright the sun is, and what moving shadows leave of it at least
+"""
+    + LIGHTS
+    + """
+out vec4 colour;
+"""
+    + TAPPED
+    + """
 float sunlit() {
 #if TAPS == 0
-  return 1.0;
+  return sunshine.x;
 #else
-  return min(tapped(p3d_LightSource[1].shadowMap, moving),
-             tapped(p3d_LightSource[0].shadowMap, still));
+  return sunshine.x * min(max(sunshine.y, tapped(p3d_LightSource[1].shadowMap, moving)),
+                          tapped(p3d_LightSource[0].shadowMap, still));
 #endif
 }
 
@@ -90,12 +96,12 @@ void main() {
 #endif
   float facing = max(dot(n, sun), 0.0);
   float shade = sunlit();
-  vec3 sky = mix(vec3(0.26, 0.24, 0.20), vec3(0.50, 0.56, 0.64), 0.5 + 0.5 * n.z);
-  vec3 light = sky + vec3(1.05, 0.98, 0.86) * facing * shade;
+  vec3 sky = mix(below, above, 0.5 + 0.5 * n.z);
+  vec3 light = sky + sunlight * facing * shade;
   vec3 near = base * light;
 #ifndef GROUND
   vec3 half_way = normalize(sun + normalize(eye - world));
-  near += pow(max(dot(n, half_way), 0.0), 24.0) * GLOSS * shade * sign(facing);
+  near += pow(max(dot(n, half_way), 0.0), 24.0) * GLOSS * sunlight * shade * sign(facing);
 #endif
   near = mix(near, base, glow);
   colour = vec4(mix(haze, near, exp(-thickness * thickness * dot(seen, seen))), 1.0);
@@ -159,11 +165,52 @@ void main() {
 
 SKY_FRAGMENT = """#version 330
 in vec3 way;
-uniform vec3 haze;
+uniform vec3 haze; uniform vec3 zenith;
 out vec4 colour;
 void main() {
   float up = clamp(way.z / length(way), 0.0, 1.0);
-  colour = vec4(mix(haze, vec3(0.42, 0.60, 0.82), smoothstep(0.0, 0.45, up)), 1.0);
+  colour = vec4(mix(haze, zenith, smoothstep(0.0, 0.45, up)), 1.0);
 }
 """
-"""Haze at the horizon, blue above."""
+"""Haze at the horizon, the zenith's colour above."""
+
+BACKDROP_VERTEX = """#version 330
+in vec4 p3d_Vertex;
+out vec2 place;
+void main() {
+  gl_Position = vec4(p3d_Vertex.xz, 0.0, 1.0);
+  place = p3d_Vertex.xz;
+}
+"""
+
+BACKDROP_FRAGMENT = (
+    """
+in vec2 place;
+uniform sampler2D sunlit; uniform sampler2D shaded; uniform sampler2D depth;
+uniform mat4 p3d_ProjectionMatrixInverse;
+"""
+    + LIGHTS
+    + TAPPED
+    + """
+out vec4 colour;
+void main() {
+  vec2 at = 0.5 * place + 0.5;
+  float far = texture(depth, at).r;
+  gl_FragDepth = far;
+#if TAPS == 0
+  colour = texture(sunlit, at);
+#else
+  vec4 seen = p3d_ProjectionMatrixInverse * vec4(place, 2.0 * far - 1.0, 1.0);
+  vec3 moving = (p3d_LightSource[1].shadowViewMatrix * vec4(seen.xyz / seen.w, 1.0)).xyz;
+  float sun = tapped(p3d_LightSource[1].shadowMap, moving);
+  colour = mix(texture(shaded, at), texture(sunlit, at), sun);
+#endif
+}
+"""
+)
+"""The sheet that shows the scenery as it was drawn, with the shadows of what moves."""
+
+
+def backdrop(taps: int) -> str:
+    """Return the program of the sheet, with 0, 1 or 4 looks at the map of moving shadows."""
+    return f"#version 330\n#define TAPS {taps}\n{BACKDROP_FRAGMENT}"

@@ -11,22 +11,20 @@ from labcrane import FloatArray, Run
 from labcrane.core import Shape, Sphere
 from labcrane.machines import Body, read_placed, segments, stands
 from labcrane_view.scene import shader
+from labcrane_view.scene.body import body_mesh
+from labcrane_view.scene.daylight import Daylight
 from labcrane_view.scene.forest import forest, grid
-from labcrane_view.scene.mesh import Mesh, bevelled_box, cone, sphere
-from labcrane_view.scene.mesh_reader import painted, read_mesh
+from labcrane_view.scene.mesh import Mesh, cone, sphere
+from labcrane_view.scene.mesh_reader import painted
 from labcrane_view.scene.rams import Ram, hoses, rams
 from labcrane_view.scene.things import pieces
-
-HAZE = (0.66, 0.75, 0.82)
-THICKNESS = 0.0125
-"""Of the haze, per metre."""
-
-SUN = (0.45, -0.38, 0.81)
-"""Direction to the sun."""
 
 SHADOWS, STILL = core.BitMask32.bit(5), core.BitMask32.bit(6)
 """Cameras of the shadow maps, of what moves and of what stands still: neither sees what glows or is
 transparent."""
+
+SCENERY, MOVING = core.BitMask32.bit(7), core.BitMask32.range(8, 23)
+"""Cameras that see the scenery alone, and those, a bit each, that see all but it."""
 
 FULL = 4
 """Looks at a map of shadows for a soft edge."""
@@ -40,9 +38,13 @@ LAST = (0.90, 0.66, 0.07, 1.0)
 STEEL = (0.42, 0.44, 0.46, 1.0)
 BARREL = (0.22, 0.23, 0.25, 1.0)
 CHROME = (0.72, 0.74, 0.77, 1.0)
+CAB = (0.10, 0.105, 0.11, 1.0)
 RUBBER = (0.05, 0.05, 0.055, 1.0)
 
 GRID = (0.78, 0.80, 0.80, 1.0)
+
+PLAIN_SUN, PLAIN_SKY = 0.96, 1.4
+"""Of the light of sun and sky, where no shader adds the light from below."""
 
 SKY_M = 150.0
 """Radius of the sky, in metres: behind everything that is drawn."""
@@ -53,6 +55,8 @@ class Stage:
 
     Parameters
     ----------
+    daylight
+        What lights it.
     shaders
         Whether the renderer runs our shader.
     shadow
@@ -64,7 +68,14 @@ class Stage:
     """
 
     def __init__(
-        self, run: Run, *, shaders: bool, shadow: int, scenery: bool, soft: bool = True
+        self,
+        run: Run,
+        daylight: Daylight,
+        *,
+        shaders: bool,
+        shadow: int,
+        scenery: bool,
+        soft: bool = True,
     ) -> None:
         self.root = core.NodePath("stage")
         self._shaders = shaders
@@ -81,15 +92,17 @@ class Stage:
         self._scenery = scenery
         self._still_left = STILL_PICTURES
         self._still: Any = None
+        self._cameras = 0
         if shaders:
-            self._light(shadow, soft=soft)
+            self._light(daylight, shadow, soft=soft)
         else:
-            self._plain_light()
+            self._plain_light(daylight)
         if scenery:
             for thing in forest():
                 node = self._add(self.root, thing.name, thing.mesh, thing.colour, thing.grain)
                 node.hide(SHADOWS)
                 node.show(STILL)
+                _be_scenery(node)
             self._add_machine(run.bodies)
             self._add_rams(run)
             if shaders:
@@ -112,7 +125,8 @@ class Stage:
             foot, eye = ram.ends(frames)
             way = (eye - foot) / np.linalg.norm(eye - foot)
             _stretch(barrel, foot, foot + ram.barrel * way, ram.radius)
-            _stretch(rod, foot, eye, 0.5 * ram.radius)
+            # Not from the barrel's end: of two surfaces in one place either would be seen.
+            _stretch(rod, foot + 0.3 * (eye - foot), eye, 0.5 * ram.radius)
 
     def _furnish(self, scene: str) -> None:
         """Set up what stands around; what moves is placed by the state from then on."""
@@ -159,6 +173,28 @@ class Stage:
         if self._shaders:
             self.root.set_shader_input("eye", camera.get_pos(self.root))
 
+    @property
+    def has_scenery(self) -> bool:
+        """Whether anything stands still that can be drawn once for all pictures."""
+        return self._scenery and self._shaders
+
+    def own_mask(self) -> Any:
+        """Return a mask for one camera, with what only that camera sees; None after the 23rd."""
+        bit = MOVING.get_lowest_on_bit() + self._cameras
+        if bit > MOVING.get_highest_on_bit():
+            return None
+        self._cameras += 1
+        return core.BitMask32.bit(bit)
+
+    def add_sheet(self, sheet: Any, mask: Any) -> None:
+        """Add what shows the scenery to a camera."""
+        sheet.set_shader(self._backdrop)
+        sheet.hide(~mask)
+
+    def add_cab(self, camera: Any, mesh: Mesh, mask: Any) -> None:
+        """Add a cab that moves with a camera, which alone sees it; it casts no shadow."""
+        self._add(camera, "cab", mesh, CAB, 0.0).hide(~mask)
+
     def see_depth(self, eye: Any, near: float, far: float) -> None:
         """Make a camera see how far away what is solid is, from ``near`` to ``far`` metres."""
         state = core.NodePath("depth picture")
@@ -176,10 +212,8 @@ class Stage:
             )
             node = self.root.attach_new_node(body.name)
             if body.mesh is not None:
-                mesh, paint = read_mesh(body.mesh), painted(body.mesh, paint)
-            else:
-                mesh = bevelled_box(body.size, body.centre)
-            self._add(node, body.name, mesh, paint, 0.0)
+                paint = painted(body.mesh, paint)
+            self._add(node, body.name, body_mesh(body), paint, 0.0)
             if body.moves:
                 self._carried.append((node, *self._places(body.moves)))
                 continue
@@ -236,7 +270,7 @@ class Stage:
             node.set_depth_write(True)
             node.set_bin("opaque", 0)
             node.show(SHADOWS)
-        node.hide(STILL)
+        node.hide(STILL | SCENERY)
 
     def drawn(self, gsg: Any) -> None:
         """Be told that a picture was drawn: shadows of what stands still need no other one."""
@@ -255,6 +289,7 @@ class Stage:
         """Draw lines on the ground, a metre apart, as far as it is level."""
         node = self._add(self.root, "grid", grid(), GRID, 0.0)
         node.hide(SHADOWS | STILL)
+        _be_scenery(node)
 
     def _add_sky(self) -> None:
         node = self.root.attach_new_node(_geometry("sky", self._ball))
@@ -266,8 +301,9 @@ class Stage:
         node.set_depth_write(False)
         node.set_bin("background", 0)
         node.hide(SHADOWS | STILL)
+        _be_scenery(node)
 
-    def _light(self, shadow: int, *, soft: bool) -> None:
+    def _light(self, daylight: Daylight, shadow: int, *, soft: bool) -> None:
         depth = core.Shader.make(core.Shader.SL_GLSL, shader.DEPTH_VERTEX, shader.DEPTH_FRAGMENT)
         for order, (name, mask, wide) in enumerate(
             (("still", STILL, 48.0), ("moving", SHADOWS, 30.0))
@@ -275,7 +311,9 @@ class Stage:
             sun = core.DirectionalLight(name)
             sun.set_priority(-order)  # the shader knows them by their places
             node = self.root.attach_new_node(sun)
-            node.set_pos(*(4.0 * (axis == 0) + 40.0 * part for axis, part in enumerate(SUN)))
+            node.set_pos(
+                *(4.0 * (axis == 0) + 40.0 * part for axis, part in enumerate(daylight.sun))
+            )
             node.look_at(4.0, 0.0, 0.0)
             if shadow:
                 sun.set_shadow_caster(caster=True, buffer_xsize=shadow, buffer_ysize=shadow)
@@ -297,26 +335,40 @@ class Stage:
             )
             for surface in (shader.GROUND, shader.ROUGH, shader.SMOOTH, shader.GLASS)
         }
+        self._backdrop = core.Shader.make(
+            core.Shader.SL_GLSL, shader.BACKDROP_VERTEX, shader.backdrop(taps)
+        )
         self.root.set_shader(self._programs[shader.SMOOTH])
-        length = math.sqrt(sum(part * part for part in SUN))
+        length = math.hypot(*daylight.sun)
         self.root.set_shader_inputs(
-            sun=core.LVector3(*(part / length for part in SUN)),
+            sun=core.LVector3(*(part / length for part in daylight.sun)),
+            sunlight=core.LVector3(*daylight.sunlight),
+            above=core.LVector3(*daylight.above),
+            below=core.LVector3(*daylight.below),
             eye=core.LVector3(0.0, 0.0, 0.0),
-            haze=core.LVector3(*HAZE),
-            thickness=THICKNESS,
+            haze=core.LVector3(*daylight.haze),
+            zenith=core.LVector3(*daylight.zenith),
+            thickness=daylight.thickness,
             glow=0.0,
             rgba=core.LVector4(1.0, 1.0, 1.0, 1.0),
             noise=_noise(),
+            sunshine=core.LVector2(1.0, 0.0),
         )
 
-    def _plain_light(self) -> None:
+    def _plain_light(self, daylight: Daylight) -> None:
         sun = core.DirectionalLight("sun")
-        sun.set_color(core.LColor(1.0, 0.94, 0.84, 1.0))
-        sun.set_direction(core.LVector3(*(-part for part in SUN)))
+        sun.set_color(core.LColor(*(PLAIN_SUN * part for part in daylight.sunlight), 1.0))
+        sun.set_direction(core.LVector3(*(-part for part in daylight.sun)))
         sky = core.AmbientLight("sky")
-        sky.set_color(core.LColor(0.75, 0.78, 0.82, 1.0))
+        sky.set_color(core.LColor(*(PLAIN_SKY * part for part in daylight.above), 1.0))
         for light in (sun, sky):
             self.root.set_light(self.root.attach_new_node(light))
+
+
+def _be_scenery(node: Any) -> None:
+    """Let something be seen by cameras of the scenery, and not by those of what moves."""
+    node.hide(MOVING)
+    node.show(SCENERY)
 
 
 def _stretch(node: Any, start: FloatArray, end: FloatArray, radius: float) -> None:

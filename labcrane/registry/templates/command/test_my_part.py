@@ -8,8 +8,7 @@ import pytest
 from my_module import count, labcrane_commands
 
 from labcrane.registry import CommandOffer
-from labcrane.testing import CommandContract, PluginContract
-from labcrane.testing.exporters import TRIALS, a_participant
+from labcrane.testing import PARTICIPANT_TRIALS, CommandContract, PluginContract, make_participant
 
 
 class TestPlugin(PluginContract):
@@ -26,6 +25,6 @@ class TestCount(CommandContract):
 
 
 def test_trials_are_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    a_participant(tmp_path)
+    make_participant(tmp_path)
     count(tmp_path)
-    assert capsys.readouterr().out == f"P001: {TRIALS}\n"
+    assert capsys.readouterr().out == f"P001: {PARTICIPANT_TRIALS}\n"

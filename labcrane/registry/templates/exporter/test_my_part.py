@@ -9,8 +9,7 @@ import pytest
 from my_module import MyPart, MyPartSettings
 
 from labcrane.analysis import Exporter
-from labcrane.testing import ExporterContract, PluginContract
-from labcrane.testing.exporters import TRIALS, a_participant
+from labcrane.testing import PARTICIPANT_TRIALS, ExporterContract, PluginContract, make_participant
 
 
 class TestPlugin(PluginContract):
@@ -26,11 +25,11 @@ class TestMyPart(ExporterContract):
 
 
 def test_every_trial_is_a_row(tmp_path: Path) -> None:
-    person = a_participant(tmp_path)
+    person = make_participant(tmp_path)
     out = tmp_path / "out"
     out.mkdir()
     MyPart(MyPartSettings(separator=";")).export([person], out)
     with (out / "P001_ses-01.csv").open(newline="") as file:
         rows = list(csv.DictReader(file, delimiter=";"))
-    assert [float(row["trial"]) for row in rows] == list(range(1, TRIALS + 1))
+    assert [float(row["trial"]) for row in rows] == list(range(1, PARTICIPANT_TRIALS + 1))
     assert {row["participant"] for row in rows} == {"P001"}

@@ -36,6 +36,8 @@ class Fault(StrEnum):
     COARSE = "stamps cut to a coarse unit"
     SHIFTED = "delay changed"
     FROZEN = "stamps that stand still"
+    REPEATED = "samples sent again"
+    STRAYED = "stamps that stray and return"
     STEPPED = "clock stepped"
     RESTARTED = "restarted"
     SLEPT = "computer slept"
@@ -56,6 +58,8 @@ _FAULTS: dict[Fault, Callable[[Quality, float], bool]] = {
     Fault.NOISY: lambda q, _: q.noise_s > 0.0 and not q.late_stamps,
     Fault.SHIFTED: lambda q, _: q.shifts > 0,
     Fault.FROZEN: lambda q, _: q.frozen > 0,
+    Fault.REPEATED: lambda q, _: q.repeated > 0,
+    Fault.STRAYED: lambda q, _: q.strayed > 0,
 }
 """Of regular streams only."""
 

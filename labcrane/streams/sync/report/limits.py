@@ -6,7 +6,7 @@ from typing import NamedTuple
 from labcrane.core.findings import Verdict
 
 
-class Limit(NamedTuple):
+class WarnLimit(NamedTuple):
     """Beyond ``warn`` a value deserves a look, beyond ``fail`` the data do."""
 
     warn: float
@@ -19,17 +19,17 @@ class Limit(NamedTuple):
         return Verdict.WARN if value > self.warn else Verdict.PASS
 
 
-ERROR_S = Limit(0.001, 0.05)
-RATE = Limit(0.002, 0.05)
-LAG_S = Limit(0.05, 5.0)
-SILENT_S = Limit(5.0, 5.0)
-GAP_S = Limit(0.0, 1.0)
-DRIFT_PPM = Limit(100.0, 500.0)
-RESIDUAL_S = Limit(0.0002, 0.002)
-RTT_S = Limit(0.002, 0.02)
-PROBE_AGE_S = Limit(6.0, 30.0)
-MISSING = Limit(0.0, 0.01)
-LATE = Limit(0.01, 0.05)
+ERROR_S = WarnLimit(0.001, 0.05)
+RATE = WarnLimit(0.002, 0.05)
+LAG_S = WarnLimit(0.05, 5.0)
+SILENT_S = WarnLimit(5.0, 5.0)
+GAP_S = WarnLimit(0.0, 1.0)
+DRIFT_PPM = WarnLimit(100.0, 500.0)
+RESIDUAL_S = WarnLimit(0.0002, 0.002)
+RTT_S = WarnLimit(0.002, 0.02)
+PROBE_AGE_S = WarnLimit(6.0, 30.0)
+MISSING = WarnLimit(0.0, 0.01)
+LATE = WarnLimit(0.01, 0.05)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,14 +62,14 @@ class Limits:
         Fraction of the loop's ticks that woke more than a period after they were due.
     """
 
-    error_s: Limit = ERROR_S
-    silent_s: Limit = SILENT_S
-    rate: Limit = RATE
-    lag_s: Limit = LAG_S
-    gap_s: Limit = GAP_S
-    drift_ppm: Limit = DRIFT_PPM
-    residual_s: Limit = RESIDUAL_S
-    rtt_s: Limit = RTT_S
-    probe_age_s: Limit = PROBE_AGE_S
-    missing: Limit = MISSING
-    late: Limit = LATE
+    error_s: WarnLimit = ERROR_S
+    silent_s: WarnLimit = SILENT_S
+    rate: WarnLimit = RATE
+    lag_s: WarnLimit = LAG_S
+    gap_s: WarnLimit = GAP_S
+    drift_ppm: WarnLimit = DRIFT_PPM
+    residual_s: WarnLimit = RESIDUAL_S
+    rtt_s: WarnLimit = RTT_S
+    probe_age_s: WarnLimit = PROBE_AGE_S
+    missing: WarnLimit = MISSING
+    late: WarnLimit = LATE

@@ -25,6 +25,9 @@ from labcrane.streams.sync.report.certificate import (
 )
 from labcrane.streams.sync.report.limits import Limits
 
+FURTHEST = 3.0
+"""The furthest of many samples lie so much further off than 95 % of them do."""
+
 
 @dataclass(frozen=True, slots=True)
 class StreamReport:
@@ -223,12 +226,23 @@ def _stamping(quality: Quality, limits: Limits) -> list[Finding]:
         unit = f"{1e3 * quality.grid_s:g} ms"
         text = f"its stamps are cut to {unit}, so that half of that is in their uncertainty"
         _add(found, Verdict.WARN, text, "let its program stamp with LSL's clock at full resolution")
+    found += _scatter(quality, limits)
+    return found
+
+
+def _scatter(quality: Quality, limits: Limits) -> list[Finding]:
+    """Judge how far stamps lie beside an even count."""
+    found: list[Finding] = []
     if quality.late_stamps:
         text = f"chunks are stamped when they are sent ({1e3 * quality.noise_s:.1f} ms of scatter)"
         _add(found, Verdict.WARN, text, "measure the delay and give it as latency_s or min_delay_s")
     elif quality.noise_s:
         text = f"its stamps scatter by {1e3 * quality.noise_s:.2f} ms about its samples"
         _add(found, Verdict.WARN, text, "let its program stamp with LSL's clock at full resolution")
+    elif quality.uneven_s > limits.error_s.warn / FURTHEST:
+        text = f"its stamps lie up to {1e3 * quality.uneven_s:.2f} ms beside an even count, and "
+        text += "arrive so: its samples are uneven, or late by as much, which nothing tells"
+        _add(found, Verdict.WARN, text, "if its sampler is steady, let its program stamp sooner")
     return found
 
 
@@ -245,6 +259,13 @@ def _order(quality: Quality) -> list[Finding]:
     if quality.frozen:
         text = f"{quality.frozen} samples have the stamp of the one before"
         _add(found, Verdict.WARN, text, "leave out the trials they are in; look at its program")
+    if quality.strayed:
+        text = f"{quality.strayed} samples are stamped beside their even count for a while: a "
+        text += "clock stood still and caught up, or its sampler waited"
+        _add(found, Verdict.WARN, text, "give a virtual machine a core of its own, or none")
+    if quality.repeated:
+        text = f"{quality.repeated} samples were sent again, with the stamp that they had"
+        _add(found, Verdict.WARN, text, "leave them out before you filter or average it")
     return found
 
 

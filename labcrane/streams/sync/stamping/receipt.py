@@ -11,7 +11,7 @@ import numpy as np
 
 from labcrane.types import FloatArray
 
-ENOUGH = 400
+ENOUGH, MANY = 400, 2000
 BLOCKS, LEAST = 40, 50
 EDGE = 0.05
 """The part of a block's samples that is sooner than its lower edge."""
@@ -25,6 +25,10 @@ LITTLE = 0.005
 
 SKEWED = 1.6
 """Delays reach so much further up from their median than down; errors of either sign do not."""
+
+HARD = 0.25
+"""Below their usual ones delays end at once: so little of that lies between the soonest in twenty
+and the soonest in two hundred. Of errors that scatter by chance it is half and more."""
 
 NEW = 0.8
 """Delays are new in each sample: neighbours are less alike than this correlation."""
@@ -125,7 +129,9 @@ def _is_computed(steps: FloatArray) -> bool:
 
 def _is_late(rest: FloatArray) -> bool:
     """Whether stamps are late by delays of their own, behind a lower edge."""
-    low, middle, high = np.quantile(rest, (0.05, 0.5, 0.95))
+    least, low, middle, high = np.quantile(rest, (0.005, 0.05, 0.5, 0.95))
     some = rest[:SLICE] - rest[:SLICE].mean()
     alike = float(some[1:] @ some[:-1]) / float(some @ some)
-    return bool(high - middle > SKEWED * (middle - low)) and alike < NEW
+    skewed = high - middle > SKEWED * (middle - low)
+    behind_an_edge = len(rest) >= MANY and low - least < HARD * (middle - low)
+    return bool(skewed or behind_an_edge) and alike < NEW

@@ -26,6 +26,7 @@ BROKEN = 0.01
 ALONE = 10
 """So many steps before and after a shift are as usual."""
 
+SEVERAL = 2
 USUAL = 0.1
 MOST = 20
 """Where there are more, the sampler is uneven."""
@@ -56,6 +57,11 @@ class Shifts:
             if abs(by) < most:
                 level[at:] += by
         return np.asarray(level - level.min(initial=0.0))
+
+    @property
+    def again_and_again(self) -> bool:
+        """Whether a delay may grow slowly and pass at once: shifts do not add up then."""
+        return len(self.by_s) >= SEVERAL and bool((self.by_s < 0.0).all())
 
 
 def find(steps: FloatArray, counts: FloatArray, usual: FloatArray, *, counted: bool) -> Shifts:

@@ -10,7 +10,7 @@ from typing import Any
 from panda3d import core
 
 from labcrane import DeviceError
-from labcrane_view.placement import Span, placed
+from labcrane_view.screen.placement import PictureSpan, placed
 from labcrane_view.settings import ViewSettings
 
 # auto-flip 1: by default Panda3D shows every picture one render_frame late. gl-finish 1: the stamp
@@ -35,9 +35,9 @@ drawn so far."""
 SHARP = 64
 """Pixels of a line of text as it is kept: larger text is blurred a little."""
 
-SEEN, TURNED = -7, -5
-"""When cameras' pictures and the whole window turned over are drawn: after the shadows (Panda3D's
--10), before what shows them (0)."""
+BAKED, SEEN, TURNED = -8, -7, -5
+"""When backdrops, cameras' pictures and the whole window turned over are drawn: after the shadows
+(Panda3D's -10), before what shows them (0)."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Window:
     output: Any
     shaders: bool
     driver: str
-    span: Span
+    span: PictureSpan
 
     @property
     def software(self) -> bool:
@@ -134,7 +134,7 @@ def _output(
     title: str,
     before: Sequence[ViewSettings],
     samples: int,
-) -> tuple[Any, Span] | None:
+) -> tuple[Any, PictureSpan] | None:
     selection = core.GraphicsPipeSelection.get_global_ptr()
     hidden = settings.display == "hidden"
     if module == "p3tinydisplay" and hidden:

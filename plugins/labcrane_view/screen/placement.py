@@ -9,7 +9,7 @@ from typing import Any
 from panda3d import core
 
 from labcrane import DeviceError
-from labcrane_view.monitors import Monitor, monitors
+from labcrane_view.screen.monitors import Monitor, monitors
 from labcrane_view.settings import ViewSettings
 
 Pixels = tuple[int, int]
@@ -50,7 +50,7 @@ class Piece:
 
 
 @dataclass(frozen=True, slots=True)
-class Span:
+class PictureSpan:
     """A window and the pieces of one picture in it: the frames between monitors hide some of it.
 
     Attributes
@@ -68,12 +68,12 @@ class Span:
     pieces: tuple[Piece, ...]
 
 
-def whole(place: Place) -> Span:
+def whole(place: Place) -> PictureSpan:
     """Return a window that shows its picture in one piece."""
-    return Span(place, place[1], (Piece(0, 0, *place[1], 0, 0),))
+    return PictureSpan(place, place[1], (Piece(0, 0, *place[1], 0, 0),))
 
 
-def span(found: Sequence[Monitor], gap_px: int) -> Span:
+def span(found: Sequence[Monitor], gap_px: int) -> PictureSpan:
     """Return the window over monitors from left to right, with ``gap_px`` hidden between them.
 
     Raises
@@ -95,10 +95,10 @@ def span(found: Sequence[Monitor], gap_px: int) -> Span:
         down = each.origin[1] - top
         pieces.append(Piece(each.origin[0] - left, down, *each.size, x, down))
         x += each.size[0] + gap_px
-    return Span(((left, top), size), (x - gap_px, size[1]), tuple(pieces))
+    return PictureSpan(((left, top), size), (x - gap_px, size[1]), tuple(pieces))
 
 
-def placed(settings: ViewSettings, before: Sequence[ViewSettings], desktop: Pixels) -> Span:
+def placed(settings: ViewSettings, before: Sequence[ViewSettings], desktop: Pixels) -> PictureSpan:
     """Return where a view's window lies: on its monitors, or beside those before it.
 
     Raises
@@ -220,7 +220,7 @@ def _find(found: Sequence[Monitor], wanted: int | str) -> Monitor | None:
     return next(named, None)
 
 
-class Keeper:
+class WindowPlacer:
     """Moves a window to a monitor that is left when its own is lost, and back when it is there.
 
     The desktop is asked in a thread of its own, which costs the picture nothing. Nothing is done to

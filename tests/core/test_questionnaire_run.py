@@ -1,4 +1,4 @@
-"""Questionnaires in the course of a session: every answer is an event at once."""
+"""Questionnaires within a session: every answer is an event at once."""
 
 import json
 from pathlib import Path

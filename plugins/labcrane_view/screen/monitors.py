@@ -8,6 +8,9 @@ from labcrane import DeviceError
 
 LINE = re.compile(r"^ *\d+: \+?\*?(\S+) (\d+)/(\d+)x(\d+)/\d+\+(-?\d+)\+(-?\d+)", re.MULTILINE)
 
+CURRENT = re.compile(r"([\d.]+)[ +]*\*")
+"""The rate of the mode that a monitor is in."""
+
 
 @dataclass(frozen=True, slots=True)
 class Monitor:
@@ -30,9 +33,24 @@ def monitors() -> list[Monitor]:
     DeviceError
         There is no xrandr, or it finds no display.
     """
+    return parse(_said("--listactivemonitors"))
+
+
+def refresh_rates() -> list[tuple[str, float]]:
+    """Return each monitor that is on and its refresh rate in Hz, 0 for a virtual screen.
+
+    Raises
+    ------
+    DeviceError
+        There is no xrandr, or it finds no display.
+    """
+    return parse_rates(_said("--current"))
+
+
+def _said(option: str) -> str:
     try:
-        done = subprocess.run(
-            ["xrandr", "--listactivemonitors"],  # noqa: S607 - wherever it is installed
+        done = subprocess.run(  # noqa: S603 - the option is ours
+            ["xrandr", option],  # noqa: S607 - wherever it is installed
             capture_output=True,
             encoding="utf-8",
             check=True,
@@ -47,7 +65,7 @@ def monitors() -> list[Monitor]:
             f"xrandr lists no monitors: {error.stderr.strip()}; check that DISPLAY names the "
             "running display, or leave screen out"
         ) from None
-    return parse(done.stdout)
+    return done.stdout
 
 
 def parse(text: str) -> list[Monitor]:
@@ -56,4 +74,15 @@ def parse(text: str) -> list[Monitor]:
     for name, *numbers in LINE.findall(text):
         width, wide_mm, height, left, top = map(int, numbers)
         found.append(Monitor(name, (width, height), (left, top), wide_mm))
+    return found
+
+
+def parse_rates(text: str) -> list[tuple[str, float]]:
+    """Return the monitors with their rates in what xrandr prints."""
+    found, name = [], ""
+    for line in text.splitlines():
+        if " connected" in line:
+            name = line.split()[0]
+        elif current := CURRENT.search(line):
+            found.append((name, float(current[1])))
     return found

@@ -11,7 +11,7 @@ HERE, AWAY, DUE = "there", "cannot be reached now", "due: to be erased or relabe
 
 
 @dataclass(frozen=True, slots=True)
-class Whereabout:
+class InventoryEntry:
     """One place.
 
     Attributes
@@ -29,18 +29,20 @@ class Whereabout:
     state: str
 
 
-def whereabouts(places: Places, participant: str) -> list[Whereabout]:
+def inventory(places: Places, participant: str) -> list[InventoryEntry]:
     """Return every place with data of a participant, by exact name."""
     register = read(places)
-    found = [Whereabout("recordings", str(folder), HERE) for folder in places.all_raw(participant)]
+    found = [
+        InventoryEntry("recordings", str(folder), HERE) for folder in places.all_raw(participant)
+    ]
     found += [
-        Whereabout("recordings", str(link), "a link, which is never followed")
+        InventoryEntry("recordings", str(link), "a link, which is never followed")
         for link in places.links(participant)
     ]
     if participant in register.participants:
-        found.append(Whereabout("register", str(places.register), HERE))
+        found.append(InventoryEntry("register", str(places.register), HERE))
     if any(stone.participant == participant for stone in register.tombstones):
-        found.append(Whereabout("register", str(places.register), "tombstone: was erased"))
+        found.append(InventoryEntry("register", str(places.register), "tombstone: was erased"))
     for export in register.exports:
         if not concerns(export, participant):
             continue
@@ -49,10 +51,10 @@ def whereabouts(places: Places, participant: str) -> list[Whereabout]:
         state = HERE if there else AWAY
         if export.staging:
             found.append(
-                Whereabout(export.exporter, str(places.root / export.staging), "not finished")
+                InventoryEntry(export.exporter, str(places.root / export.staging), "not finished")
             )
         found += [
-            Whereabout(export.exporter, str(folder / name), state)
+            InventoryEntry(export.exporter, str(folder / name), state)
             for name, people in sorted(export.files.items())
             if participant in people
         ]
@@ -60,9 +62,9 @@ def whereabouts(places: Places, participant: str) -> list[Whereabout]:
         if any(name.split("/")[0] == participant for name in files):
             state = HERE if store_reachable(store, register.study, files, ()) else AWAY
             place = in_store(Path(store), register.study, participant)
-            found.append(Whereabout("store", str(place), state))
+            found.append(InventoryEntry("store", str(place), state))
     found += [
-        Whereabout("owed", owed.folder, DUE)
+        InventoryEntry("owed", owed.folder, DUE)
         for owed in register.owed
         if owed.participant == participant
     ]

@@ -1,0 +1,96 @@
+"""Repeats: samples that a source sends again, with the stamps that they had.
+
+Only the first of them was taken: the others tell nothing of how the source samples, and are left
+out until the rest is corrected. Then each has the time of that which it repeats.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from labcrane.streams.sync.quality import ClockSegment
+from labcrane.streams.sync.raw import RawStream
+from labcrane.types import FloatArray
+
+Which = npt.NDArray[np.intp]
+
+HALF = 0.5
+"""Repeats that take less than this part of their periods were sent again."""
+
+AROUND = 200
+"""So many samples before and after show whether repeats took time: delays pass meanwhile."""
+
+
+def first_of(stamps: FloatArray, rate_hz: float) -> Which | None:
+    """Return the sample that each one of a regular stream repeats; None if none does.
+
+    What is sent again takes no time: what was taken around it fills that. Where several samples
+    share a stamp, or chunks that waited are sent at once and each stamped with that moment, all of
+    them are needed to fill it.
+
+    Parameters
+    ----------
+    stamps
+        On the source's clock, in the order of arrival, shape ``(n,)``.
+    rate_hz
+        Nominal rate.
+    """
+    rising = np.diff(stamps) > 0.0
+    if rising.all() or not rising.any():
+        return None
+    _, first, which = np.unique(stamps, return_index=True, return_inverse=True)
+    of = np.asarray(first[which], dtype=np.intp)
+    again = of != np.arange(len(stamps))
+    if not again.any():
+        return None
+    begins = np.flatnonzero(np.diff(np.r_[0, again.astype(int)]) == 1)
+    last = len(stamps) - 1
+    low, high = np.maximum(begins - AROUND, 0), np.minimum(begins + AROUND, last)
+    repeats = np.r_[0, np.cumsum(again)]
+    some = (repeats[high + 1] - repeats[low + 1]).astype(float)
+    latest = np.maximum.accumulate(stamps)
+    periods = (latest[high] - latest[low]) / _period(stamps, rising, 1.0 / rate_hz)
+    more = (periods - (high - low - some)) / np.maximum(some, 1.0)
+    return of if float(np.median(more)) < HALF else None
+
+
+def _period(stamps: FloatArray, rising: npt.NDArray[np.bool_], nominal: float) -> float:
+    """Return the usual period: from one stamp to another, or by their count; the likelier one."""
+    most = min(AROUND, len(stamps) - 1)
+    known = (
+        float(np.median(np.diff(stamps)[rising])),
+        float(np.median(stamps[most:] - stamps[:-most])) / most,
+    )
+    return min(known, key=lambda one: abs(np.log(max(one, 1e-9) / nominal)))
+
+
+def left_out(raw: RawStream, of: Which) -> RawStream:
+    """Return the stream without its repeats."""
+    own = of == np.arange(len(of))
+    before = np.r_[0, np.cumsum(own)]
+    arrivals, resets = raw.arrivals.copy(), raw.resets.copy()
+    if len(arrivals):
+        arrivals[:, 0] = before[np.clip(arrivals[:, 0].astype(int), 0, len(of))]
+    if len(resets):
+        resets[:, 1:] = before[np.clip(resets[:, 1:].astype(int), 0, len(of))]
+    return replace(
+        raw,
+        stamps=raw.stamps[own],
+        arrivals=arrivals,
+        resets=resets,
+        index=None if raw.index is None else raw.index[own],
+    )
+
+
+def put_back(segments: tuple[ClockSegment, ...], of: Which) -> tuple[ClockSegment, ...]:
+    """Return the segments of the whole stream, from those of the one without repeats."""
+    own = np.r_[np.flatnonzero(of == np.arange(len(of))), len(of)]
+    return tuple(
+        replace(each, start=int(own[each.start]), stop=int(own[each.stop])) for each in segments
+    )
+
+
+def place_of(of: Which) -> Which:
+    """Return, for each sample, its place among those that are no repeats, shape ``(n,)``."""
+    return np.asarray((np.cumsum(of == np.arange(len(of))) - 1)[of], dtype=np.intp)
