@@ -19,6 +19,7 @@ from hypothesis import HealthCheck, settings
 from left_out import leave_out, look_again, nothing_to_find
 from needs import need, not_tried
 from parts import Parts, add_options, asked_for
+from second_try import GATE, SecondTry
 
 from labcrane.streams.network import LOOPBACK
 
@@ -69,8 +70,15 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ[TURNS] = str(_FOLDER)
     if asked_for(config):
         config.pluginmanager.register(Parts(config))
+    if GATE in os.environ and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(SecondTry(config, Path(os.environ.pop(GATE))))
 
 
+QUICK = "not slow and not long and not soak"
+"""What ``pytest`` runs without a word; pyproject.toml says so too."""
+
+
+@pytest.hookimpl(optionalhook=True)  # pytest -p no:xdist
 def pytest_xdist_auto_num_workers() -> int:
     """Return how many processes ``-n auto`` starts."""
     if sys.platform == "win32":
@@ -145,8 +153,11 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     skipped = terminalreporter.stats.get("skipped", [])
     reasons = [one.longrepr[2] for one in skipped if isinstance(one.longrepr, tuple)]
     lines = not_tried(reasons)
-    if terminalreporter.config.getoption("markexpr") == "not long and not soak":
-        lines.append("what takes minutes is not tried either: pytest -m long, pytest -m soak")
+    if terminalreporter.config.getoption("markexpr") == QUICK:
+        lines.append(
+            "the quick tests were run; pytest -m slow takes ten minutes, "
+            "pytest -m long half an hour, pytest -m soak hours"
+        )
     if lines:
         terminalreporter.section("not tried on this computer")
         for line in lines:

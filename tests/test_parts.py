@@ -30,6 +30,7 @@ def run_in(folder: Path, *words: str, broken: int = 9) -> str:
     return done.stdout + done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processes", ["0", "2"])
 def test_what_has_passed_is_noted_and_what_failed_is_run_again(
     tmp_path: Path, processes: str

@@ -318,6 +318,7 @@ def converted(book: Path, sheet: int) -> list[list[str]]:
     return rows
 
 
+@pytest.mark.slow
 def test_libreoffice_opens_the_workbook_and_its_totals_are_ours(tmp_path: Path) -> None:
     record(tmp_path, "R001", vectors())
     record(tmp_path, "R002", [trial(50.0, reference=True), trial(80.0, (2, 0, 1, 0))])
@@ -350,6 +351,7 @@ def test_libreoffice_opens_the_workbook_and_its_totals_are_ours(tmp_path: Path) 
                 assert cell == "" if mean is None else float(cell) == pytest.approx(mean, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_who_was_excluded_is_not_scored_and_is_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -368,6 +370,7 @@ def test_who_was_excluded_is_not_scored_and_is_named(
     assert row[0] == "R001"
 
 
+@pytest.mark.slow
 def test_a_missing_rating_leaves_no_total_in_the_workbook(tmp_path: Path) -> None:
     record(tmp_path, "R001", [trial(60.0, reference=True), trial(60.0)], ratings=False)
     [test] = scored(tmp_path)

@@ -147,6 +147,7 @@ def test_a_block_that_is_redone_begins_anew(tmp_path: Path) -> None:
     assert end["responses"] == len(again)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [STAIRS, QUEST], ids=["stairs", "quest"])
 def test_the_next_session_goes_on_from_the_last_and_both_replay_to_the_bit(
     tmp_path: Path, text: str
@@ -238,6 +239,7 @@ def test_a_codebook_has_the_columns_of_a_track(tmp_path: Path) -> None:
     assert set(open_recording(path).session(1).trials.columns) <= names | {"counted"}
 
 
+@pytest.mark.slow
 @needs("numba")
 def test_compiled_twins_and_the_loop_choose_the_same_levels(tmp_path: Path) -> None:
     protocol = tmp_path / "protocol.yaml"

@@ -101,6 +101,7 @@ def test_there_are_few_names_at_the_top_and_none_twice() -> None:
         assert [name for name in package.__all__ if not hasattr(package, name)] == []
 
 
+@pytest.mark.slow
 def test_core_never_imports_a_plugin() -> None:
     for module in (ROOT / "labcrane").rglob("*.py"):
         names = imported_modules(module.read_text(encoding="utf-8"))
@@ -210,6 +211,7 @@ def public_classes() -> dict[str, list[str]]:
     return found
 
 
+@pytest.mark.slow
 def test_no_two_public_classes_have_one_name() -> None:
     found = public_classes()
     assert len(found) > 500
@@ -219,6 +221,7 @@ def test_no_two_public_classes_have_one_name() -> None:
 ARTICLES = re.compile("(the|this|an?)_[a-z]{2}")
 
 
+@pytest.mark.slow
 def test_no_name_is_told_from_another_by_an_article() -> None:
     named = set()
     for folder in ("labcrane", "plugins"):
@@ -240,6 +243,7 @@ RIDDLES = {
 """Words of our own for what has a name elsewhere: sequencer, handle, marker, inventory ..."""
 
 
+@pytest.mark.slow
 def test_no_name_is_a_riddle() -> None:
     named = set()
     for folder in ("labcrane", "plugins"):
@@ -302,6 +306,7 @@ def defined(module: Path) -> Iterator[str]:
             )
 
 
+@pytest.mark.slow
 def test_nothing_is_defined_that_only_tests_use() -> None:
     places = (("labcrane", "*.py*"), ("plugins", "*.py"), ("docs", "*.md"), ("benchmarks", "*.py"))
     users = [path for folder, what in places for path in (ROOT / folder).rglob(what)]

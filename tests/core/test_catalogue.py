@@ -117,6 +117,7 @@ def drawn(study: str, registry: Registry, count: int, seed: int) -> Sequence[Wro
     return random.Random(f"{study} {seed}").sample(every, min(count, len(every)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("study", STUDIES)
 def test_a_fault_drawn_at_random_is_told_in_its_line_with_its_remedy(
     study: str, folder: Path, registry: Registry

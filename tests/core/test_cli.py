@@ -29,6 +29,7 @@ def labcrane_command(
     )
 
 
+@pytest.mark.slow
 def test_the_demo_names_a_participant_file_and_a_picture_that_exist(tmp_path: Path) -> None:
     done = labcrane_command("demo", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -39,6 +40,7 @@ def test_the_demo_names_a_participant_file_and_a_picture_that_exist(tmp_path: Pa
     assert done.stderr == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("without", "engine"),
     [
@@ -85,6 +87,7 @@ def test_a_mistake_ends_with_code_2_and_no_traceback(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_real_session_without_joysticks_is_refused(tmp_path: Path) -> None:
     (tmp_path / "study.yaml").write_text(SHORT, encoding="utf-8")
     done = labcrane_command(
@@ -134,6 +137,7 @@ def test_a_planned_order_is_the_one_that_is_run() -> None:
     assert sum(trial.planned.counted for trial in block.trials) == 32
 
 
+@pytest.mark.slow
 def test_lines_of_a_pipe_are_orders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # A recorded operator needs no joystick, and is waited for like a person.
     (tmp_path / "study.yaml").write_text(SHORT, encoding="utf-8")

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from needs import needs
 
 from labcrane.core.compiled import TURN
@@ -42,6 +43,7 @@ print(json.dumps([*counts, row[0], stats.cache_path]))
 """
 
 
+@pytest.mark.slow
 @needs("numba")
 def test_of_several_processes_that_want_a_function_one_compiles_it(tmp_path: Path) -> None:
     (tmp_path / "law.py").write_text(LAW)

@@ -77,6 +77,7 @@ def test_the_lines_the_bar_the_page_and_the_view_count_alike(visit: Visit) -> No
     assert seen == list(range(1, counts.total + 1))
 
 
+@pytest.mark.slow
 def test_a_resumed_session_goes_on_counting_where_it_stopped(visit: Visit) -> None:
     stopped(visit)
     counts = TrialCounts.of(planned(visit))

@@ -132,6 +132,7 @@ def a_sensor(kind: str, name: str, column: str, level: str, delay_s: float) -> I
         process.wait()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "name", "column", "level"),
     [

@@ -152,6 +152,7 @@ def own_server() -> Sequence[str]:
     return [sys.executable, "-m", "labcrane", "language-server"]
 
 
+@pytest.mark.slow
 @needs("pybullet")
 def test_labcranes_language_server_marks_what_a_check_finds(
     folder: Path, registry: Registry, own_server: Sequence[str], capsys: pytest.CaptureFixture[str]

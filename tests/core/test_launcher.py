@@ -52,6 +52,7 @@ class LateRecorder:
         pass
 
 
+@pytest.mark.slow
 def test_a_note_that_is_given_while_streams_are_waited_for_is_in_the_record(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -146,6 +147,7 @@ parent.close()
 """
 
 
+@pytest.mark.slow
 def test_a_spare_recorder_that_hangs_keeps_no_recorder_from_closing_its_journal(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -72,6 +72,7 @@ def test_a_movement_is_played_in_real_time_in_a_window(tmp_path: Path) -> None:
     assert np.isfinite(shown["cue.ball.radius"][moving]).all()
 
 
+@pytest.mark.slow
 @needs(*GRAPHICS)
 def test_without_a_display_it_is_written_to_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
@@ -87,6 +88,7 @@ def test_without_a_display_it_is_written_to_files(
     assert "tone.wav" in names
 
 
+@pytest.mark.slow
 def test_where_nothing_can_be_shown_it_says_so(tmp_path: Path) -> None:
     protocol, _ = a_protocol(tmp_path)
     done = subprocess.run(

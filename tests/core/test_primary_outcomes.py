@@ -62,6 +62,7 @@ def test_an_outcome_that_is_named_twice_is_refused(tmp_path: Path) -> None:
     assert "'circle_to_circle' stands there twice; once is enough" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("named", [True, False])
 def test_the_report_says_which_outcomes_the_recorded_protocol_calls_primary(
     tmp_path: Path, *, named: bool

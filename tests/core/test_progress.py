@@ -91,6 +91,7 @@ def test_a_resumed_session_goes_on_where_the_machine_stood_and_ends_whole(died: 
     assert np.abs(state[border + 1, :4] - state[border, :4]).max() < 0.01
 
 
+@pytest.mark.slow
 def test_a_session_that_is_complete_is_not_gone_on_with(visit: Visit) -> None:
     run(visit, ScriptedConsole())
     with pytest.raises(ProtocolError, match="session 1 of P001-SIMULATED ran to its end"):

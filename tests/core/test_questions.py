@@ -46,6 +46,7 @@ SEEN = f"views: {{front: {{use: view}}}}\n{BALL}"
 GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "key", "said"),
     [
@@ -444,6 +445,7 @@ def labcrane_controllers():
 """
 
 
+@pytest.mark.slow
 def test_a_rate_that_this_computer_cannot_hold_is_asked_about_by_a_rehearsal(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -93,6 +93,7 @@ def test_a_pause_holds_the_machine_and_the_trials_clock(study: Study) -> None:
     assert len(plain.trials()) == len(seen.trials())
 
 
+@pytest.mark.slow
 def test_a_repeated_trial_is_kept_and_run_again_as_a_new_attempt(study: Study) -> None:
     first = rehearse(study)
     start = next(n for n, frame in enumerate(first.frames) if frame.trial == 2)
@@ -219,6 +220,7 @@ def test_a_session_ended_while_it_waits_for_feedback_begins_no_step(study: Study
     assert seen.names[-1] == "session.end"
 
 
+@pytest.mark.slow
 def test_a_break_lasts_as_written_or_until_it_is_skipped(tmp_path: Path) -> None:
     text = SHORT.replace("- block:", "- break: {seconds: 2}\n      - block:")
     study = a_study(tmp_path, text)
@@ -265,6 +267,7 @@ def test_lost_input_ends_the_session_when_the_protocol_says_so(tmp_path: Path) -
     assert seen.frames[-1].tick.number <= 301
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_frames(study: Study) -> None:
     one, two = rehearse(study), rehearse(study)
     assert len(one.frames) == len(two.frames)

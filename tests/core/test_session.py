@@ -43,6 +43,7 @@ def test_the_participant_file_holds_every_frame_and_event(visit: Visit) -> None:
     assert len(session.trials) == 2
 
 
+@pytest.mark.slow
 def test_ticks_do_not_search_what_was_there_before_them_for_garbage(visit: Visit) -> None:
     class Looking(ScriptedConsole):
         def report(self, event: Event) -> None:
@@ -179,6 +180,7 @@ def labcrane_process(*arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ENGINES)
 def test_two_fast_runs_in_two_processes_give_the_same_bits(name: str, tmp_path: Path) -> None:
     study = tmp_path / "study.yaml"
@@ -194,6 +196,7 @@ def test_two_fast_runs_in_two_processes_give_the_same_bits(name: str, tmp_path: 
     assert digests[0] == digests[1]
 
 
+@pytest.mark.slow
 def test_another_process_sees_the_streams_and_their_samples_are_the_files(tmp_path: Path) -> None:
     text = SHORT.replace("study: rehearsal", f"study: s{os.getpid()}")
     study = a_study(tmp_path, text.replace("movements: 2", "movements: 1, limit_s: 2"))

@@ -390,6 +390,7 @@ def play(stops: type[Stops], sequences: int) -> None:
     )
 
 
+@pytest.mark.slow
 def test_whatever_stops_a_session_it_owes_what_is_left_and_no_more(stops: type[Stops]) -> None:
     play(stops, 60)
 

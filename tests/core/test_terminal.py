@@ -117,6 +117,7 @@ def test_an_interrupt_from_the_keyboard_ends_the_session_in_order(folder: Path) 
     assert session.events["data"].tolist()[-1]["reason"] == "by order"
 
 
+@pytest.mark.slow
 @needs("terminals")
 def test_a_questionnaire_is_filled_in_at_the_terminal(tmp_path: Path) -> None:
     steps = "- questionnaire: [subjective_accuracy, situational_awareness]"

@@ -35,6 +35,7 @@ def test_the_plan_lists_every_step_of_a_session_in_order(
     assert places == sorted(places)
 
 
+@pytest.mark.slow
 def test_a_session_of_it_runs_and_its_trials_are_those_that_are_counted(
     protocol: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

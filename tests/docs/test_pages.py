@@ -11,6 +11,9 @@ from needs import missing, need
 RUN = {"python", "sh", "r", "octave", "matlab", "yaml", "toml", "json", "xml", ""}
 """Languages of blocks; one without a language lists files that are there."""
 
+FIRST = {"README.md", "first-study.md"}
+"""Pages that every run of the tests follows; the others are slow."""
+
 MOST_NOT_RUN = 0
 """How many blocks may be marked as not run; each has its reason beside it."""
 
@@ -23,7 +26,13 @@ def long(page: Path) -> bool:
     return any("long" in block.marks for block in blocks(page))
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, id=name(page), marks=() if page.name in FIRST else pytest.mark.slow)
+        for page in PAGES
+    ],
+)
 def test_a_page_can_be_followed_from_top_to_bottom(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, recorded: dict[str, str]
 ) -> None:
@@ -83,7 +92,7 @@ def test_blocks_have_a_language_that_is_run_or_a_reason_why_not() -> None:
 def test_what_begins_on_a_bare_machine_is_run_by_the_gate() -> None:
     marked = [b.text for page in PAGES for b in blocks(page) if "bare machine" in b.marks]
     assert sorted(commands()) == sorted(marked)
-    gate = (ROOT / ".ci" / "run").read_text()
+    gate = (ROOT / ".ci" / "stages").read_text()
     assert 'tests/docs/bare_machine.py >"$work/commands"\n' in gate
     assert 'bash -euo pipefail "$work/commands" | tee "$work/said"\n' in gate
 

@@ -45,6 +45,7 @@ def test_this_computers_clock_is_fine_enough_and_runs_like_its_hardware() -> Non
     assert abs(said) < 600.0, "NTP slews by 500 ppm at most"
 
 
+@pytest.mark.slow
 def test_lateness_is_measured_by_ticking() -> None:
     found = scheduling.examine(rate_hz=50.0)
     assert found[0].text.startswith("100 ticks at 50 Hz were late by ")

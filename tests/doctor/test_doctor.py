@@ -73,6 +73,7 @@ def lamp(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> type[labcrane.Setti
     return type(found.settings)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("does", "verdict", "text"),
     [
@@ -114,6 +115,7 @@ shutil.disk_usage = disk_usage
 """What makes every process that starts stand still where it looks at a folder's server."""
 
 
+@pytest.mark.slow
 def test_a_data_folder_that_hangs_is_named_and_the_rest_is_looked_at(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -203,6 +205,7 @@ def test_a_study_needs_looks_at_what_it_uses_and_at_nothing_else() -> None:
     assert left_out == ["input can: give --protocol with a study that uses it"]
 
 
+@pytest.mark.slow
 def test_the_command_says_all_as_json_and_keeps_it_for_the_record(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -32,6 +32,7 @@ def about(found: list[Finding], word: str) -> Finding:
     return one
 
 
+@pytest.mark.slow
 def test_streams_that_are_there_missing_or_wrong_are_told_apart(
     outlet: pylsl.StreamOutlet,
 ) -> None:
@@ -54,6 +55,7 @@ def test_streams_that_are_there_missing_or_wrong_are_told_apart(
     assert "has 4 channels, 32 are expected" in about(found, "wrong").text
 
 
+@pytest.mark.slow
 def test_a_stream_asked_for_by_its_type_alone_is_asked_about_and_rivals_are_refused() -> None:
     mine, his = (
         pylsl.StreamOutlet(pylsl.StreamInfo(f"{NAME} twin", "DoctorEEG", 4, 250.0, "float32", who))
@@ -115,6 +117,7 @@ def test_too_few_free_ports_are_a_finding_that_says_what_to_do() -> None:
     assert "PortRange = 128 under [ports]" in few.advice
 
 
+@pytest.mark.slow
 @needs_mounts
 def test_our_own_stream_is_not_found_when_nothing_gets_through() -> None:
     # In a network of its own in which not even loopback is up.
@@ -173,6 +176,7 @@ def test_what_is_no_answer_of_a_stream_is_passed_over(said: bytes) -> None:
     assert len(found) == 1
 
 
+@pytest.mark.slow
 def test_a_peer_that_answers_passes(outlet: pylsl.StreamOutlet) -> None:
     port = int(ElementTree.fromstring(outlet.get_info().as_xml()).findtext("v4service_port") or 0)
     found = lsl.ask_peer(HOST, port)

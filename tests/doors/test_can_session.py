@@ -85,6 +85,7 @@ def nobody_has_thought_of_this(*_: object) -> None:
     raise ZeroDivisionError("nobody has thought of this")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [math.nan, None], ids=str)
 def test_a_panel_that_goes_wrong_moves_nothing_and_pauses_until_it_is_well(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: float | None

@@ -42,6 +42,7 @@ def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return data
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", ["tables", "matlab", "bids", "psychds", "xdf"])
 def test_a_recording_without_frames_is_named_left_out_and_the_rest_is_exported(
     lab: Path, tmp_path: Path, capsys, to: str
@@ -56,6 +57,7 @@ def test_a_recording_without_frames_is_named_left_out_and_the_rest_is_exported(
     assert any(path.is_file() for path in out.rglob("*"))
 
 
+@pytest.mark.slow
 def test_a_report_is_of_those_who_can_be_used_and_says_who_cannot(
     lab: Path, tmp_path: Path, capsys
 ) -> None:
@@ -68,6 +70,7 @@ def test_a_report_is_of_those_who_can_be_used_and_says_who_cannot(
     assert (out / "participants" / "P003.html").is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [["export", "--to", "tables"], ["report"]], ids=" ".join)
 def test_a_recording_that_breaks_off_in_its_middle_is_left_out_by_itself(
     lab: Path, tmp_path: Path, capsys, words: list[str]
@@ -150,6 +153,7 @@ def deep(file: h5py.File, outside: Path) -> None:
         node = node.create_group("a")  # a minute, and what is too deep is too deep at 33
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change", [linked, soft, circle, raw_storage, virtual, bomb, large_piece, deep]
 )
@@ -189,6 +193,7 @@ def damaged(raw: bytes, dice: random.Random) -> bytes:
     return bytes(changed)
 
 
+@pytest.mark.slow
 def test_a_changed_number_of_a_short_column_is_found_though_hdf5_does_not_see_it(
     lab: Path, tmp_path: Path
 ) -> None:
@@ -207,6 +212,7 @@ def test_a_changed_number_of_a_short_column_is_found_though_hdf5_does_not_see_it
     assert open_recording(path).sessions == [1]
 
 
+@pytest.mark.slow
 def test_a_file_that_was_changed_with_hdf5_has_no_seal_and_is_read(
     lab: Path, tmp_path: Path
 ) -> None:
@@ -235,6 +241,7 @@ def add_something(node: h5py.Group, dice: random.Random) -> None:
         node[name] = value
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_a_file_to_which_others_added_anything_is_read(
     lab: Path, tmp_path: Path, seed: int
@@ -248,6 +255,7 @@ def test_a_file_to_which_others_added_anything_is_read(
     assert open_recording(path).session(1).events["name"].tolist() == held
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 def test_attributes_that_others_gave_to_any_node_are_returned_and_hide_nothing(
     lab: Path, tmp_path: Path, seed: int
@@ -270,6 +278,7 @@ def test_attributes_that_others_gave_to_any_node_are_returned_and_hide_nothing(
     assert {**session.attrs, "of others": None} == {**held.attrs, "of others": None}
 
 
+@pytest.mark.slow
 def test_a_text_that_says_it_is_longer_than_any_is_refused_before_memory_is_taken_for_it(
     lab: Path, tmp_path: Path
 ) -> None:
@@ -367,6 +376,7 @@ def fuzz(
     return found
 
 
+@pytest.mark.slow
 def test_a_damaged_participant_file_is_read_as_written_or_refused_in_words(
     lab: Path, tmp_path: Path
 ) -> None:
@@ -375,6 +385,7 @@ def test_a_damaged_participant_file_is_read_as_written_or_refused_in_words(
     assert min(found.values()) > 5
 
 
+@pytest.mark.slow
 def test_a_damaged_journal_is_read_as_written_or_said_not_to_be(lab: Path, tmp_path: Path) -> None:
     good = lab / "P003" / "ses-01_run.xdf"
     read = ReadJournal(good)
@@ -395,6 +406,7 @@ def test_many_damaged_files(lab: Path, tmp_path: Path, name: str) -> None:
     fuzz(raw, tmp_path / "damaged.xdf", ReadJournal(good), 750, seed, MOST_S)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("named", [3, np.arange(4), h5py.Empty("S1"), np.bytes_(b"P001")], ids=repr)
 def test_a_participant_that_is_no_text_is_refused(lab: Path, tmp_path: Path, named: object) -> None:
     path = tmp_path / "P001.h5"
@@ -405,6 +417,7 @@ def test_a_participant_that_is_no_text_is_refused(lab: Path, tmp_path: Path, nam
         open_recording(path)
 
 
+@pytest.mark.slow
 def test_of_groups_nested_without_end_only_the_first_are_visited(
     lab: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -217,6 +217,7 @@ def door_of(name: str, study: Study, folder: Path) -> Door:
     return Door(name, make(study, folder), REFUSALS, cheap, means)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DOORS)
 def test_what_is_broken_is_taken_or_refused_by_a_documented_error(
     name: str, study: Study, tmp_path: Path

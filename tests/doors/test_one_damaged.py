@@ -99,6 +99,7 @@ def good(lab: Path) -> None:
     assert main(words("tables", lab, lab.parent / "good")) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_damaged_recording_is_named_and_the_others_are_used(
     lab: Path, tmp_path: Path, capsys, command: str
@@ -118,6 +119,7 @@ def test_recordings_damaged_in_many_ways_are_named_and_the_others_are_used(
         try_it(lab, tmp_path / str(seed), capsys, command, damage, seed)
 
 
+@pytest.mark.slow
 def test_a_recording_that_lost_its_trials_is_named_by_score_and_no_other_is(
     lab: Path, tmp_path: Path, capsys
 ) -> None:

@@ -61,6 +61,7 @@ def test_a_lever_that_is_no_number_shuts_its_valve_at_once_and_is_named(
     assert commands.signals(0.02)[0] == [100.0, -50.0]
 
 
+@pytest.mark.slow
 @settings(max_examples=1500, deadline=None)
 @given(
     st.binary(max_size=8), st.integers(0, 2**29 - 1) | st.just(256), st.sampled_from([(), VALVES])

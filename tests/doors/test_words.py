@@ -63,6 +63,7 @@ def test_no_words_can_raise_in_the_loop(study: Study, order: Order, text: str) -
     assert seen.events("session.end")[0].data["reason"] == "by order"
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(st.lists(st.tuples(st.sampled_from(PEOPLE), st.text(max_size=300)), max_size=12))
 def test_no_sequence_of_orders_with_any_words_raises_in_the_loop(

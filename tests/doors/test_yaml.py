@@ -174,6 +174,7 @@ def fuzz_protocols(
         assert time.thread_time() - before < most_s, changed.read_text()
 
 
+@pytest.mark.slow
 def test_a_protocol_with_anything_in_any_place_is_checked_without_a_traceback(
     tmp_path: Path,
 ) -> None:
@@ -189,6 +190,7 @@ NOWHERE = ("{}" + "a" * 300, "b/" * 3000 + "{}", "{}/under a file", "c\0{}")
 """Names of files that no disk takes, or that lead through what is no folder."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", NOWHERE, ids=["long", "deep", "through", "NUL"])
 def test_a_file_that_no_disk_can_have_is_told_of_wherever_one_is_named(
     tmp_path: Path, form: str
@@ -244,6 +246,7 @@ TOKENS = st.sampled_from(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=800, deadline=None)
 @given(st.lists(TOKENS, max_size=40).map("".join) | st.text(max_size=60))
 def test_any_text_is_yaml_or_is_told_to_be_none(text: str) -> None:

@@ -181,6 +181,7 @@ def test_a_session_that_will_not_fit_is_refused_with_numbers(tmp_path: Path) -> 
     assert "and only 2 MB are free" in done.stdout
 
 
+@pytest.mark.slow
 def test_no_more_frames_wait_for_a_disk_than_the_table_of_limits_allows(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -203,6 +204,7 @@ def test_no_more_frames_wait_for_a_disk_than_the_table_of_limits_allows(
     assert "order.end" not in [event.name for event in console.told], "long before the order"
 
 
+@pytest.mark.slow
 def test_a_folder_that_vanishes_holds_the_session(tmp_path: Path) -> None:
     visit = Visit(a_study(tmp_path, SHORT), "P001", 1, tmp_path / "data", simulated=True)
     told = []

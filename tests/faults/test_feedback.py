@@ -127,6 +127,7 @@ class Told:
         return {name for name, ready in lost.items() if ready}
 
 
+@pytest.mark.slow
 @needs(*GRAPHICS)
 def test_killed_hanging_and_raising_feedback_leave_the_session_as_it_is(
     protocol: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

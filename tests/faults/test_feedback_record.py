@@ -89,6 +89,7 @@ def before_and_after(
     return due < changed, due > changed + SETTLED_S
 
 
+@pytest.mark.slow
 def test_every_change_of_a_setting_is_an_event(session: lab.recording.SessionRecord) -> None:
     events = session.events
     made = [dict(data) for data in events.loc[events["name"] == "feedback.setting", "data"]]
@@ -101,6 +102,7 @@ def test_every_change_of_a_setting_is_an_event(session: lab.recording.SessionRec
     assert [data["refused"] is None for data in asked] == [True, True, True, False]
 
 
+@pytest.mark.slow
 def test_the_tone_is_rebuilt_from_the_record(session: lab.recording.SessionRecord) -> None:
     heard = session.streams["labcrane.feedback.tone"].data
     way = distances(session, heard["frame.tick"].to_numpy(int))
@@ -122,6 +124,7 @@ def test_the_tone_is_rebuilt_from_the_record(session: lab.recording.SessionRecor
             np.testing.assert_allclose(heard[f"tone.{name}"].to_numpy()[chosen], values, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_sphere_follows_a_changed_setting_in_every_view(
     session: lab.recording.SessionRecord,
 ) -> None:

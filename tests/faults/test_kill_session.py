@@ -103,6 +103,7 @@ def _whole_journal(protocol: Path, prepared: Path, data: Path) -> int:
     return _size(data / "P001-SIMULATED" / "ses-02_run.xdf")
 
 
+@pytest.mark.slow
 def test_kills_hit_the_session_in_all_its_stages(killed) -> None:
     _, runs, _ = killed
     victims = [victim for _, victim, *_ in runs]
@@ -110,6 +111,7 @@ def test_kills_hit_the_session_in_all_its_stages(killed) -> None:
     assert victims.count("all") >= len(runs) // 10  # the start and the conclusion
 
 
+@pytest.mark.slow
 def test_every_recording_opens_and_no_frame_is_missing(killed) -> None:
     _, runs, seen = killed
     witnessed = 0
@@ -132,6 +134,7 @@ def test_every_recording_opens_and_no_frame_is_missing(killed) -> None:
     assert witnessed > 240, "the witness has hardly seen anything"
 
 
+@pytest.mark.slow
 def test_pyxdf_reads_every_journal(killed) -> None:
     _, runs, _ = killed
     journals = [journal for data, *_ in runs for journal in data.rglob("ses-02_*.xdf")]
@@ -145,6 +148,7 @@ def test_pyxdf_reads_every_journal(killed) -> None:
                 assert len(theirs["time_stamps"]) == len(ours[name].stamps)
 
 
+@pytest.mark.slow
 def test_no_earlier_session_changes(killed) -> None:
     prepared, runs, _ = killed
     name = Path("P001-SIMULATED")
@@ -162,6 +166,7 @@ def _interrupted(data: Path) -> bool:
     return trial is not None and trial["counted"]
 
 
+@pytest.mark.slow
 def test_a_killed_session_is_gone_on_with(killed) -> None:
     _, runs, _ = killed
     data = next(data for data, victim, *_ in runs if victim == "session" and _interrupted(data))

@@ -88,6 +88,7 @@ def test_why_it_cannot_be_started_is_said_before_its_libraries_end_the_process(
         made.stop()
 
 
+@pytest.mark.slow
 def test_one_that_hangs_when_it_is_closed_is_ended_and_all_it_presented_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

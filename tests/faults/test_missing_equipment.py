@@ -48,6 +48,7 @@ def processes(folder: Path, text: str, policy: str) -> FeedbackProcesses:
     return FeedbackProcesses(Visit(study, "P001", 1, folder, simulated=True))
 
 
+@pytest.mark.slow
 def test_a_session_goes_on_without_what_is_missing_where_the_protocol_says_so(
     tmp_path: Path,
 ) -> None:

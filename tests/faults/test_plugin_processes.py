@@ -90,6 +90,7 @@ def test_the_launcher_passes_on_what_a_session_says_of_a_plugin(spoil: Spoil) ->
     assert recorded(protocol) is not None
 
 
+@pytest.mark.slow
 def test_a_component_that_hangs_is_named_and_its_process_ended(spoil: Spoil) -> None:
     protocol = spoil("task evaluate 30 hanging")
     outcome, told = launch(protocol)

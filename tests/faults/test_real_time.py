@@ -67,6 +67,7 @@ def _besides(launcher, session: psutil.Process) -> list[psutil.Process]:
     return [each for each in children if each.pid != session.pid]
 
 
+@pytest.mark.slow
 @needs("Linux", "networks")
 def test_who_may_have_no_real_time_priority_is_told_how_before_anything_is_recorded(
     tmp_path: Path,

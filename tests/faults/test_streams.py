@@ -158,6 +158,7 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, st
             process.wait()
 
 
+@pytest.mark.slow
 def test_a_session_waits_for_its_streams_and_says_for_which(session) -> None:
     _, said = session
     assert "waiting for streams:" in said
@@ -165,6 +166,7 @@ def test_a_session_waits_for_its_streams_and_says_for_which(session) -> None:
     assert waiting < started
 
 
+@pytest.mark.slow
 def test_a_stream_of_a_type_is_the_one_that_somebody_confirmed_and_no_other_is_recorded(
     session,
 ) -> None:
@@ -179,6 +181,7 @@ def test_a_stream_of_a_type_is_the_one_that_somebody_confirmed_and_no_other_is_r
     assert ", and was confirmed: it is 'Mine'" in said
 
 
+@pytest.mark.slow
 def test_a_lost_stream_pauses_the_session_until_it_is_back(session) -> None:
     path, _ = session
     events = open_recording(path).session(1).events
@@ -194,6 +197,7 @@ def test_a_lost_stream_pauses_the_session_until_it_is_back(session) -> None:
     assert ("stream.lost", "gaze") not in names  # it is not required
 
 
+@pytest.mark.slow
 def test_a_killed_recorder_costs_nothing_and_both_at_once_one_gap(session) -> None:
     path, _ = session
     assert len(list(path.parent.glob("ses-01_streams*.xdf"))) == RECORDERS + RECORDER_KILLS + 2
@@ -206,6 +210,7 @@ def test_a_killed_recorder_costs_nothing_and_both_at_once_one_gap(session) -> No
     assert np.count_nonzero(np.diff(counter[restarted]) > 1) <= 1
 
 
+@pytest.mark.slow
 def test_the_gaps_and_what_to_do_are_in_the_sync_report(session) -> None:
     path, said = session
     report = open_recording(path).session(1).sync_report

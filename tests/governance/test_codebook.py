@@ -30,6 +30,7 @@ def ordered(rule: str, text: str = FACTORS) -> str:
     return text.replace("design:", f"design:\n  order: {{pairs: {rule}}}")
 
 
+@pytest.mark.slow
 def test_every_recorded_column_is_in_the_codebook_with_its_unit(tmp_path: Path) -> None:
     lab = Lab(tmp_path, GROUPED + "      - reference: {task: aiming, pairs: 1}\n")
     lab.approve()

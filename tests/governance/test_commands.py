@@ -44,6 +44,7 @@ def run_session(said: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 def test_from_approval_to_erasure(study: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "approved until" in approve(capsys)
     refused = run_session("")
@@ -78,6 +79,7 @@ def test_from_approval_to_erasure(study: Path, capsys: pytest.CaptureFixture[str
     assert not list(study.rglob("*.h5"))
 
 
+@pytest.mark.slow
 def test_a_change_is_refused_in_words_and_amended(
     study: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -23,6 +23,7 @@ from labcrane.participants.mentions import Mentions
 from labcrane.participants.register import read
 
 
+@pytest.mark.slow
 def test_after_erasing_nothing_but_the_tombstone_is_left(lab: Lab) -> None:
     unfinished.move(lab.places, store_of(lab))
     before = others(lab.folder), others(store_of(lab))
@@ -38,6 +39,7 @@ def test_after_erasing_nothing_but_the_tombstone_is_left(lab: Lab) -> None:
     assert sorted(path.name for path in tables.iterdir()) == ["P001.txt", "trials.csv"]
 
 
+@pytest.mark.slow
 def test_erasing_frees_the_slot_and_the_pseudonym_never_comes_back(lab: Lab) -> None:
     slot = read(lab.places).participants["P007"].slot
     unfinished.erase(lab.places, "P007", REASON, TODAY)
@@ -49,6 +51,7 @@ def test_erasing_frees_the_slot_and_the_pseudonym_never_comes_back(lab: Lab) -> 
         unfinished.erase(lab.places, "P007", REASON, TODAY)
 
 
+@pytest.mark.slow
 def test_what_people_wrote_themselves_is_named(lab: Lab) -> None:
     (lab.places.root / "todo.txt").write_text("ask P007 about the second session", encoding="utf-8")
     done = unfinished.erase(lab.places, "P007", REASON, TODAY)
@@ -89,6 +92,7 @@ def test_an_export_on_another_disk_is_reached_later(lab: Lab, tmp_path: Path) ->
     check_erased(lab)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [KILLS[0], pytest.param(2, marks=pytest.mark.long), 11])
 def test_an_erasure_that_is_killed_anywhere_is_finished_by_the_next_call(
     recorded: Lab, tmp_path: Path, step: int

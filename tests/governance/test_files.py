@@ -55,6 +55,7 @@ DRIFTS = {
 }
 
 
+@pytest.mark.slow
 def test_labcrane_run_refuses_another_number_or_question_in_any_file_and_names_it(
     rescue: Lab,
 ) -> None:
@@ -77,6 +78,7 @@ def test_labcrane_run_refuses_another_number_or_question_in_any_file_and_names_i
     assert not (rescue.places.root / "R001").exists()
 
 
+@pytest.mark.slow
 def test_each_of_these_files_alone_is_refused(rescue: Lab) -> None:
     for name, (old, new) in DRIFTS.items():
         check_eligibility(rescue.visit("R001"))
@@ -86,6 +88,7 @@ def test_each_of_these_files_alone_is_refused(rescue: Lab) -> None:
         edit(rescue.folder / name, new, old)
 
 
+@pytest.mark.slow
 def test_the_lock_holds_wherever_the_files_are_moved(rescue: Lab) -> None:
     elsewhere = rescue.folder.with_name("another disk")
     rescue.folder.rename(elsewhere)

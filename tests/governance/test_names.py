@@ -185,6 +185,7 @@ def test_a_stream_whose_name_leaves_the_folder_is_refused(tmp_path: Path) -> Non
         a_study(tmp_path, f"{SHORT}streams: {{'../eeg': {{name: EEG}}}}\n")
 
 
+@pytest.mark.slow
 def test_somebody_recorded_under_a_name_that_is_refused_today_can_be_erased(lab: Lab) -> None:
     from labcrane.participants.register import changed
 
@@ -226,6 +227,7 @@ def test_permissions_behind_links_stay_and_dangling_ones_do_not_matter(lab: Lab)
     assert stat.S_IMODE((raw / "P007.h5").stat().st_mode) == 0o600
 
 
+@pytest.mark.slow
 def test_erasing_removes_links_and_never_what_is_behind_them(lab: Lab) -> None:
     folder = outside(lab)
     raw = lab.places.raw("P007")

@@ -115,6 +115,7 @@ def test_a_session_that_never_was_recorded_was_none(lab: Lab) -> None:
     assert sitting.deviations == []
 
 
+@pytest.mark.slow
 def test_a_session_out_of_its_window_is_refused_and_can_be_waived(tmp_path: Path) -> None:
     lab = Lab(tmp_path, TWO_SESSIONS)
     lab.approve()

@@ -114,6 +114,7 @@ def test_what_cannot_be_searched_is_said_and_never_taken_for_clean(
     assert why in line
 
 
+@pytest.mark.slow
 def test_erasing_ends_with_what_nobody_could_search(
     lab: Lab, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -40,6 +40,7 @@ def relabel(lab: Lab) -> None:
         unfinished.move(lab.places, store_of(lab))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [KILLS[0], 11])
 def test_a_relabelling_that_is_killed_anywhere_is_finished_by_the_next_call(
     recorded: Lab, tmp_path: Path, step: int
@@ -72,6 +73,7 @@ def test_relabelling_changes_the_number_and_keeps_everything_else(lab: Lab) -> N
     assert read_xdf(lab.places.raw("P008") / "ses-01_run.xdf").whole
 
 
+@pytest.mark.slow
 def test_marks_go_along_with_the_right_number_and_are_erased_with_it(lab: Lab) -> None:
     file = lab.places.raw("P007") / "P007.h5"
     time = labcrane.open_recording(file).session(1).streams["state"].time

@@ -29,6 +29,7 @@ def files(package: Distribution) -> dict[str, bytes]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PACKAGES)
 def test_an_installer_makes_of_it_the_package_that_is_installed(name: str, tmp_path: Path) -> None:
     here = distribution(name)

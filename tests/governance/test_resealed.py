@@ -54,6 +54,7 @@ def swapped(lab: Lab) -> None:
     verify(lab.study, discover(), TODAY)  # by itself it is as good as the approved one
 
 
+@pytest.mark.slow
 def test_a_swapped_consent_text_is_noticed_wherever_somebody_is_to_take_part(
     lab: Lab, capsys: pytest.CaptureFixture[str]
 ) -> None:

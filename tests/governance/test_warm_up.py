@@ -21,6 +21,7 @@ def practised(seen) -> list[str]:
     return [trial["outcome"] for trial in seen.trials() if trial["practice"]]
 
 
+@pytest.mark.slow
 def test_practice_ends_as_soon_as_enough_in_a_row_succeeded(tmp_path: Path) -> None:
     seen = rehearse(a_study(tmp_path, ENOUGH))
     assert practised(seen) == ["success"] * 3  # the second round of two ends in its middle
@@ -32,6 +33,7 @@ def test_practice_ends_as_soon_as_enough_in_a_row_succeeded(tmp_path: Path) -> N
     assert steps == [1, 2, 3, 4, 5, 6]  # rounds that were not needed are done as well
 
 
+@pytest.mark.slow
 def test_practice_that_was_not_enough_says_so_and_goes_on(tmp_path: Path) -> None:
     text = ENOUGH.replace("successes: 3, rounds: 4", "successes: 9, rounds: 2")
     seen = rehearse(a_study(tmp_path, text))
@@ -40,6 +42,7 @@ def test_practice_that_was_not_enough_says_so_and_goes_on(tmp_path: Path) -> Non
     assert (end.data["met"], end.data["in_a_row"], end.data["wanted"]) == (False, 4, 9)
 
 
+@pytest.mark.slow
 def test_two_practices_count_by_themselves(tmp_path: Path) -> None:
     practice = "      - practice: {task: aiming, pairs: 1, until: {successes: 1, rounds: 2}}\n"
     seen = rehearse(a_study(tmp_path, SHORT.replace("steps:\n", f"steps:\n{practice}{practice}")))
@@ -47,6 +50,7 @@ def test_two_practices_count_by_themselves(tmp_path: Path) -> None:
     assert [event.data["met"] for event in seen.events("practice.end")] == [True, True]
 
 
+@pytest.mark.slow
 def test_consent_is_a_step_of_the_record(tmp_path: Path) -> None:
     seen = rehearse(a_study(tmp_path, ENOUGH))
     assert seen.names.index("consent.asked") < seen.names.index("block.start")

@@ -3,6 +3,7 @@
 import signal
 from pathlib import Path
 
+import pytest
 from faults.sessions import unique, wait_for
 from governed import GOVERNED, Lab
 from pages.room import a_room, photograph, press, shown, text
@@ -17,6 +18,7 @@ from labcrane.session.commands import QueueConsole
 FETCH = "const done = arguments[0]; fetch('/consent').then(r => r.text()).then(done);"
 
 
+@pytest.mark.slow
 def test_the_session_begins_once_the_participant_has_consented_on_the_page(
     tmp_path: Path, browser: webdriver.Chrome
 ) -> None:
@@ -47,6 +49,7 @@ def test_the_session_begins_once_the_participant_has_consented_on_the_page(
     assert session.attrs["consent_by"] == "participant"
 
 
+@pytest.mark.slow
 def test_a_run_that_is_ended_instead_leaves_nobody_in_the_register(tmp_path: Path) -> None:
     lab = Lab(tmp_path, GOVERNED.replace("rehearsal", unique("consent")))
     lab.approve()

@@ -155,6 +155,7 @@ def check_record(data: Path) -> None:
     assert all(d["by"] == "supervisor" and d["refused"] is None for d in given.values())
 
 
+@pytest.mark.slow
 def test_the_pages_end_without_a_complaint_of_pythons(tmp_path: Path) -> None:
     path = tmp_path / "study.yaml"
     path.write_text(STUDY.format(study=unique("ends"), steps="      - break: {seconds: 300}\n"))

@@ -96,6 +96,7 @@ def check_reach_and_contrast(browser: webdriver.Chrome, at_least: int) -> None:
     assert {words: ratio for words, ratio in ratios.items() if ratio < 4.5} == {}
 
 
+@pytest.mark.slow
 def test_the_supervisors_page_is_reached_by_keyboard_and_readable(
     room: Room, browser: webdriver.Chrome
 ) -> None:
@@ -127,6 +128,7 @@ it has heard, and where it had acknowledged anything before, it is loaded anew.
 """
 
 
+@pytest.mark.slow
 def test_what_is_half_written_outlives_a_connection_that_was_lost(
     room: Room, browser: webdriver.Chrome
 ) -> None:
@@ -148,6 +150,7 @@ def value(browser: webdriver.Chrome, ident: str) -> str:
     return str(browser.execute_script(VALUE, ident))
 
 
+@pytest.mark.slow
 def test_what_is_half_written_outlives_that_the_page_is_loaded_anew(
     room: Room, browser: webdriver.Chrome
 ) -> None:
@@ -187,6 +190,7 @@ def test_what_is_half_written_outlives_that_the_page_is_loaded_anew(
     wait_for(lambda: value(browser, "age-field") == "44")
 
 
+@pytest.mark.slow
 def test_a_questionnaire_is_answered_in_german_and_by_keyboard_alone(
     room: Room, browser: webdriver.Chrome
 ) -> None:

@@ -29,6 +29,7 @@ def answer(port: int, path: str, cookie: str = "") -> tuple[int, str, str]:
         to.close()
 
 
+@pytest.mark.slow
 def test_pages_show_a_session_whose_protocol_would_be_refused_today(tmp_path: Path) -> None:
     names = ["twice", "two_of_a_name", "no_writing", "stream_device", "no_bus"]
     path = faulty(tmp_path, random.Random(3), names)

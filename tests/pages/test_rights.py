@@ -121,6 +121,7 @@ REFUSED = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_without_the_right_token_nothing_is_given(visited) -> None:
     answers, *_ = visited
     assert {name: answers[name][0] for name in REFUSED} == dict.fromkeys(REFUSED, 403)
@@ -128,6 +129,7 @@ def test_without_the_right_token_nothing_is_given(visited) -> None:
     assert answers["supervisor's note"][0] == 202
 
 
+@pytest.mark.slow
 def test_a_refusal_says_why_and_gives_nothing_away(visited) -> None:
     answers, *_ = visited
     text = answers["no token"][2]
@@ -137,6 +139,7 @@ def test_a_refusal_says_why_and_gives_nothing_away(visited) -> None:
     )
 
 
+@pytest.mark.slow
 def test_every_refusal_is_in_the_record(visited) -> None:
     _, session, _ = visited
     events = session.events
@@ -154,6 +157,7 @@ def test_every_refusal_is_in_the_record(visited) -> None:
     assert [(note["text"], note["by"]) for note in notes] == [("seen", "supervisor")]
 
 
+@pytest.mark.slow
 def test_clients_that_reconnect_and_never_read_get_in_and_take_no_tick(visited) -> None:
     # By how much they make the loop late is measured by benchmarks.beside.
     _, session, opened = visited

@@ -324,6 +324,7 @@ def test_a_cohort_of_few_is_not_shown() -> None:
     assert earlier.cohort("nothing") is None
 
 
+@pytest.mark.slow
 def test_who_was_excluded_is_no_part_of_the_cohort(tmp_path: Path) -> None:
     lab = Lab(tmp_path)
     lab.approve()

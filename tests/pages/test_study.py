@@ -61,6 +61,7 @@ def overview(lab: Lab, today: date = TODAY) -> Overview:
     return Reader(*checked_data(lab.folder)).overview(today)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("days", "state"), [(0, "later"), (6, "later"), (7, "due"), (9, "due"), (10, "overdue")]
 )
@@ -77,6 +78,7 @@ def test_a_session_is_due_in_the_window_that_the_protocol_gives(
     assert (found["P004"].session, found["P004"].state) == (1, "due")
 
 
+@pytest.mark.slow
 def test_every_session_has_its_quality_and_every_person_consent_and_deviations(lab: Lab) -> None:
     people = {person.name: person for person in overview(lab).people}
     assert [person.sat[0].level for name, person in people.items() if person.sat] == [
@@ -95,6 +97,7 @@ def test_every_session_has_its_quality_and_every_person_consent_and_deviations(l
         assert person.bytes == sum(f.stat().st_size for f in folder.rglob("*") if f.is_file())
 
 
+@pytest.mark.slow
 def test_consent_to_an_earlier_text_and_none_at_all_stand_out(lab: Lab, tmp_path: Path) -> None:
     copy = Lab(tmp_path, TWICE + "participants: {pattern: 'VP-[0-9]{3}'}\n")
     copy.protocol = copy.protocol.rename(copy.folder / "protocol.yaml")
@@ -109,6 +112,7 @@ def test_consent_to_an_earlier_text_and_none_at_all_stand_out(lab: Lab, tmp_path
     assert levels == {"VP-001": "warn", "VP-002": "bad", "VP-003": "bad"}
 
 
+@pytest.mark.slow
 def test_groups_are_counted_by_their_slots(lab: Lab) -> None:
     found = overview(lab)
     assert sum(held for held, _ in found.groups.values()) == 3, "who left holds none"
@@ -119,6 +123,7 @@ def test_groups_are_counted_by_their_slots(lab: Lab) -> None:
     assert replace(found, groups={}).balanced
 
 
+@pytest.mark.slow
 def test_a_file_is_read_again_only_when_it_has_changed(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -139,6 +144,7 @@ def test_a_file_is_read_again_only_when_it_has_changed(
     assert [(sat.number, sat.level) for sat in damaged.sat] == [(0, "bad")]
 
 
+@pytest.mark.slow
 def test_what_people_wrote_is_text_on_the_page_and_no_markup(lab: Lab) -> None:
     page = page_of(overview(lab), TODAY, "now")
     assert "felt &lt;b&gt;unwell&lt;/b&gt;" in page

@@ -100,6 +100,7 @@ def gazed(file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_glance_has_the_areas_of_the_newest_picture_and_the_smallest_one_that_is_looked_at(
     gazed: Path,
 ) -> None:

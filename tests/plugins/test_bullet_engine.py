@@ -209,6 +209,7 @@ def digest_of_another_process(name: str, actuator: str) -> str:
     return line.split()[1]
 
 
+@pytest.mark.slow
 @cranes
 @pytest.mark.parametrize("actuator", ["ideal", "hydraulic"])
 def test_two_processes_get_the_same_bits(name: str, actuator: str) -> None:

@@ -188,6 +188,7 @@ def test_a_crane_without_load_is_the_crane_as_it_was(name: str) -> None:
     assert build(name, MACHINE).signals == build("kinematic_crane", MACHINE).signals
 
 
+@pytest.mark.slow
 @engines
 @pytest.mark.parametrize("load", ["", ", payload_kg: 50, grapple: {}"])
 def test_a_recorded_session_is_replayed_bit_for_bit(name: str, load: str, tmp_path: Path) -> None:

@@ -142,6 +142,7 @@ def session(folder: Path, controls: str, panel: Panel) -> list:
     return frames
 
 
+@pytest.mark.slow
 def test_a_panel_process_unplugged_in_the_middle_pauses_the_session_and_resumes_it(
     panel: Panel, tmp_path: Path
 ) -> None:
@@ -175,6 +176,7 @@ def test_a_panel_process_unplugged_in_the_middle_pauses_the_session_and_resumes_
     assert_told_of_the_flow(said)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("panel", [(2, 2)], indirect=True)
 def test_the_gateway_bridges_a_panel_to_a_session_over_lsl_and_the_flow_back(
     panel: Panel, tmp_path: Path

@@ -51,6 +51,7 @@ def recorded_mean(name: str, signal: int, lowest: float, highest: float) -> floa
     return float(np.mean(np.diff(edges) / np.diff(crossed)))
 
 
+@pytest.mark.slow
 def test_mean_speeds_at_signals_that_the_fit_never_saw_are_within_the_papers_error(
     model, recordings
 ) -> None:
@@ -69,6 +70,7 @@ def test_mean_speeds_at_signals_that_the_fit_never_saw_are_within_the_papers_err
     assert checked == 3 * 2 * 4
 
 
+@pytest.mark.slow
 def test_the_fit_does_not_look_at_validation_signals(model, recordings) -> None:
     from dataclasses import replace
 
@@ -80,6 +82,7 @@ def test_the_fit_does_not_look_at_validation_signals(model, recordings) -> None:
     assert fit_segment(replace(arm, runs=spoilt), PCHIP) == model["arm"]
 
 
+@pytest.mark.slow
 def test_a_refit_gives_the_same_file_and_the_file_the_same_speeds(
     model, recordings, tmp_path: Path
 ) -> None:
@@ -95,6 +98,7 @@ def test_a_refit_gives_the_same_file_and_the_file_the_same_speeds(
                 )
 
 
+@pytest.mark.slow
 def test_the_file_beside_the_protocol_is_the_fit_of_its_recordings(model, tmp_path: Path) -> None:
     save(model, tmp_path / "arm.yaml")
     assert (tmp_path / "arm.yaml").read_text(encoding="utf-8") == (
@@ -102,6 +106,7 @@ def test_the_file_beside_the_protocol_is_the_fit_of_its_recordings(model, tmp_pa
     ).read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_level_zero_and_the_dead_band_stand_still_and_speed_rises_from_its_edge(model) -> None:
     for segment in model.values():
         for angle in np.linspace(*segment.limits, 5).tolist():
@@ -114,6 +119,7 @@ def test_level_zero_and_the_dead_band_stand_still_and_speed_rises_from_its_edge(
             assert segment.speed(0, angle) == 0.0
 
 
+@pytest.mark.slow
 def test_nothing_is_extrapolated_beyond_the_measured_angles(model) -> None:
     for segment in model.values():
         for signal in (-250, -40, 40, 250):
@@ -122,6 +128,7 @@ def test_nothing_is_extrapolated_beyond_the_measured_angles(model) -> None:
                 assert far == pytest.approx(segment.speed(signal, end), rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_layers_have_the_run_up_of_the_lag_that_is_found_with_them(model, recordings) -> None:
     for recording in recordings:
         segment = model[recording.name]
@@ -139,6 +146,7 @@ def test_the_layers_have_the_run_up_of_the_lag_that_is_found_with_them(model, re
                 assert np.sqrt(np.mean(missed**2)) < 0.01 * np.abs(curve.speed).max()
 
 
+@pytest.mark.slow
 def test_every_joint_sets_off_when_its_recording_does(model, recordings) -> None:
     late = []
     for recording in recordings:
@@ -159,6 +167,7 @@ def test_every_joint_sets_off_when_its_recording_does(model, recordings) -> None
     assert np.abs(late).max() < 0.05
 
 
+@pytest.mark.slow
 def test_slow_layers_say_that_they_do_not_cover_the_range_and_go_like_the_next(model) -> None:
     (slow, *_) = model["arm"].extend.layers
     assert not slow.whole
@@ -183,12 +192,14 @@ def test_between_layers_is_a_line_or_scipys_monotone_cubic() -> None:
             assert linear(at, signals, speeds) == pytest.approx(np.interp(at, signals, speeds))
 
 
+@pytest.mark.slow
 def test_a_signal_beyond_full_flow_is_refused(model) -> None:
     for signal in (251, -300, math.nan):
         with pytest.raises(ProtocolError, match=r"asked of 'boom'; it is -250 to 250"):
             model["boom"].speed(signal, 0.0)
 
 
+@pytest.mark.slow
 def test_errors_per_level_keep_their_order(model, recordings) -> None:
     for between in ("linear", "pchip"):
         for level in validate(model.interpolated(between), recordings):
@@ -197,6 +208,7 @@ def test_errors_per_level_keep_their_order(model, recordings) -> None:
             assert row["mae"] <= row["rmse"] + 1e-12 <= row["max_abs_error"] + 2e-12
 
 
+@pytest.mark.slow
 def test_another_machines_law_is_found_in_its_recordings(tmp_path: Path) -> None:
     record(tmp_path / "stick.csv.gz")
     (stick,) = read_recordings(tmp_path)
@@ -278,6 +290,7 @@ WRONG = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", WRONG)
 def test_recordings_gone_wrong_are_refused_in_words(case: str, tmp_path: Path) -> None:
     change, message = WRONG[case]
@@ -296,6 +309,7 @@ def test_what_is_no_recording_is_refused_in_words(tmp_path: Path) -> None:
         read_recordings(tmp_path)
 
 
+@pytest.mark.slow
 def test_the_commands_leave_model_tables_and_figures(tmp_path: Path, capsys) -> None:
     arm = str(tmp_path / "arm.yaml")
     assert main(["dmd", "fit", str(FOLDER), "--out", arm, "--between", "pchip"]) == 0
@@ -322,6 +336,7 @@ def test_the_commands_leave_model_tables_and_figures(tmp_path: Path, capsys) -> 
         save(labcrane_dmd.load(Path(arm)), tmp_path / "no folder" / "arm.yaml")
 
 
+@pytest.mark.slow
 def test_the_command_fits_other_grids_as_a_line_through_two_sets_of_speeds(
     tmp_path: Path,
 ) -> None:
@@ -342,6 +357,7 @@ def test_the_command_fits_other_grids_as_a_line_through_two_sets_of_speeds(
     assert sorted(table["signal"].abs().unique()) == [0, 160, 200, 220]
 
 
+@pytest.mark.slow
 def test_the_papers_own_rule_is_a_line_from_0_that_other_runs_do_not_bend(
     recordings, tmp_path: Path
 ) -> None:
@@ -383,6 +399,7 @@ def test_grids_that_make_no_sense_are_refused_in_words(
     assert refused in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "refused"),
     [

@@ -80,6 +80,7 @@ def agrees_with_the_formula(model, level, rate_hz: float = RATE_HZ) -> None:
     assert took == pytest.approx(needs + adds, abs=0.02 * dt + 1e-6 * needs), where
 
 
+@pytest.mark.slow
 @needs_bullet
 @pytest.mark.parametrize(("seed", "name"), list(enumerate(["arm", "boom", "jaws"])))
 def test_driven_segments_move_as_the_formula_says_within_the_integrators_error(
@@ -122,6 +123,7 @@ def test_a_model_of_the_papers_own_rule_is_driven_and_agrees(tmp_path: Path) -> 
         agrees_with_the_formula(model, each)
 
 
+@pytest.mark.slow
 @needs_bullet
 def test_the_command_drives_the_arm_and_leaves_the_papers_tables(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -327,6 +329,7 @@ def test_a_live_bus_gives_the_valve_commands_and_angles_that_are_on_it(tmp_path:
     assert [(int(s), a) for s, a in pairs] == pytest.approx(sent[first : first + 20])
 
 
+@pytest.mark.slow
 def test_lsl_streams_become_a_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     import pylsl
 

@@ -188,6 +188,7 @@ def test_the_fifth_push_ends_the_run_with_k_0(tmp_path: Path) -> None:
     assert end.time == seen.events("contact.object")[-1].time
 
 
+@pytest.mark.slow
 def test_an_override_lets_a_run_of_seven_pushes_reach_its_goal_with_k_1(tmp_path: Path) -> None:
     seen = run_of(tmp_path, Pusher(7), BLOCK, {240: [Command(Order.OVERRIDE)]})
     (row,) = seen.trials()

@@ -116,6 +116,7 @@ def test_a_grip_breaks_above_the_slip_force_and_that_is_a_drop(tmp_path: Path) -
         assert dropped[-1][state.index("grip.drops")] >= 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("lift_s", "drops"), [(0.4, 0), (3.0, 1)])
 def test_letting_go_high_up_is_a_drop_and_setting_down_is_none(
     lift_s: float, drops: int, tmp_path: Path

@@ -76,6 +76,7 @@ BREACHES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("breach", BREACHES)
 def test_a_contract_notices_who_breaks_it(breach: type[InputDevice]) -> None:
     test, words = BREACHES[breach]

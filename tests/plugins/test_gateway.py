@@ -53,6 +53,7 @@ sessions: [{name: only, steps: [{block: {task: reach}}]}]
 """
 
 
+@pytest.mark.slow
 @needs_bullet
 def test_a_program_written_from_the_documentation_drives_the_arm(tmp_path: Path) -> None:
     (with_files(tmp_path) / "study.yaml").write_text(STUDY, encoding="utf-8")

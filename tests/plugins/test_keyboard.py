@@ -132,6 +132,7 @@ def test_a_silent_view_is_a_lost_input_and_stops_the_machine_at_once() -> None:
         assert desk.keyboard.fault is None
 
 
+@pytest.mark.slow
 def test_a_view_without_the_keys_is_told_apart_from_none() -> None:
     with a_view_that_sends(("a", "d")) as (desk, _):
         desk.read()
@@ -187,6 +188,7 @@ def a_window(view: str, display: str) -> Iterator["subprocess.Popen[str]"]:
         process.stdout.close()
 
 
+@pytest.mark.slow
 @needs("xdotool", "Xvfb")
 def test_real_keys_in_a_real_window_move_the_axes() -> None:
     view = f"window{os.getpid()}"

@@ -82,6 +82,7 @@ def lerobot(person: Participant, tmp_path_factory: pytest.TempPathFactory) -> Pa
     return folder
 
 
+@pytest.mark.slow
 def test_pictures_are_those_of_a_view_that_shows_the_replay(
     lerobot: Path, person: Participant, expected: dict[str, dict[int, np.ndarray]]
 ) -> None:
@@ -99,6 +100,7 @@ def test_pictures_are_those_of_a_view_that_shows_the_replay(
     assert np.any(expected["free"][ticks[0]] != expected["mine"][ticks[0]])
 
 
+@pytest.mark.slow
 def test_what_is_said_of_pictures_is_so_of_all_of_their_pixels(
     lerobot: Path, expected: dict[str, dict[int, np.ndarray]]
 ) -> None:
@@ -114,6 +116,7 @@ def test_what_is_said_of_pictures_is_so_of_all_of_their_pixels(
         assert told["count"] == [len(pictures)]
 
 
+@pytest.mark.slow
 def test_robomimic_has_the_same_pictures_and_those_of_each_next_row(
     person: Participant, expected: dict[str, dict[int, np.ndarray]], tmp_path: Path
 ) -> None:
@@ -128,6 +131,7 @@ def test_robomimic_has_the_same_pictures_and_those_of_each_next_row(
                 np.testing.assert_array_equal(after, np.concatenate([seen[1:], seen[-1:]]))
 
 
+@pytest.mark.slow
 def test_every_so_manieth_row_is_that_of_all_rows(person: Participant) -> None:
     ((_, session),) = person.sessions()
     whole = list(episodes_of(person, layout_of(session), ""))
@@ -137,6 +141,7 @@ def test_every_so_manieth_row_is_that_of_all_rows(person: Participant) -> None:
         assert few.rate_hz * EVERY == all_.rate_hz
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("camera", "said"),
     [
@@ -153,12 +158,14 @@ def test_a_camera_that_cannot_be_is_refused_in_words(
         pass
 
 
+@pytest.mark.slow
 def test_two_cameras_of_one_name_are_refused(person: Participant, tmp_path: Path) -> None:
     twice = SETTINGS.model_copy(update={"cameras": ("free", "free")})
     with pytest.raises(ProtocolError, match="two cameras are called 'free'"):
         LeRobot(twice).export([person], tmp_path)
 
 
+@pytest.mark.slow
 def test_pictures_are_taken_in_order(person: Participant) -> None:
     record = open_recording(person.path).session(1)
     with Retake(record, "free", SIZE) as retake:

@@ -127,6 +127,7 @@ def test_reaction_times_are_lognormal_around_their_median() -> None:
 # --- the closed loop
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_targets_are_reached_from_rest_and_from_each_other(scheme: str) -> None:
     reached = []
@@ -140,6 +141,7 @@ def test_targets_are_reached_from_rest_and_from_each_other(scheme: str) -> None:
     assert np.mean(reached) >= 0.95
 
 
+@pytest.mark.slow
 def test_a_whole_session_goes_on_from_where_the_machine_stands() -> None:
     loop = Loop()
     pairs = [(distance, mirror) for distance in DISTANCES for mirror in (-1, 1)]
@@ -178,6 +180,7 @@ def test_without_noise_movement_time_follows_fitts_law_exactly_as_set() -> None:
     assert intercept == pytest.approx(a + reaction + 0.2, abs=1.0)
 
 
+@pytest.mark.slow
 def test_movement_time_grows_with_the_index_of_difficulty_with_all_the_noise() -> None:
     found = times("joint_velocity", range(5), **PRACTISED)
     bits = [math.log2(distance / 0.5 + 1) for distance in found]
@@ -208,6 +211,7 @@ def test_a_machine_that_is_too_slow_makes_the_movement_longer_and_is_still_broug
     assert taken[1] > 1.3 * taken[0]
 
 
+@pytest.mark.slow
 def test_practice_makes_later_trials_faster() -> None:
     near, far = ends(3.0)
     early, late = [], []

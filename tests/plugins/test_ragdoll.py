@@ -207,6 +207,7 @@ def seen_by(run, placed) -> tuple[Observation, list[Event]]:
     return Observation(ScenarioSettings(scenes=(Path("scene.yaml"),)), run, placed), []
 
 
+@pytest.mark.slow
 def test_every_limb_that_is_pressed_against_something_fixed_is_a_mistake_of_its_own(
     tmp_path: Path,
 ) -> None:
@@ -257,6 +258,7 @@ def watched_on_the_ground(folder: Path, text: str, ticks: int, push=None) -> lis
     return events
 
 
+@pytest.mark.slow
 def test_every_limb_that_is_pressed_onto_the_ground_is_a_mistake_and_lying_there_is_none(
     tmp_path: Path,
 ) -> None:

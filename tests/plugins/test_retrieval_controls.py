@@ -147,6 +147,7 @@ EACH = pytest.mark.parametrize(
 )
 
 
+@pytest.mark.slow
 @needs_bullet
 @EACH
 def test_each_control_moves_each_joint_both_ways_and_stops_it(controls) -> None:

@@ -99,6 +99,7 @@ def test_what_is_drawn_and_touched_of_a_turned_part_is_in_the_same_place(tmp_pat
     np.testing.assert_allclose(origin, [0.4, -0.3, 0.0], atol=1e-9)
 
 
+@pytest.mark.slow
 @needs_bullet
 @pytest.mark.parametrize("seed", range(3))
 def test_a_hollow_is_entered_and_felt_at_its_true_surface_and_not_at_the_solid_around_it(

@@ -43,6 +43,7 @@ def recorded(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_scenario_is_replayed_bit_for_bit_from_its_record_alone(recorded: Path) -> None:
     context = open_recording(recorded).session(1).context
     scene = "scenes/touch.yaml"

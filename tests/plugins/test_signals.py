@@ -96,6 +96,7 @@ def test_faults_are_told_within_five_seconds_over_a_hundred_seeds(kind: str) -> 
     assert len(late) <= (1.0 - FOUND) * 100, late
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["EEG", "gaze"])
 def test_nothing_is_told_of_living_signals(kind: str) -> None:
     hours, found = alarms(kind, 0.1, seed=3)

@@ -73,6 +73,7 @@ def played(folder: Path, seconds: float, *how: str, real_time: bool) -> dict[str
     return {**json.loads(done.stdout.splitlines()[-1]), "underruns": len(underruns(log))}
 
 
+@pytest.mark.slow
 @needs_jack
 def test_blocks_that_nobody_could_compute_are_counted_here_and_by_the_server(
     tmp_path: Path,
@@ -85,6 +86,7 @@ def test_blocks_that_nobody_could_compute_are_counted_here_and_by_the_server(
     assert not result["real time"]
 
 
+@pytest.mark.slow
 @needs_jack
 @needs_real_time
 def test_a_real_time_server_is_followed_and_left_again(tmp_path: Path) -> None:
@@ -113,6 +115,7 @@ for finding in examine(SonificationSettings(driver="jack", block=1024), None):
 """
 
 
+@pytest.mark.slow
 @needs_jack
 @pytest.mark.parametrize("how", ["ordinary", pytest.param("real time", marks=needs_real_time)])
 def test_the_doctor_says_whether_jack_runs_in_real_time(tmp_path: Path, how: str) -> None:

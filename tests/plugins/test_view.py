@@ -241,6 +241,7 @@ def x_server() -> Iterator[str]:
         yield display
 
 
+@pytest.mark.slow
 def test_a_window_shows_the_newest_frame_and_is_never_late(x_server: str) -> None:
     # Each frame has a colour of its own; what the X server shows is read back after each.
     program = Path(__file__).with_name("late_frames.py")

@@ -45,6 +45,7 @@ def pictures(frames: Sequence[Frame], **settings: object) -> list[np.ndarray]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "settings",
     [
@@ -97,6 +98,7 @@ def test_a_camera_that_cannot_keep_it_draws_the_scenery_itself(camera: dict[str,
     assert "backdrop" not in names
 
 
+@pytest.mark.slow
 def test_edges_of_the_scenery_are_mixed_of_both_sides_in_high_quality() -> None:
     """Without shadows nothing else differs between the qualities."""
     frame = make_frame()

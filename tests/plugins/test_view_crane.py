@@ -40,6 +40,7 @@ def test_a_machine_with_meshes_of_its_own_gets_no_cylinders_that_do_not_belong_t
     assert hoses(bodies[-1]) is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("renderer", ["auto", "software"])
 def test_depth_cues_stand_below_the_tip_on_the_ground(renderer: str) -> None:
     frame = make_frame()

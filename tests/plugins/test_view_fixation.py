@@ -50,6 +50,7 @@ def test_the_disc_is_six_tenths_of_a_degree_where_the_eye_s_distance_is_known() 
     assert (right - left, bottom - top) == pytest.approx((wide, wide), abs=1.5)
 
 
+@pytest.mark.slow
 def test_the_examiner_sees_the_scene_and_so_does_everybody_in_a_pause() -> None:
     still, shown = (picture(point, seen_by="examiner") for point in ((), (0.5, 0.5)))
     np.testing.assert_array_equal(still, shown)

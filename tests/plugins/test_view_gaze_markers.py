@@ -100,6 +100,7 @@ def test_every_code_is_the_one_that_trackers_know_by_its_number(detector: Any) -
         assert set(seen(detector, np.dstack([sheet] * 3))) == {code}
 
 
+@pytest.mark.slow
 @needs("pupil_apriltags")
 @pytest.mark.parametrize("renderer", ["auto", "software"])
 @pytest.mark.parametrize("state", ["running", "paused"])

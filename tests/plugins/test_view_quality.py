@@ -40,6 +40,7 @@ def test_a_picture_is_measured_once_textures_are_made_and_an_outlier_does_not_co
     assert len(drawn) == WARM + MEASURED
 
 
+@pytest.mark.slow
 def test_the_record_says_what_auto_chose_in_this_window() -> None:
     with a_view(quality="auto", size=(160, 90)) as view:
         said = str(view.metadata()["quality"])
@@ -49,6 +50,7 @@ def test_the_record_says_what_auto_chose_in_this_window() -> None:
         assert np.ptp(view.picture()) > 60
 
 
+@pytest.mark.slow
 def test_only_high_smooths_edges_and_only_low_has_no_shadow() -> None:
     frame = make_frame()
     pictures = {level: shown(frame, quality=level, camera="free") for level in LEVELS}

@@ -138,6 +138,7 @@ def expected(parts: Sequence[Geom], to: tuple[float, ...], yaw: float) -> FloatA
     return np.hstack([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_everything_in_a_scene_is_drawn_where_it_stands(name: str, view: View, run: Run) -> None:
     things = place_objects(load_scene(RETRIEVAL / "scenes" / f"{name}.yaml"), 3)

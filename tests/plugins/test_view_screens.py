@@ -55,6 +55,7 @@ def in_window(x: float) -> float:
     return x if x < 480 else x - GAP if x >= 480 + GAP else float("nan")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("renderer", ["auto", "software"])
 def test_a_window_opens_on_the_display_that_is_named_now(
     renderer: str, monkeypatch: pytest.MonkeyPatch

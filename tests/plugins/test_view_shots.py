@@ -69,6 +69,7 @@ def test_a_png_file_is_read_as_it_was(shape: tuple[int, ...]) -> None:
     np.testing.assert_array_equal(np.round(255 * read).astype(np.uint8), pixels)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("renderer", ["auto", "software"])
 def test_what_is_sent_of_a_window_is_what_is_drawn_in_it(
     renderer: str, monkeypatch: pytest.MonkeyPatch

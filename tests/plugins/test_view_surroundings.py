@@ -20,6 +20,7 @@ from labcrane_view.settings import CAMERAS
 SEAT = {"name": "seat", "eye": (-2.2, 2.2, 3.3), "look": (5.2, 0.3, 0.8)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("renderer", ["auto", "software"])
 def test_every_time_of_day_has_light_of_its_own(renderer: str) -> None:
     pictures = {
@@ -32,6 +33,7 @@ def test_every_time_of_day_has_light_of_its_own(renderer: str) -> None:
     assert min(bright, key=bright.__getitem__) == "dusk"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("time", DAYLIGHT)
 def test_a_poles_shadow_is_as_long_as_the_sun_is_low(time: str) -> None:
     """It ends where the ray over its top meets the ground; under clouds it is hardly there."""
@@ -56,6 +58,7 @@ def test_a_poles_shadow_is_as_long_as_the_sun_is_low(time: str) -> None:
     assert abs(darker(1.25)) <= 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quality", ["medium", "high"])
 def test_a_cabs_window_hides_the_edges_and_nothing_in_the_middle(quality: str) -> None:
     frame = make_frame()
@@ -72,6 +75,7 @@ def test_a_cabs_window_hides_the_edges_and_nothing_in_the_middle(quality: str) -
     assert seen[0].max() < 90
 
 
+@pytest.mark.slow
 def test_only_the_camera_in_the_cab_sees_it() -> None:
     """One that stands behind would have its bars in the middle of the picture."""
     behind = {"name": "behind", "eye": (-4.2, 2.7, 3.95), "look": (5.2, 0.3, 0.8)}

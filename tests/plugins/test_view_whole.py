@@ -89,6 +89,7 @@ def grabbed(renderer: str, grabs: int, *bare: str, every_s: float = 0.013) -> tu
         return broken, len(seen)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("renderer", [pytest.param("auto", marks=pytest.mark.long), "software"])
 def test_every_grab_of_two_windows_shows_whole_pictures_while_the_crane_moves(
     renderer: str,

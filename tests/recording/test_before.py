@@ -200,6 +200,7 @@ def test_every_dataset_of_before_reads_as_it_stands(before: Path) -> None:
     assert session.protocol == (BEFORE / "protocol.yaml").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_replay_of_before_gives_every_number(before: Path) -> None:
     *differences, said = labcrane_command("replay", before / f"{NAME}.h5").strip().splitlines()
     assert said == "454 ticks replayed, every number the same bit for bit"

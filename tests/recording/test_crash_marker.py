@@ -113,6 +113,7 @@ def test_bytes_at_random_are_a_place_or_damaged(tmp_path: Path) -> None:
     assert read_crash_marker(tmp_path / "none") is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "spoil",
     [SPOILT[name] for name in ("zeros", "no texts", "deep", "a folder", "a link", "a pipe")],

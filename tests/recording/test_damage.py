@@ -59,6 +59,7 @@ def test_a_whole_journal_is_whole(data: bytes, tmp_path: Path) -> None:
     np.testing.assert_array_equal(rows(file), TRUE)
 
 
+@pytest.mark.slow
 def test_a_journal_cut_anywhere_is_read_to_its_last_whole_chunk(
     data: bytes, tmp_path: Path
 ) -> None:
@@ -94,6 +95,7 @@ def test_pyxdf_reads_what_we_read_of_a_torn_journal(data: bytes, tmp_path: Path)
             np.testing.assert_array_equal(theirs["time_series"][:count], ours[:, 1:])
 
 
+@pytest.mark.slow
 @settings(
     max_examples=300,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
@@ -141,6 +143,7 @@ def test_garbage_in_the_middle_ends_no_recording(
         np.testing.assert_array_equal(rows(file)[:before], TRUE[:before])
 
 
+@pytest.mark.slow
 def test_a_signalling_nan_anywhere_is_damage_and_no_error(data: bytes, tmp_path: Path) -> None:
     nan = np.array([0x7FF0_0000_0000_0001], "<u8").tobytes()
     for at in range(len(data) - 600, len(data) - 8):
@@ -228,6 +231,7 @@ def test_an_empty_file_is_a_journal_killed_before_its_first_chunk(tmp_path: Path
     assert not read(tmp_path, b"XD").streams
 
 
+@pytest.mark.slow
 def test_one_flipped_bit_anywhere_costs_at_most_one_frame(data: bytes, tmp_path: Path) -> None:
     start = data.index(b"labcrane.events</source_id>") + 200  # behind the headers
     for place in range(start, len(data), 7):

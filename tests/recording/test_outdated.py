@@ -145,6 +145,7 @@ def recorded(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, Path
     return path, visit.data
 
 
+@pytest.mark.slow
 def test_a_record_with_faults_is_replayed_exported_and_reported(
     recorded: tuple[Path, Path], tmp_path: Path
 ) -> None:
@@ -162,6 +163,7 @@ def test_a_record_with_faults_is_replayed_exported_and_reported(
     assert file.exists()
 
 
+@pytest.mark.slow
 def test_a_session_begun_with_faults_is_gone_on_with_as_it_was_begun(tmp_path: Path) -> None:
     path = faulty(tmp_path, *some(3))
     visit = Visit(as_recorded(path), "P001", 1, tmp_path / "data", simulated=True, fast=True)
@@ -192,6 +194,7 @@ def test_a_participant_whose_name_was_allowed_is_gone_on_with(tmp_path: Path, na
     folder.make()  # it is there, so it was made before
 
 
+@pytest.mark.slow
 def test_a_record_of_a_machine_whose_meshes_are_gone_is_read_as_before(tmp_path: Path) -> None:
     """Only those who draw it need them; who reads the record is on another computer."""
     lab = tmp_path / "lab"

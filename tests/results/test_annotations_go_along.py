@@ -39,6 +39,7 @@ def export(data: Path, to: str, out: Path) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_every_exporter_that_has_events_has_the_marks_too(marked: Path, tmp_path: Path) -> None:
     record = open_recording(marked / "P001" / "P001.h5").session(1)
     zero = record.streams["state"].time[0]
@@ -72,6 +73,7 @@ def test_every_exporter_that_has_events_has_the_marks_too(marked: Path, tmp_path
     assert marks["time"] - zero == pytest.approx([5.0, 11.5, 20.0])
 
 
+@pytest.mark.slow
 def test_the_report_lists_marks_and_the_page_of_somebody_without_any_says_nothing(
     marked: Path, electrodes: Cohort, tmp_path: Path
 ) -> None:
@@ -84,6 +86,7 @@ def test_the_report_lists_marks_and_the_page_of_somebody_without_any_says_nothin
         assert "a slip" not in page
 
 
+@pytest.mark.slow
 def test_marks_outlive_that_clocks_are_corrected_anew_and_the_file_is_made_anew(
     marked: Path, tmp_path: Path
 ) -> None:

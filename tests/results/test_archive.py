@@ -50,6 +50,7 @@ def archive(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out / "rehearsal.zip"
 
 
+@pytest.mark.slow
 def test_the_archive_has_what_a_repository_asks_for(archive: Path, cohort: Cohort) -> None:
     with zipfile.ZipFile(archive) as file:
         assert file.testzip() is None
@@ -70,6 +71,7 @@ def test_the_archive_has_what_a_repository_asks_for(archive: Path, cohort: Cohor
     assert b"CC-BY-4.0" in content["LICENSE"]
 
 
+@pytest.mark.slow
 @needs("sha256sum")
 def test_every_file_is_checked_by_sha256sum(archive: Path, tmp_path: Path) -> None:
     zipfile.ZipFile(archive).extractall(tmp_path)
@@ -83,6 +85,7 @@ def test_every_file_is_checked_by_sha256sum(archive: Path, tmp_path: Path) -> No
     assert around == f"{hashlib.sha256(archive.read_bytes()).hexdigest()}  rehearsal.zip\n"
 
 
+@pytest.mark.slow
 def test_the_same_data_are_the_same_archive(cohort: Cohort, tmp_path: Path) -> None:
     settings = ArchiveSettings(license="CC0-1.0", recordings=False)
     made = []
@@ -104,6 +107,7 @@ PERSONAL = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("planted", PERSONAL)
 def test_nothing_is_written_with_anything_personal_in_it(
     planted: str, cohort: Cohort, tmp_path: Path
@@ -131,6 +135,7 @@ def test_nothing_is_written_with_anything_personal_in_it(
     assert list(out.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_names_of_computers_are_taken_out_of_the_recordings(
     electrodes: Cohort, tmp_path: Path
 ) -> None:
@@ -163,6 +168,7 @@ def test_names_of_computers_are_taken_out_of_the_recordings(
     assert hidden == named.replace(b"annas-laptop", b"-" * 12)
 
 
+@pytest.mark.slow
 def test_what_is_no_persons_is_not_taken_for_one(cohort: Cohort, tmp_path: Path) -> None:
     """Seeds, digests, dates and machines have many digits."""
     for person in cohort.included:
@@ -175,6 +181,7 @@ def test_what_is_no_persons_is_not_taken_for_one(cohort: Cohort, tmp_path: Path)
     assert list(personal_in(table)) == ["line 2 item: a telephone number"]
 
 
+@pytest.mark.slow
 def test_an_archive_without_a_licence_is_refused_in_words(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -184,6 +191,7 @@ def test_an_archive_without_a_licence_is_refused_in_words(
     assert "zip needs 'license'; write --set NAME=VALUE, where zip has license, authors," in said
 
 
+@pytest.mark.slow
 def test_a_participant_file_says_what_it_is(cohort: Cohort) -> None:
     with h5py.File(cohort.included[0].path) as file:
         readme, cite = (file[name][()].decode() for name in ("README", "CITATION"))

@@ -63,11 +63,13 @@ def errors(folder: Path) -> list[str]:
 validated = needs("bids-validator-deno")
 
 
+@pytest.mark.slow
 @validated
 def test_the_validator_reports_no_error(folder: Path) -> None:
     assert errors(folder) == []
 
 
+@pytest.mark.slow
 @validated
 def test_the_validator_does_find_errors(folder: Path, tmp_path: Path) -> None:
     broken = tmp_path / "broken"
@@ -84,6 +86,7 @@ def test_the_validator_does_find_errors(folder: Path, tmp_path: Path) -> None:
     assert "HED_ERROR" in found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", ["crane", "joyL", "joyR"])
 def test_what_the_validator_misses(folder: Path, cohort: Cohort, system: str) -> None:
     channels = pd.read_csv(folder / f"{MOTION}_tracksys-{system}_channels.tsv", sep="\t")
@@ -117,6 +120,7 @@ def test_what_the_validator_misses(folder: Path, cohort: Cohort, system: str) ->
     assert units["latency"] == "s"
 
 
+@pytest.mark.slow
 def test_events_are_seconds_from_the_first_sample(folder: Path, cohort: Cohort) -> None:
     events = pd.read_csv(folder / f"{MOTION}_events.tsv", sep="\t", na_values="n/a")
     measured = measures_of(cohort.included[0])
@@ -130,6 +134,7 @@ def test_events_are_seconds_from_the_first_sample(folder: Path, cohort: Cohort) 
     assert set(tags) == set(about["trial_type"]["Levels"]) == set(events["trial_type"])
 
 
+@pytest.mark.slow
 def test_dates_move_and_intervals_stay(folder: Path, cohort: Cohort, tmp_path: Path) -> None:
     scans = pd.read_csv(folder / "sub-P001" / "ses-01" / "sub-P001_ses-01_scans.tsv", sep="\t")
     assert set(scans["acq_time"].str[:10]) == {"1925-01-01"}
@@ -144,6 +149,7 @@ def test_dates_move_and_intervals_stay(folder: Path, cohort: Cohort, tmp_path: P
     assert about["SamplingFrequency"] == 40.0
 
 
+@pytest.mark.slow
 def test_eye_tracking_is_physio_with_its_columns_described(folder: Path, cohort: Cohort) -> None:
     path = folder / "sub-P001" / "ses-01" / "beh" / f"{NAME}_recording-eye1_physio"
     about = json.loads(path.with_name(f"{path.name}.json").read_text(encoding="utf-8"))
@@ -159,6 +165,7 @@ def test_eye_tracking_is_physio_with_its_columns_described(folder: Path, cohort:
     assert about["StartTime"] == samples[0, 0]
 
 
+@pytest.mark.slow
 def test_people_ethics_and_questionnaires_are_where_bids_wants_them(folder: Path) -> None:
     people = pd.read_csv(folder / "participants.tsv", sep="\t", keep_default_na=False)
     assert people.iloc[0].tolist() == ["sub-P001", "24", "F", "R", "n/a", "complete"]
@@ -171,6 +178,7 @@ def test_people_ethics_and_questionnaires_are_where_bids_wants_them(folder: Path
     assert "phenotype/tlx.json" in under(folder)
 
 
+@pytest.mark.slow
 def test_the_group_of_the_design_is_in_the_table_of_people(tmp_path: Path) -> None:
     text = STUDY.replace("design:\n", "design:\n  groups: {none: [], slow: []}\n")
     grouped = study(tmp_path, text.replace("movements: 2", "movements: 1"))

@@ -123,6 +123,7 @@ def test_the_validator_finds_no_error_in_eeg_motion_physio_and_phenotype(bids: P
     assert errors(bids) == []
 
 
+@pytest.mark.slow
 @needs("bids-validator-deno")
 def test_the_validator_knows_the_tags_of_every_event_also_of_two_at_once(tmp_path: Path) -> None:
     folder = tmp_path / "sub-1" / "beh"

@@ -120,6 +120,7 @@ def test_the_better_curve_is_the_one_the_learner_follows() -> None:
     assert np.mean(right) >= 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("curve", ["exponential", "power"])
 def test_no_other_start_of_the_search_finds_a_curve_that_fits_better(curve: str) -> None:
     """Drawn learners, some of whom learn nothing: by curve_fit of scipy, from twelve starts."""
@@ -167,6 +168,7 @@ def simulated(folder: Path, gain: float) -> pd.DataFrame:
     return measures_of(find_cohort(folder / "data").included[0])
 
 
+@pytest.mark.slow
 def test_fitts_law_of_a_simulated_operator_is_found_again(tmp_path: Path) -> None:
     """The onset rule, 5 % of the peak speed, cuts 5.9 % off a minimum-jerk movement's start."""
     table = simulated(tmp_path, gain=0.0)
@@ -176,6 +178,7 @@ def test_fitts_law_of_a_simulated_operator_is_found_again(tmp_path: Path) -> Non
     assert fit.r2 > 0.9999
 
 
+@pytest.mark.slow
 def test_the_learning_rate_of_a_simulated_operator_is_found_again(tmp_path: Path) -> None:
     table = simulated(tmp_path, gain=0.5)
     practised = 3.0 + 3.0 * table["difficulty"]

@@ -87,6 +87,7 @@ def random() -> np.random.Generator:
     return np.random.default_rng(SEED)
 
 
+@pytest.mark.slow
 def test_the_drift_of_each_check_is_found_within_a_twentieth_of_a_degree(
     tmp_path: Path, random: np.random.Generator
 ) -> None:
@@ -107,6 +108,7 @@ def test_the_drift_of_each_check_is_found_within_a_twentieth_of_a_degree(
         assert (middle.right_deg, middle.down_deg) == pytest.approx(tuple(offset), abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_picture_of_unknown_size_gives_pixels_and_no_degrees(
     tmp_path: Path, random: np.random.Generator
 ) -> None:
@@ -120,6 +122,7 @@ def test_a_picture_of_unknown_size_gives_pixels_and_no_degrees(
     assert found.iloc[0][["right_px", "down_px"]].tolist() == [30.0, -10.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("facts", [(), (EXAMINER,)])
 def test_without_the_operators_view_there_is_no_row(tmp_path: Path, facts: tuple[str, ...]) -> None:
     path = record(
@@ -139,6 +142,7 @@ def test_only_blinks_are_told_as_no_valid_sample(tmp_path: Path) -> None:
     assert found[["deg", "right_px"]].isna().all().all()
 
 
+@pytest.mark.slow
 def test_report_and_tables_hold_the_drift_before_and_after(
     tmp_path: Path, random: np.random.Generator
 ) -> None:

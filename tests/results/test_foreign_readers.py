@@ -81,6 +81,7 @@ def compare(read: dict[str, list[str]], truth: dict[str, list[str]]) -> None:
         assert read[name][2] == missing, name
 
 
+@pytest.mark.slow
 @needs_r
 @pytest.mark.parametrize("script", [RHDF5, HDF5R], ids=["rhdf5", "hdf5r"])
 def test_r_reads_every_column_of_a_participant_file(path: Path, script: str) -> None:

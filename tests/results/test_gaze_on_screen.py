@@ -49,6 +49,7 @@ def test_gaze_that_follows_the_light_is_on_the_object_that_was_shown(seed: int) 
     assert right(0.0) < 0.95  # the delay matters: without it this test would prove nothing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cameras", "area"), [(["cab"], "target"), (["cab", "top"], "top_target")])
 def test_eyes_that_look_into_the_window_are_measured_as_eyes_that_name_what_they_look_at(
     tmp_path: Path, cameras: list[str], area: str

@@ -35,6 +35,7 @@ printf('columns|%d|%d\\n', numel(fieldnames(s.trials)), sum(isnan(s.trials.movem
 """
 
 
+@pytest.mark.slow
 @needs_octave
 def test_read_labcrane_loads_everything_in_one_call(folder: Path, cohort: Cohort) -> None:
     said = table(octave(READ, folder))
@@ -48,6 +49,7 @@ def test_read_labcrane_loads_everything_in_one_call(folder: Path, cohort: Cohort
     assert said["columns"] == [str(len(measured.columns)), "0"]
 
 
+@pytest.mark.slow
 def test_files_are_version_5(folder: Path) -> None:
     assert under(folder) == ["P001.mat", "P002.mat", "read_labcrane.m"]
     assert (folder / "P001.mat").read_bytes().startswith(b"MATLAB 5.0 MAT-file")

@@ -117,6 +117,7 @@ def check_answers(table: pd.DataFrame) -> None:
     assert rated.time > said.time
 
 
+@pytest.mark.slow
 def test_there_is_one_row_for_each_answer_and_each_question_without_one(cohort: Cohort) -> None:
     table = answers(cohort)
     check_answers(table)
@@ -127,6 +128,7 @@ def test_there_is_one_row_for_each_answer_and_each_question_without_one(cohort: 
     assert (table["value"].notna() | (table["text"] != "")).eq(~missing).all()
 
 
+@pytest.mark.slow
 def test_there_is_one_row_for_each_score_or_why_there_is_none(cohort: Cohort) -> None:
     table = pd.concat([scores_of(person) for person in cohort.included])
     rows = {(row.participant, row.questionnaire, row.score): row for row in table.itertuples()}
@@ -137,6 +139,7 @@ def test_there_is_one_row_for_each_score_or_why_there_is_none(cohort: Cohort) ->
     assert rows["P002", "comfort", "discomfort"].missing == "not answered"
 
 
+@pytest.mark.slow
 def test_older_recordings_have_rows_for_what_was_answered(cohort: Cohort) -> None:
     person = cohort.included[0]
     _, session = next(person.sessions())
@@ -156,6 +159,7 @@ def exports(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_pandas_reads_the_answers_from_csv_and_parquet(exports: Path) -> None:
     for table in (
         pd.read_csv(exports / "tables" / "questionnaires.csv", keep_default_na=False,
@@ -173,6 +177,7 @@ def test_pandas_reads_the_answers_from_csv_and_parquet(exports: Path) -> None:
     check_answers(pd.concat(read))
 
 
+@pytest.mark.slow
 def test_every_question_is_in_the_codebook_and_every_column_in_psych_ds(exports: Path) -> None:
     book = pd.read_csv(exports / "tables" / "codebook.csv").set_index(["table", "column"])
     for name in ("questionnaires", "scores"):
@@ -187,6 +192,7 @@ def test_every_question_is_in_the_codebook_and_every_column_in_psych_ds(exports:
         assert set(pd.read_csv(path).columns) <= described
 
 
+@pytest.mark.slow
 def test_what_was_answered_after_a_trial_is_beside_it(exports: Path) -> None:
     trials = pd.read_csv(exports / "tables" / "trials.csv")
     answers = pd.read_csv(exports / "tables" / "questionnaires.csv")
@@ -202,6 +208,7 @@ def test_what_was_answered_after_a_trial_is_beside_it(exports: Path) -> None:
     assert not any(column.startswith("comfort") for column in trials)
 
 
+@pytest.mark.slow
 @needs("Rscript")
 def test_r_reads_the_answers(exports: Path) -> None:
     script = """
@@ -216,6 +223,7 @@ def test_r_reads_the_answers(exports: Path) -> None:
     assert declined == 1
 
 
+@pytest.mark.slow
 def test_matlab_has_the_answers_as_columns(exports: Path) -> None:
     from scipy.io import loadmat
 
@@ -225,6 +233,7 @@ def test_matlab_has_the_answers_as_columns(exports: Path) -> None:
     assert values["effort"] == 50.0
 
 
+@pytest.mark.slow
 def test_phenotype_comes_from_the_recording_and_is_described(exports: Path) -> None:
     folder = exports / "bids" / "phenotype"
     tlx = pd.read_csv(folder / "nasatlx.tsv" if (folder / "nasatlx.tsv").exists()
@@ -244,6 +253,7 @@ def test_phenotype_comes_from_the_recording_and_is_described(exports: Path) -> N
     assert rating["trial"].notna().all()
 
 
+@pytest.mark.slow
 @needs("bids-validator-deno")
 def test_the_bids_validator_finds_no_error_in_phenotype(exports: Path) -> None:
     done = subprocess.run(

@@ -35,6 +35,7 @@ def changed_machine(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 @needs("pybullet")
 def test_a_whole_session_on_the_engine_is_bit_identical(tmp_path: Path) -> None:
     """The aiming study itself: each of its eight pairs of circles on PyBullet, once."""
@@ -110,6 +111,7 @@ def test_orders_are_given_again_at_their_ticks(tmp_path: Path) -> None:
     assert again.ticks == 4001
 
 
+@pytest.mark.slow
 def test_lost_controls_are_lost_again(tmp_path: Path) -> None:
     """A recorded session as input ends, which is a fault of the controls, and then an end."""
     first = record(study(tmp_path), tmp_path / "data", "P001", simulated=True)
@@ -159,6 +161,7 @@ def test_what_cannot_be_replayed_is_refused(path: Path) -> None:
         replay_session(path, 1, speed=0.0)
 
 
+@pytest.mark.slow
 def test_a_replay_is_shown_on_the_streams_at_a_speed(path: Path) -> None:
     import threading
     import time

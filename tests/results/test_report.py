@@ -37,6 +37,7 @@ def folder(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_each_figure_is_svg_and_of_the_study_png_and_pdf_and_its_table_csv(folder: Path) -> None:
     files = under(folder)
     figures = {path.removesuffix(".svg") for path in files if path.endswith(".svg")}
@@ -49,6 +50,7 @@ def test_each_figure_is_svg_and_of_the_study_png_and_pdf_and_its_table_csv(folde
         assert len(pd.read_csv(folder / f"{figure.replace('figures', 'tables')}.csv"))
 
 
+@pytest.mark.slow
 def test_every_link_of_every_page_leads_somewhere(folder: Path) -> None:
     pages = [folder / "report.html", *sorted((folder / "participants").iterdir())]
     assert len(pages) == 5
@@ -61,6 +63,7 @@ def test_every_link_of_every_page_leads_somewhere(folder: Path) -> None:
         assert all((page.parent / target).is_file() for target in targets if target[0] != "#")
 
 
+@pytest.mark.slow
 def test_the_report_says_who_is_in_it_and_who_is_not(folder: Path) -> None:
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "1 of 4 participants here are simulated." in page
@@ -70,6 +73,7 @@ def test_the_report_says_who_is_in_it_and_who_is_not(folder: Path) -> None:
     assert who.loc["P006", "status"] == "erased"
 
 
+@pytest.mark.slow
 def test_figure_tables_hold_the_means_of_participants_means(folder: Path) -> None:
     movements = pd.read_csv(folder / "tables" / "movements.csv")
     table = pd.read_csv(folder / "tables" / "movement_time_by_sequence.csv").set_index("sequence")
@@ -96,6 +100,7 @@ def test_the_sample_in_words_says_of_how_many_an_answer_is_known() -> None:
     assert table.loc[0, "gender_answers"] == table.loc[0, "age_answers"] == 3
 
 
+@pytest.mark.slow
 def test_areas_looked_at_are_told_of_fewer_people_too_than_a_test_needs(folder: Path) -> None:
     movements = pd.read_csv(folder / "tables" / "movements.csv")
     kept = movements[is_result(movements)]
@@ -206,6 +211,7 @@ def test_looks_are_compared_over_groups_and_sessions(seed: int) -> None:
     assert found.loc["session", "f"] == pytest.approx(gain.mean() ** 2 * len(gain) / (left / 8))
 
 
+@pytest.mark.slow
 def test_trials_that_are_no_results_are_listed_with_the_reason(data: Path) -> None:
     cohort = find_cohort(data, ["half-finished"])
     ended = cohort.included[2]
@@ -258,6 +264,7 @@ def test_a_movement_without_an_onset_is_no_result_and_no_accuracy_and_is_listed(
     assert is_result(other).all()
 
 
+@pytest.mark.slow
 def test_a_movement_without_an_onset_is_named_in_the_report(cohort: Cohort, tmp_path: Path) -> None:
     measured = measures_of_trials(one_that_never_moved())
     page = Page("A study", tmp_path / "report.html", tmp_path)
@@ -287,6 +294,7 @@ def test_a_time_to_rest_is_an_outcome_of_its_own_where_taps_end_movements() -> N
     )
 
 
+@pytest.mark.slow
 def test_quality_is_that_of_the_record(cohort: Cohort) -> None:
     loop = loop_quality(cohort.included[0]).iloc[0]
     assert (loop["late_ticks"], loop["lateness_worst_ms"], loop["rate_hz"]) == (0, 0.0, 120.0)
@@ -296,6 +304,7 @@ def test_quality_is_that_of_the_record(cohort: Cohort) -> None:
     assert sync["samples"] > 1000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", ["tables", "matlab", "bids", "psychds", "xdf"])
 def test_export_writes_what_is_asked_for_and_who_was_left_out(
     data: Path, tmp_path: Path, to: str, capsys: pytest.CaptureFixture[str]
@@ -312,6 +321,7 @@ def test_export_writes_what_is_asked_for_and_who_was_left_out(
     assert "is not empty, and nothing is overwritten" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_wrong_words_are_refused(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -326,6 +336,7 @@ def test_wrong_words_are_refused(
     assert "--set 'every' sets nothing; write NAME=VALUE" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_report_command_names_its_page(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -83,6 +83,7 @@ def texts(figure: Figure) -> Iterator[tuple[str, tuple[float, float, float, floa
             yield text.get_text(), (box.x0, box.y0, box.x1, box.y1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DRAWN)
 def test_no_text_of_a_figure_of_36_people_is_cut_or_over_another(
     name: str, drawings: dict[str, figures.Drawing]
@@ -104,6 +105,7 @@ def test_no_text_of_a_figure_of_36_people_is_cut_or_over_another(
         assert wide < 1 or tall < 1, f"{one!r} and {other!r} are over each other"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DRAWN)
 def test_a_figure_has_a_journals_width_letters_of_seven_points_and_its_n(
     name: str, drawings: dict[str, figures.Drawing]
@@ -119,6 +121,7 @@ def test_a_figure_has_a_journals_width_letters_of_seven_points_and_its_n(
     assert ("bars: 95 % confidence intervals" in drawing.caption) == has_bars
 
 
+@pytest.mark.slow
 def test_everybody_is_to_be_seen_in_every_figure(drawings: dict[str, figures.Drawing]) -> None:
     for name, drawing in drawings.items():
         axes = drawing.figure.axes[0]
@@ -141,6 +144,7 @@ def told(movements: pd.DataFrame, data: Path) -> dict[str, list[str]]:
     return answer(cohort, movements, (loops, pd.DataFrame()), "36 participants.", results)
 
 
+@pytest.mark.slow
 def test_the_answer_has_design_people_effects_quality_and_exclusions_with_their_numbers(
     movements: pd.DataFrame, data: Path
 ) -> None:
@@ -167,6 +171,7 @@ def test_the_answer_has_design_people_effects_quality_and_exclusions_with_their_
     assert "Left out: " in found["Participants"][1]
 
 
+@pytest.mark.slow
 def test_the_answer_names_movements_without_an_onset(movements: pd.DataFrame, data: Path) -> None:
     still = movements["participant"].isin(["P003", "P008"]) & (movements["trial"] == 17)
     onset = np.where(still, np.nan, 0.4)

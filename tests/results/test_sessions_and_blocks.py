@@ -80,6 +80,7 @@ for (last in list(character(0), "place", "distance", "far_side")) {
 WORDS = {"of_session": "session", "of_block": "block", "place": "sequence"}
 
 
+@pytest.mark.slow
 @needs_emmeans
 @pytest.mark.parametrize("seed", [420, 421])
 def test_sessions_with_the_same_blocks_are_two_factors_as_afex_has_them(

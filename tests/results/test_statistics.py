@@ -62,6 +62,7 @@ def in_r(movements: pd.DataFrame, tmp_path_factory: pytest.TempPathFactory) -> d
     return table(r(AFEX, path))
 
 
+@pytest.mark.slow
 @needs_r
 @pytest.mark.parametrize("measure", ["movement_time", "absolute_error"])
 @pytest.mark.parametrize("factor", ["sequence", "distance"])
@@ -77,6 +78,7 @@ def test_the_reports_anova_is_that_of_afex(
     assert 0.3 < ours["epsilon"] < 1.0
 
 
+@pytest.mark.slow
 @needs_r
 def test_trend_and_holm_are_those_of_r(movements: pd.DataFrame, in_r: dict[str, list[str]]) -> None:
     trend = linear_trend(movements, "movement_time")
@@ -87,6 +89,7 @@ def test_trend_and_holm_are_those_of_r(movements: pd.DataFrame, in_r: dict[str, 
     np.testing.assert_allclose(p, np.array(in_r["holm"], float), rtol=1e-12)
 
 
+@pytest.mark.slow
 @needs_r
 def test_the_mixed_model_is_that_of_lme4(
     movements: pd.DataFrame, in_r: dict[str, list[str]]
@@ -121,6 +124,7 @@ def epsilon(values: np.ndarray) -> float:
     return effect.epsilon
 
 
+@pytest.mark.slow
 def test_epsilon_is_1_under_sphericity_and_least_for_one_varying_level() -> None:
     rng = np.random.default_rng(8)
     assert epsilon(rng.standard_normal((20_000, 4))) == pytest.approx(1.0, abs=2e-3)
@@ -128,6 +132,7 @@ def test_epsilon_is_1_under_sphericity_and_least_for_one_varying_level() -> None
     assert epsilon(one_line) == pytest.approx(1.0 / 3.0)
 
 
+@pytest.mark.slow
 def test_who_lacks_a_level_is_left_out_of_the_test_by_name(movements: pd.DataFrame) -> None:
     gone = (movements["participant"] == "P004") & (movements["sequence"] == 3)
     (test,) = analyse(movements[~gone], "movement_time", ["sequence"])
@@ -135,6 +140,7 @@ def test_who_lacks_a_level_is_left_out_of_the_test_by_name(movements: pd.DataFra
     assert mixed_model(movements[~gone], "movement_time").participants == 36
 
 
+@pytest.mark.slow
 def test_two_participants_are_not_tested(movements: pd.DataFrame) -> None:
     two = movements[movements["participant"] <= "P002"]
     assert analyse(two, "movement_time", ["sequence"]) == []
@@ -179,6 +185,7 @@ def primaries(
     return table(r(PRIMARIES, path))
 
 
+@pytest.mark.slow
 @needs_r
 @pytest.mark.parametrize(
     ("name", "primary"),
@@ -200,6 +207,7 @@ def test_trends_are_corrected_over_the_outcomes_that_the_study_calls_primary(
     assert trends.drop(index=asked)["p_holm"].isna().all()
 
 
+@pytest.mark.slow
 @needs_r
 def test_the_mixed_model_of_the_time_from_circle_to_circle_is_that_of_lme4(
     with_dwell: pd.DataFrame, primaries: dict[str, list[str]]
@@ -212,6 +220,7 @@ def test_the_mixed_model_of_the_time_from_circle_to_circle_is_that_of_lme4(
     np.testing.assert_allclose(terms["se"], np.array(primaries["se"], float), rtol=5e-3)
 
 
+@pytest.mark.slow
 def test_an_outcome_of_another_kind_is_tested_where_the_study_calls_it_primary(
     with_dwell: pd.DataFrame,
 ) -> None:
@@ -238,6 +247,7 @@ for (i in seq_along(m)) cat(i - 1, sprintf("%.17g", m[i]), sep = "|", fill = 100
 """
 
 
+@pytest.mark.slow
 @needs_r
 def test_medians_with_time_outs_are_those_of_survival(tmp_path: Path) -> None:
     rng = np.random.default_rng(41)
@@ -331,6 +341,7 @@ def drawn_study(seed: int) -> pd.DataFrame:
     return table
 
 
+@pytest.mark.slow
 @needs_emmeans
 def test_drawn_studies_of_unequal_groups_and_missing_cells_are_those_of_afex_and_emmeans(
     tmp_path: Path,

@@ -26,6 +26,7 @@ def folder(cohort: Cohort, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_pandas_and_arrow_read_what_was_measured(folder: Path, cohort: Cohort) -> None:
     measured = pd.concat([measures_of(person) for person in cohort.included], ignore_index=True)
     for read in (pd.read_csv(folder / "trials.csv"), pd.read_parquet(folder / "trials.parquet")):
@@ -41,6 +42,7 @@ def test_pandas_and_arrow_read_what_was_measured(folder: Path, cohort: Cohort) -
     np.testing.assert_allclose(eyes["time"] - eyes["time_raw"], 5000.0, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_columns_of_parquet_are_those_of_csv(folder: Path) -> None:
     for path in (folder / "streams").glob("*.parquet"):
         pd.testing.assert_frame_equal(
@@ -50,6 +52,7 @@ def test_columns_of_parquet_are_those_of_csv(folder: Path) -> None:
         )
 
 
+@pytest.mark.slow
 def test_the_codebook_has_every_column_and_the_units_of_the_file(folder: Path) -> None:
     book = pd.read_csv(folder / "codebook.csv").set_index(["table", "column"])
     for name, path in {
@@ -90,6 +93,7 @@ def test_read_r_says_which_streams_it_cannot_read_and_loads_the_rest(
     assert len(said["time"]) == len(measures_of(cohort.included[0]))
 
 
+@pytest.mark.slow
 @needs_r
 def test_read_r_loads_everything_in_one_call(folder: Path, cohort: Cohort) -> None:
     said = table(r(READ, folder))
@@ -106,6 +110,7 @@ def test_read_r_loads_everything_in_one_call(folder: Path, cohort: Cohort) -> No
     assert said["title"] == ["complete", "character"]
 
 
+@pytest.mark.slow
 def test_events_are_those_of_the_file_and_the_context_stays_there(
     folder: Path, cohort: Cohort
 ) -> None:

@@ -37,6 +37,7 @@ def test_an_export_refuses_streams_never_probed_unless_told_and_says_so(
     assert noted.startswith("eyes of P001, session 1 (12 of")
 
 
+@pytest.mark.slow
 def test_a_report_refuses_streams_never_probed_unless_told_and_says_so(
     unprobed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

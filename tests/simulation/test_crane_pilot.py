@@ -81,6 +81,7 @@ def test_a_folder_stands_for_its_protocol(
     assert f"{tmp_path} is no file; give a YAML file" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_simulated_participant_has_both_times_demographics_and_errors_that_nothing_cuts_off(
     tmp_path: Path,
 ) -> None:

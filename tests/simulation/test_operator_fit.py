@@ -98,6 +98,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return of(simulated(tmp_path_factory.mktemp("fitted"), **WENT_IN))
 
 
+@pytest.mark.slow
 def test_what_went_into_a_simulation_is_found_again(recording: Path) -> None:
     """Within twice the 95 % intervals: nine of them hold all at once less often than one does."""
     fitted = fit_operator(read_strokes(recording, 1))
@@ -128,6 +129,7 @@ def test_a_fitted_operator_is_a_part_that_a_protocol_takes(
     assert {name: settings[name] for name in WENT_IN} == {name: written[name] for name in WENT_IN}
 
 
+@pytest.mark.slow
 def test_who_does_not_learn_is_given_no_learning_rate(tmp_path: Path) -> None:
     data = simulated(tmp_path, learning_gain=0.0)
     fitted = fit_operator(read_strokes(of(data), 1))
@@ -162,6 +164,7 @@ def test_too_little_to_fit_is_refused(
     assert "; choose a" in str(refused.value)
 
 
+@pytest.mark.slow
 def test_a_session_without_counted_movements_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

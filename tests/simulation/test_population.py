@@ -197,6 +197,7 @@ def test_what_a_factor_makes_possible_and_what_is_possible_alone_pass(study: Stu
     read_population(cohort, study)
 
 
+@pytest.mark.slow
 def test_a_tail_that_no_operator_can_have_is_told_of_whom_it_was_drawn_for(
     study: Study, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -284,6 +285,7 @@ def test_the_simulated_people_of_the_crane_study_are_those_of_the_paper() -> Non
     assert {one["gender"] for one in said} == {"male", "female"}
 
 
+@pytest.mark.slow
 def test_answers_of_the_cohort_stand_in_the_recording_and_change_no_others(
     asking: Study, tmp_path: Path
 ) -> None:

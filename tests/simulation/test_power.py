@@ -341,6 +341,7 @@ def pool_of_groups(effect: float, participants: int, seed: int) -> Pool:
     return Pool(values[:, None], np.ones(1), labels, labels, ())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("make", "participants", "effect"),
     [
@@ -415,6 +416,7 @@ def test_an_effect_that_no_cohort_shows_is_said_so() -> None:
         sample_size(normal_pool(0.001, 2000, 5), read_effect("m~half=0.0001"), 0.8, 50, seed=3)
 
 
+@pytest.mark.slow
 def test_small_studies_overstate_what_they_find_and_err_in_its_sign() -> None:
     """Against a simulation of its own: z tests of one normal number."""
     pool = normal_pool(0.2, 40000, 6)

@@ -137,6 +137,7 @@ def test_what_is_put_in_takes_the_place_of_what_two_groups_differ_by(there: floa
     assert 0.2 < expected < 1.0
 
 
+@pytest.mark.slow
 def test_what_is_put_in_is_corrected_with_the_other_contrasts() -> None:
     """Of three groups, by a linear model of participants' means and Holm's correction."""
     table = movements(120, groups=("a", "b", "c"), difference=0.6)
@@ -155,6 +156,7 @@ def test_what_is_put_in_is_corrected_with_the_other_contrasts() -> None:
     assert np.mean(corrected) < np.mean(plain), "the draw shows no correction"
 
 
+@pytest.mark.slow
 def test_what_is_put_in_changes_a_trend_as_if_everybody_had_it() -> None:
     table = movements(groups=("",), slope=-0.3)
     put = read_effect("movement_time~sequence=0.09")
@@ -170,6 +172,7 @@ def test_what_is_put_in_changes_a_trend_as_if_everybody_had_it() -> None:
     assert 0.2 < found.power < 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["group[T.visual]", "sequence", "group[T.visual]:sequence"])
 def test_what_is_put_in_changes_a_term_of_the_mixed_model_as_if_everybody_had_it(
     text: str,
@@ -195,6 +198,7 @@ def test_what_is_put_in_changes_a_term_of_the_mixed_model_as_if_everybody_had_it
     assert found.power == float(expected.p < 0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cohorts", [6, pytest.param(20, marks=pytest.mark.long)])
 @pytest.mark.parametrize(
     ("size", "claim", "lowest", "most"),
@@ -249,6 +253,7 @@ def test_equivalence_is_shown_as_often_as_two_one_sided_tests_show_it() -> None:
     assert 0.2 < found.power < 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "text"),
     [
@@ -288,6 +293,7 @@ def test_the_planned_test_is_the_one_that_the_report_prints(kind: str, text: str
     assert answer.p == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_who_drops_out_is_left_out_by_the_f_test_and_kept_by_the_mixed_model() -> None:
     table = movements(30, sessions=2, slope=-0.3)
     gone = table["participant"].isin([f"P{n:03}" for n in range(12)]) & (table["session"] == 2)
@@ -301,6 +307,7 @@ def test_who_drops_out_is_left_out_by_the_f_test_and_kept_by_the_mixed_model() -
     assert found.power > 0.5
 
 
+@pytest.mark.slow
 def test_who_has_no_result_at_all_is_one_of_a_cohort_and_of_no_test() -> None:
     """By t tests of those who are left, of as many as were drawn."""
     table = movements(60, difference=0.8)
@@ -320,6 +327,7 @@ def test_who_has_no_result_at_all_is_one_of_a_cohort_and_of_no_test() -> None:
     assert found.power < of_all.power
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", range(2))
 def test_the_f_test_of_drawn_groups_finds_what_scipys_finds_in_each_cohort(number: int) -> None:
     """Three or four groups of unequal pools, of whom some leave at once and some in a movement."""
@@ -360,6 +368,7 @@ def test_the_f_test_of_drawn_groups_finds_what_scipys_finds_in_each_cohort(numbe
         assert np.mean(tested) == pytest.approx(24 * share, abs=2.0)
 
 
+@pytest.mark.slow
 def test_a_contrast_is_the_second_level_less_the_first() -> None:
     table = movements(60, groups=("a", "b", "c"), difference=1.5)
     for text, sign in (("group[a,c]", 1.0), ("group[c,a]", -1.0)):
@@ -375,6 +384,7 @@ def test_a_contrast_is_the_second_level_less_the_first() -> None:
         assert found.power > 0.5
 
 
+@pytest.mark.slow
 def test_a_cohort_of_people_without_results_shows_nothing() -> None:
     table = movements(30)
     for kind, effect in (("contrast", OF_GROUPS), ("anova", PLAIN), ("mixed", "group[T.visual]")):
@@ -393,6 +403,7 @@ def test_time_outs_are_no_results_and_their_places_still_are_places() -> None:
     assert len(planned.results) == 20 * 7
 
 
+@pytest.mark.slow
 def test_cohorts_are_the_same_whoever_makes_them() -> None:
     planned = plan_test("contrast", OF_GROUPS, movements(40, difference=0.5), NOTHING)
     one = next(power_of_report(planned, [12], 30, seed=9))
@@ -486,6 +497,7 @@ def study(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_trial_tables_without_files_are_those_of_the_participant_files(
     study: Path, tmp_path: Path
 ) -> None:
@@ -510,6 +522,7 @@ def test_trial_tables_without_files_are_those_of_the_participant_files(
     pd.testing.assert_frame_equal(again, made["P001"])
 
 
+@pytest.mark.slow
 def test_power_makes_files_only_for_what_is_measured_in_frames(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -535,6 +548,7 @@ def test_power_makes_files_only_for_what_is_measured_in_frames(
     assert len(pd.read_csv(where / "power.csv")) == 1
 
 
+@pytest.mark.slow
 def test_who_leaves_before_a_first_movement_is_named_and_drawn(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

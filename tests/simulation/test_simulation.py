@@ -114,6 +114,7 @@ def local(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return digests(data)
 
 
+@pytest.mark.slow
 def test_a_simulation_leaves_the_files_of_a_study_all_stamped(
     study: Path, cohort: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -132,6 +133,7 @@ def test_a_simulation_leaves_the_files_of_a_study_all_stamped(
             assert len(session.trials) == 4 / number
 
 
+@pytest.mark.slow
 def test_two_cores_make_the_same_bits_as_one(
     study: Path, cohort: Path, tmp_path: Path, local: dict[str, str]
 ) -> None:
@@ -188,6 +190,7 @@ def test_an_interrupt_by_hand_says_who_is_there_and_the_same_command_makes_the_o
     assert first == {path: each for path, each in local.items() if path[:4] in NAMES}
 
 
+@pytest.mark.slow
 def test_another_population_is_not_mixed_into_a_folder(
     study: Path, cohort: Path, tmp_path: Path
 ) -> None:
@@ -227,6 +230,7 @@ def test_work_of_a_core_that_was_lost_is_done_again(tmp_path: Path) -> None:
     assert (tmp_path / "mark").exists()
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     from labcrane.analysis.parallel import work
 
@@ -281,6 +285,7 @@ def test_a_cluster_makes_the_same_bits_even_when_a_worker_is_killed(
     assert digests(data) == local
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [pytest.param(["report"], marks=pytest.mark.long), ["export", "--to", "tables"]],

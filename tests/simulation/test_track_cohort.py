@@ -22,6 +22,7 @@ def planned(rounds: int, **law: UpDown | QuestPlus) -> PlannedTrack:
     return PlannedTrack("t", track, 1, rounds, made)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("guess", [0.0, 0.25])
 def test_quest_plus_recovers_thresholds_with_a_bias_under_a_twentieth_of_their_spread(
     guess: float,
@@ -36,6 +37,7 @@ def test_quest_plus_recovers_thresholds_with_a_bias_under_a_twentieth_of_their_s
     assert found.spread < (0.3 if guess == 0.0 else 0.45) * 12 / np.sqrt(12)
 
 
+@pytest.mark.slow
 def test_what_quest_plus_says_of_its_own_error_is_its_error() -> None:
     track = planned(25, quest_plus=QuestPlus(spreads=(1.0,)))
     people = observe(track, abilities(track, 1500, (), seed=6), seed=7)
@@ -43,6 +45,7 @@ def test_what_quest_plus_says_of_its_own_error_is_its_error() -> None:
     assert errors.std() == pytest.approx(1.0, abs=0.06)
 
 
+@pytest.mark.slow
 def test_what_is_off_at_the_ends_is_told_besides_the_mean_that_hides_it() -> None:
     track = planned(15, quest_plus=QuestPlus(spreads=(2.0,), lapse=0.02))
     found = quality(track, observe(track, abilities(track, 1000, (), seed=2), seed=3))
@@ -69,6 +72,7 @@ def test_a_tenth_is_a_tenth_of_those_of_whom_there_is_an_estimate() -> None:
     assert found.bias == pytest.approx((2 * 5 + 2 * 7 - 7) / 29)
 
 
+@pytest.mark.slow
 def test_a_staircase_finds_the_level_at_which_it_settles() -> None:
     law = UpDown(harder_after=2, easier_after=1, steps=(2, 1), reversals=20, leave_out=4)
     track = planned(300, up_down=law)

@@ -63,6 +63,7 @@ def told(folder: Path, name: str) -> pd.DataFrame:
     return pd.read_csv(folder / "report" / "tables" / f"{name}.csv")
 
 
+@pytest.mark.slow
 def test_everybodys_thresholds_are_those_that_their_sessions_ended_with(folder: Path) -> None:
     found = told(folder, "thresholds").set_index(["participant", "session"])
     assert len(found) == 4
@@ -80,6 +81,7 @@ def test_everybodys_thresholds_are_those_that_their_sessions_ended_with(folder: 
     assert ">Thresholds</h2>" in page
 
 
+@pytest.mark.slow
 def test_bias_and_spread_of_each_track_are_told_from_a_thousand_operators(folder: Path) -> None:
     quality = told(folder, "track_quality")
     assert OPERATORS == 1000
@@ -96,6 +98,7 @@ def test_bias_and_spread_of_each_track_are_told_from_a_thousand_operators(folder
     assert stairs["spread"].is_monotonic_increasing  # shallow success is harder to find
 
 
+@pytest.mark.slow
 def test_a_study_without_tracks_has_no_word_of_thresholds(tmp_path: Path) -> None:
     text = STUDY.replace("track: quest, ", "").replace(", track: stairs", ", pairs: 1")
     text = text[: text.index("design:")] + text[text.index("sessions:") :]

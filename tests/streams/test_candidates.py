@@ -87,6 +87,7 @@ def lab(tmp_path: Path):
     lab.close()
 
 
+@pytest.mark.slow
 def test_nothing_of_a_stream_is_recorded_before_it_is_confirmed_and_it_is_asked_once(
     lab: Lab,
 ) -> None:
@@ -132,6 +133,7 @@ def test_nothing_of_a_stream_is_recorded_before_it_is_confirmed_and_it_is_asked_
     assert not any("alone" in line for line in report.advice())
 
 
+@pytest.mark.slow
 def test_who_names_a_stream_has_it_before_who_would_have_any_of_its_type(lab: Lab) -> None:
     lab.sender("Amplifier", "NamedEEG", "amplifier-1")
     wanted = [

@@ -72,6 +72,7 @@ def held_up_ms(*corrected):
     return sum(1e3 * (each.rtt_p95_s / 2.0 - each.hidden_s) for each in qualities)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "treatment", "limit_ms"),
     [("Drifting", EXACT, 0.05), ("Stepping", EXACT, 0.05), ("Chunks", CHUNKS, 0.3)],
@@ -90,6 +91,7 @@ def test_markers_fall_on_the_right_samples(recorded, name, treatment, limit_ms):
     assert 1e3 * np.quantile(np.abs(error), 0.95) < bound
 
 
+@pytest.mark.slow
 def test_no_sample_of_a_replaced_source_is_mis_stamped(recorded):
     device = recorded.streams()["Restarted"]
     corrected = resync(device)
@@ -98,6 +100,7 @@ def test_no_sample_of_a_replaced_source_is_mis_stamped(recorded):
     assert np.abs(corrected.time - truth(device)).max() < 5e-4
 
 
+@pytest.mark.slow
 def test_the_sources_clock_is_known(recorded):
     streams = recorded.streams()
     drift = resync(streams["Drifting"]).quality
@@ -107,6 +110,7 @@ def test_the_sources_clock_is_known(recorded):
     assert resync(streams["Moments"]).quality.drift_ppm == pytest.approx(0.0, abs=5.0)
 
 
+@pytest.mark.slow
 def test_pyxdf_reads_the_same_journal_to_the_same_times(recorded):
     """An independent reader, where a straight line is right: a steady clock."""
     device = recorded.streams()["Drifting"]

@@ -47,6 +47,7 @@ def recorded(source: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_streams_lists_type_rate_units_host_and_offset(source: str) -> None:
     done = labcrane("streams")
     name, channels, host, ident = done.stdout.partition(source)[0].splitlines()[-4:]
@@ -57,6 +58,7 @@ def test_streams_lists_type_rate_units_host_and_offset(source: str) -> None:
     assert ident == "  source id: "
 
 
+@pytest.mark.slow
 def test_streams_are_watched_until_it_is_known_how_they_come(source: str) -> None:
     done = labcrane("streams", "--watch", "--seconds", 12, columns=80)
     assert done.returncode == 0, done.stderr
@@ -74,6 +76,7 @@ def test_what_belongs_to_the_watch_is_refused_without_it() -> None:
     assert "--seconds and --protocol belong to --watch; add it" in done.stderr
 
 
+@pytest.mark.slow
 def test_streams_are_recorded_without_an_experiment(recorded: Path) -> None:
     stream = open_recording(recorded / "alone.h5").session(1).streams["Amplifier"]
     assert len(stream.time) > 100
@@ -81,6 +84,7 @@ def test_streams_are_recorded_without_an_experiment(recorded: Path) -> None:
     np.testing.assert_array_equal(np.diff(stream.data["Counter"]), 1.0)
 
 
+@pytest.mark.slow
 def test_the_seconds_are_counted_from_when_the_stream_is_there(tmp_path: Path) -> None:
     source = f"late-{os.getpid()}-{time.monotonic_ns()}"
     words = ["record", tmp_path / "late", "--stream", f"source_id={source}", "--seconds", 2]
@@ -104,6 +108,7 @@ def test_the_seconds_are_counted_from_when_the_stream_is_there(tmp_path: Path) -
     assert np.ptp(stream.time) > 1.5
 
 
+@pytest.mark.slow
 def test_a_recording_is_never_written_over(recorded: Path, source: str) -> None:
     done = labcrane("record", recorded, "--stream", f"source_id={source}", "--seconds", 1)
     assert done.returncode == 1
@@ -117,6 +122,7 @@ def test_a_stream_is_named_by_what_lsl_knows(
     assert "stream 'EEG' must be type=..., name=... or source_id=..." in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_recover_makes_the_file_again_of_the_journals(recorded: Path, tmp_path: Path) -> None:
     folder = tmp_path / "alone"
     shutil.copytree(recorded, folder)
@@ -133,6 +139,7 @@ def test_recover_says_when_there_is_nothing(tmp_path: Path) -> None:
     assert f"no journals below {tmp_path}" in labcrane("recover", tmp_path).stdout.replace("\n", "")
 
 
+@pytest.mark.slow
 def test_resync_corrects_again_from_the_file_alone(recorded: Path, tmp_path: Path) -> None:
     path = tmp_path / "copied.h5"
     shutil.copy(recorded / "alone.h5", path)

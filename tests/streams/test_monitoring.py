@@ -155,6 +155,7 @@ def test_a_monitor_that_raises_in_its_process_is_told_by_its_name(tmp_path: Path
     assert noted.tap.failed == {"odd": "RuntimeError: one is too much"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [2.0, 3.0], ids=["crashes", "hangs"])
 def test_a_monitor_takes_its_process_with_it_and_another_one_goes_on(
     how: float, tmp_path: Path
@@ -179,6 +180,7 @@ def test_a_monitor_takes_its_process_with_it_and_another_one_goes_on(
     assert "died 1 times and are started again" in noted.feed.fault
 
 
+@pytest.mark.slow
 def test_what_a_process_found_before_it_died_is_taken_back_however_late_it_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -204,6 +206,7 @@ def test_what_a_process_found_before_it_died_is_taken_back_however_late_it_is_re
     assert not noted.tap.faults
 
 
+@pytest.mark.slow
 def test_samples_wait_for_no_monitor(tmp_path: Path) -> None:
     noted = Noted(tmp_path, hang_s=3600.0)
     noted.give(0.0, 5.0)

@@ -40,6 +40,7 @@ def events(stream):
     return [note.data["event"] for note in stream.notes]
 
 
+@pytest.mark.slow
 def test_streams_that_come_late_return_or_never_send_are_all_recorded(lab):
     first = lab.sender("Amplifier", "EEG", "amplifier-1")
     lab.sender("Mute", "EEG", "amplifier-2", rate=-100.0)
@@ -90,6 +91,7 @@ def until_ready_but_for(recorder, name):
     return status
 
 
+@pytest.mark.slow
 def test_the_recorder_outlives_whoever_started_it_by_a_grace_and_closes_its_journal(lab):
     lab.sender("Amplifier", "EEG", "amplifier-1")
     recorder = lab.recorder(AMPLIFIER, grace_s=1.5)
@@ -104,6 +106,7 @@ def test_the_recorder_outlives_whoever_started_it_by_a_grace_and_closes_its_jour
     assert after > 0.0, "it went on recording when nobody was there any more"
 
 
+@pytest.mark.slow
 def test_a_killed_recorder_goes_on_in_the_next_part(lab):
     lab.sender("Amplifier", "EEG", "amplifier-1")
     first = lab.recorder(AMPLIFIER)
@@ -143,6 +146,7 @@ def test_samples_of_a_chunk_under_way_when_the_recorder_connects_have_the_times_
     assert note["samples"] == [0, 11]
 
 
+@pytest.mark.slow
 def test_two_programs_with_one_source_id_are_warned_of(lab):
     lab.sender("Amplifier", "EEG", "same")
     lab.sender("Amplifier", "EEG", "same")
@@ -156,6 +160,7 @@ def test_two_programs_with_one_source_id_are_warned_of(lab):
     assert events(lab.streams()["Amplifier"]) == ["opened", "warning"]
 
 
+@pytest.mark.slow
 def test_a_source_that_comes_back_from_another_session_is_warned_of(lab, tmp_path, monkeypatch):
     ours = Path(os.environ[VARIABLE])
     theirs = tmp_path / "theirs.cfg"
@@ -179,6 +184,7 @@ def test_a_source_that_comes_back_from_another_session_is_warned_of(lab, tmp_pat
     assert "warning" in events(lab.streams()["Amplifier"])
 
 
+@pytest.mark.slow
 def test_a_source_that_comes_back_in_this_session_is_not_warned_of(lab):
     first = lab.sender("Amplifier", "EEG", "amplifier-1")
     recorder = lab.recorder(AMPLIFIER)
@@ -206,6 +212,7 @@ def named_or_none(status, name):
     return next((s["condition"] for s in status["streams"] if s["name"] == name), None)
 
 
+@pytest.mark.slow
 def test_discovery_tells_rate_units_and_clock(lab):
     lab.sender("Amplifier", "EEG", "amplifier-1")
     deadline = time.monotonic() + 240.0
@@ -235,6 +242,7 @@ def test_a_request_that_any_stream_would_meet_is_refused():
         StreamRequest("anything")
 
 
+@pytest.mark.slow
 def test_a_request_that_two_streams_meet_takes_none_silently(lab):
     """Two programs of one name; both are recorded, the session waits."""
     for source_id in ("amplifier-1", "filter-1"):

@@ -81,6 +81,7 @@ def test_a_search_that_finds_nothing_waits_as_long_as_told_and_not_for_liblsl(
         assert wait_s <= time.monotonic() - began
 
 
+@pytest.mark.slow
 def test_a_search_takes_the_ports_of_one_look_however_many_there_are() -> None:
     """In a process of its own: a look of another test's search may still be under way."""
     process = [sys.executable, "-c", SEARCHES, unique("nobody")]
@@ -148,6 +149,7 @@ def test_a_name_with_a_quote_is_searched_for_and_with_both_is_refused() -> None:
         equal(name='it\'s "so"')
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", range(6))
 def test_a_process_that_loses_its_stream_ends_without_an_abort(number: int) -> None:
     """It ends while the stream is searched for again, at some moment of a look."""

@@ -103,6 +103,7 @@ def test_delays_that_nothing_tells_from_uneven_samples_do_not_pass(seed: int) ->
     assert faults(corrected.quality, 250.0) == set()
 
 
+@pytest.mark.slow
 def test_delays_that_grow_slowly_and_pass_at_once_are_in_the_error_where_they_are_named() -> None:
     """Each passing looked like a buffer that shrank, and as many of them added up."""
     named = 0

@@ -1,0 +1,132 @@
+"""A second try for tests that failed in the gate, and what the gate says of a run.
+
+A computer that does other work can make a right test fail. So the gate runs what failed once more,
+alone, when everything else has ended. What passes then is named, and its run is green; a test that
+fails twice, or more than ``MOST`` that fail once, is red. ``pytest`` by itself gives no second try.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+GATE = "LABCRANE_GATE"
+"""Names the file that the stages of a gate write their runs into; set by the gate alone."""
+
+MOST = 3
+"""How many tests of one gate may need a second try."""
+
+LONG_FOR_QUICK_S = 3.0
+"""Quick tests that take longer are listed; they fail nothing."""
+
+LASTS_S = 1200.0
+"""How long the second tries may take together."""
+
+
+class SecondTry:
+    """Tries once more what failed, and notes counts, times and second tries in a file.
+
+    Parameters
+    ----------
+    config
+        Of the process that was started, not of one of its workers.
+    path
+        A line of JSON is added to it for this run; the lines of the same gate count together.
+    """
+
+    def __init__(self, config: pytest.Config, path: Path) -> None:
+        self._root = config.rootpath
+        self._path = path
+        self._failed: dict[str, None] = {}
+        self._counts = {"passed": 0, "failed": 0, "skipped": 0}
+        self._seconds: dict[str, float] = {}
+        self._slow: set[str] = set()
+        self._again: list[str] = []
+        self._says: list[str] = []
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Count what ends, and keep what failed in any of its phases."""
+        name = report.nodeid.partition("@")[0]  # which xdist appends a group to
+        self._seconds[name] = self._seconds.get(name, 0.0) + report.duration
+        if {"slow", "long", "soak"} & set(report.keywords):
+            self._slow.add(name)
+        if report.failed:
+            self._counts["failed"] += name not in self._failed
+            self._failed[name] = None
+        elif report.skipped or report.when == "call":
+            self._counts[report.outcome] += 1
+
+    @pytest.hookimpl(trylast=True)  # when the workers have ended
+    def pytest_sessionfinish(self, session: pytest.Session, exitstatus: int) -> None:
+        """Run what failed alone; the run is green when all of it passes."""
+        before = [name for line in self._lines() for name in line["second_try"]]
+        if exitstatus == pytest.ExitCode.TESTS_FAILED and self._failed:
+            if len(before) + len(self._failed) > MOST:
+                self._says.append(
+                    f"no second try: {len(before) + len(self._failed)} tests failed in this gate, "
+                    f"{MOST} may"
+                )
+            elif _passes(list(self._failed), self._root):
+                self._again = list(self._failed)
+                session.exitstatus = pytest.ExitCode.OK
+            else:
+                self._says.append("failed twice: " + ", ".join(self._failed))
+        if self._again:
+            self._says.append("needed a second try: " + ", ".join(self._again))
+        self._note(int(session.exitstatus))
+
+    def _lines(self) -> list[dict[str, list[str]]]:
+        if not self._path.exists():
+            return []
+        return [json.loads(line) for line in self._path.read_text(encoding="utf-8").splitlines()]
+
+    def _note(self, status: int) -> None:
+        line = {
+            "status": status,
+            **self._counts,
+            "second_try": self._again,
+            "processor_s": round(_processor_s()),
+        }
+        with self._path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(line) + "\n")
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        """End with quick tests that are not quick, the processor's time, and second tries."""
+        terminalreporter.section("the gate")
+        long = {
+            name: seconds
+            for name, seconds in self._seconds.items()
+            if seconds > LONG_FOR_QUICK_S and name not in self._slow
+        }
+        for name, seconds in sorted(long.items(), key=lambda pair: -pair[1]):
+            terminalreporter.line(f"{seconds:6.1f} s for a quick test: {name}")
+        terminalreporter.line(f"{_processor_s():.0f} s of processor")
+        for says in self._says:
+            terminalreporter.line(says)
+
+
+def _passes(names: list[str], root: Path) -> bool:
+    """Whether tests pass when they are run one after the other, with nothing beside them."""
+    words = ["-n", "0", "-m", "", "-q", "-p", "no:cacheprovider", *names]
+    environment = {name: value for name, value in os.environ.items() if name != "PYTEST_ADDOPTS"}
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "pytest", *words],
+            cwd=root, env=environment, timeout=LASTS_S, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return False
+    return done.returncode == 0
+
+
+def _processor_s() -> float:
+    """Return the seconds of processor of this process and of all that it has waited for."""
+    import resource  # Windows has none, and no gate
+
+    return sum(
+        used.ru_utime + used.ru_stime
+        for used in map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    )

@@ -1,0 +1,81 @@
+"""What failed in the gate is run once more, alone; a test that fails twice is red."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+TESTS = """
+from pathlib import Path
+import pytest
+
+@pytest.mark.parametrize("number", range(6))
+def test_it(number):
+    tried = Path(f"tried-{number}")
+    before = tried.exists()
+    tried.touch()
+    assert number not in __ALWAYS__
+    assert before or number not in __ONCE__
+"""
+CONFTEST = """
+import os
+from pathlib import Path
+from second_try import GATE, SecondTry
+
+def pytest_configure(config):
+    if GATE in os.environ and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(SecondTry(config, Path(os.environ.pop(GATE))))
+"""
+
+
+def gate_in(
+    folder: Path, *, once: tuple[int, ...] = (), always: tuple[int, ...] = (), processes: str = "0"
+) -> tuple[int, str, dict]:
+    """Return the status, what was said, and what is noted of the newest run."""
+    tests = TESTS.replace("__ALWAYS__", str(always)).replace("__ONCE__", str(once))
+    (folder / "test_some.py").write_text(tests)
+    (folder / "conftest.py").write_text(CONFTEST)
+    (folder / "pytest.ini").write_text("[pytest]\n")
+    here = {"PYTHONPATH": str(Path(__file__).parent), "PATH": "", "LABCRANE_GATE": "runs"}
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-n", processes],
+        cwd=folder, env=here, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    newest = (folder / "runs").read_text().splitlines()[-1]
+    return done.returncode, done.stdout + done.stderr, json.loads(newest)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("processes", ["0", "2"])
+def test_what_fails_once_is_named_and_its_run_is_green(tmp_path: Path, processes: str) -> None:
+    status, said, noted = gate_in(tmp_path, once=(1, 4), processes=processes)
+    both = {"test_some.py::test_it[1]", "test_some.py::test_it[4]"}
+    assert (status, set(noted["second_try"])) == (0, both)
+    assert "needed a second try: test_some.py::test_it[" in said
+    assert (noted["passed"], noted["failed"], noted["skipped"]) == (4, 2, 0)
+
+
+@pytest.mark.slow
+def test_what_fails_twice_is_red(tmp_path: Path) -> None:
+    status, said, noted = gate_in(tmp_path, once=(1,), always=(2,))
+    assert (status, noted["status"], noted["second_try"]) == (1, 1, [])
+    assert "failed twice: test_some.py::test_it[1], test_some.py::test_it[2]" in said
+
+
+@pytest.mark.slow
+def test_more_than_three_in_all_stages_of_a_gate_get_no_second_try(tmp_path: Path) -> None:
+    assert gate_in(tmp_path, once=(0, 1))[0] == 0
+    for tried in tmp_path.glob("tried-*"):
+        tried.unlink()
+    status, said, _ = gate_in(tmp_path, once=(0, 1))
+    assert status == 1
+    assert "no second try: 4 tests failed in this gate, 3 may" in said
+
+
+def test_a_run_in_which_nothing_fails_needs_none(tmp_path: Path) -> None:
+    status, said, noted = gate_in(tmp_path)
+    assert (status, noted["passed"], noted["second_try"]) == (0, 6, [])
+    assert "second try" not in said
+    assert "s of processor" in said
