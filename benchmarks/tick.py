@@ -66,7 +66,7 @@ machine: ch8
 input: {{use: dual_joystick}}
 scheme:
   use: joint_velocity
-  map: {{slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}}
+  map: {{slew: -left.x, elbow: left.y, wrist: -right.x, shoulder: -right.y}}
 dynamics: {{use: bullet_crane}}
 tasks:
   aiming: {{use: aiming, end: trigger, limit_s: 1.0e+6}}

@@ -5,7 +5,7 @@ machine: ch8
 input: {use: dual_joystick}
 scheme:
   use: joint_velocity
-  map: {slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}
+  map: {slew: -left.x, elbow: left.y, wrist: -right.x, shoulder: -right.y}
 dynamics: {use: kinematic_crane}
 """
 

@@ -60,9 +60,9 @@ def told(tmp_path: Path, registry: Registry):
 @pytest.mark.parametrize(
     ("study", "old", "new", "said"),
     [
-        ("aiming", "right.x", "right.z", "14:45: scheme.map.wrist is 'right.z', and there is no such axis; did you mean"),
-        ("aiming", ", wrist: right.x", "", "14:8: scheme.map has nothing for the joint 'wrist'; it needs one for each of slew, shoulder, elbow, wrist"),
-        ("aiming", "elbow: left.y", "boom: left.y", "14:23: scheme.map.boom is 'boom', and there is no such joint; the machine has elbow, shoulder, slew, wrist"),
+        ("aiming", "right.x", "right.z", "14:46: scheme.map.wrist is '-right.z', and there is no such axis; did you mean"),
+        ("aiming", ", wrist: -right.x", "", "14:8: scheme.map has nothing for the joint 'wrist'; it needs one for each of slew, shoulder, elbow, wrist"),
+        ("aiming", "elbow: left.y", "boom: left.y", "14:24: scheme.map.boom is 'boom', and there is no such joint; the machine has elbow, shoulder, slew, wrist"),
         ("retrieval", "proportional: [base]", "proportional: [foo]", "17:18: dynamics.proportional[1] is 'foo', and there is no such joint; the machine has arm, base, boom, jaws"),
         ("retrieval", "boom: 3", "bom: 3", "11:72: input.valves.bom is 'bom', and there is no such joint; did you mean 'boom'?"),
         ("retrieval", "boom: 3, ", "", "13:9: scheme needs the axis 'valve.boom', and there is no such axis"),
@@ -81,7 +81,7 @@ def told(tmp_path: Path, registry: Registry):
         ("aiming", "camera: cab", "areas: [targt]", "27:33: views.operator.areas[1] is 'targt', and there is no such object; did you mean 'target'?"),
         ("aiming", "camera: cab", "patch: {on: [trial.strat]}", "27:38: views.operator.patch.on[1] is 'trial.strat', and there is no such event; did you mean 'trial.start'?"),
         ("aiming", "camera: cab", "supervisor: {cameras: [moon]}", "27:48: views.operator.supervisor.cameras[1] is 'moon', and there is no such camera;"),
-        ("aiming", "wrist: right.x", "wrist: -left.y", "14:45: scheme.map has 'left.y' for both 'elbow' and 'wrist'; give each its own"),
+        ("aiming", "wrist: -right.x", "wrist: -left.y", "14:46: scheme.map has 'left.y' for both 'elbow' and 'wrist'; give each its own"),
         ("aiming", "width: 0.5", "width: 50", "20:57: tasks.aiming.width: a circle 50 m wide holds the middle of its partner 2 m away; write less than 2"),
         ("aiming", "width: 0.5", "width: 1e300", "20:57: tasks.aiming.width: a circle 1e+300 m wide"),
         ("aiming", "width: 0.5", "width: 2", "20:57: tasks.aiming.width: a circle 2 m wide"),
@@ -90,8 +90,8 @@ def told(tmp_path: Path, registry: Registry):
         ("aiming", "feedback: group", "feedback: grup", "39:41: sessions[1].steps[2].block.feedback is 'grup'; it must be 'all', 'none' or 'group', or a list: [.., ..]"),
         ("aiming", "on_fault", "  - {name: acquisition, steps: [consent]}\non_fault", "41:12: two sessions are called 'acquisition'; give each a name of its own"),
         ("aiming", "pattern: 'P\\d{3}'", "pattern: 'P\\d{3}$1'", "7:25: participants.pattern 'P\\d{3}$1' is matched by nobody; "),
-        ("aiming", "use: joint_velocity\n  map: {slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}", "use: end_effector\n  map: {x: left.x, y: left.y, up: right.y}", "14:31: scheme.map.up is 'up', and there is no such direction of the frame; it has x, y, z"),
-        ("aiming", "use: joint_velocity\n  map: {slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}", "use: end_effector\n  map: {x: left.x, y: left.y}", "14:8: scheme.map has nothing for the direction of the frame 'z'; it needs one for each of x, y, z"),
+        ("aiming", "use: joint_velocity\n  map: {slew: -left.x, elbow: left.y, wrist: -right.x, shoulder: -right.y}", "use: end_effector\n  map: {x: left.x, y: left.y, up: right.y}", "14:31: scheme.map.up is 'up', and there is no such direction of the frame; it has x, y, z"),
+        ("aiming", "use: joint_velocity\n  map: {slew: -left.x, elbow: left.y, wrist: -right.x, shoulder: -right.y}", "use: end_effector\n  map: {x: left.x, y: left.y}", "14:8: scheme.map has nothing for the direction of the frame 'z'; it needs one for each of x, y, z"),
         ("retrieval", "model: arm.dmd.yaml\n  prop", "model: avc.dbc\n  prop", "16:10: "),
         ("retrieval", "jaws: {grip_n: 60", "jaws: {joint: boom, grip_n: 60", "18:17: the jaws' joint 'boom' must be the machine's last and have length 0, but the last is 'jaws'"),
         ("retrieval", "proportional: [base]", "proportional: [base, base]", "17:24: dynamics.proportional has 'base' twice; write it once"),
@@ -516,7 +516,7 @@ def test_the_events_of_every_session_are_those_that_its_code_tells() -> None:
 @pytest.mark.parametrize(
     ("study", "old", "new", "said"),
     [
-        ("aiming", "wrist: right.x, shoulder: -right.y}\n  dead_zone: 0.05", "wrist: right.z, shoulder: -right.y}\n  dead_zone: much", ["scheme.map.wrist is 'right.z'", "scheme.dead_zone is 'much'"]),
+        ("aiming", "wrist: -right.x, shoulder: -right.y}\n  dead_zone: 0.05", "wrist: right.z, shoulder: -right.y}\n  dead_zone: much", ["scheme.map.wrist is 'right.z'", "scheme.dead_zone is 'much'"]),
         ("aiming", "end: rest_inside, limit_s: 30", "end: trigger, trigger: left.knob, limit_s: 3 parsnips", ["tasks.aiming.trigger is 'left.knob'", "tasks.aiming.limit_s"]),
         ("aiming", "camera: cab", "areas: [targt], size: [1280, much], keys: [lft]", ["views.operator.areas[1] is 'targt'", "views.operator.size[2]", "views.operator.keys[1] is 'lft'"]),
         ("aiming", "camera: cab", "camera: {eye: [1, 2, 3], look: [3, 4, 5], fov_deg: 800, on: bom}", ["views.operator.camera.on is 'bom'", "views.operator.camera.fov_deg is 800"]),

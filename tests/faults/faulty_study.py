@@ -25,7 +25,7 @@ input: {{use: dual_joystick}}
 operator: {{use: faulty_input}}
 scheme:
   use: faulty_scheme
-  map: {{slew: left.x, elbow: left.y, wrist: right.x, shoulder: -right.y}}
+  map: {{slew: -left.x, elbow: left.y, wrist: -right.x, shoulder: -right.y}}
 dynamics: {{use: faulty_dynamics}}
 tasks:
   aiming: {{use: faulty_task, distances: [2], movements: 1, limit_s: 0.5}}

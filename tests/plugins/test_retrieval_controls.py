@@ -95,7 +95,7 @@ def panel(study: Study) -> Iterator[Controls]:
         yield Controls(study, push, report, 0.05)
 
 
-STICKS = {"base": (0, 0, 1), "arm": (0, 1, -1), "boom": (1, 1, -1), "jaws": (1, 0, 1)}
+STICKS = {"base": (0, 0, -1), "arm": (0, 1, -1), "boom": (1, 1, -1), "jaws": (1, 0, 1)}
 """Of each joint: which stick, which of its axes, and which way is 1."""
 
 
