@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from labcrane.analysis.statistics.time_scales import quantities, summary, taken_away
+from labcrane.analysis.statistics.time_scales import APART, TAKEN, adjustment, quantities, summary
 
 PEOPLE, PHASES, PLACES = 9, 3, 6
 PAIRS = {"near": -0.7, "far": 1.9}
@@ -69,7 +69,8 @@ def test_each_quantity_is_that_of_the_persons_own_curve(
 def test_a_groups_mean_interval_and_test_are_those_of_its_people(
     curves: np.ndarray, found: pd.DataFrame
 ) -> None:
-    told = summary(found, "movement_time").set_index(["phase", "quantity", "group"])
+    everybody = {f"P{who:03}": "none" if who % 3 else "slow" for who in range(PEOPLE)}
+    told = summary(found, "movement_time", everybody).set_index(["phase", "quantity", "group"])
     people = np.arange(PEOPLE)
     for phase in range(PHASES):
         for quantity, values in known(curves, phase).items():
@@ -115,9 +116,10 @@ def test_of_unbalanced_pairs_what_statsmodels_finds_that_they_add_is_taken_away(
     kinds = sorted(cells["pair"].unique())
     adds = {each: model.params[f"C(pair, Sum)[S.{each}]"] for each in kinds[:-1]}
     adds[kinds[-1]] = -sum(adds.values())
-    mine = taken_away(movements, "movement_time")
+    found = adjustment(movements, "movement_time")
+    mine = found.shares.to_numpy() @ found.adds
+    np.testing.assert_allclose(mine, movements["pair"].map(adds), rtol=1e-9, atol=1e-9)
     wanted = movements["movement_time"] - movements["pair"].map(adds)
-    np.testing.assert_allclose(mine, wanted, rtol=1e-9, atol=1e-9)
     # Means of pairs alone take learning away with them.
     alone = movements.groupby(["participant", "pair"])["movement_time"].mean()
     alone = movements["pair"].map(alone.groupby(level=1).mean())
@@ -134,11 +136,39 @@ def test_learning_is_found_whole_though_few_people_had_pairs_in_orders_that_favo
     assert np.mean(slopes) == pytest.approx(-0.4, abs=4.0 * error)
 
 
-def test_pairs_that_came_in_one_order_for_all_cannot_be_told_from_positions() -> None:
-    movements = unbalanced(1)
+@pytest.mark.parametrize("seed", range(4))
+def test_of_one_order_for_all_there_is_only_what_compares_a_pair_with_itself(seed: int) -> None:
+    """From session to session pairs are the same: a mean and a last position can be compared."""
+    movements = unbalanced(seed)
     same = movements.assign(pair=movements["place"].map(dict(enumerate("abcdefgh", start=1))))
-    mine = taken_away(same, "movement_time")
-    np.testing.assert_array_equal(mine, same["movement_time"])
+    keys = ["participant", "phase", "place"]
+    whole = same.groupby(keys)["movement_time"].mean().unstack(["phase", "place"])
+    if whole.isna().any(axis=None):
+        same = same[same["participant"].isin(whole.dropna().index)]
+    found = quantities(same, "movement_time")
+    people = dict.fromkeys(sorted(same["participant"].unique()), "none")
+    told = summary(found, "movement_time", people).set_index(["phase", "quantity"])
+    first, second = (whole.dropna()[f"{phase} session"] for phase in (1, 2))
+    wanted = {"change": second.mean(axis=1) - first.mean(axis=1), "retention": second[8] - first[8]}
+    for quantity, values in wanted.items():
+        row = told.loc[("2 session", quantity)]
+        assert (row["adjustment"], row["why"], row["n"]) == ("", "", len(values))
+        test = stats.ttest_1samp(values, 0.0)
+        np.testing.assert_allclose(
+            [row["mean"], row["t"], row["p"]], [values.mean(), test.statistic, test.pvalue]
+        )
+    for key, row in told.iterrows():
+        if key[1] not in wanted:
+            assert (row["adjustment"], row["why"]) == (APART, APART)
+            assert row[["mean", "t", "p"]].isna().all()
+
+
+def test_a_quantity_says_whether_pairs_were_taken_away_from_it() -> None:
+    found = quantities(unbalanced(2), "movement_time")
+    assert set(found.loc[found["quantity"] == "slope", "adjustment"]) == {TAKEN}
+    one = unbalanced(2).assign(pair="a")
+    assert set(quantities(one, "movement_time")["adjustment"]) == {""}
+    assert set(quantities(one.drop(columns="pair"), "movement_time")["adjustment"]) == {""}
 
 
 def test_what_goes_by_a_position_or_phase_that_somebody_lacks_is_not_made_of_its_neighbour() -> (

@@ -195,7 +195,7 @@ def test_where_nothing_can_be_tested_all_of_it_is_named_and_trends_too(found) ->
         "linear trend of sequence in 1 acquisition", "linear trend of sequence in 2 retention",
     }  # fmt: skip
     assert "2 of 2 people have a value in every cell of session, and 3 are needed" in page
-    assert "Mean change to 2 retention: not tested, 2 of 2 people have it." in said
+    assert "Mean change to 2 retention: not tested, 2 of 2 people have it, and 3 are" in said
 
 
 def test_positions_that_cannot_be_told_from_pairs_are_named(found) -> None:

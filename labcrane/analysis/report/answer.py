@@ -136,6 +136,8 @@ def _effect(
 ) -> str:
     """Return ``differed over distance (2 m: 3.21 s, 6 m: 5.40 s; F(1, 35) = 90.1, p < .001)``."""
     name, measure = str(row["factor"]).removesuffix(ADJUSTED), str(row["measure"])
+    if row["confounded"]:
+        return f"what {name} does cannot be told from {row['confounded']}"
     said = "differed over" if row["p_gg"] < LEVEL else "did not detectably differ over"
     cells = counted.groupby([column, "participant"])[measure].mean().dropna()
     means = cells.groupby(level=0).mean()

@@ -1,5 +1,6 @@
 """Factors of a study as its report sees them: group, phase, place in it, distance, side."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +33,8 @@ class Factors:
     crossed
         Levels of session and block where both vary and each session has the same blocks; they are
         two factors then, and otherwise phases are one.
+    people
+        Everybody in the sample, also who has no movement, and their group.
     """
 
     groups: tuple[str, ...]
@@ -41,6 +44,7 @@ class Factors:
     practice: bool
     targets: dict[str, tuple[Any, ...]]
     crossed: dict[str, tuple[Any, ...]]
+    people: dict[str, str]
 
     @property
     def between(self) -> list[str]:
@@ -133,8 +137,14 @@ def _names(table: "pd.DataFrame", counted: "pd.Series[bool]") -> list[str]:
     return [named[(s, b)] if is_counted else f"practice {b:g}" for s, b, is_counted in pairs]
 
 
-def factors_of(table: "pd.DataFrame") -> Factors:
-    """Return what varies, from movements :func:`with_factors`."""
+def factors_of(table: "pd.DataFrame", people: Mapping[str, str] | None = None) -> Factors:
+    """Return what varies, from movements :func:`with_factors`.
+
+    Parameters
+    ----------
+    people
+        Everybody in the sample, and their group; who has movements, if it is not told.
+    """
     counted = table[table["practice"].astype(float) == 0.0]
     groups = tuple(sorted(name for name in counted[GROUP].unique() if name))
     phases = tuple(sorted(counted[PHASE].unique()))
@@ -150,7 +160,11 @@ def factors_of(table: "pd.DataFrame") -> Factors:
     }
     targets = {name: levels for name, levels in planned.items() if len(levels) > 1}
     crossed = _crossed(counted)
-    return Factors(several, phases, kind, places, len(counted) < len(table), targets, crossed)
+    if people is None:
+        first = table.drop_duplicates("participant")
+        people = dict(zip(map(str, first["participant"]), map(str, first[GROUP]), strict=True))
+    practice = len(counted) < len(table)
+    return Factors(several, phases, kind, places, practice, targets, crossed, dict(people))
 
 
 def _crossed(counted: "pd.DataFrame") -> dict[str, tuple[Any, ...]]:

@@ -17,7 +17,8 @@ from labcrane.analysis.report.factors import (
 )
 from labcrane.analysis.statistics.anova import Anova, Contrast, analyse, compare
 from labcrane.analysis.statistics.anova import word as word  # noqa: PLC0414 - of levels, here too
-from labcrane.analysis.statistics.time_scales import quantities, summary
+from labcrane.analysis.statistics.confounding import told_apart
+from labcrane.analysis.statistics.time_scales import TAKEN, adjusted, quantities, summary
 from labcrane.analysis.statistics.trends import holm, linear_trend
 
 if TYPE_CHECKING:
@@ -29,10 +30,14 @@ USUAL = ("movement_time", "absolute_error", "circle_to_circle")
 TO_REST = "onset_to_rest"
 """Tested too where a movement ends otherwise than by rest, and so is not the movement time."""
 
-ADJUSTED = " with pairs' means taken away"
-"""Behind the name of an effect of positions, where pairs come in another order for everybody."""
+ADJUSTED = f" with {TAKEN}"
+"""Behind the name of an effect of positions that was tested beside pairs of targets."""
 
 SEQUENCE = "sequence"
+
+PAIRS = "pairs of targets"
+POSITIONS = ("positions", (PHASE, PLACE))
+"""What an effect may not be told from: positions hold learning, and pairs their distance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +54,15 @@ class Plan:
         What pairs are told by, where the effect is tested beside them; otherwise empty.
     phase
         The only one whose movements are in it; empty for all.
+    confusable
+        What the effect may not be told from, in words, and its columns; empty for nothing.
     """
 
     within: tuple[str, ...]
     asked: tuple[str, ...] = ()
     beside: str = ""
     phase: str = ""
+    confusable: tuple[str, tuple[str, ...]] = ("", ())
 
     @property
     def suffix(self) -> str:
@@ -64,6 +72,15 @@ class Plan:
     def of(self, results: "pd.DataFrame") -> "pd.DataFrame":
         """Return the movements that are in it."""
         return results[results[PHASE] == self.phase] if self.phase else results
+
+    def confounded(self, results: "pd.DataFrame", measure: str) -> str:
+        """Return what the effect that is asked for cannot be told from; empty where it can."""
+        words, columns = self.confusable
+        if not words:
+            return ""
+        known = self.of(results).dropna(subset=[measure])
+        apart = told_apart(known, self.asked, [("participant", PHASE), columns])
+        return "" if apart else words
 
 
 def measures_in(results: "pd.DataFrame", primary: Sequence[str] = ()) -> list[str]:
@@ -87,9 +104,13 @@ def anova_table(
     found: list[Anova] = []
     for measure in measures_in(results, primary):
         own: dict[str, Anova] = {}
-        for test in tests(results, measure, factors):
-            name = named(test, factors)
-            own.setdefault(name, replace(test, factor=name))  # groups come with every design
+        for plan in plans(results, factors):
+            confounded = plan.confounded(results, measure)
+            for test in tests_of(plan, results, measure, factors):
+                name = named(test, factors)
+                of_it = confounded if test.factor == ":".join(plan.asked) + plan.suffix else ""
+                # Groups come with every design.
+                own.setdefault(name, replace(test, factor=name, confounded=of_it))
         found += own.values()
     return _frame(found)
 
@@ -109,28 +130,41 @@ def named_factor(name: str, factors: Factors) -> str:
 def plans(results: "pd.DataFrame", factors: Factors) -> Iterator[Plan]:
     """Yield what is planned of every outcome."""
     phases = tuple(factors.over_phases)
-    pair = next((name for name in ("pair", DISTANCE) if name in results), "")
+    pair = pair_of(results)
     # First, because most participants are whole there.
     yield Plan(phases)
     # Positions of phases of unequal length have nothing to do with each other.
+    confusable = (PAIRS, (pair,)) if pair else ("", ())
     for phase in ("",) if factors.alike else factors.phases:
         within = (PLACE,) if phase else (*phases, PLACE)
-        yield Plan(within, (PLACE,), phase=phase)
-        if pair:
-            yield Plan(within, (PLACE,), pair, phase)
+        yield Plan(within, (PLACE,), phase=phase, confusable=confusable)
+        if pair and results[pair].nunique() > 1:
+            yield Plan(within, (PLACE,), pair, phase, confusable)
     for name in (DISTANCE, SIDE):
         if name in results:
-            yield Plan((*phases, name), (name,))
+            yield Plan((*phases, name), (name,), confusable=POSITIONS)
     if {DISTANCE, SIDE} <= set(results):  # a pair of targets is a distance on a side
-        yield Plan((DISTANCE, SIDE), (DISTANCE, SIDE))
+        yield Plan((DISTANCE, SIDE), (DISTANCE, SIDE), confusable=POSITIONS)
+
+
+def pair_of(results: "pd.DataFrame") -> str:
+    """Return the column that tells pairs of targets apart; empty where there is none."""
+    return next((name for name in ("pair", DISTANCE) if name in results), "")
 
 
 def tests(results: "pd.DataFrame", measure: str, factors: Factors) -> Iterator[Anova]:
     """Yield the tests; what stands behind an effect's name says where and of what it is."""
     for plan in plans(results, factors):
-        for test in analyse(plan.of(results), measure, plan.within, factors.between, plan.beside):
-            if set(plan.asked) <= set(test.factor.split(":")):
-                yield replace(test, factor=test.factor + plan.suffix)
+        yield from tests_of(plan, results, measure, factors)
+
+
+def tests_of(
+    plan: Plan, results: "pd.DataFrame", measure: str, factors: Factors
+) -> Iterator[Anova]:
+    """Yield the tests of one plan; one that was to be adjusted and was not is left out."""
+    for test in analyse(plan.of(results), measure, plan.within, factors.between, plan.beside):
+        if set(plan.asked) <= set(test.factor.split(":")) and test.beside == plan.beside:
+            yield replace(test, factor=test.factor + plan.suffix)
 
 
 def practice_table(
@@ -173,9 +207,14 @@ def contrast_table(
             for other in phases:
                 if other != name:
                     found += compare(results, measure, name, phases, between, at=other)
-        found += compare(results, measure, DISTANCE, [*phases, DISTANCE], between)
+        plan = Plan((*phases, DISTANCE), (DISTANCE,), confusable=POSITIONS)
+        confounded = plan.confounded(results, measure)
+        found += [
+            replace(one, confounded=confounded)
+            for one in compare(results, measure, DISTANCE, plan.within, between)
+        ]
     rows = [asdict(one) | {"factor": named_factor(one.factor, factors)} for one in found]
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows).drop(columns="people", errors="ignore")
 
 
 def trend_table(
@@ -201,13 +240,21 @@ def trend_table(
         {
             **asdict(trend),
             factors.kind: phase,
+            "confounded": trend_confounded(results, trend.measure, phase),
             "slope_low": trend.slope_ci[0],
             "slope_high": trend.slope_ci[1],
             "p_holm": next(p_holm) if trend.measure in corrected else float("nan"),
         }
         for phase, trend in found
     ]
-    return pd.DataFrame(rows).drop(columns="slope_ci", errors="ignore")
+    return pd.DataFrame(rows).drop(columns=["slope_ci", "people"], errors="ignore")
+
+
+def trend_confounded(results: "pd.DataFrame", measure: str, phase: str) -> str:
+    """Return what positions of a phase cannot be told from; empty where they can."""
+    pair = pair_of(results)
+    confusable = (PAIRS, (pair,)) if pair else ("", ())
+    return Plan((PLACE,), (PLACE,), phase=phase, confusable=confusable).confounded(results, measure)
 
 
 def time_scale_tables(
@@ -219,14 +266,17 @@ def time_scale_tables(
     tables, tests = [], []
     for measure in measures_in(results, primary):
         found = quantities(results, measure)
-        tables.append(summary(found, measure))
+        tables.append(summary(found, measure, factors.people))
         if not factors.between:
             continue
         for (phase, quantity), own in found.groupby(["phase", "quantity"], sort=False):
-            about = {"phase": phase, "quantity": quantity}
+            about = {"phase": str(phase), "quantity": str(quantity)}
             named = own.rename(columns={"value": measure})
-            tests += [asdict(test) | about for test in analyse(named, measure, (), [GROUP])]
-    return pd.concat(tables, ignore_index=True), pd.DataFrame(tests)
+            made = _frame(analyse(named, measure, (), [GROUP]))
+            tests.append(made.assign(**about, adjustment=adjusted(own)))
+    by_group = [table for table in tests if len(table)]
+    joined = pd.concat(by_group, ignore_index=True) if by_group else pd.DataFrame()
+    return pd.concat(tables, ignore_index=True), joined
 
 
 def score_table(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
@@ -302,4 +352,4 @@ def _frame(tests: Sequence[Anova]) -> "pd.DataFrame":
     rows: list[dict[str, Any]] = [
         asdict(test) | {"left_out": " ".join(test.left_out)} for test in tests
     ]
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows).drop(columns=["people", "beside"], errors="ignore")

@@ -32,11 +32,11 @@ from labcrane.analysis.report.outcomes import measures_in
 from labcrane.analysis.report.sample import in_words, sample
 from labcrane.analysis.report.shortfalls import Made, shortfalls
 from labcrane.analysis.report.thresholds import Judge, add_thresholds, thresholds_of
-from labcrane.analysis.report.words import STYLES, UNBALANCED, Results, paragraphs
+from labcrane.analysis.report.words import STYLES, UNBALANCED, Results, confounding, paragraphs
 from labcrane.analysis.statistics.fitts import throughput
 from labcrane.analysis.statistics.learning import learning_curves
 from labcrane.analysis.statistics.time_outs import time_outs
-from labcrane.analysis.statistics.time_scales import QUANTITIES
+from labcrane.analysis.statistics.time_scales import QUANTITIES, TAKEN
 from labcrane.analysis.statistics.trends import mixed_model
 from labcrane.analysis.tables.annotations import annotations_of
 from labcrane.analysis.tables.definitions import MEASURES
@@ -226,7 +226,7 @@ def _study(
 ) -> Results:
     """Add what is only known of all together, and return what was found."""
     everything = with_factors(everything)
-    factors = factors_of(everything)
+    factors = factors_of(everything, groups)
     results = everything[is_result(everything)]
     by = [*factors.between, *factors.by_phase, "distance"]
     counts = time_outs(everything, by)
@@ -247,7 +247,7 @@ def _study(
         page.table("scores", outcomes.score_table(scores, groups))
         page.table("score_tests", tests)
     made = Made(anovas, trends, practice, looked, tests)
-    short = shortfalls(everything, scores, made, groups, primary)
+    short = shortfalls(everything, scores, made, factors, primary)
     page.heading("What was not tested")
     if len(short):
         page.say(
@@ -356,11 +356,16 @@ def _statistics(
     else:
         page.say(
             "Analysis of variance over participants' means (type III); p_gg is corrected after "
-            "Greenhouse and Geisser. It says that some levels differ, not in which direction. "
-            "Pairs of circles come in another order for everybody: with pairs' means taken away, a "
-            "position is compared with what its pair takes on average, which is estimated too and "
-            "costs degrees of freedom."
+            "Greenhouse and Geisser. It says that some levels differ, not in which direction."
         )
+        if anovas["factor"].str.contains(outcomes.ADJUSTED, regex=False).any():
+            page.say(
+                "Pairs of targets come in several orders: with pairs' means taken away, a position "
+                "is compared with what its pair takes on average, which is estimated too and costs "
+                "degrees of freedom."
+            )
+        for note in confounding(anovas):
+            page.say(note)
         page.table("anova", anovas)
     if len(contrasts):
         page.say("Differences two by two; p_holm is corrected within a factor, at one level.")
@@ -371,9 +376,9 @@ def _statistics(
         )
         page.table("trends", trends)
     page.say(
-        "Two time scales: within a session or block, and from one to the next. Here pairs' means "
-        "are taken away, so that a slope is not quite that of the trends above; whoever lacks a "
-        "first or last position or a session is left out of what goes by it. "
+        "Two time scales: within a session or block, and from one to the next. Where adjustment "
+        f"says {TAKEN}, a slope is not quite that of the trends above; whoever lacks a first or "
+        "last position or a session is left out of what goes by it. "
         + "; ".join(f"{name}: {words}" for name, words in QUANTITIES.items())
         + "."
     )

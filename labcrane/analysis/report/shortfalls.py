@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.quality import is_result
-from labcrane.analysis.report.factors import DISTANCE, GROUP, PHASE, PLACE, Factors, factors_of
+from labcrane.analysis.report.factors import DISTANCE, GROUP, PHASE, PLACE, Factors
 from labcrane.analysis.report.outcomes import (
     ADJUSTED,
     SEQUENCE,
@@ -73,7 +73,7 @@ def shortfalls(
     everything: "pd.DataFrame",
     scores: "pd.DataFrame",
     made: Made,
-    people: dict[str, str],
+    factors: Factors,
     primary: Sequence[str] = (),
 ) -> "pd.DataFrame":
     """Return what planned tests lack; empty where all were made, of every group and level.
@@ -86,12 +86,12 @@ def shortfalls(
         Of questionnaires.
     made
         The tests that were made.
-    people
-        Everybody in the sample, also who has no result, and their group.
+    factors
+        What varies, and who is in the sample.
     """
     import pandas as pd
 
-    factors, results = factors_of(everything), everything[is_result(everything)]
+    people, results = factors.people, everything[is_result(everything)]
     found: list[Shortfall] = []
     for measure in measures_in(results, primary):
         tested = _made(made.anova, measure)
@@ -165,7 +165,9 @@ def _of_plan(
         if not plan.beside:
             yield from design.lacking(effect, name, tested=name in made)
         elif name not in made and before in made:
-            why = "positions cannot be told from pairs of targets"
+            apart = plan.confounded(results, measure)
+            few = "so few people leave nothing to tell how they differ"
+            why = f"positions cannot be told from {apart}" if apart else few
             yield Shortfall(measure, name, "", len(people), len(design.whole), why)
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.report.factors import GROUP, PHASE, Factors
-from labcrane.analysis.statistics.time_scales import LEAST
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -231,7 +230,7 @@ def f_test(row: Mapping[str, Any], style: Style, people: int) -> str:
 def _effect(row: Mapping[str, Any], style: Style, people: int) -> str:
     effect, _, rest = str(row["factor"]).partition(" ")
     found = row["p_gg"] < LEVEL
-    where = f" {style.plain(rest)}" if rest else ""
+    where = (f" {style.plain(rest)}" if rest else "") + _confounded(row)
     if ":" in effect:
         names = style.plain(" and ".join(effect.split(":")))
         said = "there was an interaction" if found else "no interaction was found"
@@ -247,8 +246,9 @@ def _trend(row: Mapping[str, Any], style: Style, people: int) -> str:
     holm = "" if math.isnan(row["p_holm"]) else f" (after Holm {_p(row['p_holm'], style)})"
     low, high = _number(row["slope_low"], style), _number(row["slope_high"], style)
     return (
-        f"Over the positions of {style.plain(phase)} it {word} by {abs(row['slope']):.3g} {unit} "
-        f"each, 95 {style.percent} CI [{low}, {high}], {_t(row, style)}{holm}"
+        f"Over the positions of {style.plain(phase)}{_confounded(row)} it {word} by "
+        f"{abs(row['slope']):.3g} {unit} each, 95 {style.percent} CI [{low}, {high}], "
+        f"{_t(row, style)}{holm}"
         f"{of_people(row, style, people)}."
     )
 
@@ -256,7 +256,7 @@ def _trend(row: Mapping[str, Any], style: Style, people: int) -> str:
 def _scale(row: Mapping[str, Any], style: Style, people: int) -> str:
     """Return what happened within a phase and from one to the next, over all participants."""
     spoken = {
-        "slope": "With pairs' means taken away, change with each position of",
+        "slope": "Change with each position of",
         "change": "Mean change to",
         "warm-up decrement": "Warm-up decrement at the start of",
         "retention": "Difference of the last positions, to",
@@ -264,11 +264,10 @@ def _scale(row: Mapping[str, Any], style: Style, people: int) -> str:
     if row["group"] != "all" or row["quantity"] not in spoken:
         return ""
     unit, mean = UNITS.get(row["measure"], ""), _number(row["mean"], style)
-    said = f"{spoken[row['quantity']]} {style.plain(str(row['phase']))}:"
-    if math.isnan(row["t"]):
-        number = int(row["n"])
-        why = f"{number} of {people} people have it" if number < LEAST else "all have the same"
-        return f"{said} not tested, {why}."
+    said = f"{spoken[row['quantity']]} {style.plain(str(row['phase']))}"
+    if row["why"]:
+        return f"{said}: not tested, {row['why']}."
+    said += f", with {row['adjustment']}:" if row["adjustment"] else ":"
     return f"{said} {mean} {unit}, {_t(row, style)}{of_people(row, style, people)}."
 
 
@@ -276,6 +275,7 @@ def _contrast(row: Mapping[str, Any], style: Style, people: int) -> str:
     if math.isnan(row["t"]):
         return ""  # all are alike
     at = f" in {style.plain(str(row['at']))}" if row["at"] else ""
+    at += _confounded(row)
     first, second = style.plain(str(row["first"])), style.plain(str(row["second"]))
     unit = UNITS.get(row["measure"], "")
     if row["factor"] == "distance":
@@ -287,6 +287,21 @@ def _contrast(row: Mapping[str, Any], style: Style, people: int) -> str:
         f"{_number(row['t'], style, '.2f')}, Holm-corrected {_p(row['p_holm'], style)}"
         f"{of_people(row, style, people)}."
     )
+
+
+def _confounded(row: Mapping[str, Any]) -> str:
+    """Return `` (cannot be told from positions)`` where an effect is confounded."""
+    return f" (cannot be told from {row['confounded']})" if row.get("confounded") else ""
+
+
+def confounding(anova: "pd.DataFrame") -> list[str]:
+    """Return in a sentence for each what the effects of some factors cannot be told from."""
+    rows = anova[anova["confounded"] != ""].drop_duplicates(["factor", "confounded"])
+    return [
+        f"What {' and '.join(own['factor'])} do{'es' if len(own) == 1 else ''} cannot be told from "
+        f"{words}: as these came, either may have made the difference."
+        for words, own in rows.groupby("confounded")
+    ]
 
 
 def _t(row: Mapping[str, Any], style: Style) -> str:

@@ -1,7 +1,7 @@
 """Analysis of variance of designs within, between and of both, and contrasts of their means."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, combinations, product
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +47,12 @@ class Anova:
         Participants.
     left_out
         Participants without a value in some cell, and therefore not in the test.
+    people
+        Those who are in it.
+    beside
+        The column that the effect was tested beside; empty where there was nothing to adjust for.
+    confounded
+        What the effect cannot be told from, in words; empty where it can, or nobody has looked.
     """
 
     measure: str
@@ -61,6 +67,9 @@ class Anova:
     eta2p: float
     n: int
     left_out: tuple[str, ...]
+    people: tuple[str, ...]
+    beside: str = ""
+    confounded: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +92,10 @@ class Contrast:
         The same corrected for the differences of one family: those of a factor, at one level.
     n
         Participants.
+    people
+        Who they are.
+    confounded
+        What the difference cannot be told from, in words; empty where it can, or nobody has looked.
     """
 
     measure: str
@@ -99,6 +112,8 @@ class Contrast:
     p: float
     p_holm: float
     n: int
+    people: tuple[str, ...]
+    confounded: str = ""
 
 
 @dataclass(frozen=True)
@@ -119,6 +134,8 @@ class FactorialDesign:
         Shares of what is adjusted for in each cell, sum-to-zero: participants, cells, columns.
     left_out
         Participants who lack a cell.
+    people
+        Those who have all of them, in the order of the rows.
     """
 
     values: FloatArray
@@ -128,6 +145,7 @@ class FactorialDesign:
     terms: dict[tuple[str, ...], list[int]]
     beside: FloatArray
     left_out: tuple[str, ...]
+    people: tuple[str, ...]
 
     @property
     def free(self) -> int:
@@ -157,7 +175,10 @@ def design(
     groups = {name: own for name, own in groups.items() if len(own) > 1}
     model, terms = _model(who, groups)
     shares = _shares(known, beside, levels, whole.index)
-    found = FactorialDesign(whole.to_numpy(float), levels, groups, model, terms, shares, left_out)
+    people = tuple(map(str, whole.index))
+    found = FactorialDesign(
+        whole.to_numpy(float), levels, groups, model, terms, shares, left_out, people
+    )
     rank = int(np.linalg.matrix_rank(model)) if len(whole) else 0
     whole_enough = len(whole) >= LEAST and found.free >= 1 and rank == model.shape[1]
     return found if whole_enough else None
@@ -281,7 +302,8 @@ def analyse(
                 continue
             effect = float((without**2).sum()) - float(np.trace(error))
             name = ":".join((*outside, *inside))
-            found.append(_test(measure, name, effect, error, (more_free - free, free), cells))
+            test = _test(measure, name, effect, error, (more_free - free, free), cells)
+            found.append(replace(test, beside=beside) if cells.beside.shape[2] else test)
     return found
 
 
@@ -343,6 +365,7 @@ def _test(
         eta2p=f * df1 / (f * df1 + df2),
         n=len(cells.values),
         left_out=cells.left_out,
+        people=cells.people,
     )
 
 
@@ -374,7 +397,6 @@ def compare(
     if cells is None or factor not in {**cells.within, **cells.between}:
         return []
     places = cells.within.get(at, (None,))
-    people = len(cells.values)
     found = []
     for place in places:
         chosen = {} if place is None else {at: place}
@@ -394,7 +416,11 @@ def compare(
         corrected = holm([one[-1] for _, _, one in rows])
         found += [
             Contrast(
-                *(measure, factor, word(place), word(first), word(second)), *one, p_holm, people
+                *(measure, factor, word(place), word(first), word(second)),
+                *one,
+                p_holm,
+                len(cells.people),
+                cells.people,
             )
             for (first, second, one), p_holm in zip(rows, corrected, strict=True)
         ]

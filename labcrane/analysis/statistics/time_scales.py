@@ -1,8 +1,13 @@
 """Two time scales of learning: within sessions or blocks, and from one to the next."""
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from labcrane.analysis.statistics.confounding import dummies
+from labcrane.types import FloatArray
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,14 +25,62 @@ QUANTITIES = {
 """What is worked out of each participant's session or block."""
 
 
-def taken_away(movements: "pd.DataFrame", measure: str) -> "pd.Series[float]":
-    """Return a measure with what each pair of targets adds taken away.
+TAKEN = "pairs' means taken away"
+"""An adjustment that was made: what pairs of targets add is taken away."""
+
+APART = "positions cannot be told from pairs of targets"
+"""Why one could not be made."""
+
+LEAST_SHARE = 1e-9
+"""Of a pair in a quantity; what is below it comes of rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class Adjustment:
+    """What each pair of targets adds to a measure, and what of it is known.
+
+    Attributes
+    ----------
+    shares
+        Sum-to-zero columns of pairs, one row per movement; none where there is one pair or none.
+    adds
+        What each column adds, in the measure's unit, shape ``(columns,)``.
+    known
+        Projects upon the combinations of columns that can be told from positions and people, shape
+        ``(columns, columns)``.
+    """
+
+    shares: "pd.DataFrame"
+    adds: FloatArray
+    known: FloatArray
+
+    def taken_from(self, seen: FloatArray) -> tuple[float, str]:
+        """Return a quantity without what pairs add to it, and which adjustment that was.
+
+        It is :data:`TAKEN`, or empty where pairs add nothing to this quantity; where it cannot be
+        made it is :data:`APART`, and the quantity NaN.
+
+        Parameters
+        ----------
+        seen
+            The quantity of the measure, and that of each column of shares.
+        """
+        value, shares = float(seen[0]), seen[1:]
+        if not np.any(np.abs(shares) > LEAST_SHARE):
+            return value, ""
+        if np.any(np.abs(shares - shares @ self.known) > LEAST_SHARE):
+            return np.nan, APART
+        return value - float(shares @ self.adds), TAKEN
+
+
+def adjustment(movements: "pd.DataFrame", measure: str) -> Adjustment:
+    """Return what each pair of targets adds.
 
     Positions can then be compared though pairs come in another order for everybody. What a pair
     adds is its coefficient in least squares beside participant and position (in each phase), over
     their cells' means, and is 0 on average over pairs: means of pairs alone would take learning
-    away with them wherever a pair came late more often than others. Where pairs cannot be told from
-    positions and people, as when they come in one order for all, nothing is taken away.
+    away with them wherever a pair came late more often than others. Pairs that cannot be told from
+    positions and people, as when they come in one order for all, stay unknown.
 
     Parameters
     ----------
@@ -35,38 +88,40 @@ def taken_away(movements: "pd.DataFrame", measure: str) -> "pd.Series[float]":
         With ``participant``, ``pair`` or ``distance``, and where there are some ``phase`` and
         ``place``.
     """
+    import pandas as pd
+
     pair = next((name for name in ("pair", "distance") if name in movements), None)
     if pair is None:
-        return movements[measure].astype(float)
+        return Adjustment(pd.DataFrame(index=movements.index), np.empty(0), np.empty((0, 0)))
     where = [name for name in ("phase", "place") if name in movements]
     cells = movements.groupby(["participant", *where, pair])[measure].mean().dropna().reset_index()
     places = cells.groupby(where).ngroup().to_numpy() if where else np.zeros(len(cells), int)
-    pairs, kinds = cells[pair].factorize(sort=True)
-    beside = np.hstack([_dummies(cells["participant"].factorize()[0]), _dummies(places)])
-    # One column less than pairs: their coefficients add up to 0.
-    of_pairs = _dummies(pairs)
-    of_pairs = of_pairs[:, :-1] - of_pairs[:, -1:]
-    design = np.hstack([of_pairs, beside])
-    rank = np.linalg.matrix_rank
-    if not of_pairs.size or rank(design) < rank(beside) + of_pairs.shape[1]:
-        return movements[measure].astype(float)
-    found = np.linalg.lstsq(design, cells[measure].to_numpy(float), rcond=None)[0]
-    added = found[: of_pairs.shape[1]]
-    adds = dict(zip(kinds, [*added, -added.sum()], strict=True))
-    return movements[measure] - movements[pair].map(adds).astype(float)
+    kinds = sorted(cells[pair].unique())
+    beside = np.hstack([dummies(cells["participant"].factorize()[0]), dummies(places)])
+    of_pairs = _shares(cells[pair], kinds).to_numpy(float)
+    both = np.column_stack([of_pairs, cells[measure].to_numpy(float)])
+    left = both - beside @ np.linalg.lstsq(beside, both, rcond=None)[0]
+    left, rest = left[:, :-1], left[:, -1]
+    left[np.abs(left) < LEAST_SHARE] = 0.0
+    inverse = np.linalg.pinv(left, rcond=LEAST_SHARE)
+    return Adjustment(_shares(movements[pair], kinds), inverse @ rest, inverse @ left)
 
 
-def _dummies(labels: "np.typing.NDArray[np.integer[Any]]") -> "np.typing.NDArray[np.float64]":
-    """Return a column for each label, with 1 in its rows."""
-    own: np.typing.NDArray[np.float64] = np.eye(int(labels.max(initial=-1)) + 1)[labels]
-    return own
+def _shares(pairs: "pd.Series[Any]", kinds: "Sequence[Any]") -> "pd.DataFrame":
+    """Return sum-to-zero columns of pairs: one less than pairs, whose coefficients add up to 0."""
+    import pandas as pd
+
+    own = {kind: (pairs == kind).astype(float) for kind in kinds}
+    columns = {f"share {at}": own[kind] - own[kinds[-1]] for at, kind in enumerate(kinds[:-1])}
+    return pd.DataFrame(columns, index=pairs.index)
 
 
 def quantities(movements: "pd.DataFrame", measure: str) -> "pd.DataFrame":
     """Return each participant's :data:`QUANTITIES`, one row per participant, phase and quantity.
 
-    Whoever lacks a first or last position has nothing that goes by it, and whoever lacks a phase
-    nothing that goes from it to the next: what stands beside them is no stand-in.
+    What pairs of targets add is taken away, and ``adjustment`` says whether it was. Whoever lacks a
+    first or last position has nothing that goes by it, and whoever lacks a phase nothing that goes
+    from it to the next: what stands beside them is no stand-in.
 
     Parameters
     ----------
@@ -77,57 +132,95 @@ def quantities(movements: "pd.DataFrame", measure: str) -> "pd.DataFrame":
     """
     import pandas as pd
 
-    own = movements.assign(value=taken_away(movements, measure))
+    of_pairs = adjustment(movements, measure)
+    own = movements.assign(value=movements[measure].astype(float), **of_pairs.shares)
     known = own.dropna(subset=["value"])
     ends = known.groupby("phase")["place"].agg(["min", "max"])
-    cells = known.groupby(["participant", "phase", "place"])["value"].mean()
-    groups = known.groupby("participant")["group"].first()
+    # Whatever is worked out of the measure is worked out of pairs' shares as well.
+    cells = known.groupby(["participant", "phase", "place"])[["value", *of_pairs.shares]].mean()
+    of_group = dict(zip(known["participant"], known["group"], strict=True))
     of = "session" if "session" in known else "phase"
     sessions = dict(known.drop_duplicates("phase").set_index("phase", drop=False)[of])
+    nothing = np.full(cells.shape[1], np.nan)
     rows = []
     for participant, mine in cells.groupby(level="participant"):
-        before: pd.Series[float] | None = None
-        last_before, session_before = np.nan, None
-        for phase, (at_first, at_last) in ends.iterrows():
+        before: FloatArray | None = None
+        last_before, session_before = nothing, None
+        for phase, at_first, at_last in ends.itertuples():
             means = mine[mine.index.get_level_values("phase") == phase].droplevel([0, 1])
-            first, last = (float(means.get(place, np.nan)) for place in (at_first, at_last))
+            first, last = (
+                means.loc[place].to_numpy(float) if place in means.index else nothing
+                for place in (at_first, at_last)
+            )
             found = {}
             if len(means) > 1:
-                found["slope"] = float(np.polyfit(means.index.to_numpy(float), means, 1)[0])
+                places = means.index.to_numpy(float)
+                found["slope"] = np.polyfit(places, means.to_numpy(float), 1)[0]
                 found["gain"] = last - first
+            mean = means.to_numpy(float).mean(axis=0) if len(means) else nothing
             if before is not None:
-                found["change"] = float(means.mean() - before.mean())
+                found["change"] = mean - before
             if session_before not in {None, sessions[phase]}:
                 found["warm-up decrement"] = first - last_before
                 found["retention"] = last - last_before
-            about = {"participant": participant, "group": groups[participant], "phase": phase}
-            rows += [
-                {**about, "quantity": name, "value": value}
-                for name, value in found.items()
-                if np.isfinite(value)
-            ]
-            before, last_before, session_before = means, last, sessions[phase]
-    return pd.DataFrame(rows, columns=["participant", "group", "phase", "quantity", "value"])
+            about = {"participant": participant, "group": of_group[participant], "phase": phase}
+            for name, seen in found.items():
+                if np.isfinite(seen[0]):
+                    value, word = of_pairs.taken_from(seen)
+                    rows.append({**about, "quantity": name, "value": value, "adjustment": word})
+            before, last_before, session_before = mean, last, sessions[phase]
+    names = ["participant", "group", "phase", "quantity", "value", "adjustment"]
+    return pd.DataFrame(rows, columns=names)
 
 
-def summary(found: "pd.DataFrame", measure: str) -> "pd.DataFrame":
-    """Return mean, confidence interval and t test against zero of each, for all and by group."""
+def adjusted(found: "pd.DataFrame") -> str:
+    """Return the adjustment of a quantity over participants; one that lacks it spoils the mean."""
+    words = set(found["adjustment"])
+    return APART if APART in words else TAKEN if TAKEN in words else ""
+
+
+def summary(found: "pd.DataFrame", measure: str, people: Mapping[str, str]) -> "pd.DataFrame":
+    """Return mean, confidence interval and t test against zero of each, for all and by group.
+
+    ``why`` says what a row without a test lacks, ``left_out`` who has no such quantity.
+
+    Parameters
+    ----------
+    found
+        Of :func:`quantities`.
+    people
+        Everybody in the sample, and their group.
+    """
     import pandas as pd
     from scipy.stats import ttest_1samp
 
     rows = []
-    groups = [name for name in found["group"].unique() if name]
+    everybody = {"all": list(people)}
+    if len(groups := sorted({name for name in people.values() if name})) > 1:
+        everybody |= {group: [who for who in people if people[who] == group] for group in groups}
     for (phase, quantity), part in found.groupby(["phase", "quantity"], sort=False):
-        parts = [("all", part)] + [(name, part[part["group"] == name]) for name in groups]
-        for group, own in parts if len(groups) > 1 else parts[:1]:
-            values = own["value"].to_numpy(float)
+        word = adjusted(part)
+        for group, who in everybody.items():
+            mine = part[part["participant"].isin(who)]
+            values = mine["value"].to_numpy(float)
+            gone = [name for name in who if name not in set(mine["participant"])]
+            why = ""
+            if word == APART:
+                why = APART
+            elif len(values) < LEAST:
+                why = f"{len(values)} of {len(who)} people have it, and {LEAST} are needed"
+            elif np.ptp(values) == 0.0:
+                why = "all have the same"
             row = {"measure": measure, "phase": phase, "quantity": quantity, "group": group}
-            row |= {"n": len(values), "mean": float(values.mean()) if len(values) else np.nan}
-            if len(values) >= LEAST and np.ptp(values) > 0.0:
+            row |= {"adjustment": word, "n": len(values), "left_out": " ".join(gone), "why": why}
+            if word != APART and len(values):
+                row["mean"] = float(values.mean())
+            if not why:
                 test = ttest_1samp(values, 0.0)
                 low, high = test.confidence_interval(0.95)
                 row |= {"ci_low": float(low), "ci_high": float(high), "t": float(test.statistic)}
                 row |= {"df": float(test.df), "p": float(test.pvalue)}
             rows.append(row)
-    names = ["measure", "phase", "quantity", "group", "n", "mean", "ci_low", "ci_high"]
-    return pd.DataFrame(rows).reindex(columns=[*names, "t", "df", "p"])
+    names = ["measure", "phase", "quantity", "group", "adjustment", "n", "mean"]
+    names += ["ci_low", "ci_high", "t", "df", "p", "left_out", "why"]
+    return pd.DataFrame(rows).reindex(columns=names)

@@ -40,6 +40,8 @@ class Trend:
         Effect size: mean slope over the slopes' standard deviation.
     n
         Participants.
+    people
+        Who they are.
     """
 
     measure: str
@@ -51,6 +53,7 @@ class Trend:
     p: float
     dz: float
     n: int
+    people: tuple[str, ...]
 
 
 def linear_trend(movements: "pd.DataFrame", measure: str) -> Trend | None:
@@ -60,11 +63,12 @@ def linear_trend(movements: "pd.DataFrame", measure: str) -> Trend | None:
     """
     from scipy.stats import ttest_1samp
 
-    slopes = []
-    for _, own in movements.groupby("participant"):
+    slopes, people = [], []
+    for name, own in movements.groupby("participant"):
         means = own.groupby("sequence")[measure].mean().dropna()
         if len(means) > 1:
             slopes.append(float(np.polyfit(means.index.to_numpy(float), means.to_numpy(), 1)[0]))
+            people.append(str(name))
     if len(slopes) < 3 or np.ptp(slopes) == 0.0:  # noqa: PLR2004 - no test with fewer
         return None
     found = ttest_1samp(slopes, 0.0)
@@ -79,6 +83,7 @@ def linear_trend(movements: "pd.DataFrame", measure: str) -> Trend | None:
         p=float(found.pvalue),
         dz=float(np.mean(slopes) / np.std(slopes, ddof=1)),
         n=len(slopes),
+        people=tuple(people),
     )
 
 
