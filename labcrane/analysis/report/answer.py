@@ -15,6 +15,7 @@ from labcrane.analysis.report.factors import (
     with_factors,
 )
 from labcrane.analysis.report.outcomes import ADJUSTED, SEQUENCE, named_factor
+from labcrane.analysis.report.shortfalls import people_in_words
 from labcrane.analysis.report.words import (
     LEVEL,
     LOOKED,
@@ -56,7 +57,7 @@ def answer(
     """
     return {
         "Design": [_design(cohort, everything, results)],
-        "Participants": [about, *_left_out(cohort)],
+        "Participants": [about, *_left_out(cohort), *_untested(results)],
         "Main effects": _effects(everything, results),
         "Data quality": list(_quality(*quality)),
         "Exclusions": [_exclusions(everything)],
@@ -95,9 +96,26 @@ def _columns(factors: Factors) -> Iterator[tuple[str, str, str]]:
 def _left_out(cohort: Cohort) -> list[str]:
     counts = Counter(str(person.status) for person in cohort.left_out)
     if not counts:
-        return ["Nobody was left out."]
+        return ["Nobody's recording was left out."]
     listed = ", ".join(f"{count} {status}" for status, count in counts.items())
     return [f"Left out: {listed}; each with the reason in the table of participants."]
+
+
+def _untested(results: Results | None) -> list[str]:
+    """Return who of the sample is not in each of the tests, and where it says why."""
+    if results is None:
+        return []
+    tables = (results.anova, results.contrasts, results.trends, results.gaze, results.scores)
+    names = {
+        name
+        for table in tables
+        for left_out in (table["left_out"].unique() if len(table) else ())
+        for name in str(left_out).split()
+    }
+    if not names:
+        return []
+    said = people_in_words(sorted(names))
+    return [f"Not in every test, for the reason that stands with each: {said}."]
 
 
 def _effects(everything: "pd.DataFrame", results: Results | None) -> list[str]:
@@ -114,16 +132,26 @@ def _effects(everything: "pd.DataFrame", results: Results | None) -> list[str]:
         rows = own[own["measure"] == measure].to_dict("records") if len(own) else []
         by_factor = {str(row["factor"]): {str(k): v for k, v in row.items()} for row in rows}
         said = [
-            _effect(row, counted, column, unit, results.people)
+            _effect(row, counted, column, unit, results)
             for name, column, unit in _columns(results.factors)
             if (row := _test_of(name, by_factor)) is not None and column in counted
         ]
-        short = lacking(results.shortfalls, str(measure), STYLE)
+        short = lacking(_of_effects(results), str(measure), STYLE)
         if said or short:
             effects = "; ".join(said) or "was tested by no analysis of variance"
             about = f"{NAMES.get(str(measure), str(measure))} {effects}."
             found.append(" ".join([about, *short]))
     return found or [TESTED]
+
+
+def _of_effects(results: Results) -> "pd.DataFrame":
+    """Return the shortfalls but for who is missing from what the answer does not tell."""
+    table = results.shortfalls
+    if not len(table):
+        return table
+    told = [name for name, _, _ in _columns(results.factors)]
+    told += [name + ADJUSTED for name in told]
+    return table[table["factor"].isin(told) | (table["without"] == "")]
 
 
 def _test_of(name: str, rows: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Any] | None:
@@ -132,24 +160,32 @@ def _test_of(name: str, rows: Mapping[str, Mapping[str, Any]]) -> Mapping[str, A
 
 
 def _effect(
-    row: Mapping[str, Any], counted: "pd.DataFrame", column: str, unit: str, people: int
+    row: Mapping[str, Any], counted: "pd.DataFrame", column: str, unit: str, results: Results
 ) -> str:
-    """Return ``differed over distance (2 m: 3.21 s, 6 m: 5.40 s; F(1, 35) = 90.1, p < .001)``."""
+    """Return ``differed over distance (2 m: 3.21 s, 6 m: 5.40 s; F(1, 35) = 90.1, p < .001)``.
+
+    The means are of those who are in the test, each cell of its design counting alike.
+    """
     name, measure = str(row["factor"]).removesuffix(ADJUSTED), str(row["measure"])
     if row["confounded"]:
         return f"what {name} does cannot be told from {row['confounded']}"
     said = "differed over" if row["p_gg"] < LEVEL else "did not detectably differ over"
-    cells = counted.groupby([column, "participant"])[measure].mean().dropna()
-    means = cells.groupby(level=0).mean()
+    own = counted[~counted["participant"].isin(str(row["left_out"]).split())]
+    by = [column, "participant"]
+    within = [each for each in results.factors.over_phases if each != column]
+    cells = own.groupby([*by, *within])[measure].mean().dropna()
+    each = cells.groupby(level=by).mean().groupby(level=0)
+    means, sizes = each.mean(), dict(each.size())
     if name == SEQUENCE and len(means) > 2:  # noqa: PLR2004 - the first and the last are enough
         means = means.iloc[[0, -1]]
     of = "position " if name == SEQUENCE else ""
     levels = ", ".join(
         f"{of}{f'{level:g}' if isinstance(level, float) else level}{unit}: "
         f"{mean:.3g} {UNITS.get(measure, '')}".rstrip()
+        + (f" of {sizes[level]} people" if column == GROUP else "")
         for level, mean in means.items()
     )
-    return f"{said} {name} ({levels}; {f_test(row, STYLE, people)})"
+    return f"{said} {name} ({levels}; {f_test(row, STYLE, results.people)})"
 
 
 def _quality(loops: "pd.DataFrame", syncs: "pd.DataFrame") -> Iterator[str]:

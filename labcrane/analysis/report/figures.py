@@ -92,13 +92,24 @@ def over(movements: "pd.DataFrame", measure: str, by: list[str]) -> "pd.DataFram
     return pd.DataFrame(rows, columns=columns)
 
 
-def by_sequence(movements: "pd.DataFrame", measure: str) -> Drawing:
-    """Draw a measure over the sequence: everybody thin, the mean of each group thick."""
+def by_sequence(
+    movements: "pd.DataFrame", measure: str, tested: "pd.DataFrame | None" = None
+) -> Drawing:
+    """Draw a measure over the sequence: everybody thin, the mean of each group thick.
+
+    Parameters
+    ----------
+    tested
+        The movements of those who are in the test over the sequence, of whom the means are; those
+        of all where it is not given, or nobody is.
+    """
+    few = tested is not None and 0 < len(tested) < len(movements)
+    whose = tested if few and tested is not None else movements
     each = movements.groupby(["participant", "sequence"])[measure].mean().unstack(level=0)
     series = [Series(_numbers(each.index), _numbers(each[name]), FAINT, "line") for name in each]
     groups = movements["group"].nunique() > 1 if "group" in movements else False
     by = ["group", "sequence"] if groups else ["sequence"]
-    table = over(movements, measure, by)
+    table = over(whose, measure, by)
     for number, (name, part) in enumerate(table.groupby("group") if groups else [("", table)]):
         for at, own in enumerate(_by_phase(movements, part)):
             label = str(name) if at == 0 else ""
@@ -106,7 +117,8 @@ def by_sequence(movements: "pd.DataFrame", measure: str) -> Drawing:
     panel = Panel(PLACE_WORDS, WORDS.get(measure, measure), series, legend="group")
     caption = (
         f"{_begun(WORDS.get(measure, measure))}, over the sequence. {MEANS} of "
-        f"{_of(movements, 'group' if groups else '')}; thin lines: each participant."
+        f"{_of(whose, 'group' if groups else '')}{', those who are tested' if few else ''}"
+        f"{_at(table)}; thin lines: each of {_all(movements)}."
     )
     return Drawing(f"{measure}_by_sequence", caption, [panel], table)
 
@@ -146,7 +158,8 @@ def by_distance(movements: "pd.DataFrame") -> Drawing:
         )
         tables.append(table.assign(measure=measure))
     caption = (
-        f"Times and accuracy over the sequence, for each distance. {MEANS} of {_of(movements)}, "
+        f"Times and accuracy over the sequence, for each distance. {MEANS} of {_of(movements)}"
+        f"{_at(pd.concat(tables))}, "
         "beside each other so that they can be told apart; dots: each participant. An interval of "
         "few participants may be wider than what is shown."
     )
@@ -239,8 +252,8 @@ def sticks(movements: "pd.DataFrame") -> Drawing:
         panels.append(Panel(PLACE_WORDS, WORDS[measure], [*thin, _with_ci(table, COLOURS[0])]))
         tables.append(table.assign(measure=measure))
     caption = (
-        f"Use of the sticks over the sequence. {MEANS} of {_of(movements)}; thin lines: each "
-        "participant."
+        f"Use of the sticks over the sequence. {MEANS} of {_of(movements)}"
+        f"{_at(pd.concat(tables))}; thin lines: each participant."
     )
     return Drawing("sticks", caption, panels, pd.concat(tables))
 
@@ -278,6 +291,17 @@ def _of(movements: "pd.DataFrame", by: str = "") -> str:
         return said
     sizes = movements.groupby(by)["participant"].nunique()
     return f"{said} ({', '.join(f'{size} {name}' for name, size in sizes.items())})"
+
+
+def _all(movements: "pd.DataFrame") -> str:
+    count = int(movements["participant"].nunique())
+    return f"{count} {_people(count)}"
+
+
+def _at(table: "pd.DataFrame") -> str:
+    """Return of how many a point is, where points are of different numbers of participants."""
+    fewest, most = int(table["participants"].min()), int(table["participants"].max())
+    return "" if fewest == most else f", {fewest} to {most} in a point"
 
 
 def _aside(number: int, count: int) -> float:

@@ -1,6 +1,6 @@
 """Outcomes of a study in its design: tests, contrasts, time scales, questionnaires."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,7 @@ from labcrane.analysis.statistics.anova import Anova, Contrast, analyse, compare
 from labcrane.analysis.statistics.anova import word as word  # noqa: PLC0414 - of levels, here too
 from labcrane.analysis.statistics.confounding import told_apart
 from labcrane.analysis.statistics.time_scales import TAKEN, adjusted, quantities, summary
-from labcrane.analysis.statistics.trends import holm, linear_trend
+from labcrane.analysis.statistics.trends import Trend, holm, linear_trend
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -112,7 +112,7 @@ def anova_table(
                 # Groups come with every design.
                 own.setdefault(name, replace(test, factor=name, confounded=of_it))
         found += own.values()
-    return _frame(found)
+    return _frame(found, factors.people)
 
 
 def named(test: Anova, factors: Factors) -> str:
@@ -181,14 +181,18 @@ def practice_table(
         for measure in measures_in(done, primary)
         for test in analyse(done, measure, ["practice"], factors.between)
     ]
-    return _frame(tests)
+    return _frame(tests, factors.people)
 
 
 def practised(everything: "pd.DataFrame") -> "pd.DataFrame":
     """Return what succeeded, in practice too, with that as a factor."""
     done = everything[is_done(everything)].copy()
-    done["practice"] = done["practice"].astype(float).map({0.0: "counted", 1.0: "practice"})
-    return done
+    return done.assign(practice=practice_words(done))
+
+
+def practice_words(movements: "pd.DataFrame") -> "pd.Series[str]":
+    """Return whether movements are practice or counted, in words."""
+    return movements["practice"].astype(float).map({0.0: "counted", 1.0: "practice"})
 
 
 def contrast_table(
@@ -213,8 +217,8 @@ def contrast_table(
             replace(one, confounded=confounded)
             for one in compare(results, measure, DISTANCE, plan.within, between)
         ]
-    rows = [asdict(one) | {"factor": named_factor(one.factor, factors)} for one in found]
-    return pd.DataFrame(rows).drop(columns="people", errors="ignore")
+    named = [replace(one, factor=named_factor(one.factor, factors)) for one in found]
+    return pd.DataFrame([_row(one, factors.people) for one in named])
 
 
 def trend_table(
@@ -238,7 +242,7 @@ def trend_table(
     p_holm = iter(holm([trend.p for _, trend in found if trend.measure in corrected]))
     rows = [
         {
-            **asdict(trend),
+            **_row(trend, factors.people),
             factors.kind: phase,
             "confounded": trend_confounded(results, trend.measure, phase),
             "slope_low": trend.slope_ci[0],
@@ -247,7 +251,7 @@ def trend_table(
         }
         for phase, trend in found
     ]
-    return pd.DataFrame(rows).drop(columns=["slope_ci", "people"], errors="ignore")
+    return pd.DataFrame(rows).drop(columns="slope_ci", errors="ignore")
 
 
 def trend_confounded(results: "pd.DataFrame", measure: str, phase: str) -> str:
@@ -272,7 +276,7 @@ def time_scale_tables(
         for (phase, quantity), own in found.groupby(["phase", "quantity"], sort=False):
             about = {"phase": str(phase), "quantity": str(quantity)}
             named = own.rename(columns={"value": measure})
-            made = _frame(analyse(named, measure, (), [GROUP]))
+            made = _frame(analyse(named, measure, (), [GROUP]), factors.people)
             tests.append(made.assign(**about, adjustment=adjusted(own)))
     by_group = [table for table in tests if len(table)]
     joined = pd.concat(by_group, ignore_index=True) if by_group else pd.DataFrame()
@@ -280,15 +284,28 @@ def time_scale_tables(
 
 
 def score_table(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
-    """Return means and spreads of every score, by group and occasion."""
+    """Return means and spreads of every score, by group and occasion.
+
+    Those of whoever has a value on every occasion, who are tested, stand beside those of all.
+    """
     import pandas as pd
 
     own = occasions(scores, groups).dropna(subset=["value"])
     if own.empty:
         return pd.DataFrame()
-    each = own.groupby(["outcome", GROUP, "occasion", "participant"])["value"].mean()
-    table = each.groupby(level=["outcome", GROUP, "occasion"]).agg(["count", "mean", "std"])
-    return table.reset_index().rename(columns={"count": "n", "std": "sd"})
+    by = ["outcome", GROUP, "occasion"]
+    each = own.groupby([*by, "participant"])["value"].mean()
+    had = each.groupby(level=["outcome", "participant"]).transform("size")
+    planned = own.groupby("outcome")["occasion"].nunique().loc[each.index.get_level_values(0)]
+    whole = each[had.to_numpy() == planned.to_numpy()]
+    table = pd.DataFrame(
+        {
+            name + suffix: getattr(part.groupby(level=by), of)()
+            for suffix, part in (("", each), ("_tested", whole))
+            for name, of in (("n", "count"), ("mean", "mean"), ("sd", "std"))
+        }
+    )
+    return table.fillna({"n_tested": 0}).astype({"n_tested": int}).reset_index()
 
 
 def score_tests(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
@@ -302,7 +319,7 @@ def score_tests(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame
             part.rename(columns={"value": str(outcome)}), str(outcome), ["occasion"], between
         )
     ]
-    return _frame(tests)
+    return _frame(tests, groups)
 
 
 def occasions(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
@@ -318,7 +335,7 @@ def occasions(scores: "pd.DataFrame", groups: dict[str, str]) -> "pd.DataFrame":
 
 
 def gaze_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
-    """Return means of how long each area was looked at, over participants' means."""
+    """Return means over participants' means of how long areas were looked at, and of how many."""
     import pandas as pd
 
     columns = of_gaze(results)
@@ -326,7 +343,8 @@ def gaze_table(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
         return pd.DataFrame()
     by = [*factors.between, *factors.by_phase, DISTANCE]
     each = results.groupby([*by, "participant"])[columns].mean()
-    return each.groupby(level=by).mean().reset_index()
+    cells = each.groupby(level=by)
+    return cells.mean().join(cells.count().add_prefix("n_")).reset_index()
 
 
 def gaze_tests(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
@@ -337,7 +355,7 @@ def gaze_tests(results: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
         for name in of_gaze(results)
         for test in analyse(results, name, within, factors.between)
     ]
-    return _frame(tests)
+    return _frame(tests, factors.people)
 
 
 def of_gaze(results: "pd.DataFrame") -> list[str]:
@@ -346,10 +364,28 @@ def of_gaze(results: "pd.DataFrame") -> list[str]:
     return [name for name in names if results[name].notna().any()]
 
 
-def _frame(tests: Sequence[Anova]) -> "pd.DataFrame":
+def _frame(tests: Sequence[Anova], people: Mapping[str, str]) -> "pd.DataFrame":
     import pandas as pd
 
-    rows: list[dict[str, Any]] = [
-        asdict(test) | {"left_out": " ".join(test.left_out)} for test in tests
-    ]
-    return pd.DataFrame(rows).drop(columns=["people", "beside"], errors="ignore")
+    rows = [_row(test, people) for test in tests]
+    return pd.DataFrame(rows).drop(columns="beside", errors="ignore")
+
+
+def _row(result: Anova | Contrast | Trend, people: Mapping[str, str]) -> dict[str, Any]:
+    """Return a result as a row of a table, with who of the sample is not in it."""
+    row: dict[str, Any] = asdict(result)
+    tested = set(row.pop("people"))
+    return row | {"left_out": " ".join(name for name in people if name not in tested)}
+
+
+def tested(results: "pd.DataFrame", measure: str, factors: Factors) -> "pd.DataFrame":
+    """Return the movements of those who are in a test over positions; empty where there is none."""
+    import pandas as pd
+
+    parts = []
+    for plan in plans(results, factors):
+        if plan.asked == (PLACE,) and not plan.beside:
+            own = plan.of(results)
+            people = next((test.people for test in tests_of(plan, results, measure, factors)), ())
+            parts.append(own[own["participant"].isin(people)])
+    return pd.concat(parts) if parts else results.iloc[:0]

@@ -236,7 +236,7 @@ def _study(
         "in the median (Kaplan and Meier) a time-out takes longer than it was allowed to."
     )
     page.table("time_outs", counts)
-    _movements(page, running(results, factors), measures_in(results, primary))
+    _movements(page, results, factors, measures_in(results, primary))
     anovas, contrasts, trends, scales, practice = _statistics(
         page, everything, results, factors, primary
     )
@@ -246,17 +246,17 @@ def _study(
         page.heading("Questionnaires")
         page.table("scores", outcomes.score_table(scores, groups))
         page.table("score_tests", tests)
-    made = Made(anovas, trends, practice, looked, tests)
+    made = Made(anovas, trends, scales, practice, looked, tests)
     short = shortfalls(everything, scores, made, factors, primary)
     page.heading("What was not tested")
     if len(short):
         page.say(
-            "Planned tests that could not be made, or not of every group or level: a test is of "
-            "those with a value in each of its cells."
+            "Planned tests that could not be made, or not of everybody and every level: a test is "
+            "of those with a value in each of its cells."
         )
         page.table("shortfalls", short)
     else:
-        page.say("Every planned test was made, of every group and level.")
+        page.say("Every planned test was made, of everybody and every level.")
     found = Results(
         about, anovas, contrasts, trends, scales, looked, tests, counts, factors, len(groups), short
     )
@@ -272,12 +272,16 @@ def _in_words(page: Page, results: Results) -> None:
         page.text(f"results.{name}", "\n\n".join(paragraphs(results, STYLES[name])) + "\n")
 
 
-def _movements(page: Page, results: "pd.DataFrame", measures: Sequence[str]) -> None:
+def _movements(
+    page: Page, movements: "pd.DataFrame", factors: Factors, measures: Sequence[str]
+) -> None:
     import pandas as pd
 
+    results = running(movements, factors)
     page.heading("Movement time and accuracy")
     for measure in measures:
-        page.draw(figures.by_sequence(results, measure))
+        tested = outcomes.tested(movements, measure, factors)
+        page.draw(figures.by_sequence(results, measure, running(tested, factors)))
     page.draw(figures.by_distance(results))
     if outcomes.rests_apart(results):
         page.say(_rests(results))

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.quality import is_result
@@ -15,12 +16,18 @@ from labcrane.analysis.report.outcomes import (
     occasions,
     of_gaze,
     plans,
+    practice_words,
     practised,
 )
 from labcrane.analysis.statistics.anova import LEAST, whole_people, word
 
 if TYPE_CHECKING:
     import pandas as pd
+
+NOTHING = "nothing recorded"
+
+NAMED = 12
+"""Participants who are named in a sentence; tables have them all."""
 
 SHOWN = 3
 """Cells without a value that are named; of more their number is told."""
@@ -35,7 +42,7 @@ class Shortfall:
     measure, factor
         What was to be tested, over what, as the tables of tests name it.
     without
-        The group or level that the test had to do without; empty where there is no test.
+        The group, level or people that the test had to do without; empty where there is no test.
     people
         Of the sample, or of the group it had to do without.
     whole
@@ -58,12 +65,13 @@ class Made:
 
     Attributes
     ----------
-    anova, trends, practice, gaze, scores
+    anova, trends, scales, practice, gaze, scores
         Empty ones where none was.
     """
 
     anova: "pd.DataFrame"
     trends: "pd.DataFrame"
+    scales: "pd.DataFrame"
     practice: "pd.DataFrame"
     gaze: "pd.DataFrame"
     scores: "pd.DataFrame"
@@ -76,7 +84,7 @@ def shortfalls(
     factors: Factors,
     primary: Sequence[str] = (),
 ) -> "pd.DataFrame":
-    """Return what planned tests lack; empty where all were made, of every group and level.
+    """Return what planned tests lack; empty where all were made, of everybody and every level.
 
     Parameters
     ----------
@@ -96,12 +104,13 @@ def shortfalls(
     for measure in measures_in(results, primary):
         tested = _made(made.anova, measure)
         for plan in plans(results, factors):
-            found += _of_plan(plan, results, measure, factors, people, tested)
-        found += _of_trends(results, measure, factors, people, made.trends)
+            found += _of_plan(plan, everything, measure, factors, people, tested)
+        found += _of_trends(everything, measure, factors, people, made.trends)
+        found += _of_scales(everything, measure, factors, made.scales)
     found += _of_practice(everything, factors, people, made.practice, primary)
     for name in of_gaze(results):
         plan = Plan((*factors.over_phases, DISTANCE))
-        found += _of_plan(plan, results, name, factors, people, _made(made.gaze, name))
+        found += _of_plan(plan, everything, name, factors, people, _made(made.gaze, name))
     found += _of_scores(scores, made.scores, people)
     return pd.DataFrame([asdict(one) for one in found])
 
@@ -118,7 +127,8 @@ def _of_practice(
     done = practised(everything)
     levels = {"practice": ("counted", "practice"), GROUP: factors.groups}
     for measure in measures_in(done, primary):
-        design = _Design(done, measure, ("practice",), levels, people, {})
+        recorded = everything.assign(practice=practice_words(everything))
+        design = _Design(done, recorded, measure, ("practice",), levels, people, {})
         tested = "practice" in _made(tests, measure)
         yield from design.lacking(("practice",), "practice", tested=tested)
 
@@ -132,7 +142,7 @@ def _of_scores(
         levels = {name: each for name, each in levels.items() if len(each) > 1}
         made = _made(tests, str(outcome))
         table = own.rename(columns={"value": str(outcome)})
-        design = _Design(table, str(outcome), ("occasion",), levels, people, {})
+        design = _Design(table, table, str(outcome), ("occasion",), levels, people, {})
         for name in levels:
             yield from design.lacking((name,), name, tested=name in made)
 
@@ -143,28 +153,30 @@ def _made(tests: "pd.DataFrame", measure: str) -> set[str]:
 
 def _of_plan(
     plan: Plan,
-    results: "pd.DataFrame",
+    everything: "pd.DataFrame",
     measure: str,
     factors: Factors,
     people: Mapping[str, str],
     made: set[str],
 ) -> Iterator[Shortfall]:
+    results = everything[is_result(everything)]
     names = {*plan.within, GROUP}
     levels = {name: factors.levels(name) for name in names}
     if plan.phase:
         levels[PLACE] = levels[PLACE][: factors.places[plan.phase]]
     levels = {name: own for name, own in levels.items() if len(own) > 1}
     words = {name: named_factor(name, factors) for name in names}
-    design = _Design(plan.of(results), measure, plan.within, levels, people, words)
+    recorded = plan.of(_counted(everything))
+    design = _Design(plan.of(results), recorded, measure, plan.within, levels, people, words)
     effects = [plan.asked] if plan.asked else [(name,) for name in (*plan.within, GROUP)]
     for effect in effects:
         if not set(effect) <= set(levels):
             continue  # it was not to vary
         plain = ":".join(effect) + plan.suffix
         name, before = (named_factor(each, factors) for each in (plain, _before(plain)))
-        if not plan.beside:
+        if not plan.beside or name in made:
             yield from design.lacking(effect, name, tested=name in made)
-        elif name not in made and before in made:
+        elif before in made:
             apart = plan.confounded(results, measure)
             few = "so few people leave nothing to tell how they differ"
             why = f"positions cannot be told from {apart}" if apart else few
@@ -181,6 +193,7 @@ class _Design:
     def __init__(
         self,
         table: "pd.DataFrame",
+        recorded: "pd.DataFrame",
         measure: str,
         within: tuple[str, ...],
         levels: Mapping[str, tuple[Any, ...]],
@@ -188,10 +201,11 @@ class _Design:
         words: Mapping[str, str],
     ) -> None:
         self.measure, self.levels, self.people = measure, levels, people
+        self._known = table.dropna(subset=[measure])
+        self._done, self._recorded = table, recorded
         self.whole, self._empty = whole_people(table, measure, within)
-        known = table.dropna(subset=[measure])
         self._there = {
-            name: [level for level in own if (known[name] == level).any()]
+            name: [level for level in own if (self._known[name] == level).any()]
             for name, own in levels.items()
             if name in within
         }
@@ -214,6 +228,50 @@ class _Design:
             if members and not set(members) & set(self.whole):
                 why = f"none of its {len(members)} people has a value in every cell"
                 yield Shortfall(self.measure, name, f"{GROUP} {group}", len(members), 0, why)
+
+        yield from self.missing(name)
+
+    def missing(self, name: str) -> Iterator[Shortfall]:
+        """Yield who is not in the test, and what they lack of its cells."""
+        varied = {factor: own for factor, own in self._there.items() if len(own) > 1}
+        cells = set(product(*varied.values()))
+        why: dict[str, list[str]] = {}
+        for who in self.people:
+            if who not in self.whole:
+                lacks = cells - _cells_of(self._known, who, list(varied))
+                recorded = _cells_of(self._recorded, who, list(varied))
+                done = _cells_of(self._done, who, list(varied))
+                of_kind = {
+                    NOTHING: lacks - recorded,
+                    "no success": (lacks & recorded) - done,
+                    "no value": lacks & done,
+                }
+                said = [
+                    kind + self._where(own, cells, list(varied))
+                    for kind, own in of_kind.items()
+                    if own
+                ]
+                why.setdefault(" and ".join(said), []).append(who)
+        yield from left_out(self.measure, name, why, len(self.people))
+
+    def _where(
+        self, lacks: set[tuple[Any, ...]], cells: set[tuple[Any, ...]], names: list[str]
+    ) -> str:
+        """Return which cells these are: all with some levels of one factor, or one by one."""
+        if lacks == cells:
+            return ""
+        for at, name in enumerate(names):
+            levels = {cell[at] for cell in lacks}
+            if lacks == {cell for cell in cells if cell[at] in levels}:
+                return f" at {self._word(name)} {', '.join(map(word, sorted(levels)))}"
+        said = [
+            ", ".join(
+                f"{self._word(name)} {word(level)}" for name, level in zip(names, cell, strict=True)
+            )
+            for cell in sorted(lacks)
+        ]
+        more = f" and {len(said) - SHOWN} more" if len(said) > SHOWN else ""
+        return f" at {'; '.join(said[:SHOWN])}{more}"
 
     def _word(self, name: str) -> str:
         return self._words.get(name, name)
@@ -248,20 +306,91 @@ class _Design:
         return f"; nobody has one at {'; '.join(said[:SHOWN])}{more}"
 
 
+def left_out(
+    measure: str, name: str, why: Mapping[str, list[str]], people: int
+) -> Iterator[Shortfall]:
+    """Yield who is not in a test, from people by their reason; nothing where all are in it."""
+    gone = [who for own in why.values() for who in own]
+    if not gone:
+        return
+    if len(why) == 1:
+        (said,) = why
+    else:
+        said = "; ".join(f"{people_in_words(own)}: {reason}" for reason, own in why.items())
+    yield Shortfall(measure, name, people_in_words(gone), people, people - len(gone), said)
+
+
+def people_in_words(names: Sequence[str]) -> str:
+    """Return names in words: ``P001, P002 and P003``."""
+    if len(names) > NAMED:
+        return f"{', '.join(names[:NAMED])} and {len(names) - NAMED} more"
+    *others, last = sorted(names)
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def _cells_of(table: "pd.DataFrame", who: str, names: list[str]) -> set[tuple[Any, ...]]:
+    """Return the cells in which a participant has rows; the only one where nothing varies."""
+    own = table[table["participant"] == who]
+    if not names:
+        return {()} if len(own) else set()
+    return set(own[names].drop_duplicates().itertuples(index=False, name=None))
+
+
+def _counted(everything: "pd.DataFrame") -> "pd.DataFrame":
+    return everything[everything["practice"].astype(float) == 0.0]
+
+
 def _of_trends(
-    results: "pd.DataFrame",
+    everything: "pd.DataFrame",
     measure: str,
     factors: Factors,
     people: Mapping[str, str],
     trends: "pd.DataFrame",
 ) -> Iterator[Shortfall]:
+    results, recorded = everything[is_result(everything)], _counted(everything)
     made = trends[trends["measure"] == measure] if len(trends) else trends
     for phase in factors.phases:
-        if factors.places[phase] < 2 or (len(made) and (made[factors.kind] == phase).any()):  # noqa: PLR2004
+        if factors.places[phase] < 2:  # noqa: PLR2004
             continue
-        known = results[results[PHASE] == phase].dropna(subset=[measure])
-        several = int((known.groupby("participant")[PLACE].nunique() > 1).sum())
-        why = f"{several} of {len(people)} people have values at two or more positions"
-        why += f", and {LEAST} are needed" if several < LEAST else ", whose slopes do not differ"
         name = f"linear trend of {SEQUENCE} in {phase}"
-        yield Shortfall(measure, name, "", len(people), several, why)
+        known = results[results[PHASE] == phase].dropna(subset=[measure])
+        places = known.groupby("participant")[PLACE].nunique()
+        several = set(map(str, places[places > 1].index))
+        if len(made) and (made[factors.kind] == phase).any():
+            there = set(recorded.loc[recorded[PHASE] == phase, "participant"])
+            reasons: dict[str, list[str]] = {}
+            for who in people:
+                if who not in several:
+                    few = "values at fewer than two positions"
+                    few = few if who in there else f"{NOTHING} in {phase}"
+                    reasons.setdefault(few, []).append(who)
+            yield from left_out(measure, name, reasons, len(people))
+            continue
+        why = f"{len(several)} of {len(people)} people have values at two or more positions"
+        why += (
+            f", and {LEAST} are needed" if len(several) < LEAST else ", whose slopes do not differ"
+        )
+        yield Shortfall(measure, name, "", len(people), len(several), why)
+
+
+def _of_scales(
+    everything: "pd.DataFrame", measure: str, factors: Factors, scales: "pd.DataFrame"
+) -> Iterator[Shortfall]:
+    """Yield who lacks a quantity of the time scales; what has no test says so in its own row."""
+    recorded = _counted(everything)
+    for row in scales[scales["measure"] == measure].to_dict("records") if len(scales) else ():
+        if row["why"] or row["group"] != "all":
+            continue
+        phase = str(row["phase"])
+        of = [phase]
+        if row["quantity"] not in {"slope", "gain"}:
+            of.insert(0, factors.phases[factors.phases.index(phase) - 1])
+        reasons: dict[str, list[str]] = {}
+        for who in str(row["left_out"]).split():
+            mine = recorded[recorded["participant"] == who]
+            away = [each for each in of if not (mine[PHASE] == each).any()]
+            few = {"slope": "values at fewer than two positions", "change": "no value in a phase"}
+            why = few.get(row["quantity"], "no value at a first or last position")
+            why = f"{NOTHING} in {' and '.join(away)}" if away else why
+            reasons.setdefault(why, []).append(who)
+        yield from left_out(measure, f"{row['quantity']} of {phase}", reasons, len(factors.people))
