@@ -129,13 +129,17 @@ def test_everybody_is_to_be_seen_in_every_figure(drawings: dict[str, figures.Dra
         assert len(axes.lines) >= 36 or points >= 36, name
 
 
-def told(movements: pd.DataFrame, data: Path) -> dict[str, list[str]]:
+def told(
+    movements: pd.DataFrame, data: Path, primary: tuple[str, ...] = ()
+) -> dict[str, list[str]]:
     whole = with_factors(movements)
     factors = factors_of(whole)
     empty = pd.DataFrame()
-    anova = anova_table(whole, factors)
+    anova = anova_table(whole, factors, primary)
     scores = pd.DataFrame(columns=list(SCORES))
-    results = Results("36 participants.", anova, *[empty] * 4, scores, empty, factors, 36, empty)
+    results = Results(
+        "36 participants.", anova, *[empty] * 4, scores, empty, factors, 36, empty, primary
+    )
     loops = pd.DataFrame({
         "late_ticks": [3, 0], "ticks": [1000, 1000], "lateness_worst_ms": [12.5, 1.0],
         "sync_verdict": ["WARN", "PASS"],
@@ -169,6 +173,49 @@ def test_the_answer_has_design_people_effects_quality_and_exclusions_with_their_
         f"1 of {len(lost)} movements count for no average (0.1%); each is listed with why."
     ]
     assert "Left out: " in found["Participants"][1]
+
+
+def paper_of(movements: pd.DataFrame, measure: str) -> tuple[str, str]:
+    """Return F and corrected df over positions, plain as a paper has them, by statsmodels."""
+    from statsmodels.stats.anova import AnovaRM
+
+    cells = movements.groupby(["participant", "sequence"])[measure].mean().reset_index()
+    row = AnovaRM(cells, measure, "participant", within=["sequence"]).fit().anova_table.iloc[0]
+    wide = cells.pivot_table(index="participant", columns="sequence", values=measure)
+    ranks = np.cov(wide.to_numpy(float), rowvar=False)
+    k = len(ranks)
+    centred = (np.eye(k) - 1 / k) @ ranks @ (np.eye(k) - 1 / k)
+    epsilon = np.trace(centred) ** 2 / ((k - 1) * (centred**2).sum())
+    free = f"{epsilon * row['Num DF']:.2f}, {epsilon * row['Den DF']:.2f}"
+    return free, f"{row['F Value']:.2f}"
+
+
+def test_the_answer_gives_the_plain_test_of_the_primary_outcome_and_names_the_adjusted_one(
+    movements: pd.DataFrame, data: Path
+) -> None:
+    table = movements.drop(columns="group")
+    time, error = told(table, data, primary=("absolute_error",))["Main effects"][1::-1]
+    assert error.startswith("Primary outcome: The distance from the target's centre ")
+    assert time.startswith("Further outcome: ")
+    for said, measure in ((time, "movement_time"), (error, "absolute_error")):
+        free, f = paper_of(table, measure)
+        plain, adjusted = re.findall(r"over sequence( with pairs' means taken away)? \(", said)
+        assert (plain, adjusted) == ("", " with pairs' means taken away")
+        (begin,) = re.findall(r"over sequence \(position 1: [^;]*; F\(([^)]*)\) = ([\d.]+),", said)
+        assert begin == (free, f)
+
+
+def test_without_primary_outcomes_none_is_called_so(movements: pd.DataFrame, data: Path) -> None:
+    assert "rimary" not in "".join(told(movements, data)["Main effects"])
+
+
+def test_positions_of_phases_of_other_lengths_are_in_the_answer(
+    movements: pd.DataFrame, data: Path
+) -> None:
+    second = movements[movements["sequence"] <= 5].assign(session=2.0)
+    said = told(pd.concat([movements, second]), data)["Main effects"][0]
+    for phase, last in (("1 session 1", 8), ("2 session 2", 5)):
+        assert re.search(rf"over sequence in {phase} \(position 1: [^;]*, position {last}: ", said)
 
 
 @pytest.mark.slow

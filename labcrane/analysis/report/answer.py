@@ -1,7 +1,7 @@
 """Answer of a study: what stands on the first page of its report, in words with their numbers."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.cohort import Cohort
@@ -9,6 +9,7 @@ from labcrane.analysis.quality import is_result, without_onset
 from labcrane.analysis.report.factors import (
     DISTANCE,
     GROUP,
+    PHASE,
     PLACE,
     SIDE,
     Factors,
@@ -128,20 +129,26 @@ def _effects(everything: "pd.DataFrame", results: Results | None) -> list[str]:
     for measure in dict.fromkeys(name for names in measures for name in names):
         if measure not in counted or str(measure).startswith(tuple(LOOKED)):
             continue  # a questionnaire's, or of gaze
-        own = results.anova
-        rows = own[own["measure"] == measure].to_dict("records") if len(own) else []
-        by_factor = {str(row["factor"]): {str(k): v for k, v in row.items()} for row in rows}
         said = [
             _effect(row, counted, column, unit, results)
             for name, column, unit in _columns(results.factors)
-            if (row := _test_of(name, by_factor)) is not None and column in counted
+            if column in counted
+            for row in _tests_of(name, str(measure), results)
         ]
         short = lacking(_of_effects(results), str(measure), STYLE)
         if said or short:
             effects = "; ".join(said) or "was tested by no analysis of variance"
             about = f"{NAMES.get(str(measure), str(measure))} {effects}."
-            found.append(" ".join([about, *short]))
+            standing = _standing(str(measure), results.primary)
+            found.append(" ".join([*standing, about, *short]))
     return found or [TESTED]
+
+
+def _standing(measure: str, primary: Sequence[str]) -> list[str]:
+    """Return what the protocol calls an outcome; nothing where it names no primary ones."""
+    if not primary:
+        return []
+    return ["Primary outcome:" if measure in primary else "Further outcome:"]
 
 
 def _of_effects(results: Results) -> "pd.DataFrame":
@@ -150,13 +157,21 @@ def _of_effects(results: Results) -> "pd.DataFrame":
     if not len(table):
         return table
     told = [name for name, _, _ in _columns(results.factors)]
-    told += [name + ADJUSTED for name in told]
-    return table[table["factor"].isin(told) | (table["without"] == "")]
+    return table[table["factor"].map(_factor_of).isin(told) | (table["without"] == "")]
 
 
-def _test_of(name: str, rows: Mapping[str, Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    """Return the test of a factor; of positions, that which takes pairs' means away first."""
-    return rows.get(name + ADJUSTED, rows.get(name))
+def _factor_of(effect: str) -> str:
+    """Return the factor of an effect, wherever and beside whatever it is."""
+    return effect.partition(" ")[0]
+
+
+def _tests_of(name: str, measure: str, results: Results) -> Iterator[Mapping[str, Any]]:
+    """Yield the tests of a factor: the plain one, as papers print it, and then adjusted ones."""
+    own = results.anova
+    rows = own[own["measure"] == measure].to_dict("records") if len(own) else []
+    for row in rows:
+        if _factor_of(str(row["factor"])) == name:
+            yield {str(key): value for key, value in row.items()}
 
 
 def _effect(
@@ -166,23 +181,27 @@ def _effect(
 
     The means are of those who are in the test, each cell of its design counting alike.
     """
-    name, measure = str(row["factor"]).removesuffix(ADJUSTED), str(row["measure"])
+    name, measure = str(row["factor"]), str(row["measure"])
     if row["confounded"]:
         return f"what {name} does cannot be told from {row['confounded']}"
     said = "differed over" if row["p_gg"] < LEVEL else "did not detectably differ over"
-    own = counted[~counted["participant"].isin(str(row["left_out"]).split())]
+    if name.endswith(ADJUSTED):  # the means are those of the plain test, before it
+        return f"{said} {name} ({f_test(row, STYLE, results.people)})"
+    phase = name.removeprefix(f"{SEQUENCE} in ") if name.startswith(f"{SEQUENCE} in ") else ""
+    own = counted[counted[PHASE] == phase] if phase else counted
+    own = own[~own["participant"].isin(str(row["left_out"]).split())]
     by = [column, "participant"]
     within = [each for each in results.factors.over_phases if each != column]
     cells = own.groupby([*by, *within])[measure].mean().dropna()
     each = cells.groupby(level=by).mean().groupby(level=0)
     means, sizes = each.mean(), dict(each.size())
-    if name == SEQUENCE and len(means) > 2:  # noqa: PLR2004 - the first and the last are enough
+    if column == PLACE and len(means) > 2:  # noqa: PLR2004 - the first and the last are enough
         means = means.iloc[[0, -1]]
-    of = "position " if name == SEQUENCE else ""
+    of = "position " if column == PLACE else ""
     levels = ", ".join(
-        f"{of}{f'{level:g}' if isinstance(level, float) else level}{unit}: "
+        f"{of}{f'{level:g}' if isinstance(level, float) else level}{unit}"
+        f"{f', n = {sizes[level]}' if column == GROUP else ''}: "
         f"{mean:.3g} {UNITS.get(measure, '')}".rstrip()
-        + (f" of {sizes[level]} people" if column == GROUP else "")
         for level, mean in means.items()
     )
     return f"{said} {name} ({levels}; {f_test(row, STYLE, results.people)})"

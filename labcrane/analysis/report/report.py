@@ -258,7 +258,18 @@ def _study(
     else:
         page.say("Every planned test was made, of everybody and every level.")
     found = Results(
-        about, anovas, contrasts, trends, scales, looked, tests, counts, factors, len(groups), short
+        about,
+        anovas,
+        contrasts,
+        trends,
+        scales,
+        looked,
+        tests,
+        counts,
+        factors,
+        len(groups),
+        short,
+        tuple(primary),
     )
     _in_words(page, found)
     return found

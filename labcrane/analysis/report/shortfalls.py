@@ -205,9 +205,9 @@ class _Design:
         self._done, self._recorded = table, recorded
         self.whole, self._empty = whole_people(table, measure, within)
         self._there = {
-            name: [level for level in own if (self._known[name] == level).any()]
-            for name, own in levels.items()
-            if name in within
+            name: [level for level in levels[name] if (self._known[name] == level).any()]
+            for name in within
+            if name in levels
         }
         self._words = words
         varied = [self._word(name) for name in within if len(self._there.get(name, ())) > 1]

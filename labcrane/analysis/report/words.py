@@ -113,6 +113,8 @@ class Results:
         Participants of the sample; a test of others tells its own number.
     shortfalls
         What planned tests lack.
+    primary
+        Outcomes that the protocol names as primary.
     """
 
     sample: str
@@ -126,6 +128,7 @@ class Results:
     factors: Factors
     people: int
     shortfalls: "pd.DataFrame"
+    primary: tuple[str, ...] = ()
 
 
 def paragraphs(results: Results, style: Style) -> list[str]:
