@@ -14,6 +14,9 @@ COUNTS = {
 }
 """The columns of a trial's row that hold its mistakes, by their component of the indicator."""
 
+RATINGS = {"accuracy": "subjective_accuracy", "awareness": "situational_awareness"}
+"""The questionnaires that hold its ratings, by their component of the indicator."""
+
 TIME = "time"
 """The column that holds how long a trial took."""
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from labcrane.analysis.cohort import Cohort
 from labcrane.analysis.indicator import Indicator, Performance, indicate
-from labcrane.analysis.indicator_settings import COUNTS, TIME, IndicatorSettings
+from labcrane.analysis.indicator_settings import COUNTS, RATINGS, TIME, IndicatorSettings
 from labcrane.errors import LabcraneError, RecordingError
 from labcrane.recording.participant_file.reader import Recording, SessionRecord
 from labcrane.recording.participant_file.writer import DAMAGED
@@ -25,7 +25,6 @@ DROPS = "n_drop"
 DETECTION = ("deformity", "found", "false_reports")
 """What was reported of deformities, where a test has these columns."""
 
-RATINGS = {"accuracy": "subjective_accuracy", "awareness": "situational_awareness"}
 OVERRIDE = "order.override"
 
 

@@ -9,12 +9,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from labcrane.analysis.indicator_settings import COUNTS, RATINGS, TIME
 from labcrane.core.references import Reference, mentioned
 from labcrane.errors import LabcraneError, ProtocolError, suggestion
 from labcrane.files.pseudonyms import pseudonyms
 from labcrane.files.system import is_there
 from labcrane.files.yaml import Place
 from labcrane.protocol.components import ComponentSpec
+from labcrane.protocol.design import AS_WRITTEN
 from labcrane.protocol.effective import written_numbers
 from labcrane.protocol.pages import unserved
 from labcrane.protocol.references import twice
@@ -170,6 +172,8 @@ def _doubts(study: Study) -> Doubts:
     yield from _of_groups(study)
     yield from _of_squares(study)
     yield from _of_sessions(study)
+    yield from _of_what_counts(study)
+    yield from _of_what_is_scored(study)
     yield from _of_stop_rules(study)
     yield from _of_what_is_not_used(study)
     yield from _of_what_is_not_asked(study)
@@ -551,6 +555,89 @@ def _duration(seconds: float) -> str:
     if seconds < 2 * 3600.0:
         return f"{seconds / 60:.3g} minutes"
     return f"{seconds / 3600:.3g} hours"
+
+
+def _steps(study: Study) -> Iterator[tuple[Place, str, Block]]:
+    """Yield where each block, practice and reference is, which it is, and its keys."""
+    for place, block in _blocks(study):
+        kind = study.protocol.sessions[int(place[1])].steps[int(place[3])].kind
+        yield (*place, kind), kind, block
+
+
+def _of_what_counts(study: Study) -> Doubts:
+    """Question a study of which nothing is a result."""
+    kinds = dict.fromkeys(kind for _, kind, _ in _steps(study))
+    if "block" not in kinds:
+        only = f", only {' and '.join(kinds)}, which counts for nothing" if kinds else ""
+        yield (
+            ("sessions",),
+            f"no session has a block{only}, so that a report has no result; write block: "
+            "{task: ...} where trials count",
+        )
+    for name, task in study.tasks.items():
+        if not any(trial.counted for trial in task.plan(task.factors())):
+            yield ("tasks", name), f"no trial of task {name!r} counts"
+
+
+def _of_what_is_scored(study: Study) -> Doubts:
+    """Question tests of which ``labcrane score`` would leave out the whole, or some points.
+
+    Their columns say that they are scored; by the operator's own reference time in each scenario,
+    of the latest reference before them.
+    """
+    weights = study.protocol.indicator.weights
+    rated = [name for part, name in RATINGS.items() if getattr(weights, part)]
+    timed: set[str] = set()
+    for place, kind, block in _steps(study):
+        task = study.tasks[block.task]
+        if not {TIME, *COUNTS.values()} <= {name for one in task.results for name in one.columns}:
+            continue
+        if kind == "reference":
+            timed |= _scenarios(study, block, surely=True)
+        elif kind == "block":
+            here = f"{kind} {int(place[3]) + 1} of session {int(place[1]) + 1}"
+            if lacks := _scenarios(study, block, surely=False) - timed:
+                of = f" of {', '.join(sorted(lacks))}" if timed and all(lacks) else ""
+                yield (
+                    (*place, "task"),
+                    f"{here} is scored against the operator's own reference time{of}, which no "
+                    "step before it takes, so that labcrane score leaves its tests out; write "
+                    f"reference: {{task: {block.task}}} before it",
+                )
+            steps = study.protocol.sessions[int(place[1])].steps[int(place[3]) + 1 :]
+            asked = {*block.ask, *(name for step in steps for name in step.questionnaires)}
+            if unasked := [name for name in rated if name not in asked]:
+                yield (
+                    (*place, "ask"),
+                    f"{here} is scored by ratings too, and {' and '.join(unasked)} "
+                    f"{'is' if len(unasked) == 1 else 'are'} asked neither in it nor after it, so "
+                    "that its indicator has no sum; write ask: "
+                    f"[{', '.join(rated)}], or give them no weight under indicator",
+                )
+
+
+def _scenarios(study: Study, block: Block, *, surely: bool) -> set[str]:
+    """Return the scenarios that everybody does in a block, or that anybody may; "" for none."""
+    task = study.tasks[block.task]
+    levels = dict(task.factors())
+    for factor, there in levels.items():
+        if not drawn_part(study, block, factor):
+            levels[factor] = there[: block.limits.get(factor)]
+        elif surely:
+            return set()
+    return {str(trial.condition.get("scenario") or "") for trial in task.plan(levels)}
+
+
+def drawn_part(study: Study, block: Block, factor: str) -> bool:
+    """Return whether each participant does another part of a factor's levels in a block."""
+    order = study.protocol.design.order.get(factor, AS_WRITTEN)
+    most = block.limits.get(factor)
+    levels = len(study.tasks[block.task].factors()[factor])
+    if most is None or most >= levels * order.times:
+        return False
+    # Every repetition holds each level once, but where all are shuffled together.
+    whole = order.rule != "shuffled" and most % levels == 0
+    return order.rule != AS_WRITTEN.rule and not whole
 
 
 def _of_what_is_not_used(study: Study) -> Doubts:

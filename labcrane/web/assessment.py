@@ -4,8 +4,8 @@ import math
 from collections.abc import Mapping
 
 from labcrane.analysis.indicator import Performance, indicate
-from labcrane.analysis.indicator_settings import COUNTS, TIME, IndicatorSettings
-from labcrane.analysis.operator_tests import DROPS, RATINGS, completion
+from labcrane.analysis.indicator_settings import COUNTS, RATINGS, TIME, IndicatorSettings
+from labcrane.analysis.operator_tests import DROPS, completion
 from labcrane.core.records import Event, Value
 
 SHARE = "score.share"

@@ -4,6 +4,7 @@
 
 import json
 from pathlib import Path
+from shutil import copytree
 from tempfile import TemporaryDirectory
 
 import pytest
@@ -15,7 +16,7 @@ from labcrane import ProtocolError
 from labcrane.cli.app import main
 from labcrane.files.units import in_unit
 from labcrane.protocol.effective import written_quantities
-from labcrane.protocol.questions import questions
+from labcrane.protocol.questions import about, questions
 from labcrane.protocol.study import Study, load
 from labcrane.registry.registry import discover
 from labcrane.simulation import rehearsal
@@ -51,6 +52,9 @@ GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
     ("changes", "key", "said"),
     [
         ([("movements: 2", "movements: 2, limit_s: 0.3")], "tasks.aiming.limit_s", "at full speed"),
+        ([(BLOCK, BLOCK.replace("block", "practice"))], "sessions", "no session has a block, only practice, which counts for nothing"),
+        ([(BLOCK, BLOCK.replace("block", "reference"))], "sessions", "no session has a block, only reference, which"),
+        ([(BLOCK, "      - questionnaire: nasa_tlx\n")], "sessions", "no session has a block, so that a report has no result; write block"),
         ([("movements: 2", "movements: 2, limit_s: 5e6")], "tasks.aiming.limit_s", "5e+06 s"),
         ([(BLOCK, f"{BLOCK}      - break: {{seconds: 3 days}}\n")],
          "sessions.1.steps.2.break.seconds", "a break of 72 hours"),
@@ -173,6 +177,67 @@ def test_a_number_that_nobody_means_is_asked_about_until_it_is_answered(
     assert asked[key].endswith("is that meant?")
     answer = ("sessions:", f"expected: [{', '.join(asked)}]\nsessions:")
     assert questions(a_study(tmp_path, *changes, answer)) == ()
+
+
+RETRIEVAL = Path(__file__).parents[2] / "protocols" / "retrieval"
+REFERENCE = "      - reference: {task: retrieval}"
+ASK = ", ask: [subjective_accuracy, situational_awareness]"
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "said", "line"),
+    [
+        ([(REFERENCE, "      - break: {seconds: 9}")], "sessions.1.steps.4.block.task",
+         "own reference time, which no step before it takes, so that labcrane score leaves its tests out; write reference: {task: retrieval}", "- block:"),
+        ([(REFERENCE, REFERENCE.replace("}", ", scenes: 2}"))], "sessions.1.steps.4.block.task",
+         "own reference time, which no step before it takes", "- block:"),
+        ([(REFERENCE, REFERENCE.replace("}", ", scenes: 2}")), ("{scenes: shuffled}", "{scenes: as_written}")],
+         "sessions.1.steps.4.block.task", "reference time of {lacks}, which no step", "- block:"),
+        ([(ASK, "")], "sessions.1.steps.4.block.ask", "subjective_accuracy and situational_awareness are asked neither in it nor after it", "- block:"),
+        ([(ASK, ", ask: [situational_awareness]")], "sessions.1.steps.4.block.ask", "subjective_accuracy is asked neither", "- block:"),
+    ],
+)  # fmt: skip
+def test_a_study_that_cannot_be_scored_is_asked_about_at_its_line(
+    tmp_path: Path, changes: list[tuple[str, str]], key: str, said: str, line: str
+) -> None:
+    copytree(RETRIEVAL, tmp_path / "study")
+    path = tmp_path / "study" / "protocol.yaml"
+    text = path.read_text(encoding="utf-8")
+    assert questions(load(path, discover(study=path))) == ()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    path.write_text(text, encoding="utf-8")
+    study = load(path, discover(study=path))
+    (asked,) = questions(study)
+    lacks = ", ".join(sorted(study.tasks["retrieval"].factors()["scenes"][2:]))
+    assert asked.key == key
+    assert said.format(lacks=lacks) in asked.text if "{lacks}" in said else said in asked.text
+    found = about(study, asked)
+    assert line in text.splitlines()[found["line"] - 1]
+    path.write_text(
+        text.replace("\nsessions:", f"\nexpected: [{key}]\nsessions:"), encoding="utf-8"
+    )
+    assert questions(load(path, discover(study=path))) == ()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        (ASK + "}", "}\n      - questionnaire: [situational_awareness, subjective_accuracy]"),
+        (ASK + "}", "}\nindicator: {weights: {accuracy: 0, awareness: 0}}"),
+        (REFERENCE, REFERENCE + "\n      - reference: {task: retrieval, scenes: 1}"),
+    ],
+)
+def test_a_study_that_can_be_scored_is_not_asked_about(
+    tmp_path: Path, change: tuple[str, str]
+) -> None:
+    copytree(RETRIEVAL, tmp_path / "study")
+    path = tmp_path / "study" / "protocol.yaml"
+    text = path.read_text(encoding="utf-8")
+    assert change[0] in text
+    path.write_text(text.replace(*change, 1), encoding="utf-8")
+    assert questions(load(path, discover(study=path))) == ()
 
 
 @pytest.mark.parametrize(
