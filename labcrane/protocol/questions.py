@@ -174,6 +174,7 @@ def _doubts(study: Study) -> Doubts:
     yield from _of_sessions(study)
     yield from _of_what_counts(study)
     yield from _of_what_is_scored(study)
+    yield from _of_orders(study)
     yield from _of_stop_rules(study)
     yield from _of_what_is_not_used(study)
     yield from _of_what_is_not_asked(study)
@@ -621,14 +622,47 @@ def _scenarios(study: Study, block: Block, *, surely: bool) -> set[str]:
     task = study.tasks[block.task]
     levels = dict(task.factors())
     for factor, there in levels.items():
-        if not drawn_part(study, block, factor):
+        if not _drawn_part(study, block, factor):
             levels[factor] = there[: block.limits.get(factor)]
         elif surely:
             return set()
     return {str(trial.condition.get("scenario") or "") for trial in task.plan(levels)}
 
 
-def drawn_part(study: Study, block: Block, factor: str) -> bool:
+def _of_orders(study: Study) -> Doubts:
+    """Question counted blocks that hold a chance part of the levels, or have one order for all."""
+    protocol = study.protocol
+    unsaid: dict[str, list[str]] = {}
+    for place, kind, block in _steps(study):
+        if kind != "block":
+            continue
+        track = protocol.design.tracks.get(block.track)
+        for factor, levels in study.tasks[block.task].factors().items():
+            used = min(block.limits.get(factor, len(levels)), len(levels))
+            if track is not None and factor == track.factor:
+                continue
+            if _drawn_part(study, block, factor):
+                yield (
+                    (*place, factor),
+                    f"the block takes {used} of the {len(levels)} {factor} of {block.task!r}, "
+                    f"whose order is {protocol.design.order[factor].rule}: each participant does "
+                    "another part of them, so that what they differ in is no factor that everybody "
+                    f"meets; leave {factor} out, give the task fewer levels, or write order: "
+                    f"{{{factor}: as_written}} for the same part",
+                )
+            elif used > 1 and factor not in protocol.design.order:
+                unsaid.setdefault(factor, []).append(block.task)
+    for factor, tasks in unsaid.items():
+        of = ", ".join(map(repr, dict.fromkeys(tasks)))
+        yield (
+            ("design", "order", factor),
+            f"design says no order for {factor} of {of}, so that they come as written, in one "
+            "order for everybody, and what they do cannot be told from learning; write order: "
+            f"{{{factor}: shuffled}} under design, or as_written",
+        )
+
+
+def _drawn_part(study: Study, block: Block, factor: str) -> bool:
     """Return whether each participant does another part of a factor's levels in a block."""
     order = study.protocol.design.order.get(factor, AS_WRITTEN)
     most = block.limits.get(factor)

@@ -4,6 +4,7 @@
 
 import json
 from pathlib import Path
+from random import Random
 from shutil import copytree
 from tempfile import TemporaryDirectory
 
@@ -14,7 +15,9 @@ from rehearsal import SHORT
 
 from labcrane import ProtocolError
 from labcrane.cli.app import main
+from labcrane.design.plan import plan_session
 from labcrane.files.units import in_unit
+from labcrane.protocol.design import RULES
 from labcrane.protocol.effective import written_quantities
 from labcrane.protocol.questions import about, questions
 from labcrane.protocol.study import Study, load
@@ -52,6 +55,12 @@ GROUPS = f"design: {{groups: {{none: [], ball: [ball]}}}}\n{BALL}"
     ("changes", "key", "said"),
     [
         ([("movements: 2", "movements: 2, limit_s: 0.3")], "tasks.aiming.limit_s", "at full speed"),
+        ([(BLOCK, BLOCK.replace(", pairs: 1", ""))], "design.order.pairs", "for pairs of 'aiming', so that they come as written, in one order for everybody"),
+        ([("sessions:", "design: {order: {pairs: shuffled}}\nsessions:")], "sessions.1.steps.1.block.pairs",
+         "takes 1 of the 2 pairs of 'aiming', whose order is shuffled: each participant does another part"),
+        ([("sessions:", "design: {order: {pairs: {rule: shuffled, times: 2}}}\nsessions:"), ("pairs: 1", "pairs: 2")],
+         "sessions.1.steps.1.block.pairs", "takes 2 of the 2 pairs"),
+        ([("sessions:", "design: {order: {pairs: latin_square}}\nsessions:")], "sessions.1.steps.1.block.pairs", "whose order is latin_square"),
         ([(BLOCK, BLOCK.replace("block", "practice"))], "sessions", "no session has a block, only practice, which counts for nothing"),
         ([(BLOCK, BLOCK.replace("block", "reference"))], "sessions", "no session has a block, only reference, which"),
         ([(BLOCK, "      - questionnaire: nasa_tlx\n")], "sessions", "no session has a block, so that a report has no result; write block"),
@@ -238,6 +247,46 @@ def test_a_study_that_can_be_scored_is_not_asked_about(
     assert change[0] in text
     path.write_text(text.replace(*change, 1), encoding="utf-8")
     assert questions(load(path, discover(study=path))) == ()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        [(", pairs: 1", ""), ("sessions:", "design: {order: {pairs: as_written}}\nsessions:")],
+        [(", pairs: 1", ""), ("sessions:", "design: {order: {pairs: shuffled}}\nsessions:")],
+        [("pairs: 1", "pairs: 2"), ("sessions:", "design: {order: {pairs: shuffled}}\nsessions:")],
+        [("pairs: 1", "pairs: 2"), ("sessions:", "design: {order: {pairs: {rule: blocked, times: 3}}}\nsessions:")],
+        [("sessions:", "design: {order: {pairs: shuffled}}\nsessions:"), (BLOCK, BLOCK.replace("block", "practice") + BLOCK.replace(", pairs: 1", ""))],
+    ],
+)  # fmt: skip
+def test_an_order_that_is_said_and_holds_all_levels_is_not_asked_about(
+    tmp_path: Path, changes: list[tuple[str, str]]
+) -> None:
+    assert questions(a_study(tmp_path, *changes)) == ()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_part_is_asked_about_where_plans_of_participants_hold_other_levels(
+    tmp_path: Path, seed: int
+) -> None:
+    dice = Random(f"order {seed}")
+    rule = dice.choice(RULES)
+    times = dice.randint(1, 2)
+    levels, used = 8, dice.randint(1, 8)
+    order = f"design: {{order: {{pairs: {{rule: {rule}, times: {times}}}}}}}\nsessions:"
+    study = a_study(
+        tmp_path,
+        ("distances: [2]", "distances: [2, 3, 4, 6]"),
+        ("pairs: 1", f"pairs: {used}"),
+        ("sessions:", order),
+    )
+    done = {
+        frozenset(plan_session(study, f"P{number:03}", 1).blocks[0].levels["pairs"])
+        for number in range(1, 3 * levels)
+    }
+    asked = [each.key for each in questions(study)]
+    assert (asked == ["sessions.1.steps.1.block.pairs"]) == (len(done) > 1), (rule, times, used)
+    assert len(asked) == (len(done) > 1)
 
 
 @pytest.mark.parametrize(

@@ -118,6 +118,22 @@ def test_two_orders_that_mirror_each_other_tell_a_trend_and_not_each_position(
     assert np.isfinite(scales.loc["slope", "t"])
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_factor_of_which_each_did_a_chance_part_is_said_not_to_be_tested(
+    found: Found, seed: int
+) -> None:
+    """A block of two pairs of six in a drawn order, as ``block: {pairs: 2}`` makes it."""
+    table = drawn(seed, (7,), sessions=1)
+    part = table[table["sequence"] <= 2]
+    had = part.groupby("participant")["distance"].nunique() == part["distance"].nunique()
+    assert not had.any()
+    results, page = found(part)
+    said = in_words(results)
+    assert "distance" not in set(results.anova["factor"])
+    for text in (said, page):
+        assert "0 of 7 people have a value in every cell of distance, and 3 are needed" in text
+
+
 def test_the_file_for_papers_says_the_same(found: Found, tmp_path: Path) -> None:
     found(in_orders(6, 5, orders=1))
     said = (tmp_path / "results.md").read_text(encoding="utf-8")
