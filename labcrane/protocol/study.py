@@ -11,7 +11,7 @@ from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.core.records import Value
 from labcrane.core.roles import Controller, Dynamics, InputDevice, Questionnaire, Task
 from labcrane.core.settings import Settings
-from labcrane.errors import ProtocolError, nearest
+from labcrane.errors import ProtocolError, meant, nearest
 from labcrane.files.complaints import written
 from labcrane.files.names import check_name
 from labcrane.files.yaml import Place, YamlFile
@@ -337,8 +337,10 @@ class Checker:
         factors = task.factors()
         for factor, count in limits.items():
             if factor not in factors:
-                there = nearest(factor, factors, "it varies")
-                message = f"{factor!r} is nothing the task varies; {there}"
+                close = meant(factor, [*Block.model_fields, *factors])
+                listed = ", ".join(factors) or "nothing"
+                there = f"{close} it varies {listed}".lstrip()
+                message = f"{factor!r} is no key of a block and nothing the task varies; {there}"
             elif not (self._is_count(count) and 1 <= count <= len(factors[factor])):
                 most = len(factors[factor])
                 message = f"{factor} is {written(count)}; it must be a whole number, 1 to {most}"

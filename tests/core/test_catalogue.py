@@ -39,6 +39,10 @@ JARGON = re.compile(
 REMEDY = re.compile(
     r"; |must be|did you mean|is it what|there is no .*; |needs |possible:|is that meant"
 )
+MISSPELT = "key misspelt as "
+NEAR = 4
+"""Letters of a name that is found again when one of them is another."""
+
 LONGEST = 700
 """Characters of a message: all events of a session are named in one."""
 
@@ -53,6 +57,15 @@ def assert_in_the_file(at: Iterable[tuple[int, int]], wrong: Wrong) -> None:
     for line, column in at:
         assert 1 <= line <= len(lines), (str(wrong), line, column)
         assert 1 <= column <= len(lines[line - 1]) + 1, (str(wrong), line, column)
+
+
+def assert_the_nearest_is_named(wrong: Wrong, lines: Sequence[str]) -> None:
+    """Assert that a key of which one letter is wrong is told with a key that there is."""
+    if not wrong.fault.startswith(MISSPELT) or len(str(wrong.place[-1])) < NEAR:
+        return
+    unknown = re.compile(f"{wrong.fault.removeprefix(MISSPELT)!r} is (not a|no) key of")
+    for line in lines:
+        assert not unknown.search(line) or "did you mean '" in line, (str(wrong), line)
 
 
 def standing(study: str, path: Path, registry: Registry) -> frozenset[str]:
@@ -90,10 +103,11 @@ def judge(
         assert here or wrong.line == 0 or missed, (str(wrong), wrong.line, lines)
         if not missed and wrong.fault.startswith("key misspelt"):
             # What a mapping needs as a whole is told of the mapping, and not of its key.
-            unknown = [line for line in lines if "is not a key of" in line]
+            unknown = [line for line in lines if re.search("is (not a|no) key of", line)]
             assert here & wrong.columns or not unknown, (str(wrong), wrong.columns, lines)
         elif wrong.columns and not missed:
             assert here & wrong.columns, (str(wrong), wrong.columns, lines)
+        assert_the_nearest_is_named(wrong, lines)
         for line in lines:
             assert REMEDY.search(line), (str(wrong), line)
             assert not JARGON.search(line), (str(wrong), line)
