@@ -18,7 +18,8 @@ def loop_quality(participant: Participant) -> "pd.DataFrame":
     """Return how late the loop's ticks were, one row per session.
 
     Lateness is from when a tick was due to when it woke. A late tick is one whose lateness is
-    more than a period. A session on a clock that jumps (``--fast``) is never late.
+    more than a period. A session on a clock that jumps (``--fast``) is never late, and has no
+    streams of others: ``not_there`` names those that it would have had.
     """
     import pandas as pd
 
@@ -34,6 +35,7 @@ def loop_quality(participant: Participant) -> "pd.DataFrame":
                 "session": number,
                 "clock": session.attrs.get("clock", ""),
                 "sync_verdict": session.sync_report.get("verdict", ""),
+                "not_there": ", ".join(session.sync_report.get("absent", ())),
                 "ticks": len(wrote),
                 "rate_hz": rate_hz,
                 "lateness_median_ms": 1e3 * float(np.median(lateness)),

@@ -58,7 +58,10 @@ def conclude(group: "h5py.Group") -> SyncReport:
     judged = [_corrected(one, raw, end, limits) for one, raw in zip(streams, raws, strict=True)]
     came = {one.label for one in streams}
     missing = {label: need.required for label, need in needs.items() if label not in came}
-    report = SyncReport(tuple(judged), _loop(group, context, limits), never_came(missing))
+    # A session as fast as it goes is without LSL.
+    absent = tuple(missing) if group.attrs.get("fast") == "yes" else ()
+    never = () if absent else never_came(missing)
+    report = SyncReport(tuple(judged), _loop(group, context, limits), never, absent)
     write_sync_report(group, report.as_json())
     return report
 

@@ -7,6 +7,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pandas as pd
 import pytest
+from rehearsal import SHORT
 from scipy.stats import ttest_ind, ttest_rel
 
 from labcrane.analysis.cohort import Cohort, Status, find_cohort
@@ -305,6 +306,22 @@ def test_quality_is_that_of_the_record(cohort: Cohort) -> None:
 
 
 @pytest.mark.slow
+def test_a_rehearsal_fails_in_nothing_that_is_not_there(tmp_path: Path) -> None:
+    """A study with a required EEG, simulated: FAIL is kept for what failed."""
+    streams = (
+        "streams: {eeg: {type: EEG, name: amp}, gaze: {name: eyes, required: false}}\nsessions:"
+    )
+    path = tmp_path / "study.yaml"
+    path.write_text(SHORT.replace("sessions:", streams), encoding="utf-8")
+    out = tmp_path / "data"
+    assert main(["simulate", str(path), "--participants", "1", "--out", str(out)]) == 0
+    (person,) = find_cohort(out, ["simulated"]).included
+    report = person.recording.session(1).sync_report
+    assert (report["verdict"], report["missing"], report["absent"]) == ("PASS", [], ["eeg", "gaze"])
+    row = loop_quality(person).iloc[0]
+    assert (row["sync_verdict"], row["not_there"]) == ("PASS", "eeg, gaze")
+
+
 @pytest.mark.parametrize("to", ["tables", "matlab", "bids", "psychds", "xdf"])
 def test_export_writes_what_is_asked_for_and_who_was_left_out(
     data: Path, tmp_path: Path, to: str, capsys: pytest.CaptureFixture[str]

@@ -142,7 +142,7 @@ def told(
     )
     loops = pd.DataFrame({
         "late_ticks": [3, 0], "ticks": [1000, 1000], "lateness_worst_ms": [12.5, 1.0],
-        "sync_verdict": ["WARN", "PASS"],
+        "sync_verdict": ["WARN", "PASS"], "not_there": ["eeg, gaze", "eeg"],
     })  # fmt: skip
     cohort = find_cohort(data, ["half-finished"])
     return answer(cohort, movements, (loops, pd.DataFrame()), "36 participants.", results)
@@ -168,7 +168,10 @@ def test_the_answer_has_design_people_effects_quality_and_exclusions_with_their_
     assert found["Data quality"][0] == (
         "2 sessions of 2,000 ticks: 3 were late (0.150%), the worst by 12.5 ms."
     )
-    assert found["Data quality"][1] == "Time stamps by their sync reports: 1 WARN, 1 PASS."
+    assert found["Data quality"][1:] == [
+        "Time stamps by their sync reports: 1 WARN, 1 PASS.",
+        "Not there in a rehearsal, and not judged: eeg, gaze.",
+    ]
     assert found["Exclusions"] == [
         f"1 of {len(lost)} movements count for no average (0.1%); each is listed with why."
     ]

@@ -217,6 +217,10 @@ def _quality(loops: "pd.DataFrame", syncs: "pd.DataFrame") -> Iterator[str]:
     if verdicts:
         listed = ", ".join(f"{count} {word}" for word, count in verdicts.most_common())
         yield f"Time stamps by their sync reports: {listed}."
+    absent = [name for each in loops["not_there"] for name in each.split(", ") if name]
+    if absent:
+        names = ", ".join(dict.fromkeys(absent))
+        yield f"Not there in a rehearsal, and not judged: {names}."
     if len(syncs):
         unknown = int((syncs["corrected"] == "no").sum())
         yield (

@@ -44,11 +44,22 @@ class LoopReport:
 
 @dataclass(frozen=True, slots=True)
 class SyncReport:
-    """All streams and the loop."""
+    """All streams and the loop.
+
+    Attributes
+    ----------
+    streams, loop
+        What was recorded; no loop where its clock was moved by hand.
+    missing
+        What is to be said of streams that never came.
+    absent
+        Streams that are not there in a rehearsal, by label: nothing of them can have failed.
+    """
 
     streams: tuple[StreamReport, ...]
     loop: LoopReport | None = None
     missing: tuple[Finding, ...] = field(default_factory=tuple)
+    absent: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
