@@ -500,7 +500,11 @@ RADIO = Wait(
 
 
 def a_buffer_changes(random, *, counted, grows):
-    """From some sample on all are stamped later by some time, or sooner; none is lost."""
+    """From some sample on all are stamped later by some time, or sooner; none is lost.
+
+    A pause looks like a buffer that grows, and stamps are not moved: whether a line through all of
+    them comes nearer is chance.
+    """
     times = regular(random, 250.0)
     most = 0.2 if grows else 0.045
     at, by = int(len(times) * random.uniform(0.2, 0.7)), random.uniform(0.02, most)
@@ -511,7 +515,7 @@ def a_buffer_changes(random, *, counted, grows):
         return a_buffer_changes(random, counted=counted, grows=grows)
     return received(
         random, Clock(random), times, 250.0, stamped=times + delay, sent=sent, index=index,
-        faults=frozenset({Fault.SHIFTED}), clean=False,
+        faults=frozenset({Fault.SHIFTED}), clean=False, chance=grows,
     )  # fmt: skip
 
 

@@ -39,7 +39,6 @@ from labcrane.streams.sync.quality import (
 )
 from labcrane.streams.sync.raw import REMOTE, RTT, RawStream
 from labcrane.streams.sync.sampling import RATE_CHANGE, Sampling, examine, examine_irregular
-from labcrane.streams.sync.stamping.shifts import DELAY_S
 from labcrane.types import FloatArray
 
 
@@ -79,6 +78,12 @@ PAUSE_S = 0.5
 
 BACK_S = 0.001
 """By more than this a sample is placed before one that came earlier."""
+
+NEARLY_ALL = 1.35
+"""Of what scatters by chance, 99 % are within so many times what 95 % are within."""
+
+LONG_RUN = 400
+"""So many samples between holes tell a steady clock of them."""
 
 ENOUGH = 2000
 """So many samples tell a rate well enough to see it change from one clock to the next."""
@@ -207,7 +212,12 @@ def _followed(time: FloatArray, sampling: Sampling) -> _Followed:
     A phase that slides along the grid of polls is none of the sampler's.
     """
     if sampling.received is None or not sampling.received.polled:
-        return follow_sample_clock(time, sampling.index)
+        evened, doubt = time.copy(), np.full(len(time), sampling.noise_s)
+        for start, stop in itertools.pairwise((0, *sampling.breaks, len(time))):
+            if stop - start >= LONG_RUN:  # how long a hole is, is not made even
+                part = slice(start, stop)
+                evened[part], doubt[part] = follow_sample_clock(time[part], sampling.index[part])
+        return evened, doubt
     line = even_line(time, sampling.index)
     return line, np.full(len(time), sampling.received.strayed_s)
 
@@ -223,6 +233,8 @@ def _evened(
         part = slice(segment.start, segment.stop)
         # Nothing tells cut stamps from rounded ones, and so whether they are half a unit early.
         error[part] += sampling.grid_s / 2.0
+        if not len(raw.arrivals):  # nothing shows whether samples or their stamps are uneven
+            error[part] += NEARLY_ALL * sampling.uneven_s
         if sampling.strayed is not None:
             error[part] += sampling.strayed
         if sampling.shifted is not None:
@@ -230,8 +242,8 @@ def _evened(
             repeated = sampling.shifted.again_and_again
             least = float(np.abs(sampling.shifted.by_s).max(initial=0.0)) if repeated else 0.0
             error[part] += np.maximum(sampling.shifted.late(count), least)
-            if not repeated and way is Dejitter.AUTO and segment.basis is Basis.PROBES:
-                time[part] -= sampling.shifted.late(count, DELAY_S)
+            if way is Dejitter.AUTO and segment.basis is Basis.PROBES:
+                time[part] -= sampling.shifted.surely(count)
         if way is Dejitter.AUTO and followed is not None and segment.basis is Basis.PROBES:
             time[part], doubt = followed
             error[part] += doubt

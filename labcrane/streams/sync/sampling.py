@@ -7,16 +7,20 @@ or because they were stamped so.
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import numpy.typing as npt
 
-from labcrane.streams.sync.stamping import receipt, shifts, strays, units
+from labcrane.streams.sync.stamping import holes, receipt, shifts, strays, units
 from labcrane.streams.sync.stamping.late_chunks import lost_before, lost_between, slope, soonest
 from labcrane.types import FloatArray
 
 FEW = 20
 BLOCKS = 200
-MANY = 400
+MANY, SPAN = 400, 150
 CLUMPED = 0.5
 """Where the usual step is less than this part of the period, samples are stamped in bursts."""
+
+BURST = 1.0 / 3.0
+"""No sampler goes faster for a while by more: what seems to is sent behind a stall."""
 
 EXACT = 0.1
 """Stamps that scatter by less than this part of a period leave no doubt which are missing."""
@@ -95,6 +99,8 @@ class Sampling:
     strayed
         By how much each sample is stamped beside its count for a while, shape ``(n,)``; None where
         none is.
+    breaks
+        The samples behind holes of which nothing shows how many periods they are.
     """
 
     period: float = np.nan
@@ -116,6 +122,7 @@ class Sampling:
     index: FloatArray = field(default_factory=lambda: np.empty(0))
     uneven_s: float = 0.0
     strayed: FloatArray | None = None
+    breaks: npt.NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
 
     @property
     def rate_hz(self) -> float:
@@ -206,7 +213,7 @@ def examine(
         found.period, found.missing, found.gaps, found.longest, disordered, rates, noise, grid,
         _reach(found), late, steady, uncounted, None, found.shifted, stalls, longest,
         found.index if not disordered else index, uneven,
-        found.strayed if not disordered and not rates else None,
+        found.strayed if not disordered and not rates else None, found.breaks,
     )  # fmt: skip
 
 
@@ -244,6 +251,8 @@ class _Steps:
     """What the steps between neighbouring stamps show."""
 
     time: FloatArray
+    flowed: FloatArray
+    breaks: npt.NDArray[np.intp]
     period: float
     local: FloatArray
     index: FloatArray
@@ -262,43 +271,34 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
     steps, counts = np.diff(time), np.maximum(np.diff(index), 1.0)
     local = _local(steps / counts)
     typical = _typical(time, index)
-    clumped = bool(np.median(local) < CLUMPED * typical or not local.min() > 0.0)
+    clumped = bool(np.median(local) < CLUMPED * _least(time, index) or not local.min() > 0.0)
     if clumped:
         local = np.full(len(steps), typical)
     whole = counts if counted else np.maximum(np.round(steps / local), 1.0)
     rest = steps - whole * local
     scatter = 1.4826 * float(np.median(np.abs(rest)))
-    odd = np.abs(rest) > WHOLE * local
-    exact = scatter < EXACT * float(np.median(local)) and float(odd.mean()) < 0.01  # noqa: PLR2004
-    same = np.abs(steps - counts * local) < EQUAL_S
-    boundary = steps[~same] - (counts * local)[~same]
-    moved = float(np.abs(boundary).sum())
-    balance = abs(float(boundary.sum())) / moved if moved > 0.0 else 0.0
-    # Steps of chunks stamped when sent differ by their delays, which do not add up.
-    between = boundary / local[~same]
-    fraction = np.abs(between - np.round(between)) > 0.05 if len(between) else np.zeros(0, bool)  # noqa: PLR2004
-    repeated = same.mean() > SAME and len(boundary) >= 5 and fraction.mean() > 0.5  # noqa: PLR2004
+    odd = float((np.abs(rest) > WHOLE * local).mean())
+    exact = scatter < EXACT * float(np.median(local)) and odd < 0.01  # noqa: PLR2004
+    same, balance, in_chunks = _chunks(steps, counts * local)
     # Steps are computed by one rate, whatever the clock that stamps the chunks does meanwhile.
     one_rate = bool(np.ptp(np.quantile(local, (0.1, 0.9))) < RATE_CHANGE * typical)
-    # A chunk that waits for longer than the one before comes late, the next one early.
-    early = (steps - counts * float(np.median(local)))[~same] < -EQUAL_S
-    both_ways = len(early) > 0 and float(early.mean()) > EARLIER
-    computed = clumped or (not grid and bool(repeated) and one_rate and both_ways)
+    computed = clumped or (not grid and in_chunks and one_rate)
     exact = exact and not computed
-    if not counted and not exact:
-        whole = np.where(steps > np.maximum(20.0 * local, 1.0), np.round(steps / local), 1.0)
-    shifted = None
-    if exact and not grid:
-        shifted = shifts.find(steps, counts, local, counted=counted)
-        if not counted:
-            whole[shifted.at - 1] = 1.0
-    # A device that pauses and keeps its count has lost nothing, but was interrupted.
-    paused = counted & exact & (steps - whole * local > shifts.MOST_S)
-    gaps = whole > 1.5 if exact or counted else whole > 1.0  # noqa: PLR2004
-    missing = int((whole - 1.0)[gaps].sum())
-    gaps |= paused
+    if counted:
+        # A device that pauses and keeps its count has lost nothing, but was interrupted.
+        pause = exact & (steps - counts * local > np.maximum(shifts.LEAST_S, WHOLE * local))
+        beyond = pause * (steps - counts * local)
+        breaks, longer = np.flatnonzero(pause), np.ones(len(steps), dtype=np.bool_)
+    else:
+        hole = holes.find(steps, local, scatter, grid, exact=exact, chunks=computed)
+        whole, beyond = 1.0 + hole.lost(len(steps)), hole.beyond(len(steps))
+        breaks = hole.at[hole.broken | hole.untold]
+        longer = np.isin(np.arange(len(steps)), hole.at[hole.broken])
+    shifted = shifts.find(steps, counts, local, longer) if exact and not grid else None
+    gaps = np.maximum(whole - 1.0, beyond / local) > holes.LONGER
+    missing = int((whole - 1.0).sum())
     position = index if counted else index[0] + np.r_[0.0, np.cumsum(whole)]
-    flowed = time - np.r_[0.0, np.cumsum(np.where(paused, rest, 0.0))]
+    flowed = time - np.r_[0.0, np.cumsum(beyond)]
     mean, usual = slope(position, flowed), float(np.median(local))
     if computed and not clumped and not counted:
         first = np.r_[0, np.flatnonzero(~same) + 1]
@@ -309,13 +309,34 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
             position = position + np.repeat(before, np.diff(np.r_[first, len(time)]))
             missing += max(int(before[-1]), 1)
     longest = float(steps[gaps].max(initial=0.0))
-    strayed = strays.find(flowed, position, usual, scatter) if exact and not grid else None
+    strayed = None
+    # A long hole may be off by a part of a period, and what is behind it seem to stray.
+    if exact and not grid and not len(breaks) and float(whole.max()) < strays.LONG_HOLE:
+        strayed = strays.find(flowed, position, usual, scatter)
     if strayed is not None:
         mean = slope(position[strayed == 0.0], flowed[strayed == 0.0])
     return _Steps(
-        time, mean, local, position, missing, int(gaps.sum()), longest, exact, computed, clumped,
-        balance, shifted, strayed,
+        time, flowed, breaks + 1, mean, local, position, missing, int(gaps.sum()), longest, exact,
+        computed, clumped, balance, shifted, strayed,
     )  # fmt: skip
+
+
+def _chunks(steps: FloatArray, usual: FloatArray) -> tuple[npt.NDArray[np.bool_], float, bool]:
+    """Return which steps are usual ones, how far others add up, and whether these part chunks.
+
+    Steps of chunks stamped when sent differ by their delays, which do not add up.
+    """
+    same = np.abs(steps - usual) < EQUAL_S
+    boundary = (steps - usual)[~same]
+    moved = float(np.abs(boundary).sum())
+    balance = abs(float(boundary.sum())) / moved if moved > 0.0 else 0.0
+    between = boundary / usual[~same]
+    fraction = np.abs(between - np.round(between)) > 0.05 if len(between) else np.zeros(0, bool)  # noqa: PLR2004
+    repeated = same.mean() > SAME and len(boundary) >= 5 and fraction.mean() > 0.5  # noqa: PLR2004
+    # A chunk that waits for longer than the one before comes late, the next one early.
+    early = boundary < -EQUAL_S
+    both_ways = len(early) > 0 and float(early.mean()) > EARLIER
+    return same, balance, bool(repeated and both_ways)
 
 
 def _typical(time: FloatArray, index: FloatArray) -> float:
@@ -326,13 +347,23 @@ def _typical(time: FloatArray, index: FloatArray) -> float:
     )
 
 
+def _least(time: FloatArray, index: FloatArray) -> float:
+    """Return the usual period while samples flowed: of the shortest of many spans of samples."""
+    most = min(SPAN, len(time) - 1)
+    spans = (time[most:] - time[:-most]) / np.maximum(index[most:] - index[:-most], 1.0)
+    return float(np.quantile(spans, 0.1))
+
+
 def _local(steps: FloatArray) -> FloatArray:
     """Return the usual step around each, shape of ``steps``: a rate may change."""
     size = max(len(steps) // BLOCKS, 50)
     count = max(len(steps) // size, 1)
     blocks = np.array_split(steps, count)
     middle = np.cumsum([len(block) for block in blocks]) - len(blocks[0]) / 2
-    return np.interp(np.arange(len(steps)), middle, [float(np.median(block)) for block in blocks])
+    usual = np.array([float(np.median(block)) for block in blocks])
+    mean = float(np.median(usual))
+    usual[usual < BURST * mean] = mean
+    return np.asarray(np.interp(np.arange(len(steps)), middle, usual))
 
 
 def _is_shuffled(steps: FloatArray, in_order: FloatArray) -> bool:
@@ -354,16 +385,16 @@ def _rates(found: _Steps) -> tuple[float, ...]:
         edges = np.unique(own[np.minimum(np.searchsorted(own, edges), len(own) - 1)])
     blurred = 0.0
     if found.computed:
-        edges, blurred = soonest(found.time, found.period, found.index)
+        edges, blurred = soonest(found.flowed, found.period, found.index)
     span = np.diff(found.index[edges])
     if len(span) < PIECES or (span <= 0).any() or (found.computed and found.balance >= DELAYS):
         return ()
-    rate = np.diff(found.time[edges]) / span
+    rate = np.diff(found.flowed[edges]) / span
     scatter = 1.4826 * float(np.median(np.abs(np.diff(rate)))) / np.sqrt(2.0)
     ends = [float(np.median(part)) for part in (rate[:4], rate[-4:])]
     mean = float(np.median(rate))
     low, high = np.quantile(rate, (0.05, 0.95))
-    blurred *= mean / float(np.diff(found.time[edges]).min())
+    blurred *= mean / float(np.diff(found.flowed[edges]).min())
     if high - low < max(RATE_CHANGE * mean, 8.0 * scatter, blurred):
         return ()
     if found.exact or abs(ends[1] - ends[0]) > RATE_CHANGE * mean:
@@ -382,7 +413,7 @@ def _noise(
     Stamps that are computed, of a coarse clock, or unlike the arrivals of their samples were not
     taken when the samples were.
     """
-    rest = found.time - found.period * (found.index - found.index[0])
+    rest = found.flowed - found.period * (found.index - found.index[0])
     size = max(len(rest) // BLOCKS, 50)
     if found.computed:
         size = max(size, 20 * max(len(rest) // max(_boundaries(found), 1), 1))
@@ -422,7 +453,7 @@ def _reach(found: _Steps) -> float:
         bursts = bool(np.median(steps) < CLUMPED * np.median(found.local))
         count = int(np.count_nonzero(steps > found.local)) if bursts else _boundaries(found)
         size *= max(len(found.time) // max(count, 1), 1)
-    rest = found.time - found.period * (found.index - found.index[0])
+    rest = found.flowed - found.period * (found.index - found.index[0])
     whole = len(rest) // size * size
     return (
         float(np.quantile(np.ptp(rest[:whole].reshape(-1, size), axis=1), 0.95)) if whole else 0.0

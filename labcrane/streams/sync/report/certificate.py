@@ -34,7 +34,7 @@ class Fault(StrEnum):
     LATE_STAMPS = "stamped when sent"
     NOISY = "noisy stamps"
     COARSE = "stamps cut to a coarse unit"
-    SHIFTED = "delay changed"
+    SHIFTED = "paused, or delay changed"
     FROZEN = "stamps that stand still"
     REPEATED = "samples sent again"
     STRAYED = "stamps that stray and return"

@@ -221,7 +221,7 @@ def _stamping(quality: Quality, limits: Limits) -> list[Finding]:
     if quality.shifts:
         text = f"{quality.shifts} times its stamps were shifted, by {1e3 * quality.shift_s:.0f} ms "
         text += "at most: it paused, or its delay changed"
-        _add(found, Verdict.WARN, text, "what is later may be late by that; look at its buffers")
+        _add(found, Verdict.WARN, text, "what is later may be late by that, and is not moved")
     if quality.grid_s:
         unit = f"{1e3 * quality.grid_s:g} ms"
         text = f"its stamps are cut to {unit}, so that half of that is in their uncertainty"

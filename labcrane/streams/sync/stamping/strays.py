@@ -15,6 +15,9 @@ AWAY, AROUND = 3, 10
 FEW = 5
 """So many samples of a second tell where it is."""
 
+LONG_HOLE = 20
+"""Across holes of more periods it is not known well enough where samples belong."""
+
 LEAST_S = 3e-4
 SHARP = 4.0
 """What strays does so by more than so many times what its neighbours stray from a straight line."""
