@@ -232,7 +232,7 @@ def _evened(
     for segment, sampling, followed in sampled:
         part = slice(segment.start, segment.stop)
         # Nothing tells cut stamps from rounded ones, and so whether they are half a unit early.
-        error[part] += sampling.grid_s / 2.0
+        error[part] += sampling.grid_s / 2.0 + sampling.back_s
         if not len(raw.arrivals):  # nothing shows whether samples or their stamps are uneven
             error[part] += NEARLY_ALL * sampling.uneven_s
         if sampling.strayed is not None:

@@ -34,6 +34,14 @@ CERTAIN_S = 0.1
 """Jumps beyond this show in the times of arrival, whatever the network did."""
 
 
+FAR_S, EQUALLY_S = 10.0, 1e-3
+"""Clocks that differ by more than the first do not share their times; places where they may change
+are as good as each other if they differ by less than the second."""
+
+PROBED_S = 5.0
+"""LabRecorder asks for an offset as often."""
+
+
 @dataclass(frozen=True, slots=True)
 class Epoch:
     """Samples and probes of one and the same clock.
@@ -182,6 +190,9 @@ def _changes(
         probe = near[0] if near else int(np.searchsorted(probes[:, LOCAL], told))
         left -= set(near)
         changes.append(_Change(probe, _within(raw, int(low), int(high)), told=True))
+    apart = np.abs(np.diff(probes[:, OFFSET]))[[k - 1 for k in left]]
+    if not len(raw.arrivals) and not changes and len(raw.stamps) and (apart > FAR_S).any():
+        changes, left = _in_their_order(raw.stamps, probes, sorted(left)), set()
     for k in sorted(left):
         sample, unsure = _step(raw, probes[k - 1], probes[k], regular=regular)
         changes.append(_Change(k, sample, unsure))
@@ -267,6 +278,42 @@ def _step_between_stamps(
     rivals = np.flatnonzero(odd > abs(jump) / 2)
     unsure = int(rivals[-1] - rivals[0])
     return low + int(np.argmax(odd)), unsure
+
+
+def _in_their_order(stamps: FloatArray, probes: FloatArray, jumps: list[int]) -> list[_Change]:
+    """Return where clocks change that are far apart, by the order of the samples alone.
+
+    Each sample is near the times at which its own clock was probed, and none is of an earlier clock
+    than the one before. Where several places are as good, stamps that go back tell, as far as
+    probes do; no clock goes back but a new one.
+    """
+    told = [np.diff(one[:, LOCAL]) for one in np.split(probes, jumps)]
+    every = 2.0 * max((float(np.median(one)) for one in told if len(one)), default=PROBED_S)
+    ranges = [(one.min() - every, one.max() + every) for one in np.split(probes[:, REMOTE], jumps)]
+    away = np.array(
+        [np.maximum(np.maximum(low - stamps, stamps - high), 0.0) for low, high in ranges]
+    )
+    total = np.pad(np.cumsum(away, axis=1), ((0, 0), (1, 0)))
+    costs = [total[0]]
+    for one in total[1:]:
+        costs.append(np.minimum.accumulate(costs[-1] - one) + one)
+    steps = np.r_[0.0, np.diff(stamps)]
+    found: list[_Change] = []
+    stop = len(stamps)
+    for k in range(len(jumps), 0, -1):
+        cost = (costs[k - 1] - total[k])[: stop + 1]
+        equal = np.flatnonzero(cost <= cost.min() + EQUALLY_S)
+        inside = equal[(equal > 0) & (equal < stop)]
+        unsure, sample = 0, int(equal[0])
+        if len(inside):
+            back = inside[steps[inside] < 0.0]
+            likely = back if len(back) else inside
+            due = float(probes[jumps[k - 1], REMOTE] - probes[jumps[k - 1] - 1, REMOTE])
+            sample = int(likely[np.argmin(np.abs(steps[likely] - due))])
+            unsure = 0 if len(back) else int(np.ptp(inside))
+        found.append(_Change(jumps[k - 1], sample, unsure))
+        stop = sample
+    return found[::-1]
 
 
 def _step_in_arrival(

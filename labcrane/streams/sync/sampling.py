@@ -101,6 +101,8 @@ class Sampling:
         none is.
     breaks
         The samples behind holes of which nothing shows how many periods they are.
+    back_s
+        By how much stamps go back, in sum, further than any buffer shrinks.
     """
 
     period: float = np.nan
@@ -123,6 +125,7 @@ class Sampling:
     uneven_s: float = 0.0
     strayed: FloatArray | None = None
     breaks: npt.NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    back_s: float = 0.0
 
     @property
     def rate_hz(self) -> float:
@@ -214,6 +217,7 @@ def examine(
         _reach(found), late, steady, uncounted, None, found.shifted, stalls, longest,
         found.index if not disordered else index, uneven,
         found.strayed if not disordered and not rates else None, found.breaks,
+        0.0 if disordered else found.back,
     )  # fmt: skip
 
 
@@ -265,6 +269,7 @@ class _Steps:
     balance: float
     shifted: shifts.Shifts | None
     strayed: FloatArray | None
+    back: float
 
 
 def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -> _Steps:
@@ -294,11 +299,15 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
         whole, beyond = 1.0 + hole.lost(len(steps)), hole.beyond(len(steps))
         breaks = hole.at[hole.broken | hole.untold]
         longer = np.isin(np.arange(len(steps)), hole.at[hole.broken])
+    back = np.zeros(len(steps))
+    if not computed:
+        back = holes.went_back(steps - counts * local, local, scatter)
+        breaks = np.union1d(breaks, np.flatnonzero(back)).astype(np.intp)
     shifted = shifts.find(steps, counts, local, longer) if exact and not grid else None
     gaps = np.maximum(whole - 1.0, beyond / local) > holes.LONGER
     missing = int((whole - 1.0).sum())
     position = index if counted else index[0] + np.r_[0.0, np.cumsum(whole)]
-    flowed = time - np.r_[0.0, np.cumsum(beyond)]
+    flowed = time - np.r_[0.0, np.cumsum(beyond - back)]
     mean, usual = slope(position, flowed), float(np.median(local))
     if computed and not clumped and not counted:
         first = np.r_[0, np.flatnonzero(~same) + 1]
@@ -318,6 +327,7 @@ def _steps(time: FloatArray, index: FloatArray, grid: float, *, counted: bool) -
     return _Steps(
         time, flowed, breaks + 1, mean, local, position, missing, int(gaps.sum()), longest, exact,
         computed, clumped, balance, shifted, strayed,
+        float(back.sum()),
     )  # fmt: skip
 
 

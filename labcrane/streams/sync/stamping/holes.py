@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from labcrane.streams.sync.stamping.shifts import MOST_S
 from labcrane.types import FloatArray
 
 LONGER = 0.5
@@ -130,6 +131,33 @@ def find(
     untold = (doubt > TOLD) | chunks
     broken = np.abs(periods - np.round(periods)) > np.maximum(BROKEN, doubt)
     return Holes(at, periods, broken & ~untold, untold & (periods > LONGER), usual[at])
+
+
+def went_back(late: FloatArray, usual: FloatArray, scatter: float) -> FloatArray:
+    """Return by how much stamps go back in each step, and do not return, shape ``(n - 1,)``.
+
+    In seconds, and by more than a buffer shrinks: a clock was set, and nothing tells whether it was
+    right before or is now.
+
+    Parameters
+    ----------
+    late
+        By how much each step is longer than it should be, in seconds, shape ``(n - 1,)``.
+    usual
+        The period around each, in seconds.
+    scatter
+        Of the steps, a standard deviation.
+    """
+    level, found = np.r_[0.0, np.cumsum(late)], np.zeros(len(late))
+    for k in np.flatnonzero(late < -np.maximum(MOST_S, SURE * scatter)):
+        far = max(round(PASSING_S / float(usual[k])), LEVEL)
+        near, lasting = (
+            float(np.median(level[max(k + 1 - n, 0) : k + 1]) - np.median(level[k + 1 : k + 1 + n]))
+            for n in (LEVEL, far)
+        )
+        if min(near, lasting) > MOST_S / 2.0:
+            found[k] = near + SURE * scatter
+    return found
 
 
 def _flowing(steps: FloatArray, usual: FloatArray, even: npt.NDArray[np.bool_]) -> FloatArray:
