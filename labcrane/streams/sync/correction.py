@@ -28,7 +28,7 @@ from labcrane.streams.sync import repeats
 from labcrane.streams.sync.dejitter import Dejitter, even, even_line, follow_sample_clock, left_open
 from labcrane.streams.sync.epochs import epochs
 from labcrane.streams.sync.own_clock import OwnClock
-from labcrane.streams.sync.placement import Placement, moving, place
+from labcrane.streams.sync.placement import LATE_S, PULL_S, Placement, moving, place
 from labcrane.streams.sync.quality import (
     Basis,
     ClockSegment,
@@ -81,6 +81,9 @@ BACK_S = 0.001
 
 NEARLY_ALL = 1.35
 """Of what scatters by chance, 99 % are within so many times what 95 % are within."""
+
+STANDING = 20
+"""So many stamps of markers that are all the same say nothing."""
 
 LONG_RUN = 400
 """So many samples between holes tell a steady clock of them."""
@@ -139,18 +142,54 @@ def correct(raw: RawStream, treatment: Treatment, end: float | None = None) -> C
             f"a least transport delay of {treatment.transport_s} s needs dejitter 'envelope', "
             "which finds the least delayed samples; give the mean delay as latency otherwise"
         )
+    told = np.isfinite(raw.stamps)
+    least = 2 if treatment.rate_hz > 0.0 else STANDING  # markers may come two at once
+    if np.count_nonzero(told) >= least and np.ptp(raw.stamps[told]) == 0.0:
+        told[:] = False
+    if not told.all():
+        return _some_untold(raw, treatment, end, told)
     of = repeats.first_of(raw.stamps, treatment.rate_hz) if treatment.rate_hz > 0.0 else None
     if of is None:
         return _on_our_clock(raw, treatment, end)
-    found = _on_our_clock(repeats.left_out(raw, of), treatment, end)
+    own = of == np.arange(len(of))
+    found = _on_our_clock(repeats.left_out(raw, own), treatment, end)
     where = repeats.place_of(of)
     return Corrected(
         found.time[where],
         found.error[where],
         found.uneven[where],
-        repeats.put_back(found.segments, of),
-        replace(found.quality, repeated=int(np.count_nonzero(of != np.arange(len(of))))),
+        repeats.put_back(found.segments, own),
+        replace(found.quality, repeated=int(np.count_nonzero(~own))),
     )
+
+
+def _some_untold(
+    raw: RawStream, treatment: Treatment, end: float | None, told: npt.NDArray[np.bool_]
+) -> Corrected:
+    """Correct a stream of which some stamps, or all, say nothing: none, or the same for ever.
+
+    Those samples are placed by their arrival, which is all that is known of them.
+    """
+    rest = repeats.left_out(raw, told)
+    found = correct(rest, treatment, end)
+    arrival, count = raw.arrival(), len(raw.stamps)
+    time, error, uneven = (np.full(count, np.nan) for _ in range(3))
+    segments = repeats.put_back(found.segments, told)
+    if arrival is not None:
+        time[~told] = uneven[~told] = arrival[~told] - treatment.latency_s
+        error[~told] = PULL_S + LATE_S
+    if not told.any():
+        basis = Basis.NOTHING if arrival is None else Basis.ARRIVALS
+        segments = (ClockSegment(0, count, basis, unsure=0),)
+    time[told], error[told], uneven[told] = found.time, found.error, found.uneven
+    frozen = int(np.count_nonzero(np.isfinite(raw.stamps[~told])))
+    quality = replace(
+        found.quality,
+        unprobed=found.quality.unprobed + int(np.count_nonzero(~told)),
+        frozen=found.quality.frozen + frozen,
+        **_errors(time, error, uneven),
+    )
+    return Corrected(time, error, uneven, segments, quality)
 
 
 def _on_our_clock(raw: RawStream, treatment: Treatment, end: float | None) -> Corrected:

@@ -65,15 +65,14 @@ def _period(stamps: FloatArray, rising: npt.NDArray[np.bool_], nominal: float) -
     return min(known, key=lambda one: abs(np.log(max(one, 1e-9) / nominal)))
 
 
-def left_out(raw: RawStream, of: Which) -> RawStream:
-    """Return the stream without its repeats."""
-    own = of == np.arange(len(of))
+def left_out(raw: RawStream, own: npt.NDArray[np.bool_]) -> RawStream:
+    """Return the stream of these samples alone."""
     before = np.r_[0, np.cumsum(own)]
     arrivals, resets = raw.arrivals.copy(), raw.resets.copy()
     if len(arrivals):
-        arrivals[:, 0] = before[np.clip(arrivals[:, 0].astype(int), 0, len(of))]
+        arrivals[:, 0] = before[np.clip(arrivals[:, 0].astype(int), 0, len(own))]
     if len(resets):
-        resets[:, 1:] = before[np.clip(resets[:, 1:].astype(int), 0, len(of))]
+        resets[:, 1:] = before[np.clip(resets[:, 1:].astype(int), 0, len(own))]
     return replace(
         raw,
         stamps=raw.stamps[own],
@@ -83,11 +82,13 @@ def left_out(raw: RawStream, of: Which) -> RawStream:
     )
 
 
-def put_back(segments: tuple[ClockSegment, ...], of: Which) -> tuple[ClockSegment, ...]:
-    """Return the segments of the whole stream, from those of the one without repeats."""
-    own = np.r_[np.flatnonzero(of == np.arange(len(of))), len(of)]
+def put_back(
+    segments: tuple[ClockSegment, ...], own: npt.NDArray[np.bool_]
+) -> tuple[ClockSegment, ...]:
+    """Return the segments of the whole stream, from those of these samples alone."""
+    where = np.r_[np.flatnonzero(own), len(own)]
     return tuple(
-        replace(each, start=int(own[each.start]), stop=int(own[each.stop])) for each in segments
+        replace(each, start=int(where[each.start]), stop=int(where[each.stop])) for each in segments
     )
 
 

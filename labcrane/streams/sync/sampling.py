@@ -483,7 +483,7 @@ def coarse_unit(stamps: FloatArray, *, regular: bool) -> float:
     unit = units.find(stamps)
     if not unit:
         return 0.0
-    if not regular:
+    if not regular or len(stamps) < 2:  # noqa: PLR2004
         return units.tick(stamps, unit, 0.0)
     period = _typical(np.sort(stamps), np.arange(float(len(stamps))))
     if abs(unit / period - 1.0) < RATE_CHANGE:  # all steps are of one sample, or of some
