@@ -37,12 +37,15 @@ class Resynced:
         where pyxdf is not installed, cannot read the file, or reads other samples.
     damage
         What of the file could not be read, one line each.
+    unread_by_pyxdf
+        Why pyxdf could not read the file; empty where it could, or is not installed.
     """
 
     path: Path
     report: SyncReport
     against_pyxdf: dict[str, tuple[float, float]]
     damage: tuple[str, ...] = ()
+    unread_by_pyxdf: str = ""
 
 
 def resync_xdf(path: Path) -> Resynced:
@@ -81,7 +84,8 @@ def resync_xdf(path: Path) -> Resynced:
             for column, values in columns_of(each).items():
                 write_numbers(group, column, values, TIME_COLUMNS[column])
             write_attributes(group["time"], quality_of(each, treatment_of(one.header)))
-    return Resynced(beside, report, _compared(path, streams, corrected), _damage(states))
+    apart, why = _compared(path, streams, corrected)
+    return Resynced(beside, report, apart, _damage(states), why)
 
 
 def _damage(states: list[JournalState]) -> tuple[str, ...]:
@@ -107,19 +111,19 @@ def _raw(recorded: RecordedStream) -> RawStream:
 
 def _compared(
     path: Path, streams: list[RecordedStream], corrected: list[Corrected]
-) -> dict[str, tuple[float, float]]:
-    """Return how far pyxdf's times are from ours."""
+) -> tuple[dict[str, tuple[float, float]], str]:
+    """Return how far pyxdf's times are from ours, and why it could not read the file."""
     try:
         import pyxdf  # noqa: PLC0415 - not everybody has it
     except ImportError:
-        return {}
+        return {}, ""
     theirs: dict[tuple[str, str], FloatArray] = {}
     try:
         for stream in pyxdf.load_xdf(str(path))[0]:
             info = stream["info"]
             theirs[info["name"][0], info["source_id"][0] or ""] = np.asarray(stream["time_stamps"])
-    except Exception:  # noqa: BLE001 - of a damaged file it raises whatever comes, documented nowhere
-        return {}
+    except Exception as error:  # noqa: BLE001 - of a damaged file it raises whatever comes
+        return {}, f"{type(error).__name__}: {error}"
     found = {}
     for one, each in zip(streams, corrected, strict=True):
         other = theirs.get((one.header.name, one.header.source_id))
@@ -128,4 +132,4 @@ def _compared(
             known = apart[np.isfinite(apart)]
             if len(known):
                 found[one.header.name] = float(np.median(known)), float(known.max())
-    return found
+    return found, ""

@@ -220,6 +220,25 @@ def test_stamps_that_were_left_out_are_deduced_from_the_rate_as_pyxdf_does(tmp_p
     np.testing.assert_array_equal(stream.data[:, 0], [1, 2, 3])
 
 
+def test_texts_whose_stamps_were_left_out_go_on_at_their_rate(tmp_path: Path) -> None:
+    """They repeated the stamp of the one before."""
+    header = StreamHeader("n", "Words", channels(1), "string", 10.0)
+    body = b"\x08" + np.float64(5.0).tobytes() + b"\x01\x01a"
+    body += b"".join(b"\x00\x01\x01" + text for text in (b"b", b"c"))
+    path = tmp_path / "x.xdf"
+    path.write_bytes(
+        b"XDF:"
+        + pack(Tag.FILE_HEADER, b"<info><version>1.0</version></info>")
+        + pack(Tag.STREAM_HEADER, b"\x01\0\0\0" + header.xml.encode())
+        + samples_head(1, 3, len(body))
+        + body
+    )
+    stream = read_xdf(path).stream("n")
+    np.testing.assert_allclose(stream.stamps, [5.0, 5.1, 5.2])
+    np.testing.assert_allclose(load(path)["n"]["time_stamps"], stream.stamps)
+    assert [row[0] for row in stream.texts] == ["a", "b", "c"]
+
+
 def test_a_file_is_read_while_it_is_written(tmp_path: Path) -> None:
     path = tmp_path / "x.xdf"
     with XdfWriter(path) as writer:

@@ -35,4 +35,5 @@ def test_whatever_pyxdf_raises_of_a_file_ends_no_correction(
     monkeypatch.setattr(pyxdf, "load_xdf", load)
     done = resync_xdf(path)
     assert done.against_pyxdf == {}
+    assert done.unread_by_pyxdf == f"{type(error).__name__}: {error}"
     assert done.path.is_file()

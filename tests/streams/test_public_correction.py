@@ -264,6 +264,22 @@ def test_what_of_an_xdf_file_could_not_be_read_is_told(
     )
 
 
+def test_the_name_of_an_xdf_file_may_be_in_capitals_but_a_packed_one_is_refused(
+    tmp_path: Path, random: np.random.Generator, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Both were taken for HDF5."""
+    path = tmp_path / "others.XDF"
+    as_labrecorder_writes(path, random)
+    assert main(["resync", str(path)]) == 0
+    assert (tmp_path / "others_resync.h5").is_file()
+    packed = tmp_path / "others.xdfz"
+    packed.write_bytes(b"")
+    assert main(["resync", str(packed)]) == 1
+    assert "is packed: unpack it into an .xdf file first" in " ".join(
+        capsys.readouterr().err.split()
+    )
+
+
 def test_an_xdf_file_that_is_not_there_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

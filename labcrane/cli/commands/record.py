@@ -229,7 +229,11 @@ def resync(
     file: Annotated[Path, typer.Argument(help="a participant file, or anybody's XDF file")],
 ) -> None:
     """Correct the clocks of a participant file's streams again, or those of any XDF file."""
-    if file.suffix == ".xdf":
+    if file.suffix.lower() == ".xdfz":
+        raise RecordingError(
+            f"{file} is packed: unpack it into an .xdf file first (gunzip -S .xdfz)"
+        )
+    if file.suffix.lower() == ".xdf":
         _resync_xdf(file)
         return
     from labcrane.recording.participant_file.recorrect import recorrect
@@ -247,6 +251,8 @@ def _resync_xdf(file: Path) -> None:
     for line in done.damage:
         out.print(line, style="yellow", markup=False)
     print_report(done.report)
+    if done.unread_by_pyxdf:
+        out.print(f"pyxdf could not read it: {done.unread_by_pyxdf}", markup=False)
     for name, (usual, most) in done.against_pyxdf.items():
         out.print(
             f"{name}: pyxdf's times are {1e3 * usual:.3f} ms away, {1e3 * most:.3f} ms at most",

@@ -152,12 +152,13 @@ def _texts(
     count, start = _count(data, chunk)
     size = chunk.stop - chunk.start
     _check_count(count, 1 + len(header.channels), chunk.stop - start)
+    step = 1.0 / header.rate_hz if header.rate_hz else 0.0
     times: list[float] = []
     rows: Texts = []
     for repeat in range(chunk.count):
         position, stop = start + repeat * size, chunk.stop + repeat * size
         for _ in range(count):
-            last, position = _stamp(data, position, last)
+            last, position = _stamp(data, position, last + step)
             row = []
             for _channel in header.channels:
                 found = read_length(data, position, stop)
