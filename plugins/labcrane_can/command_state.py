@@ -59,6 +59,7 @@ class PanelCommands:
         self._joints: dict[int, str] = {}
         self._signals: dict[int, tuple[Message, dict[str, str]]] = {}
         self._full = settings.full
+        self._broken: type[Exception] = FrameError
         if settings.map is None:
             for joint, valve in settings.valves.items():
                 if int(valve) in self._joints:
@@ -68,7 +69,9 @@ class PanelCommands:
                     )
                 self._joints[int(valve)] = joint
         else:
-            self._signals = described(settings)
+            from cantools import Error  # noqa: PLC0415 - loads for a moment
+
+            self._signals, self._broken = described(settings), Error
 
     def take(self, frame: CanFrame, time: float) -> None:
         """Take one frame that came at ``time`` in s."""
@@ -152,8 +155,9 @@ class PanelCommands:
             return
         try:
             values: Any = message.decode(bytes(frame.data), decode_choices=False)
-        except (ValueError, LookupError, ArithmeticError, TypeError) as error:
-            # cantools raises DecodeError, a ValueError, and what its parts raise
+        except (self._broken, ValueError, LookupError, ArithmeticError, TypeError) as error:
+            # cantools raises its own error for a page that the DBC does not list, and what its
+            # parts raise
             self.refuse(f"{message.name} cannot be decoded: {error}")
             return
         for signal, joint in joints.items():

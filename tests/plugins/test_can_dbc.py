@@ -1,5 +1,6 @@
 """Panels whose messages a DBC file describes."""
 
+import random
 import shutil
 from pathlib import Path
 
@@ -41,6 +42,36 @@ def test_a_dbc_file_maps_another_panel(panel: Path) -> None:
         ProtocolError, match=r"has no 'Levers.Bom' for joint 'elbow'; it has Levers"
     ):
         PanelCommands(ValveMap(valves={"elbow": "Levers.Bom"}, map=panel))
+
+
+PAGES = (
+    'VERSION ""\nNS_ :\nBS_:\nBU_: P\n\nBO_ 256 Levers: 8 P\n'
+    ' SG_ Page M : 0|8@1+ (1,0) [0|255] "" P\n'
+    ' SG_ Boom m0 : 8|16@1- (0.1,0) [-100|100] "%" P\n'
+    ' SG_ Heat m1 : 8|8@1- (1,0) [-40|120] "degC" P\n'
+)
+
+
+def test_a_page_that_the_dbc_does_not_list_is_refused_and_the_panel_stays(tmp_path: Path) -> None:
+    (tmp_path / "pages.dbc").write_text(PAGES, encoding="utf-8")
+    commands = PanelCommands(ValveMap(valves={"elbow": "Levers.Boom"}, map=tmp_path / "pages.dbc"))
+    known = bytes([0]) + (500).to_bytes(2, "little") + bytes(5)
+    for number in range(256):
+        page = bytes([number]) + known[1:]
+        commands.take(can.Message(arbitration_id=256, is_extended_id=False, data=page), 0.0)
+    assert commands.refused == 254
+    assert "Levers cannot be decoded: expected multiplexer id 0 or 1, but got 255" in commands.why
+    assert commands.signals(0.0)[0] == [125.0]
+
+
+def test_any_eight_bytes_are_obeyed_or_refused(tmp_path: Path) -> None:
+    (tmp_path / "pages.dbc").write_text(PAGES, encoding="utf-8")
+    commands = PanelCommands(ValveMap(valves={"elbow": "Levers.Boom"}, map=tmp_path / "pages.dbc"))
+    drawn = random.Random(11)
+    for _ in range(2_000):
+        data = drawn.randbytes(drawn.randrange(0, 9))
+        commands.take(can.Message(arbitration_id=256, is_extended_id=False, data=data), 0.0)
+    assert 1_900 < commands.refused < 2_000
 
 
 @pytest.mark.parametrize(
