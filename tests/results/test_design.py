@@ -257,7 +257,9 @@ def test_the_sample_is_that_of_the_answers(report: Path) -> None:
     assert about.loc["all", "age_answers"] == about.loc[["none", "slow"], "age_answers"].sum()
     counts = [int(part.split()[0]) for part in about.loc["all", "gender"].split(", ")]
     assert sum(counts) <= PEOPLE
-    assert "7 participants (" in (report / "report.html").read_text()
+    page = (report / "report.html").read_text()
+    assert "7 participants (" in page
+    assert "<h1>SIMULATED: " in page, "whose results they are is the first that is read"
 
 
 def test_questionnaires_are_outcomes_of_groups_and_sessions(report: Path) -> None:

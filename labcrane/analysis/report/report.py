@@ -96,7 +96,7 @@ def write_report(
     in_order = [found[participant.name] for participant in cohort.included]
     movements, loops, syncs, answers, scores, thresholds, drifts = zip(*in_order, strict=True)
     everything = pd.concat(movements, ignore_index=True)
-    page = Page(_title(cohort.included[0]), folder / "report.html", folder)
+    page = Page(_title(cohort.included), folder / "report.html", folder)
     _stamp(page, [participant.status for participant in cohort.included])
     page.links({p.name: f"participants/{p.name}.html" for p in cohort.included})
     _who(page, cohort, everything)
@@ -176,8 +176,12 @@ def _primary(cohort: Cohort) -> list[str]:
     return list(dict.fromkeys(str(name) for names in named for name in names))
 
 
-def _title(participant: Participant) -> str:
-    return str(participant.context.get("title", "labcrane"))
+def _title(participants: Sequence[Participant]) -> str:
+    """Return the study's title, behind what kind of participants it is about."""
+    title = str(participants[0].context.get("title", "labcrane"))
+    found = {participant.status for participant in participants}
+    kinds = [str(kind).upper() for kind in (Status.SIMULATED, Status.PILOT) if kind in found]
+    return f"{' and '.join(kinds)}: {title}" if kinds else title
 
 
 def _stamp(page: Page, statuses: list[Status]) -> None:
