@@ -8,9 +8,18 @@ import numpy as np
 
 from labcrane.analysis.cohort import Participant
 from labcrane.analysis.gaze import gaze_measures, looks
-from labcrane.analysis.movements import Groups, Movement, cut, machine_of, movements_of
+from labcrane.analysis.kinematics.halts import halts
+from labcrane.analysis.kinematics.smoothness import ldlj, path_ratio, sparc, sub_movements
+from labcrane.analysis.movements import (
+    ANEW,
+    Groups,
+    Movement,
+    by_todays_rule,
+    cut,
+    machine_of,
+    movements_of,
+)
 from labcrane.analysis.quality import OF_AIMING, without_onset
-from labcrane.analysis.smoothness import ldlj, path_ratio, sparc, sub_movements
 from labcrane.analysis.sticks import coordination, effort, limit_hits, reversals, stick_use
 from labcrane.analysis.tables.definitions import MEASURES
 from labcrane.analysis.tables.measure_cache import kept
@@ -40,9 +49,9 @@ class MeasureSettings:
     hysteresis
         Change of an axis that makes a reversal, as a fraction of full scale.
     sparc_highest_hz, sparc_least
-        Of :func:`~labcrane.analysis.smoothness.sparc`.
+        Of :func:`~labcrane.analysis.kinematics.smoothness.sparc`.
     low_pass_hz, prominence
-        Of :func:`~labcrane.analysis.smoothness.sub_movements`.
+        Of :func:`~labcrane.analysis.kinematics.smoothness.sub_movements`.
     limit_tolerance_deg
         Distance in degrees at which a joint is at its limit.
     display_delay_s
@@ -140,15 +149,21 @@ def measure_session(
     machine = machine_of(session)
     rate_hz = float(session.attrs["rate_hz"])
     seen = looks(session, settings.display_delay_s)
-    rows = []
-    for movement in cut(frames, trials, rate_hz) if frames else movements_of(session):
+    rows, recorded = [], []
+    for each in cut(frames, trials, rate_hz) if frames else movements_of(session):
+        movement = by_todays_rule(each, session)
         row = measure(movement, machine, settings)
+        recorded.append(movement.row)
         span = movement.span
         if seen is not None and span is not None:
             due = movement.due
             row |= gaze_measures(seen, due[0], due[span.start], due[span.stop - 1])
         rows.append(row)
     measured = pd.DataFrame(rows, index=trials.index)
+    if measured["measured_anew"].any():
+        told = {name: [row.get(name, np.nan) for row in recorded] for name in ANEW}
+        there = {name: told[name] for name in ANEW if any(name in row for row in recorded)}
+        trials = trials.assign(**there)
     return pd.concat([trials, _order(trials), measured], axis=1)
 
 
@@ -194,13 +209,16 @@ def measure(movement: Movement, machine: Machine, settings: MeasureSettings) -> 
         "constant_error": movement.result("error_along"),
         "absolute_error": movement.result("error"),
     }
-    if set(OF_AIMING) <= movement.row.keys() and np.isnan(movement.result("reaction_time")):
-        return nothing  # where the machine stood is nobody's accuracy
+    how = {"measured_anew": float(movement.anew)}
+    if set(OF_AIMING) <= movement.row.keys() and np.isnan(movement.result("movement_onset")):
+        return nothing | how  # where the machine stood is nobody's accuracy
     if span is None or span.stop - span.start < SHORTEST:
-        return nothing | errors
+        return nothing | how | errors
     speed, tip = movement.speed[span], movement.tip[span]
     return {
         **errors,
+        **how,
+        **_strokes(movement, span),
         "amplitude": _along(movement, tip),
         "path_ratio": path_ratio(tip),
         "peak_speed_tip": float(speed.max()),
@@ -219,6 +237,18 @@ def measure(movement: Movement, machine: Machine, settings: MeasureSettings) -> 
         "ldlj": ldlj(speed, movement.rate_hz),
         **_sticks(movement, span, settings),
         **_machine_use(movement, span, machine, settings),
+    }
+
+
+def _strokes(movement: Movement, span: slice) -> dict[str, float]:
+    threshold, hold_s = movement.result("onset_speed"), movement.result("onset_hold")
+    if np.isnan(threshold):  # of a task that does not say what a halt is
+        return {}
+    found = halts(movement.elapsed[span], movement.speed[span], threshold=threshold, hold_s=hold_s)
+    return {
+        "halts": found.count,
+        "halt_time": found.seconds,
+        "main_stroke_time": found.main_stroke_s,
     }
 
 

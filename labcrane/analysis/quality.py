@@ -146,7 +146,7 @@ def is_done(movements: "pd.DataFrame") -> "pd.Series[bool]":
     return (movements["outcome"] == "success") & ~without_onset(movements)
 
 
-OF_AIMING = ("reaction_time", "movement_time", "error_along")
+OF_AIMING = ("movement_onset", "movement_time", "error_along")
 """Results by which an aimed movement is known; trials of other tasks lack the last of them."""
 
 
@@ -159,4 +159,4 @@ def without_onset(movements: "pd.DataFrame") -> "pd.Series[bool]":
 
     if not set(OF_AIMING) <= set(movements):
         return pd.Series(data=False, index=movements.index, dtype=bool)
-    return movements["reaction_time"].isna() & movements["error_along"].notna()
+    return movements["movement_onset"].isna() & movements["error_along"].notna()

@@ -38,8 +38,12 @@ class Aiming(Task):
     )
 
     results = (
-        Signal("reaction_time", "s"),  # from the trial's start to the movement's onset
+        Signal("reaction_time", "s"),  # from the trial's start to the first stick beyond its dead
+        # zone, once all were within it: a stick that is still held from before answers nothing
         Signal("command_onset", "s"),  # from the trial's start to the first command
+        Signal("movement_onset", "s"),  # from the trial's start to the machine's onset
+        Signal("onset_speed", "m/s"),  # of the tip, by which that was found; where a recording has
+        Signal("onset_hold", "s"),  # none of these three, its onset is by a former rule
         Signal("movement_time", "s"),  # from onset to offset
         Signal("onset_to_rest", "s"),  # from onset to the beginning of the rest it ended in
         Signal("at_rest", "s"),  # how long that rest was when the trial ended; 0 while moving
@@ -138,6 +142,7 @@ class Aiming(Task):
         self._values = self._movement.shown
         self._going_on = TrialStatus(Phase.RUNNING, self._values)  # what most ticks are
         self._limit = self._settings.limit_s
+        self._begun = False
         self._pressed = True  # a trigger still held from the last movement ends nothing
 
     def lift_limits(self) -> None:
@@ -150,10 +155,6 @@ class Aiming(Task):
         phase, end = self._phase(frame, events)
         if not phase.over:
             return TrialStatus(phase, self._values, tuple(events)) if events else self._going_on
-        onset = movement.onset()
-        if onset is not None:
-            # Known only now, because it depends on the peak; stamped when it happened.
-            events.append(Event("movement.onset", movement.due[onset]))
         if end is not None:
             events.append(Event("movement.offset", movement.due[end]))
         return TrialStatus(phase, self._values, tuple(events), movement.measures(end))
@@ -161,25 +162,29 @@ class Aiming(Task):
     def twin(self) -> Twin:
         import numpy as np  # noqa: PLC0415 - as in open
 
-        from labcrane_aiming.compiled import CHANGING, evaluate  # noqa: PLC0415 - loads numba
+        from labcrane_aiming.compiled import CHANGING, SHOWN, evaluate  # noqa: PLC0415 - loads numba
 
-        own = np.zeros(18 + 7)
+        own = np.zeros(SHOWN + 7)
         return Twin(evaluate, own, CHANGING, self._take_over, self._hand_back)
 
     def _take_over(self, own: "FloatArray", seen: Frame) -> bool:
+        from labcrane_aiming.compiled import SHOWN  # noqa: PLC0415 - loads numba
         from labcrane_aiming.movement import ROUNDING_S  # noqa: PLC0415 - loads numpy
 
         settings, movement, command = self._settings, self._movement, self._command
-        own[:18] = (
+        if not movement.ticks:
+            return False
+        own[:SHOWN] = (
             movement.rest_since, movement.inside, movement.entries, self._pressed,
-            max(movement.speed, default=0.0) > settings.onset_speed,
-            not math.isnan(movement.command_onset), settings.rest_speed,
-            settings.rest_s - ROUNDING_S, self._limit, settings.width / 2,
+            movement.fast_since, movement.hands_off, movement.begun,
+            not math.isnan(movement.command_onset), not math.isnan(movement.reaction_time),
+            settings.rest_speed, settings.rest_s - ROUNDING_S, self._limit, settings.width / 2,
             END_RULES.index(settings.end), self._trigger or 0, settings.rest_after,
             self._tip.start, self._velocity.start, command.start, command.stop,
-            settings.onset_speed,
+            settings.onset_speed, settings.onset_hold_s - ROUNDING_S, movement.elapsed[0],
+            movement.distance[0],
         )  # fmt: skip
-        own[18:] = self._values
+        own[SHOWN:] = self._values
         return True
 
     def _hand_back(self, own: "FloatArray", rows: "FloatArray", places: "Places") -> None:
@@ -189,7 +194,8 @@ class Aiming(Task):
             rows[:, twin.ELAPSED], rows[:, twin.TIME], rows[:, at + tip.start : at + tip.stop],
             rows[:, at + velocity.start : at + velocity.stop],
         )  # fmt: skip
-        movement.rest_since, inside, entries, pressed = own[:4].tolist()
+        movement.rest_since, inside, entries, pressed, movement.fast_since, off = own[:6].tolist()
+        movement.hands_off = bool(off)
         movement.inside, movement.entries = bool(inside), int(entries)
         self._pressed = bool(pressed)
 
@@ -198,9 +204,15 @@ class Aiming(Task):
         events = []
         if movement.ticks == 1:
             events.append(Event("targets.shown", due))
-        if math.isnan(movement.command_onset) and frame.command[self._command].any():
-            movement.command_onset = frame.elapsed
-            events.append(Event("command.onset", due))
+        if math.isnan(movement.reaction_time):
+            silent = math.isnan(movement.command_onset)
+            movement.command(frame.elapsed, given=bool(frame.command[self._command].any()))
+            if silent and not math.isnan(movement.command_onset):
+                events.append(Event("command.onset", due))
+        if movement.begun and not self._begun:
+            self._begun = True
+            began = movement.due[movement.tick_at(movement.onset)]
+            events.append(Event("movement.onset", began, {"delay_s": due - began}))
         if movement.entered:
             movement.entries += 1
             if movement.entries == 1:
@@ -238,9 +250,7 @@ class Aiming(Task):
             return True
         movement = self._movement
         # Where the last movement ended may be beyond that share of the way of a repeated one.
-        return movement.done >= self._settings.rest_after and (
-            movement.inside or movement.onset() is not None
-        )
+        return movement.done >= self._settings.rest_after and (movement.inside or movement.begun)
 
 
 def _short(value: float) -> str:

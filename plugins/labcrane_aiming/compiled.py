@@ -5,13 +5,11 @@ import math
 from labcrane import FloatArray
 from labcrane.core import Places, compiled, twin
 
-RESTS_SINCE, INSIDE, ENTRIES, PRESSED, FAST = range(5)
-CHANGING = 5
-COMMANDED, REST_SPEED, REST, LIMIT, HALF, RULE, TRIGGER, AFTER, TIP, VELOCITY, FIRST, LAST = range(
-    5, 17
-)
-ONSET_SPEED = 17
-SHOWN = 18
+RESTS_SINCE, INSIDE, ENTRIES, PRESSED, FAST_SINCE, HANDS_OFF = range(6)
+CHANGING = 6
+BEGUN, COMMANDED, REACTED, REST_SPEED, REST, LIMIT, HALF, RULE, TRIGGER, AFTER = range(6, 16)
+TIP, VELOCITY, FIRST, LAST, ONSET_SPEED, ONSET_HOLD, STARTED, START_DISTANCE = range(16, 24)
+SHOWN = 24
 """The task's signals: target, radius and where the movement comes from."""
 
 REST_INSIDE, REST_ANYWHERE, BY_TRIGGER = range(3)
@@ -31,6 +29,19 @@ def _done(own: FloatArray, row: FloatArray, tip: int) -> float:
     return along / length2
 
 
+@compiled.part
+def _begins(own: FloatArray, elapsed: float, speed: float, distance: float) -> bool:
+    """Return whether the onset is known from this tick on, as the task looks for it."""
+    if not speed > own[ONSET_SPEED]:
+        own[FAST_SINCE] = math.nan
+        return False
+    if math.isnan(own[FAST_SINCE]):
+        own[FAST_SINCE] = elapsed
+    if own[FAST_SINCE] == own[STARTED]:
+        return bool(own[START_DISTANCE] - distance >= own[HALF])
+    return bool(elapsed - own[FAST_SINCE] >= own[ONSET_HOLD])
+
+
 @compiled.tick
 def evaluate(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray) -> int:
     """Judge a tick; decline one with an event, or that may end the trial."""
@@ -42,21 +53,26 @@ def evaluate(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray)
     ex = row[tip] - own[SHOWN]
     ey = row[tip + 1] - own[SHOWN + 1]
     ez = row[tip + 2] - own[SHOWN + 2]
-    inside = math.sqrt(ex * ex + ey * ey + ez * ez) <= own[HALF]
+    distance = math.sqrt(ex * ex + ey * ey + ez * ez)
+    inside = distance <= own[HALF]
     entered = inside and own[INSIDE] == 0.0
     own[INSIDE] = 1.0 if inside else 0.0
     if speed >= own[REST_SPEED] or not (inside or rule != REST_INSIDE):
         own[RESTS_SINCE] = math.nan
     elif math.isnan(own[RESTS_SINCE]):
         own[RESTS_SINCE] = elapsed
-    if speed > own[ONSET_SPEED]:
-        own[FAST] = 1.0
-    if own[COMMANDED] == 0.0:
+    if own[BEGUN] == 0.0 and _begins(own, elapsed, speed, distance):
+        return twin.DECLINED
+    if own[REACTED] == 0.0:
+        given = False
         for k in range(
             places[twin.COMMAND] + int(own[FIRST]), places[twin.COMMAND] + int(own[LAST])
         ):
-            if row[k] != 0.0:
-                return twin.DECLINED
+            given = given or row[k] != 0.0
+        if given and (own[COMMANDED] == 0.0 or own[HANDS_OFF] != 0.0):
+            return twin.DECLINED
+        if not given:
+            own[HANDS_OFF] = 1.0
     if entered:
         own[ENTRIES] += 1.0
         if own[ENTRIES] == 1.0:
@@ -67,9 +83,8 @@ def evaluate(own: FloatArray, places: Places, seen: FloatArray, row: FloatArray)
             return twin.DECLINED
         own[PRESSED] = 1.0 if pressed else 0.0
     elif elapsed - own[RESTS_SINCE] >= own[REST] and (
-        # Before the tip was fast there is no onset; of others the task itself decides.
         rule == REST_INSIDE
-        or ((inside or own[FAST] != 0.0) and _done(own, row, tip) >= own[AFTER] - ROUNDING)
+        or ((inside or own[BEGUN] != 0.0) and _done(own, row, tip) >= own[AFTER] - ROUNDING)
     ):
         return twin.DECLINED
     if elapsed >= own[LIMIT]:

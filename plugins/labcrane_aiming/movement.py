@@ -40,6 +40,12 @@ class AimedMovement:
         the target's centre in m.
     inside, entered
         Whether the tip is in the target now, and whether it came into it in this very tick.
+    fast_since, onset
+        Trial time since which the tip has been faster than the onset speed, and at which the
+        movement began, in s; NaN for not yet.
+    hands_off, command_onset, reaction_time
+        Whether there has been a tick without a command; and trial times in s of the first command,
+        and of the first one after such a tick; NaN for not yet.
     """
 
     settings: AimingSettings
@@ -52,7 +58,11 @@ class AimedMovement:
     distance: Numbers = field(default_factory=none_yet)
     entries: int = 0
     first_entry: float = math.nan
+    fast_since: float = math.nan
+    onset: float = math.nan
+    hands_off: bool = False
     command_onset: float = math.nan
+    reaction_time: float = math.nan
     rest_since: float = math.nan
     ticks: int = 0
     inside: bool = False
@@ -81,11 +91,44 @@ class AimedMovement:
         self.speed.append(speed)
         self.position.extend(tip)
         self.distance.append(distance)
+        if not self.begun:
+            self._look_for_onset(elapsed, speed, distance)
+
+    def _look_for_onset(self, elapsed: float, speed: float, distance: float) -> None:
+        """Take one tick more into account; the compiled twin does the same.
+
+        The onset is the first tick of the first stretch in which the tip is faster than the onset
+        speed for long enough, however fast it becomes later. What was fast already when the trial
+        began may be how the movement before runs out: that has begun once it has come nearer to the
+        target by the circle's radius.
+        """
+        settings = self.settings
+        if not speed > settings.onset_speed:
+            self.fast_since = math.nan
+            return
+        if math.isnan(self.fast_since):
+            self.fast_since = elapsed
+        if self.fast_since == self.elapsed[0]:
+            held = self.distance[0] - distance >= settings.width / 2
+        else:
+            held = elapsed - self.fast_since >= settings.onset_hold_s - ROUNDING_S
+        if held:
+            self.onset = self.fast_since
+
+    def command(self, elapsed: float, *, given: bool) -> None:
+        """Take whether there is a command in a tick: a stick beyond its dead zone."""
+        if not given:
+            self.hands_off = True
+            return
+        if math.isnan(self.command_onset):
+            self.command_onset = elapsed
+        if self.hands_off and math.isnan(self.reaction_time):
+            self.reaction_time = elapsed
 
     def go_on(
         self, elapsed: FloatArray, due: FloatArray, tip: FloatArray, velocity: FloatArray
     ) -> None:
-        """Take many ticks, as :meth:`see` takes one; who calls knows entries and rests.
+        """Take many ticks, as :meth:`see` takes one; who calls knows entries, rests, what is fast.
 
         Parameters
         ----------
@@ -119,31 +162,10 @@ class AimedMovement:
         way = np.subtract(self.position[-3:], self.start)
         return float(way @ axis / (axis @ axis))
 
-    def onset(self) -> int | None:
-        """Return the tick at which the movement began, or None when it never did.
-
-        The first tick of a stretch in which the tip is faster than the onset speed for long enough;
-        of several, of that with the highest speed.
-        """
-        speed, elapsed = np.array(self.speed), np.array(self.elapsed)
-        threshold = max(self.settings.onset_speed, self.settings.onset_share * speed.max())
-        turns = np.flatnonzero(np.diff(speed > threshold, prepend=False, append=False))
-        first, last = turns[::2], turns[1::2] - 1
-        long = elapsed[last] - elapsed[first] >= self.settings.onset_hold_s - ROUNDING_S
-        peaks = [speed[a : b + 1].max() for a, b in zip(first[long], last[long], strict=True)]
-        return int(first[long][int(np.argmax(peaks))]) if peaks else None
-
     @property
     def begun(self) -> bool:
-        """Whether the movement has begun, and is not only how the one before it runs out.
-
-        What was fast already when the trial began, has begun when it has come nearer to the target
-        by the circle's radius.
-        """
-        onset = self.onset()
-        if onset == 0:
-            return self.distance[0] - self.distance[-1] >= self.settings.width / 2
-        return onset is not None
+        """Whether the movement has begun, and is not only how the one before it runs out."""
+        return not math.isnan(self.onset)
 
     def tick_at(self, elapsed: float) -> int:
         """Return the tick at a trial time."""
@@ -155,27 +177,30 @@ class AimedMovement:
         Without an offset (a time-out) the errors are those of the last tick, and the times that
         end with it are NaN. They are also without an onset: nobody made a movement then.
         """
-        onset = self.onset()
+        settings = self.settings
         last = len(self.elapsed) - 1 if end is None else end
-        began = self.elapsed[onset] if onset is not None else math.nan
+        began = self.onset
         positions = np.array(self.position).reshape(-1, 3)
-        path = positions[onset or 0 : last + 1]
+        path = positions[self.tick_at(began) if self.begun else 0 : last + 1]
         along, across = self._error(positions[last])
-        bounded = self.settings.end == "rest_inside" and end is not None
+        bounded = settings.end == "rest_inside" and end is not None
         return {
-            "reaction_time": began,
+            "reaction_time": self.reaction_time,
             "command_onset": self.command_onset,
+            "movement_onset": began,
+            "onset_speed": settings.onset_speed,
+            "onset_hold": settings.onset_hold_s,
             "movement_time": math.nan if end is None else self.elapsed[end] - began,
             "onset_to_rest": math.nan if end is None else self._rests_after(began),
             "at_rest": 0.0 if math.isnan(self.rest_since) else self.elapsed[-1] - self.rest_since,
-            "circle_to_circle": math.nan if end is None or onset is None else self.elapsed[end],
+            "circle_to_circle": self.elapsed[end] if end is not None and self.begun else math.nan,
             "between_circles": self.first_entry - self._left(),
             "first_entry": self.first_entry,
             "entries": self.entries,
             "error": self.distance[last],
             "error_along": along,
             "error_across": across,
-            "error_bound": self.settings.width / 2 if bounded else math.nan,
+            "error_bound": settings.width / 2 if bounded else math.nan,
             "path_length": float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()),
             "peak_speed": max(self.speed),
         }

@@ -11,6 +11,7 @@ from pydantic import (
     PositiveInt,
     ValidationInfo,
     field_validator,
+    model_validator,
 )
 
 from labcrane import Machine, Settings
@@ -68,13 +69,12 @@ class AimingSettings(Settings):
     """Fraction of the way after which a rest ends a movement, when ``end`` is ``rest_anywhere``."""
 
     onset_speed: Annotated[PositiveFloat, Unit("m/s")] = 0.02
-    """Tip speed above which a movement has begun, in metres per second."""
-
-    onset_share: float = Field(default=0.05, ge=0.0, lt=1.0)
-    """The same as a fraction of the movement's peak speed; the larger of the two holds."""
+    """Tip speed above which a movement has begun, in metres per second. Set it by the noise of the
+    machine's sensors: above the speed that they tell of a tip at rest, and no higher."""
 
     onset_hold_s: NonNegativeFloat = 0.1
-    """How long the tip must stay above the onset speed, in seconds."""
+    """How long the tip must stay above the onset speed, in seconds. The event ``movement.onset``
+    comes so much later than the onset, whose time it is stamped with."""
 
     limit_s: PositiveFloat = 30.0
     """Longest a movement may take, in seconds; then it ends as a time-out."""
@@ -103,6 +103,14 @@ class AimingSettings(Settings):
             if speed >= fastest:
                 found[key] = f"is {speed:g} m/s, and the tip never reaches {_about(fastest)} m/s"
         return found
+
+    @model_validator(mode="before")
+    @classmethod
+    def _former(cls, written: object, info: ValidationInfo) -> object:
+        # A record may say which share of the peak speed an onset had to have, by a former rule.
+        if was_run(info) and isinstance(written, Mapping):
+            return {key: value for key, value in written.items() if key != "onset_share"}
+        return written
 
     @field_validator("distances")
     @classmethod

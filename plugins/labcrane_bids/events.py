@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
+from labcrane.analysis import movements_of
 from labcrane.recording import SessionRecord, hed_sidecar, labelled, name_of
 from labcrane_bids.files import first_tick
 
@@ -24,16 +25,16 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
     """Return the events: onset, duration, trial_type, label, and what trial they are of.
 
     ``trial_type`` is the event's plain name and ``label`` says block and condition too. A trial's
-    start lasts until its end; everything else is a moment. ``response_time`` is the time from the
-    trial's start to the movement's onset. What somebody marked afterwards is an ``annotation`` with
-    its text.
+    start lasts until its end; everything else is a moment. ``response_time`` is the reaction
+    time: from the trial's start to the first stick beyond its dead zone. What somebody marked
+    afterwards is an ``annotation`` with its text.
     """
     import pandas as pd
 
     zero = first_tick(session)
     events = session.events.sort_values("time", kind="stable")
-    trials = session.trials
-    ended = {(row["trial"], row["attempt"]): row for _, row in trials.iterrows()}
+    rows_of = (movement.row for movement in movements_of(session))
+    ended = {(row["trial"], row["attempt"]): row for row in rows_of}
     rows = []
     told = list(zip(events["name"].astype(str), events["data"], strict=True))
     for time, (name, data), label in zip(events["time"], told, labelled(told), strict=True):
@@ -75,7 +76,7 @@ def event_description(table: "pd.DataFrame", context: dict[str, Any]) -> dict[st
         "trial_type": {**types, "HED": hed},
         "label": {"Description": "name of the event, block and condition"},
         "response_time": {
-            "Description": "from the trial's start to the movement's onset",
+            "Description": "from the trial's start to the first stick beyond its dead zone",
             "Units": "s",
         },
         "trial": {"Description": "number of the trial in the session"},

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from labcrane import ProtocolError, Task
+from labcrane.analysis.kinematics.onset import onset, reaction
 from labcrane.core import Phase
 from labcrane.machines import reach
 from labcrane.machines.library import load_machine
@@ -130,22 +131,96 @@ def test_onset_and_offset_are_where_the_speed_crosses_the_thresholds() -> None:
     judgements = Path().play(minimum_jerk(seconds))
     results = judgements[-1].results
     peak = minimum_jerk_speed(0.5) * distance / seconds
-    onset = crossing(max(0.02, 0.05 * peak) * seconds / distance) * seconds
+    onset = crossing(0.02 * seconds / distance) * seconds
     offset = (1 - crossing(0.02 * seconds / distance)) * seconds
     assert judgements[-1].phase is Phase.SUCCESS
-    assert results["reaction_time"] == pytest.approx(0.5 + onset, abs=1.5 / RATE_HZ)
+    assert results["movement_onset"] == pytest.approx(0.5 + onset, abs=1.5 / RATE_HZ)
     assert results["movement_time"] == pytest.approx(offset - onset, abs=2.5 / RATE_HZ)
     assert results["peak_speed"] == pytest.approx(peak, rel=1e-3)
 
 
-def test_the_onset_is_stamped_when_it_happened_though_it_is_known_only_at_the_end() -> None:
-    judgements = Path().play(minimum_jerk(2.0))
-    last = {event.name: event.time for event in judgements[-1].events}
+@pytest.mark.parametrize("hold_s", [0.0, 0.1, 0.3])
+def test_the_onset_is_told_once_it_is_held_stamped_when_it_was_and_says_how_late(
+    hold_s: float,
+) -> None:
+    judgements = Path(onset_hold_s=hold_s).play(minimum_jerk(2.0))
     results = judgements[-1].results
-    assert last["movement.onset"] == pytest.approx(results["reaction_time"])
-    assert last["movement.offset"] - last["movement.onset"] == pytest.approx(
-        results["movement_time"]
-    )
+    told = [(at, e) for at, j in enumerate(judgements) for e in j.events if "movement" in e.name]
+    (known, onset), (_, offset) = told
+    assert (onset.name, offset.name) == ("movement.onset", "movement.offset")
+    assert onset.time == pytest.approx(results["movement_onset"])
+    assert onset.data["delay_s"] == pytest.approx(hold_s, abs=1e-9)
+    assert known / RATE_HZ == pytest.approx(onset.time + hold_s)
+    assert offset.time - onset.time == pytest.approx(results["movement_time"])
+    assert (results["onset_speed"], results["onset_hold"]) == (0.02, hold_s)
+
+
+def strokes(*parts: tuple[float, float], before: float = 0.5) -> np.ndarray:
+    """Fractions of the way: minimum-jerk strokes of a share of it each, a halt behind each."""
+    way, made = [np.zeros(round(before * RATE_HZ))], 0.0
+    for share, halt in parts:
+        way.append(made + share * minimum_jerk(1.0, before=0.0, after=halt))
+        made += share
+    return np.concatenate(way)
+
+
+def test_strokes_before_a_halt_are_part_of_the_movement() -> None:
+    halting = strokes((0.1, 0.4), (0.2, 0.4), (0.5, 0.4), (0.2, 1.0))
+    results = Path().play(halting)[-1].results
+    first, last = crossing(0.02 / 0.2), crossing(0.02 / 0.4)
+    assert results["movement_onset"] == pytest.approx(0.5 + first, abs=1.5 / RATE_HZ)
+    assert results["movement_time"] == pytest.approx(5.2 - first - last, abs=3.5 / RATE_HZ)
+    assert results["path_length"] == pytest.approx(2.0, abs=0.01)
+
+
+def test_a_press_between_two_strokes_ends_a_movement_whose_onset_no_later_stroke_moves() -> None:
+    slow_then_fast = strokes((0.02, 0.5), (0.98, 1.0))
+    last = Path(end="trigger").play(slow_then_fast, trigger=ticks((3.5, 3.6)))[-1].results
+    onset = 0.5 + crossing(0.02 / 0.04)
+    assert last["movement_onset"] == pytest.approx(onset, abs=1.5 / RATE_HZ)
+    early = Path(end="trigger").play(slow_then_fast, trigger=ticks((1.8, 1.9)))[-1]
+    assert early.phase is Phase.SUCCESS
+    assert early.results["movement_onset"] == last["movement_onset"]
+
+
+@pytest.mark.parametrize("held", [0, 60])
+def test_the_reaction_is_the_first_command_after_a_tick_without_one(held: int) -> None:
+    commands = [*range(held), *range(150, 400)]
+    results = Path().play(minimum_jerk(2.0), commands=commands)[-1].results
+    assert results["reaction_time"] == pytest.approx(150 / RATE_HZ)
+    assert results["command_onset"] == pytest.approx(0.0 if held else 150 / RATE_HZ)
+    never = Path().play(minimum_jerk(2.0), commands=range(2000))[-1].results
+    assert math.isnan(never["reaction_time"])
+
+
+def test_the_task_finds_onset_and_reaction_of_the_functions_of_whole_arrays() -> None:
+    random = np.random.default_rng(38)
+    found = 0
+    for _ in range(60):
+        steps = random.normal(0.0, 0.004, 20) * (random.random(20) < 0.5)
+        way = np.interp(np.linspace(0.0, 20.0, 800), np.arange(20), np.cumsum(steps))
+        way += np.cumsum(random.normal(0.0, 2e-5, 800))
+        commands = np.flatnonzero(random.random(800) < random.choice([0.0, 0.1, 0.9, 1.0]))
+        path = Path(end="trigger", onset_hold_s=float(random.uniform(0.0, 0.2)))
+        hold_s = path.task._settings.onset_hold_s
+        results = path.play(way, commands=set(commands), trigger={790})[-1].results
+        tip = path.start + np.outer(way, path.target - path.start)
+        ended = 791
+        if not results:
+            continue
+        at = onset(
+            np.arange(ended) / RATE_HZ,
+            np.linalg.norm(np.gradient(tip, 1 / RATE_HZ, axis=0), axis=1)[:ended],
+            np.linalg.norm(tip - path.target, axis=1)[:ended],
+            threshold=0.02, hold_s=hold_s, nearer=0.25,
+        )  # fmt: skip
+        given = np.isin(np.arange(ended), commands)[:, None]
+        expected = reaction(np.arange(ended) / RATE_HZ, given)
+        assert at is not None
+        assert results["movement_onset"] == pytest.approx(at / RATE_HZ)
+        assert results["reaction_time"] == pytest.approx(expected, nan_ok=True)
+        found += 1
+    assert found > 40
 
 
 @pytest.mark.parametrize("over", [-0.1, 0.0, 0.1])
@@ -160,7 +235,7 @@ def test_the_signed_error_is_positive_beyond_the_centre(over: float) -> None:
 def test_times_from_circle_to_circle_include_what_onset_and_rest_leave_out() -> None:
     seconds, distance, radius = 2.0, 2.0, 0.25
     results = Path().play(minimum_jerk(seconds))[-1].results
-    whole = results["reaction_time"] + results["movement_time"]
+    whole = results["movement_onset"] + results["movement_time"]
     assert results["circle_to_circle"] == pytest.approx(whole, rel=1e-12)
 
     def after(fraction: float) -> float:
@@ -230,7 +305,7 @@ def test_the_time_to_rest_is_that_of_the_rest_rules_whenever_the_tap_comes(dwell
     by_tap = Path(end="trigger").play(path, trigger=ticks((offset + dwell, 3.4)))[-1].results
     assert by_tap["onset_to_rest"] == by_rest["onset_to_rest"]
     assert by_tap["at_rest"] == pytest.approx(dwell, abs=1.5 / RATE_HZ)
-    parts = by_tap["reaction_time"] + by_tap["onset_to_rest"] + by_tap["at_rest"]
+    parts = by_tap["movement_onset"] + by_tap["onset_to_rest"] + by_tap["at_rest"]
     assert parts == pytest.approx(by_tap["circle_to_circle"], rel=1e-12)
 
 
@@ -250,7 +325,7 @@ def test_the_rest_is_the_one_that_the_tap_found_not_one_before_a_correction() ->
     path = np.concatenate([0.8 * minimum_jerk(2.0), 0.8 + 0.2 * minimum_jerk(1.0, before=0.0)])
     last = Path(end="trigger").play(path, trigger=ticks((5.0, 5.1)))[-1]
     corrected = 3.5 + (1 - crossing(0.02 * 1.0 / 0.4)) * 1.0
-    began = last.results["reaction_time"]
+    began = last.results["movement_onset"]
     assert last.results["onset_to_rest"] == pytest.approx(corrected - began, abs=2.5 / RATE_HZ)
 
 
@@ -316,7 +391,7 @@ def test_a_movement_slower_than_the_last_ones_short_end_has_an_onset() -> None:
     assert last.phase is Phase.SUCCESS
     peak = minimum_jerk_speed(0.5) * 2.0 / 3.0
     assert last.results["peak_speed"] > peak
-    assert 0.55 < last.results["reaction_time"] < 1.0
+    assert 0.55 < last.results["movement_onset"] < 1.0
 
 
 def test_who_is_in_the_circle_already_may_tap_without_a_movement_and_has_no_times() -> None:
@@ -326,7 +401,7 @@ def test_who_is_in_the_circle_already_may_tap_without_a_movement_and_has_no_time
     last = judgements[-1]
     assert last.phase is Phase.SUCCESS
     assert len(judgements) - 1 == RATE_HZ
-    for name in ("reaction_time", "movement_time", "circle_to_circle"):
+    for name in ("movement_onset", "movement_time", "circle_to_circle"):
         assert math.isnan(last.results[name])
 
 
@@ -336,7 +411,7 @@ def test_rest_anywhere_waits_for_a_movement_unless_the_tip_is_in_the_circle() ->
     goes = np.concatenate([stands, 0.7 + 0.2 * minimum_jerk(1.0)])
     last = Path(end="rest_anywhere").play(goes)[-1]
     assert last.phase is Phase.SUCCESS
-    assert last.results["reaction_time"] > 1.5
+    assert last.results["movement_onset"] > 1.5
     assert Path(end="rest_anywhere").play(np.ones(100))[-1].phase is Phase.SUCCESS
 
 
@@ -369,5 +444,5 @@ def test_the_first_command_is_an_event() -> None:
 def test_a_twitch_is_no_onset() -> None:
     twitch = np.concatenate([np.zeros(100), np.linspace(0, 0.01, 10), np.full(1000, 0.01)])
     last = Path(limit_s=2.0).play(twitch)[-1]
-    assert math.isnan(last.results["reaction_time"])
+    assert math.isnan(last.results["movement_onset"])
     assert math.isnan(last.results["circle_to_circle"])

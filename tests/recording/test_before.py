@@ -19,25 +19,34 @@ import pytest
 import pyxdf
 
 import labcrane
+from labcrane.analysis.measures import measure_session
+from labcrane.analysis.tables.definitions import MEASURES
 
 BEFORE = Path(__file__).parent / "before"
 NAME = "P001-SIMULATED"
 OF_THE_COMPUTER = {"versions", "sync"}
 """What the start of a session says of the program: versions, and the limits that it judges by."""
-ADDED = {"done", "owed", "circle_to_circle", "between_circles", "onset_to_rest", "at_rest"}
-"""What events say since, beside all that they said: whether a step was done, what is owed, and at
-the end of an aiming movement, the times between circles and those of rest."""
+ADDED_RESULTS = {
+    "circle_to_circle", "between_circles", "onset_to_rest", "at_rest", "movement_onset",
+    "onset_speed", "onset_hold",
+}  # fmt: skip
+"""What is measured since at the end of an aiming movement."""
+ADDED = {"done", "owed", *ADDED_RESULTS}
+"""What events say since, beside all that they said: whether a step was done, what is owed, and what
+is measured."""
+BY_ANOTHER_RULE = {"reaction_time", "movement_time", "path_length"}
+"""What is measured otherwise since: from the first onset, not from that of the fastest stroke."""
+ONSET = "movement.onset"
+"""It is told as soon as it is known since, and no more with the trial's end."""
 ADDED_SETTINGS = {"axes": [], "button": None}
 """What the simulated operator can be told since, and what that is where it is not."""
 ABOUT_THE_FILE = {"README", "dataset_description", "CITATION"}
 """What every participant file says of itself since."""
 ADDED_COLUMNS = {
-    "ses-01/trials/circle_to_circle",
-    "ses-01/trials/between_circles",
-    "ses-01/trials/onset_to_rest",
-    "ses-01/trials/at_rest",
+    *(f"ses-01/trials/{name}" for name in ADDED_RESULTS),
     *ABOUT_THE_FILE,
 }
+OF_ANOTHER_RULE = {f"ses-01/trials/{name}" for name in BY_ANOTHER_RULE}
 OF_THE_JOURNAL = {"ses-01/journals/size", "ses-01/context"}
 """How long versions' names are; the context is compared by its content."""
 
@@ -88,6 +97,10 @@ def events(folder: Path) -> list[dict[str, Any]]:
 def unlike(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
     """Return what an event says otherwise than before; what is :data:`ADDED` may be there."""
     kept = {name: value for name, value in new.items() if name in old or name not in ADDED}
+    old, kept = (
+        {name: value for name, value in each.items() if name not in BY_ANOTHER_RULE}
+        for each in (old, kept)
+    )
     same = kept.keys() == old.keys() and all(alike(kept[name], old[name]) for name in old)
     return {} if same else {"was": old, "is": new}
 
@@ -137,20 +150,29 @@ def test_the_same_seed_writes_the_same_events(before: Path, now: Path) -> None:
     assert len(kept) > 25
     units = again["trial_units"]
     again["trial_units"] = {name: units[name] for name in units if name not in ADDED}
+    assert start["components"]["tasks.aiming"]["settings"].pop("onset_share") == 0.05
     operator = again["components"]["input"]["settings"]
     assert {name: operator.pop(name) for name in ADDED_SETTINGS} == ADDED_SETTINGS
     assert {name: again[name] for name in kept} == {name: start[name] for name in kept}
     assert len(new) == len(old)
-    assert not [unlike(*pair) for pair in zip(old, new, strict=True) if unlike(*pair)]
-    stamps = [journal(folder)["labcrane.events"]["time_stamps"] for folder in (before, now)]
-    assert stamps[0].tobytes() == stamps[1].tobytes()
+    stamps = [journal(folder)["labcrane.events"]["time_stamps"][1:] for folder in (before, now)]
+    was, found = (
+        [row for row in zip(rows, of, strict=True) if row[0]["event"] != ONSET]
+        for rows, of in zip((old, new), stamps, strict=True)
+    )
+    assert len(found) == len(was) < len(new)
+    assert not [unlike(a, b) for (a, _), (b, _) in zip(was, found, strict=True) if unlike(a, b)]
+    assert [stamp for _, stamp in was] == [stamp for _, stamp in found]
 
 
 def test_the_same_seed_makes_the_same_datasets(before: Path, now: Path) -> None:
     old, new = datasets(before), datasets(now)
     assert new.keys() - ADDED_COLUMNS == old.keys()
-    for path in sorted(old.keys() - OF_THE_JOURNAL):
+    others = [each["ses-01/events/name"][0] != ONSET.encode() for each in (old, new)]
+    for path in sorted(old.keys() - OF_THE_JOURNAL - OF_ANOTHER_RULE):
         (was, attributes), (values, described) = old[path], new[path]
+        if path.startswith("ses-01/events/"):
+            was, values = was[others[0]], values[others[1]]
         if path.startswith("ses-01/trials/"):  # those that were added stand in between
             described, attributes = dict(described), dict(attributes)
             assert described.pop("position") >= attributes.pop("position")
@@ -166,6 +188,19 @@ def test_the_same_seed_makes_the_same_datasets(before: Path, now: Path) -> None:
             np.testing.assert_allclose(values, was, rtol=LAST_BITS, atol=0.0, err_msg=path)
             continue
         assert np.asarray(values).tobytes() == np.asarray(was).tobytes(), path
+
+
+def test_a_recording_of_before_is_measured_by_the_rule_of_today(before: Path, now: Path) -> None:
+    old, new = (labcrane.open_recording(each / f"{NAME}.h5").session(1) for each in (before, now))
+    was, found, today = measure_session(old), measure_session(new), new.trials
+    assert (was["measured_anew"] == 1.0).all()
+    assert (found["measured_anew"] == 0.0).all()
+    for name in {*BY_ANOTHER_RULE, "movement_onset", "onset_speed", "onset_hold"}:
+        np.testing.assert_allclose(was[name], today[name], rtol=1e-12, err_msg=name)
+        np.testing.assert_array_equal(found[name], today[name], err_msg=name)
+    for name in MEASURES.keys() - {"measured_anew"}:
+        np.testing.assert_allclose(was[name], found[name], rtol=1e-12, err_msg=name)
+    assert not np.allclose(old.trials["reaction_time"], today["reaction_time"])
 
 
 def test_every_dataset_of_before_reads_as_it_stands(before: Path) -> None:

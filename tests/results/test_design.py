@@ -247,7 +247,7 @@ def test_time_outs_are_counted_beside_the_mean_of_what_succeeded(report: Path) -
         here = here[here["session_name"] == row.phase.partition(" ")[2]]
         done = here[here["outcome"] == "success"]
         assert row.mean_of_successes_s == pytest.approx(
-            (done["reaction_time"] + done["movement_time"]).mean(), rel=1e-9
+            (done["movement_onset"] + done["movement_time"]).mean(), rel=1e-9
         )
 
 

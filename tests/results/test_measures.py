@@ -68,7 +68,7 @@ def test_dwell_and_first_look_are_those_of_the_eyes(cohort: Cohort) -> None:
     table = measures_of(cohort.included[0])
     for row in table.itertuples():
         assert row.dwell_during_1 == pytest.approx(0.5 * row.movement_time, abs=0.3)
-        assert 0.0 <= row.dwell_before_1 <= row.reaction_time + 1e-9
+        assert 0.0 <= row.dwell_before_1 <= row.movement_onset + 1e-9
     machine = machine_of(session)
     assert machine.names[0] == "slew"
 

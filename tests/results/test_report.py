@@ -239,11 +239,11 @@ def test_practice_is_no_result() -> None:
 
 def one_that_never_moved() -> pd.DataFrame:
     """Return the movements of 36 people, of whom P003's trial 17 was over before anything moved."""
-    table = cohort_of_36().assign(reaction_time=0.4, error=lambda t: t["absolute_error"])
+    table = cohort_of_36().assign(movement_onset=0.4, error=lambda t: t["absolute_error"])
     table = table.assign(outcome="success", practice=0.0, session=1.0, attempt=1.0, block=1.0)
     table = table.assign(pair=table["distance"].astype(str) + table["far_side"])
     never = (table["participant"] == "P003") & (table["trial"] == 17)
-    table.loc[never, ["reaction_time", "movement_time"]] = np.nan
+    table.loc[never, ["movement_onset", "movement_time"]] = np.nan
     table.loc[never, ["error", "error_along"]] = 3.64, -3.64
     return table.drop(columns=["sequence", "absolute_error"])
 

@@ -225,7 +225,7 @@ def test_positions_of_phases_of_other_lengths_are_in_the_answer(
 def test_the_answer_names_movements_without_an_onset(movements: pd.DataFrame, data: Path) -> None:
     still = movements["participant"].isin(["P003", "P008"]) & (movements["trial"] == 17)
     onset = np.where(still, np.nan, 0.4)
-    found = told(movements.assign(reaction_time=onset), data)
+    found = told(movements.assign(movement_onset=onset), data)
     assert found["Exclusions"] == [
         f"2 of {len(movements)} movements count for no average (0.2%); each is listed with why. "
         "Without an onset: P003 trial 17, P008 trial 17."

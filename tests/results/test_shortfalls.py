@@ -40,7 +40,7 @@ def drawn(seed: int, sizes: tuple[int, ...], sessions: int = 2) -> pd.DataFrame:
             "outcome": "success",
             "started": 0.0,
             "ended": 9.0,
-            "reaction_time": 0.3,
+            "movement_onset": 0.3,
             "movement_time": float(np.exp(0.2 * PAIRS[at][0] + dice.normal(0.0, 0.3))),
         }
         for person, group in enumerate(people, start=1)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from labcrane.analysis.smoothness import ldlj, path_ratio, sparc, sub_movements
+from labcrane.analysis.kinematics.smoothness import ldlj, path_ratio, sparc, sub_movements
 from labcrane.analysis.sticks import coordination, effort, limit_hits, reversals, stick_use
 
 RATE_HZ = 100.0

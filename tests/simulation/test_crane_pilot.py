@@ -98,7 +98,7 @@ def test_a_simulated_participant_has_both_times_demographics_and_errors_that_not
     assert trials["error_bound"].isna().all()
     done = trials[trials["outcome"] == "success"]
     np.testing.assert_allclose(
-        done["circle_to_circle"], done["reaction_time"] + done["movement_time"], rtol=1e-9
+        done["circle_to_circle"], done["movement_onset"] + done["movement_time"], rtol=1e-9
     )
     rests = done["onset_to_rest"]
     assert rests.notna().all()

@@ -123,6 +123,7 @@ def write_report(
     page.lead(answer(cohort, everything, quality, in_words(about), results))
     page.heading("Definitions")
     page.say(f"Settings of the measures: {settings.as_dict()}")
+    page.say(_by_which_rule(everything))
     page.table("definitions", _definitions())
     everything.to_csv(folder / "tables" / "movements.csv", index=False)
     return page.write()
@@ -484,6 +485,23 @@ def _syncs(page: Page, syncs: "pd.DataFrame") -> None:
         page.say("No streams of others were recorded: there is one clock.")
     else:
         page.table("sync_quality", syncs)
+
+
+def _by_which_rule(everything: "pd.DataFrame") -> str:
+    """Return what the movements' onset is, and how many recordings had it by another rule."""
+    rule = (
+        "A movement begins when the tip is first faster than onset_speed for onset_hold, columns "
+        "of the movements, and its halts are part of it; reaction_time is that of the sticks."
+    )
+    anew = int((everything["measured_anew"] == 1.0).sum()) if "measured_anew" in everything else 0
+    if not anew:
+        return rule
+    return (
+        f"{rule} {anew} of {len(everything)} movements were recorded by a former rule, from the "
+        "onset of the fastest stroke, with reaction_time up to it: their reaction_time, "
+        "movement_onset, movement_time, onset_to_rest and path_length were measured anew, and are "
+        "not those of the recording."
+    )
 
 
 def _definitions() -> "pd.DataFrame":

@@ -84,7 +84,7 @@ def trial_seconds(movements: "pd.DataFrame") -> "pd.Series[float]":
     whole = movements["ended"] - movements["started"]
     if "paused" in movements:
         whole = whole - movements["paused"].fillna(0.0)
-    if "movement_time" in movements and "reaction_time" in movements:
-        offset = movements["reaction_time"] + movements["movement_time"]
+    if "movement_time" in movements and "movement_onset" in movements:
+        offset = movements["movement_onset"] + movements["movement_time"]
         return offset.where(movements["outcome"] == "success").fillna(whole)
     return whole

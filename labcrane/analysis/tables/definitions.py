@@ -13,6 +13,20 @@ MEASURES: Mapping[str, tuple[str, str]] = {
         "m",
         "distance of the tip from the target's centre at the end; NaN where nothing moved",
     ),
+    "measured_anew": (
+        "1",
+        "1 where the recording has onset and times by a former rule, and here they are by today's",
+    ),
+    "halts": (
+        "1",
+        "stretches between onset and offset in which the tip is no faster than onset_speed for "
+        "onset_hold or longer; the rest in which the movement ends is none",
+    ),
+    "halt_time": ("s", "how long the halts are together"),
+    "main_stroke_time": (
+        "s",
+        "of the stroke with the highest speed, from the halt before it to the one behind it",
+    ),
     "amplitude": ("m", "way made along the task axis, from onset to offset"),
     "path_ratio": ("1", "length of the way over the straight distance between its ends"),
     "peak_speed_tip": ("m/s", "largest speed of the tip between onset and offset"),
