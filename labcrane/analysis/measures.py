@@ -9,7 +9,7 @@ import numpy as np
 from labcrane.analysis.cohort import Participant
 from labcrane.analysis.gaze import gaze_measures, looks
 from labcrane.analysis.kinematics.halts import halts
-from labcrane.analysis.kinematics.smoothness import ldlj, path_ratio, sparc, sub_movements
+from labcrane.analysis.kinematics.smoothness import ldlj, low_pass, path_ratio, sparc, sub_movements
 from labcrane.analysis.movements import (
     ANEW,
     Groups,
@@ -50,7 +50,10 @@ class MeasureSettings:
         Change of an axis that makes a reversal, as a fraction of full scale.
     sparc_highest_hz, sparc_least
         Of :func:`~labcrane.analysis.kinematics.smoothness.sparc`.
-    low_pass_hz, prominence
+    low_pass_hz
+        Cutoff at -3 dB of :func:`~labcrane.analysis.kinematics.smoothness.low_pass`, for what jerk,
+        sub-movements and the length of the way are worked out of.
+    prominence
         Of :func:`~labcrane.analysis.kinematics.smoothness.sub_movements`.
     limit_tolerance_deg
         Distance in degrees at which a joint is at its limit.
@@ -215,12 +218,13 @@ def measure(movement: Movement, machine: Machine, settings: MeasureSettings) -> 
     if span is None or span.stop - span.start < SHORTEST:
         return nothing | how | errors
     speed, tip = movement.speed[span], movement.tip[span]
+    smooth = low_pass(movement.tip, movement.rate_hz, settings.low_pass_hz)
     return {
         **errors,
         **how,
         **_strokes(movement, span),
         "amplitude": _along(movement, tip),
-        "path_ratio": path_ratio(tip),
+        "path_ratio": path_ratio(smooth[span]),
         "peak_speed_tip": float(speed.max()),
         "sub_movements": sub_movements(
             speed,
@@ -234,7 +238,7 @@ def measure(movement: Movement, machine: Machine, settings: MeasureSettings) -> 
             highest_hz=settings.sparc_highest_hz,
             least=settings.sparc_least,
         ),
-        "ldlj": ldlj(speed, movement.rate_hz),
+        "ldlj": ldlj(movement.velocity, movement.rate_hz, span, low_pass_hz=settings.low_pass_hz),
         **_sticks(movement, span, settings),
         **_machine_use(movement, span, machine, settings),
     }

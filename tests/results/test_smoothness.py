@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from labcrane.analysis.kinematics.smoothness import ldlj, path_ratio, sparc, sub_movements
+from labcrane.analysis.kinematics.smoothness import ldlj, low_pass, path_ratio, sparc, sub_movements
 from labcrane.analysis.sticks import coordination, effort, limit_hits, reversals, stick_use
 
 RATE_HZ = 100.0
@@ -13,29 +13,71 @@ TIME = np.arange(-1.0, 1.0, 0.01)
 BELL = np.exp(-5.0 * TIME**2)
 
 
+def along_x(speed: np.ndarray) -> np.ndarray:
+    """Velocity of a movement along a line."""
+    return np.column_stack([speed, 0.0 * speed, 0.0 * speed])
+
+
 def test_sparc_and_ldlj_are_those_published_for_the_reference_signal() -> None:
-    """The signal and values of Balasubramanian's own implementation."""
+    """The signal and values of Balasubramanian's own implementation.
+
+    It takes 2 s for the time from the first sample to the last, which is 1.99.
+    """
     assert sparc(BELL, RATE_HZ) == pytest.approx(-1.41403, abs=5e-6)
-    assert ldlj(BELL, RATE_HZ) == pytest.approx(-5.81636, abs=5e-6)
+    published = -5.81636 + 3.0 * math.log(2.0 / 1.99)
+    assert ldlj(along_x(BELL), RATE_HZ) == pytest.approx(published, abs=2e-3)
 
 
-def test_a_minimum_jerk_movement_has_the_jerk_of_its_closed_form() -> None:
-    s = np.linspace(0.0, 1.0, 20001)
-    speed = 30.0 * s**2 * (1.0 - s) ** 2
+@pytest.mark.parametrize("rate_hz", [30.0, 100.0, 1000.0])
+@pytest.mark.parametrize("seconds", [1.5, 3.0])
+def test_a_minimum_jerk_movement_has_the_jerk_of_its_closed_form(
+    rate_hz: float, seconds: float
+) -> None:
+    time = np.arange(0.0, seconds + 2.0, 1.0 / rate_hz)
+    s = np.clip((time - 1.0) / seconds, 0.0, 1.0)
+    velocity = along_x(30.0 * s**2 * (1.0 - s) ** 2 / seconds)
+    span = slice(round(rate_hz), round((1.0 + seconds) * rate_hz) + 1)
     expected = -math.log(720.0 / 1.875**2)
-    assert ldlj(speed, 20000.0) == pytest.approx(expected, abs=2e-3)
+    assert ldlj(velocity, rate_hz, span) == pytest.approx(expected, abs=0.1)
+
+
+def test_jerk_is_of_the_vector_so_that_a_bend_is_less_smooth_than_a_line() -> None:
+    """At an even speed v on a circle of radius r, jerk is v³ / r²: T³ / v² · v⁶ / r⁴ · T."""
+    time = np.arange(0.0, 4.0 + 1e-9, 0.01)
+    circle = np.column_stack([np.cos(2.0 * time), np.sin(2.0 * time), 0.0 * time])
+    span = slice(100, 301)
+    expected = -math.log(2.0**3 * 2.0 * 2.0**4)
+    assert ldlj(circle, RATE_HZ, span) == pytest.approx(expected, abs=0.02)
+
+
+def test_a_low_pass_has_its_minus_3_db_at_the_cutoff_it_names_and_no_delay() -> None:
+    for rate_hz in (30.0, 100.0, 1000.0):
+        time = np.arange(0.0, 10.0, 1.0 / rate_hz)
+        inner = (time > 2.0) & (time < 8.0)
+        for frequency in (1.0, 3.0, 6.0, 12.0):
+            wave = np.sin(2.0 * np.pi * frequency * time)
+            gain = 1.0 / (1.0 + (math.sqrt(2.0) - 1.0) * (frequency / 6.0) ** 4)
+            if frequency < rate_hz / 2.0:
+                smooth = low_pass(wave, rate_hz, 6.0)
+                np.testing.assert_allclose(smooth[inner], gain * wave[inner], atol=2e-3)
+
+
+def test_a_low_pass_above_half_of_the_rate_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"at 6 Hz needs more than 12 samples a second.* are 10;"):
+        low_pass(BELL, 10.0, 6.0)
 
 
 @pytest.mark.parametrize("factor", [0.01, 7.0])
 def test_smoothness_does_not_depend_on_the_unit_of_speed(factor: float) -> None:
+    bell = along_x(BELL)
     assert sparc(factor * BELL, RATE_HZ) == pytest.approx(sparc(BELL, RATE_HZ), rel=1e-12)
-    assert ldlj(factor * BELL, RATE_HZ) == pytest.approx(ldlj(BELL, RATE_HZ), rel=1e-12)
+    assert ldlj(factor * bell, RATE_HZ) == pytest.approx(ldlj(bell, RATE_HZ), rel=1e-12)
 
 
 def test_tremor_makes_a_movement_less_smooth() -> None:
     shaken = BELL * (1.0 + 0.2 * np.sin(2 * np.pi * 6.0 * TIME))
     assert sparc(shaken, RATE_HZ) < sparc(BELL, RATE_HZ)
-    assert ldlj(shaken, RATE_HZ) < ldlj(BELL, RATE_HZ)
+    assert ldlj(along_x(shaken), RATE_HZ) < ldlj(along_x(BELL), RATE_HZ)
 
 
 @pytest.mark.parametrize("count", [1, 2, 4])

@@ -1,7 +1,5 @@
 """Smoothness of a movement."""
 
-from functools import cache
-
 import numpy as np
 
 from labcrane.types import FloatArray
@@ -45,46 +43,94 @@ def sparc(
     return -float(steps.sum())
 
 
-def ldlj(speed: FloatArray, rate_hz: float) -> float:
-    """Return the log dimensionless jerk of a speed profile: higher is smoother.
+def ldlj(
+    velocity: FloatArray, rate_hz: float, span: slice | None = None, *, low_pass_hz: float = 6.0
+) -> float:
+    """Return the log dimensionless jerk of a movement: higher is smoother.
 
-    ``-ln(T³ / v_peak² · ∫ (d²v/dt²)² dt)`` with the second difference for the derivative
-    (Balasubramanian et al. 2015). A minimum-jerk movement has -ln(720 / 1.875²) = -5.32.
+    ``-ln(T³ / v_peak² · ∫ |d²v/dt²|² dt)`` of the velocity vector, so that a bend is jerk as well
+    as a change of speed (Balasubramanian et al. 2015, J NeuroEng Rehabil 12:112). A minimum-jerk
+    movement along a line has -ln(720 / 1.875²) = -5.32. Velocity is :func:`low_pass` filtered, and
+    differentiated as a spline, so that the result is not one of the sampling rate; the noise of
+    sensors within the pass-band is jerk too. It falls with duration where there are halts or
+    several strokes: T³ is that of one.
 
     Parameters
     ----------
-    speed
-        From onset to offset, in any unit, shape ``(n,)``, three samples or more.
+    velocity
+        In any unit, shape ``(n, n_axes)``, four samples or more.
+    span
+        From onset to offset. What is before and behind lets the filter settle; without it, all.
     """
-    dt = 1.0 / rate_hz
-    jerk = np.diff(speed, 2) / dt**2
-    scale = (len(speed) * dt) ** 3 / float(np.abs(speed).max()) ** 2
-    return -float(np.log(scale * (jerk**2).sum() * dt))
+    from scipy.interpolate import make_interp_spline
+
+    time = np.arange(len(velocity)) / rate_hz
+    curve = make_interp_spline(time, low_pass(velocity, rate_hz, low_pass_hz), k=3)
+    first, last = (0, len(time) - 1) if span is None else (span.start, span.stop - 1)
+    fine = np.linspace(time[first], time[last], FINE * (last - first) + 1)
+    jerk = (curve(fine, 2) ** 2).sum(axis=1)
+    peak = float(np.linalg.norm(curve(fine), axis=1).max())
+    scale = (time[last] - time[first]) ** 3 / peak**2
+    return -float(np.log(scale * np.trapezoid(jerk, fine)))
+
+
+FINE = 8
+"""Points of a spline between two samples, where a square of it is summed up."""
 
 
 def sub_movements(
     speed: FloatArray, rate_hz: float, *, low_pass_hz: float = 6.0, prominence: float = 0.05
 ) -> int:
-    """Return how many peaks the speed has.
+    """Return how many peaks the speed has, after :func:`low_pass`.
 
-    Counted after a second-order Butterworth low-pass run forwards and backwards. A peak rises by
-    at least ``prominence`` of the largest speed above what separates it from a higher one.
+    A peak rises by at least ``prominence`` of the largest speed above what separates it from a
+    higher one.
     """
-    from scipy.signal import find_peaks, sosfiltfilt
+    from scipy.signal import find_peaks
 
-    sections = _low_pass(low_pass_hz, rate_hz)
-    padded = np.concatenate([[0.0], speed, [0.0]])  # a movement that ends fast still has a peak
-    smooth = sosfiltfilt(sections, padded, padlen=min(int(rate_hz), len(padded) - 1))
+    # A movement that ends fast still has a peak.
+    smooth = low_pass(np.concatenate([[0.0], speed, [0.0]]), rate_hz, low_pass_hz)
     peaks, _ = find_peaks(smooth, prominence=prominence * float(smooth.max()))
     return len(peaks)
 
 
-@cache
-def _low_pass(low_pass_hz: float, rate_hz: float) -> FloatArray:
-    """Return the sections of a filter, which takes longer to work out than to use."""
-    from scipy.signal import butter
+def low_pass(values: FloatArray, rate_hz: float, cutoff_hz: float) -> FloatArray:
+    """Return values without what is faster than a frequency, and as late as they were.
 
-    return np.asarray(butter(2, low_pass_hz, fs=rate_hz, output="sos"))
+    The gain of a Butterworth filter of second order run forwards and backwards, with -3 dB of both
+    together at ``cutoff_hz``: ``1 / (1 + (√2 - 1) (f / cutoff)⁴)``. It is applied to the sine
+    transform of what is beside the line from the first to the last sample, which stay as they are;
+    so, other than with a digital filter, no frequency's gain is one of the sampling rate.
+
+    Parameters
+    ----------
+    values
+        Shape ``(n,)`` or ``(n, n_axes)``.
+    rate_hz, cutoff_hz
+        In Hz.
+
+    Raises
+    ------
+    ValueError
+        The cutoff is not below half of the rate.
+    """
+    from scipy.fft import dst, idst
+
+    if not 0.0 < cutoff_hz < rate_hz / 2.0:
+        raise ValueError(
+            f"a low-pass at {cutoff_hz:g} Hz needs more than {2.0 * cutoff_hz:g} samples a second, "
+            f"and there are {rate_hz:g}; lower the cutoff"
+        )
+    inner = len(values) - 2
+    if inner < 1:
+        return values
+    line = np.linspace(values[0], values[-1], len(values))
+    frequency = np.arange(1, inner + 1) * rate_hz / (2.0 * (inner + 1))
+    gain = 1.0 / (1.0 + (np.sqrt(2.0) - 1.0) * (frequency / cutoff_hz) ** 4)
+    waves = dst((values - line)[1:-1], type=1, axis=0)
+    smooth: FloatArray = line.copy()
+    smooth[1:-1] += idst(gain.reshape(-1, *[1] * (values.ndim - 1)) * waves, type=1, axis=0)
+    return smooth
 
 
 def path_ratio(tip: FloatArray) -> float:
