@@ -17,8 +17,8 @@ class Halts:
     count, seconds
         Halts between onset and offset, and how long they are together, in s.
     main_stroke_s
-        Of the stroke with the highest speed: from the onset or the halt before it to the halt or
-        the rest behind it, in s.
+        Of the stroke with the highest speed, from the halt or the rest before it to that behind it,
+        in s; 0 where no stroke is long enough to be one.
     """
 
     count: int
@@ -29,9 +29,9 @@ class Halts:
 def halts(elapsed: FloatArray, speed: FloatArray, *, threshold: float, hold_s: float) -> Halts:
     """Return the halts of a movement.
 
-    A halt is a stretch of at least ``hold_s`` in which the tip is never faster than ``threshold``:
-    the rule of the onset turned over, so that strokes and halts make up the movement. The rest in
-    which a movement ends is no halt, and belongs to no stroke.
+    A stroke is what is faster than ``threshold`` for at least ``hold_s``, as an onset is; a halt is
+    at least ``hold_s`` between two strokes. So noise that passes the threshold for a moment makes
+    no halt and ends none. The rest in which a movement ends is no halt, and belongs to no stroke.
 
     Parameters
     ----------
@@ -40,16 +40,17 @@ def halts(elapsed: FloatArray, speed: FloatArray, *, threshold: float, hold_s: f
     threshold, hold_s
         In m/s and s: those of the onset.
     """
-    slow = np.concatenate([[False], speed <= threshold])
-    turns = np.flatnonzero(np.diff(slow, append=False))
-    # From the first slow tick to the first fast one behind it; at the end to the last tick.
-    times = np.append(elapsed, elapsed[-1])[turns].reshape(-1, 2)
-    held = times[times[:, 1] - times[:, 0] >= hold_s - ROUNDING_S]
-    within = held[held[:, 1] < elapsed[-1]]
-    peak = elapsed[int(np.argmax(speed))]
-    before, after = held[held[:, 1] <= peak, 1], held[held[:, 0] > peak, 0]
+    turns = np.flatnonzero(np.diff(speed > threshold, prepend=False, append=False))
+    # From the first fast tick to the first slow one behind it; at the end to the last tick.
+    fast = np.append(elapsed, elapsed[-1])[turns].reshape(-1, 2)
+    strokes = fast[fast[:, 1] - fast[:, 0] >= hold_s - ROUNDING_S]
+    gaps = strokes[1:, 0] - strokes[:-1, 1]
+    held = gaps >= hold_s - ROUNDING_S
+    begins = np.concatenate([strokes[:1, 0], strokes[1:, 0][held]])
+    ends = np.concatenate([strokes[:-1, 1][held], strokes[-1:, 1]])
+    main = (begins <= elapsed[np.argmax(speed)]).nonzero()[0][-1:]
     return Halts(
-        count=len(within),
-        seconds=float((within[:, 1] - within[:, 0]).sum()),
-        main_stroke_s=float(min(after, default=elapsed[-1]) - max(before, default=elapsed[0])),
+        count=int(held.sum()),
+        seconds=float(gaps[held].sum()),
+        main_stroke_s=float((ends[main] - begins[main]).sum()),
     )
