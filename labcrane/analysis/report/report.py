@@ -33,6 +33,7 @@ from labcrane.analysis.report.sample import in_words, sample
 from labcrane.analysis.report.shortfalls import Made, shortfalls
 from labcrane.analysis.report.thresholds import Judge, add_thresholds, thresholds_of
 from labcrane.analysis.report.words import STYLES, UNBALANCED, Results, confounding, paragraphs
+from labcrane.analysis.statistics.errors import errors
 from labcrane.analysis.statistics.fitts import throughput
 from labcrane.analysis.statistics.learning import learning_curves
 from labcrane.analysis.statistics.time_outs import time_outs
@@ -301,7 +302,11 @@ def _movements(
     page.draw(figures.by_distance(results))
     if outcomes.rests_apart(results):
         page.say(_rests(results))
-    page.table("errors", _errors(results))
+    page.say(
+        "Constant, variable and absolute error are along the task axis, variable error within "
+        "conditions; radial error, the measure absolute_error, is the distance from the centre."
+    )
+    page.table("errors", errors(results))
     page.heading("Learning curves")
     in_phase = results.assign(sequence=results[PLACE])
     curves = pd.concat([learning_curves(in_phase, measure) for measure in measures])
@@ -332,20 +337,6 @@ def _rests(results: "pd.DataFrame") -> str:
         f"moved when they were ended, in {len(missing) - moving} it had not rested for as long as "
         "a rest is."
     )
-
-
-def _errors(results: "pd.DataFrame") -> "pd.DataFrame":
-    """Return constant, variable and absolute error along the axis and movement time."""
-    import numpy as np
-
-    own = results.groupby("participant")
-    return own.agg(
-        movements=("trial", "size"),
-        movement_time_s=("movement_time", "mean"),
-        constant_error_m=("constant_error", "mean"),
-        variable_error_m=("constant_error", lambda values: float(np.std(values))),
-        absolute_error_m=("absolute_error", "mean"),
-    ).reset_index()
 
 
 def _statistics(

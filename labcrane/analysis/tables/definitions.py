@@ -11,7 +11,8 @@ MEASURES: Mapping[str, tuple[str, str]] = {
     ),
     "absolute_error": (
         "m",
-        "distance of the tip from the target's centre at the end; NaN where nothing moved",
+        "distance of the tip from the target's centre at the end, in any direction (radial error); "
+        "NaN where nothing moved",
     ),
     "measured_anew": (
         "1",
