@@ -5,7 +5,7 @@ from .cohort import Participant, find_cohort
 from .electrodes.mne import EEG_READERS, channel_types, eeg_streams, events_at, to_mne, volts
 from .electrodes.sampled import Sampled, sampled
 from .exporter import Exporter
-from .gaze import fixations_of
+from .gaze import fixations_of, with_unseen_areas
 from .measures import measures_of
 from .movements import Movement, movements_of
 from .questionnaires import answers_of, asked_in, beside_trials, scores_of
@@ -36,4 +36,5 @@ __all__ = [
     "scores_of",
     "to_mne",
     "volts",
+    "with_unseen_areas",
 ]

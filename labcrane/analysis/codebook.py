@@ -73,7 +73,7 @@ def trial_codebook(
             unit, meaning = MEASURES[column]
             row = (unit, meaning, MEASURED)
         elif column in gaze:
-            row = (gaze[column], "gaze on an area of interest", MEASURED)
+            row = (*gaze[column], MEASURED)
         elif column in asked:
             row = ("", asked[column], WRITTEN)
         else:

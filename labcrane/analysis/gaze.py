@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from labcrane.analysis.cohort import Participant
 from labcrane.recording.participant_file.reader import SessionRecord, Stream
@@ -38,22 +39,43 @@ class Looks:
         On our clock, in seconds, shape ``(n,)``.
     area
         The area's name; "" for none.
+    tracked
+        Whether it is known where somebody looked: not in a blink, nor where tracking was lost.
+    areas
+        Names of all areas that there were, looked at or not, as far as they are known.
     """
 
     time: FloatArray
     area: Sequence[str]
+    tracked: npt.NDArray[np.bool_]
+    areas: Sequence[str]
 
     def dwell(self, area: str, start: float, stop: float) -> float:
         """Return for how long ``area`` was looked at from ``start`` to ``stop``, in seconds.
 
-        A sample holds until the next one, at most for twice the usual step: a gap is no look.
+        A sample holds until the next one, at most for twice the usual step: a gap is no look. NaN
+        where no sample says where somebody looked.
         """
+        held = self._held(start, stop)
+        if not held[self.tracked].any():
+            return math.nan
+        return float(held[np.array([name == area for name in self.area], bool)].sum())
+
+    def valid(self, start: float, stop: float) -> float:
+        """Return for which share of the time from ``start`` to ``stop`` it is known, 0 to 1.
+
+        NaN where there is no time.
+        """
+        known = float(self._held(start, stop)[self.tracked].sum())
+        return min(known / (stop - start), 1.0) if stop > start else math.nan
+
+    def _held(self, start: float, stop: float) -> FloatArray:
+        """Return for how long each sample holds between two times, in s, shape ``(n,)``."""
         steps = np.diff(self.time, append=np.nan)
         usual = float(np.nanmedian(steps)) if len(steps) > 1 else 0.0
         until = self.time + np.where(np.isnan(steps), usual, np.minimum(steps, 2.0 * usual))
-        inside = np.minimum(until, stop) - np.maximum(self.time, start)
-        on = np.array([name == area for name in self.area])
-        return float(np.clip(inside[on], 0.0, None).sum())
+        held: FloatArray = np.minimum(until, stop) - np.maximum(self.time, start)
+        return np.clip(held, 0.0, None)
 
     def first(self, area: str, start: float, stop: float) -> float:
         """Return when ``area`` was first looked at from ``start`` to ``stop``; NaN for never."""
@@ -79,7 +101,9 @@ def looks(session: SessionRecord, delay_s: float = 0.0) -> Looks | None:
         if stream.attrs.get("type") == KIND and CHANNEL in stream.units:
             values = stream.values([CHANNEL])[CHANNEL].tolist()
             names = {value: area_name(value) for value in set(values)}  # each name is kept once
-            return Looks(stream.time, [names[value] for value in values])
+            found = [names[value] for value in values]
+            tracked = np.array([not _is_lost(value) for value in values], bool)
+            return Looks(stream.time, found, tracked, sorted({*names.values()} - {""}))
     gaze = next((each for each in streams if each.attrs.get("type") == KIND and place(each)), None)
     pictures = next((each for each in streams if each.name.endswith(AREAS)), None)
     if gaze is None or pictures is None or not (columns := area_columns(pictures)):
@@ -172,7 +196,7 @@ def looks_on_screen(
                 f"({len(shown)}, 4)"
             )
     if not names or not len(shown):
-        return Looks(time, [""] * len(time))
+        return Looks(time, [""] * len(time), np.zeros(len(time), bool), names)
     picture = np.searchsorted(shown + delay_s, time, side="right") - 1
     boxes = np.stack([areas[name] for name in names], axis=1)[np.maximum(picture, 0)]
     left, top, right, bottom = np.moveaxis(boxes, -1, 0)
@@ -181,7 +205,9 @@ def looks_on_screen(
     sizes = np.where(within, (right - left) * (bottom - top), np.inf)
     smallest = np.argmin(sizes, axis=1)
     found = np.isfinite(sizes[np.arange(len(time)), smallest])
-    return Looks(time, [names[at] if on else "" for at, on in zip(smallest, found, strict=True)])
+    area = [names[at] if on else "" for at, on in zip(smallest, found, strict=True)]
+    tracked = np.isfinite(gaze).all(axis=1) & (picture >= 0)
+    return Looks(time, area, tracked, names)
 
 
 @dataclass(frozen=True, slots=True)
@@ -415,26 +441,60 @@ def area_name(value: object) -> str:
     return "" if np.isnan(number) or number == 0.0 else f"{number:g}"
 
 
-def gaze_measures(seen: Looks, started: float, onset: float, offset: float) -> dict[str, float]:
-    """Return dwell and first look for each area.
+def _is_lost(value: object) -> bool:
+    """Return whether a sample of ``aoi`` says that nobody knows; a text always knows."""
+    return not isinstance(value, str) and math.isnan(float(str(value)))
 
-    ``dwell_before_X`` and ``dwell_during_X`` are the seconds from the trial's start to onset and
-    from onset to offset; ``look_lead_X`` is the time from the first look at X in the trial to the
-    movement's onset, in seconds, NaN when X was not looked at before it.
+
+def gaze_measures(seen: Looks, started: float, onset: float, offset: float) -> dict[str, float]:
+    """Return how much of gaze is known, and dwell and first look for each area.
+
+    ``gaze_valid_before`` and ``gaze_valid_during`` are the shares of the time from the trial's
+    start to onset and from onset to offset in which it is known where somebody looked.
+    ``dwell_before_X`` and ``dwell_during_X`` are the seconds in which that was X: 0 where it was
+    not, NaN where that share is 0. ``look_lead_X`` is the time from the first look at X in the
+    trial to the movement's onset, in seconds, NaN when X was not looked at before it.
 
     Parameters
     ----------
     started, onset, offset
         Of trial and movement, on our clock, in seconds.
     """
-    found = {}
-    for area in sorted(set(seen.area) - {""}):
+    found = {
+        "gaze_valid_before": seen.valid(started, onset),
+        "gaze_valid_during": seen.valid(onset, offset),
+    }
+    for area in seen.areas:
         found[f"dwell_before_{area}"] = seen.dwell(area, started, onset)
         found[f"dwell_during_{area}"] = seen.dwell(area, onset, offset)
         found[f"look_lead_{area}"] = onset - seen.first(area, started, onset)
     return found
 
 
-def gaze_units(columns: "pd.Index[str]") -> dict[str, str]:
-    """Return the unit of each gaze measure among ``columns``."""
-    return {name: "s" for name in columns if name.startswith(("dwell_", "look_lead_"))}
+def with_unseen_areas(movements: "pd.DataFrame") -> "pd.DataFrame":
+    """Return movements of several recordings with 0 s for areas that only others looked at.
+
+    A stream that names what is looked at does not say what else there was: an area has a column in
+    the tables of those who looked at it. Where tracking was lost it stays NaN.
+    """
+    filled = {}
+    for part in ("before", "during"):
+        if f"gaze_valid_{part}" not in movements:
+            continue
+        known = movements[f"gaze_valid_{part}"] > 0.0
+        for name in (str(each) for each in movements if str(each).startswith(f"dwell_{part}_")):
+            filled[name] = movements[name].mask(known & movements[name].isna(), 0.0)
+    return movements.assign(**filled)
+
+
+def gaze_units(columns: "pd.Index[str]") -> dict[str, tuple[str, str]]:
+    """Return unit and meaning of each gaze measure among ``columns``."""
+    found = {}
+    for name in columns:
+        if name.startswith("gaze_valid_"):
+            found[name] = ("1", "share of the time in which it is known where somebody looked")
+        elif name.startswith("dwell_"):
+            found[name] = ("s", "gaze on an area of interest; NaN where tracking was lost")
+        elif name.startswith("look_lead_"):
+            found[name] = ("s", "first look at an area of interest before the onset")
+    return found

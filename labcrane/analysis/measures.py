@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from labcrane.analysis.cohort import Participant
-from labcrane.analysis.gaze import gaze_measures, looks
+from labcrane.analysis.gaze import gaze_measures, looks, with_unseen_areas
 from labcrane.analysis.kinematics.halts import halts
 from labcrane.analysis.kinematics.smoothness import ldlj, low_pass, path_ratio, sparc, sub_movements
 from labcrane.analysis.movements import (
@@ -116,7 +116,7 @@ def _all_sessions(participant: Participant, settings: MeasureSettings) -> "pd.Da
         table.insert(0, "session", number)
         table.insert(1, "session_name", str(session.attrs.get("session_name", "")))
         tables.append(table)
-    return pd.concat(tables, ignore_index=True)
+    return with_unseen_areas(pd.concat(tables, ignore_index=True))
 
 
 def measure_or_say_why(participant: Participant) -> tuple[str, str, MeasuredParticipant | None]:

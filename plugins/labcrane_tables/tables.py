@@ -19,6 +19,7 @@ from labcrane.analysis import (
     fixations_of,
     measures_of,
     scores_of,
+    with_unseen_areas,
 )
 from labcrane.recording import SessionRecord, labelled
 from labcrane_tables.frames import StreamTable, snake, stream_tables
@@ -75,7 +76,8 @@ class Tables(Exporter):
         for name, tables in (("annotations", marks), ("fixations", looked_at)):
             if any(map(len, tables)):
                 write_csv(joined(tables), folder / f"{name}.csv")
-        for name, tables in (("trials", trials), ("questionnaires", answers), ("scores", scores)):
+        seen = with_unseen_areas(joined(trials))
+        for name, tables in (("trials", [seen]), ("questionnaires", answers), ("scores", scores)):
             everything = joined(tables)
             write_csv(everything, folder / f"{name}.csv")
             everything.to_parquet(folder / f"{name}.parquet", index=False)

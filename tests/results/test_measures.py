@@ -3,10 +3,11 @@
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from labcrane.analysis.cohort import Cohort
-from labcrane.analysis.gaze import Looks, gaze_measures, looks
+from labcrane.analysis.gaze import Looks, gaze_measures, looks, with_unseen_areas
 from labcrane.analysis.measures import MeasureSettings, measure_session, measures_of
 from labcrane.analysis.movements import cut, groups, machine_of
 from labcrane.analysis.sticks import reversals
@@ -75,7 +76,8 @@ def test_dwell_and_first_look_are_those_of_the_eyes(cohort: Cohort) -> None:
 
 def test_looks_are_counted_to_the_sample() -> None:
     time = np.arange(0.0, 1.0, 0.1)
-    seen = Looks(time, ["", "", "a", "a", "b", "", "a", "", "", ""])
+    areas = ["", "", "a", "a", "b", "", "a", "", "", ""]
+    seen = Looks(time, areas, np.ones(10, bool), ["a", "b"])
     found = gaze_measures(seen, started=0.0, onset=0.5, offset=0.9)
     assert found["dwell_before_a"] == pytest.approx(0.2)
     assert found["dwell_during_a"] == pytest.approx(0.1)
@@ -84,9 +86,49 @@ def test_looks_are_counted_to_the_sample() -> None:
 
 
 def test_a_gap_in_the_eyes_is_no_look() -> None:
-    seen = Looks(np.array([0.0, 0.1, 0.2, 5.0, 5.1]), ["a"] * 5)
+    seen = Looks(np.array([0.0, 0.1, 0.2, 5.0, 5.1]), ["a"] * 5, np.ones(5, bool), ["a"])
     assert seen.dwell("a", 0.0, 10.0) == pytest.approx(0.1 + 0.1 + 0.2 + 0.1 + 0.1)
     assert math.isnan(seen.first("b", 0.0, 10.0))
+
+
+def test_an_area_nobody_looked_at_has_0_s_but_where_tracking_was_lost() -> None:
+    random = np.random.default_rng(38)
+    time = np.arange(0.0, 10.0, 0.01)
+    for _ in range(50):
+        areas = random.choice(["", "a"], len(time)).tolist()
+        lost, back = np.sort(random.uniform(0.0, 10.0, 2))
+        tracked = (time < lost) | (time >= back)
+        areas = [area if on else "" for area, on in zip(areas, tracked, strict=True)]
+        seen = Looks(time, areas, tracked, ["a", "b"])
+        found = gaze_measures(seen, 0.0, 4.0, 9.0)
+        for part, start, stop in (("before", 0.0, 4.0), ("during", 4.0, 9.0)):
+            inside = (time >= start) & (time < stop)
+            share = tracked[inside].mean()
+            assert found[f"gaze_valid_{part}"] == pytest.approx(share, abs=0.01)
+            looked = 0.01 * (np.array(areas)[inside] == "a").sum()
+            if share == 0.0:
+                assert math.isnan(found[f"dwell_{part}_a"])
+                assert math.isnan(found[f"dwell_{part}_b"])
+            elif share > 0.01:
+                assert found[f"dwell_{part}_a"] == pytest.approx(looked, abs=0.02)
+                assert found[f"dwell_{part}_b"] == 0.0
+    nothing = gaze_measures(Looks(time, [""] * 1000, time > 4.0, ["a"]), 0.0, 4.0, 9.0)
+    assert math.isnan(nothing["dwell_before_a"])
+    assert nothing["dwell_during_a"] == 0.0
+
+
+def test_an_area_that_only_others_looked_at_has_0_s_and_does_not_raise_their_mean() -> None:
+    rows = [
+        {"gaze_valid_before": 1.0, "gaze_valid_during": 0.9, "dwell_during_a": 1.0},
+        {"gaze_valid_before": 1.0, "gaze_valid_during": 0.0},
+        {"gaze_valid_before": 1.0, "gaze_valid_during": 0.5, "look_lead_a": np.nan},
+        {"gaze_valid_before": np.nan, "gaze_valid_during": np.nan},
+    ]
+    found = with_unseen_areas(pd.DataFrame(rows))
+    np.testing.assert_array_equal(found["dwell_during_a"], [1.0, np.nan, 0.0, np.nan])
+    assert found["dwell_during_a"].mean() == 0.5
+    assert found["look_lead_a"].isna().all()
+    assert with_unseen_areas(pd.DataFrame({"dwell_during_a": [np.nan]})).isna().all(axis=None)
 
 
 def turns_one_by_one(axis: list[float], hysteresis: float) -> int:

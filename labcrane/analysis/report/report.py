@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from labcrane.analysis.cohort import Cohort, Participant, Status
-from labcrane.analysis.gaze import fixations_of
+from labcrane.analysis.gaze import fixations_of, with_unseen_areas
 from labcrane.analysis.measures import DEFAULTS, MeasureSettings, measures_of
 from labcrane.analysis.parallel import work
 from labcrane.analysis.quality import (
@@ -96,7 +96,7 @@ def write_report(
             progress(len(found), len(cohort.included))
     in_order = [found[participant.name] for participant in cohort.included]
     movements, loops, syncs, answers, scores, thresholds, drifts = zip(*in_order, strict=True)
-    everything = pd.concat(movements, ignore_index=True)
+    everything = with_unseen_areas(pd.concat(movements, ignore_index=True))
     page = Page(_title(cohort.included), folder / "report.html", folder)
     _stamp(page, [participant.status for participant in cohort.included])
     page.links({p.name: f"participants/{p.name}.html" for p in cohort.included})
