@@ -7,7 +7,7 @@ from .electrodes.sampled import Sampled, sampled
 from .exporter import Exporter
 from .gaze import fixations_of, with_unseen_areas
 from .measures import measures_of
-from .movements import Movement, movements_of
+from .movements import Movement, events_of, movements_of
 from .questionnaires import answers_of, asked_in, beside_trials, scores_of
 from .tables.annotations import annotations_of
 from .tables.dataset import Dataset, open_dataset
@@ -27,6 +27,7 @@ __all__ = [
     "codebook_of",
     "eeg_streams",
     "events_at",
+    "events_of",
     "find_cohort",
     "fixations_of",
     "measures_of",

@@ -193,6 +193,29 @@ def by_todays_rule(movement: Movement, session: SessionRecord) -> Movement:
     return replace(movement, row={**row, **anew}, anew=True)
 
 
+def events_of(session: SessionRecord) -> "pd.DataFrame":
+    """Return a session's events, with the onsets of its counted movements by today's rule.
+
+    Of a recording by a former rule, ``movement.onset`` is at the former onset; here it is at
+    :func:`by_todays_rule`'s, and its data say so: ``measured_anew``. Other recordings' events are
+    as recorded.
+    """
+    events, trials = session.events, session.trials
+    if "error_along" not in trials or "onset_speed" in trials:
+        return events
+    onsets = (events["name"] == "movement.onset").to_numpy()
+    time, data = events["time"].to_numpy(np.float64).copy(), list(events["data"])
+    for movement in movements_of(session):
+        began = movement.result("movement_onset")
+        if not movement.anew or np.isnan(began):
+            continue
+        within = (time >= movement.due[0] - ROUNDING_S) & (time <= movement.due[-1] + ROUNDING_S)
+        for at in np.flatnonzero(onsets & within):
+            time[at] = movement.due[np.searchsorted(movement.elapsed, began - ROUNDING_S)]
+            data[at] = {**data[at], "measured_anew": True}
+    return events.assign(time=time, data=data)
+
+
 def _judged_by(session: SessionRecord) -> tuple[float, float]:
     """Return by which speed and for how long it judged an onset, in m/s and s.
 

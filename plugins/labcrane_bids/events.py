@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from labcrane.analysis import movements_of
+from labcrane.analysis import events_of, movements_of
 from labcrane.recording import SessionRecord, hed_sidecar, labelled, name_of
 from labcrane_bids.files import first_tick
 
@@ -32,7 +32,7 @@ def event_table(session: SessionRecord) -> "pd.DataFrame":
     import pandas as pd
 
     zero = first_tick(session)
-    events = session.events.sort_values("time", kind="stable")
+    events = events_of(session).sort_values("time", kind="stable")
     rows_of = (movement.row for movement in movements_of(session))
     ended = {(row["trial"], row["attempt"]): row for row in rows_of}
     rows = []

@@ -16,6 +16,7 @@ from labcrane.analysis import (
     answers_of,
     beside_trials,
     codebook_of,
+    events_of,
     measures_of,
     scores_of,
 )
@@ -76,7 +77,7 @@ class Matlab(Exporter):
         )
 
     def _session(self, number: int, session: SessionRecord) -> Element:
-        events = session.events.copy()
+        events = events_of(session).copy()
         events["data"] = [
             "{}" if name == "session.start" else json.dumps(data, ensure_ascii=False)
             for name, data in zip(events["name"], events["data"], strict=True)

@@ -16,6 +16,7 @@ from labcrane.analysis import (
     answers_of,
     beside_trials,
     codebook_of,
+    events_of,
     fixations_of,
     measures_of,
     scores_of,
@@ -191,13 +192,14 @@ def _person(participant: Participant) -> dict[str, object]:
 
 
 def _events(participant: Participant, number: int, session: SessionRecord) -> "pd.DataFrame":
-    events = session.events[["time", "tick", "part", "trial", "name", "data"]].copy()
+    told = events_of(session)
+    events = told[["time", "tick", "part", "trial", "name", "data"]].copy()
     # The first event holds the whole context; it stays in the participant file.
     events["data"] = [
         "{}" if name == "session.start" else json.dumps(data, ensure_ascii=False)
         for name, data in zip(events["name"], events["data"], strict=True)
     ]
-    said = zip(session.events["name"], session.events["data"], strict=True)
+    said = zip(told["name"], told["data"], strict=True)
     events.insert(list(events).index("name") + 1, "label", labelled(said))
     events.insert(0, "participant", participant.name)
     events.insert(1, "session", number)

@@ -20,6 +20,7 @@ import pyxdf
 
 import labcrane
 from labcrane.analysis.measures import measure_session
+from labcrane.analysis.movements import events_of
 from labcrane.analysis.tables.definitions import MEASURES
 
 BEFORE = Path(__file__).parent / "before"
@@ -201,6 +202,26 @@ def test_a_recording_of_before_is_measured_by_the_rule_of_today(before: Path, no
     for name in MEASURES.keys() - {"measured_anew"}:
         np.testing.assert_allclose(was[name], found[name], rtol=1e-12, err_msg=name)
     assert not np.allclose(old.trials["reaction_time"], today["reaction_time"])
+
+
+def test_onsets_of_before_are_told_where_they_are_by_the_rule_of_today(
+    before: Path, now: Path
+) -> None:
+    old, new = (labcrane.open_recording(each / f"{NAME}.h5").session(1) for each in (before, now))
+    of_old, of_new = events_of(old), events_of(new)
+    assert of_new is new.events
+    counted = old.trials["trial"].to_list()
+    found, expected = (
+        events[(events["name"] == ONSET) & events["trial"].isin(counted)]["time"].to_numpy()
+        for events in (of_old, of_new)
+    )
+    assert len(found) == len(counted)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+    anew = [data.get("measured_anew", False) for data in of_old["data"]]
+    moved = of_old["time"].to_numpy() != old.events["time"].to_numpy()
+    assert moved.any()
+    assert sum(anew) == len(counted)
+    assert not (moved & ~np.array(anew)).any()
 
 
 def test_every_dataset_of_before_reads_as_it_stands(before: Path) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from labcrane.analysis.electrodes.sampled import Sampled, sampled
+from labcrane.analysis.movements import events_of
 from labcrane.errors import PluginError, RecordingError, nearest
 from labcrane.files.units import in_unit
 from labcrane.recording.labels import labelled
@@ -106,7 +107,7 @@ def events_at(session: SessionRecord, signal: Sampled) -> tuple[Any, list[str]]:
 
     Those outside of the recording are left out.
     """
-    events = session.events.sort_values("time", kind="stable")
+    events = events_of(session).sort_values("time", kind="stable")
     told = zip(events["name"].astype(str), events["data"], strict=True)
     positions = signal.at(events["time"].to_numpy(np.float64))
     inside = np.isfinite(positions)
