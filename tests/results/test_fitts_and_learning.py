@@ -10,7 +10,13 @@ from scipy.optimize import curve_fit
 
 from labcrane.analysis.cohort import find_cohort
 from labcrane.analysis.measures import measures_of
-from labcrane.analysis.statistics.fitts import WIDTH_FACTOR, difficulty, regress, throughput
+from labcrane.analysis.statistics.fitts import (
+    WIDTH_FACTOR,
+    difficulty,
+    mean_line,
+    regress,
+    throughput,
+)
 from labcrane.analysis.statistics.learning import CURVES, fit_curve, learning_curves
 from results.recorded import STUDY, record, study
 
@@ -66,6 +72,29 @@ def test_throughput_is_the_mean_of_means_with_the_true_spread() -> None:
     expected = np.mean([math.log2(d / wide + 1.0) / 5.0 for d in (2.0, 4.0)])
     assert table["throughput"].to_numpy() == pytest.approx(expected, rel=0.01)
     assert set(table["pooled"]) == {"no"}
+
+
+def test_throughput_is_of_mean_times_so_that_their_scatter_does_not_raise_it() -> None:
+    table = movements(4000, spread=0.1)
+    even = throughput(table)["throughput"].to_numpy()
+    scatter = np.random.default_rng(3).lognormal(0.0, 0.3, len(table))
+    means = pd.Series(scatter).groupby([table["participant"], table["distance"]]).transform("mean")
+    uneven = table.assign(movement_time=5.0 * scatter / means.to_numpy())
+    assert throughput(uneven)["throughput"].to_numpy() == pytest.approx(even, rel=1e-9)
+
+
+def test_the_interval_of_the_mean_line_holds_peoples_true_mean_as_often_as_it_says() -> None:
+    rng, held, runs = np.random.default_rng(4), 0, 200
+    bits = np.repeat(np.log2(np.array([2.0, 3.0, 4.0, 6.0]) / 0.5 + 1.0), 8)
+    for _ in range(runs):
+        people = rng.normal((1.0, 2.5), (1.0, 0.6), (12, 2))
+        lines = [regress(bits, a + b * bits + rng.normal(0.0, 0.5, 32)) for a, b in people]
+        whole = mean_line([line for line in lines if line is not None])
+        assert whole is not None
+        assert whole.n == 12
+        held += whole.slope_ci[0] <= 2.5 <= whole.slope_ci[1]
+    assert 0.95 - 3.0 * math.sqrt(0.05 * 0.95 / runs) < held / runs < 0.99
+    assert mean_line([]) is None
 
 
 @pytest.mark.parametrize(("n", "pooled"), [(14, "participant"), (15, "no"), (4, "study")])

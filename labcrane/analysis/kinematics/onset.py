@@ -17,8 +17,7 @@ def onset(
     The first tick, from the front, of the first stretch in which the tip is faster than
     ``threshold`` for at least ``hold_s``, however fast it becomes later: strokes before a halt are
     part of the movement. The threshold is absolute, above what the sensors tell of a tip at rest: a
-    share of the peak speed (Wierzbicka & Wiegner 1992) would make the onset of slow and of fast
-    movements two things.
+    share of the peak speed would make the onset of slow and of fast movements two things.
 
     What is fast from the first tick on is how the movement before runs out, and no onset, unless it
     comes nearer to the target by ``nearer``.

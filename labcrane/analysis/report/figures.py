@@ -8,7 +8,7 @@ import numpy as np
 
 from labcrane.analysis.report.panels import FAINT, GREY, Panel, Series, figure_of, lighter
 from labcrane.analysis.report.style import COLOURS, HIGH, new_figure, styled
-from labcrane.analysis.statistics.fitts import regress
+from labcrane.analysis.statistics.fitts import Regression, mean_line, regress
 from labcrane.analysis.statistics.learning import CURVES
 from labcrane.types import FloatArray
 
@@ -167,21 +167,26 @@ def by_distance(movements: "pd.DataFrame") -> Drawing:
 
 
 def fitts(movements: "pd.DataFrame") -> Drawing:
-    """Draw movement time over difficulty, with the regression over participants' means."""
+    """Draw movement time over difficulty, with the mean of the participants' regressions."""
     import pandas as pd
 
     cells = movements.groupby(["participant", "difficulty"])["movement_time"].mean().reset_index()
     x, y = _numbers(cells["difficulty"]), _numbers(cells["movement_time"])
     series, law = [Series(x, y, GREY, "dots")], ""
-    rows = []
-    for participant, own in movements.groupby("participant"):
-        rows.append(_line(str(participant), own["difficulty"], own["movement_time"]))
-    whole = regress(x, y)
-    rows.append(_line("all (participants' means)", cells["difficulty"], cells["movement_time"]))
+    lines = {
+        str(participant): regress(_numbers(own["difficulty"]), _numbers(own["movement_time"]))
+        for participant, own in movements.groupby("participant")
+    }
+    whole = mean_line([line for line in lines.values() if line is not None])
+    rows = [_line(*each) for each in [*lines.items(), ("mean of participants' lines", whole)]]
     if whole is not None:
         ends = np.array([x.min(), x.max()])
         series.append(Series(ends, whole.intercept + whole.slope * ends, COLOURS[0], "line"))
-        law = f" Line: {whole.intercept:.2f} s + {whole.slope:.2f} s/bit, R² = {whole.r2:.2f}."
+        low, high = whole.slope_ci
+        law = (
+            f" Line: the mean of {whole.n} participants' lines, {whole.intercept:.2f} s + "
+            f"{whole.slope:.2f} s/bit (95 % interval over people {low:.2f} to {high:.2f})."
+        )
     panel = Panel("index of difficulty (bit)", WORDS["movement_time"], series)
     caption = (
         f"Fitts' law: movement time over the index of difficulty. Dots: each participant's mean at "
@@ -194,8 +199,7 @@ def _numbers(column: "pd.Series[Any] | pd.Index[Any]") -> FloatArray:
     return np.asarray(column, np.float64)
 
 
-def _line(who: str, x: "pd.Series[float]", y: "pd.Series[float]") -> dict[str, object]:
-    fit = regress(_numbers(x), _numbers(y))
+def _line(who: str, fit: Regression | None) -> dict[str, object]:
     if fit is None:
         return {"participant": who}
     return {

@@ -16,7 +16,7 @@ def errors(results: "pd.DataFrame") -> "pd.DataFrame":
 
     ``constant_error_m`` is the mean signed error along the task axis, and ``absolute_error_m`` the
     mean of its size. ``variable_error_m`` is how far movements of one condition are spread about
-    their mean along the axis (Schmidt & Lee 2011, Motor Control and Learning, chapter 2): the root
+    their mean along the axis (Schmidt & Lee 2011, Motor Control and Learning): the root
     of the conditions' variances, averaged by their degrees of freedom; NaN where no condition has
     two movements. ``radial_error_m`` is the mean distance from the target's centre, in any
     direction, which is the measure ``absolute_error``.

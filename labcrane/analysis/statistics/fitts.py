@@ -4,6 +4,7 @@ After Soukoreff & MacKenzie 2004 (Int J Human-Computer Studies 61:751-789).
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -36,7 +37,7 @@ def effective_width(spread: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Regression:
-    """Movement time = intercept + slope · difficulty, by least squares.
+    """Movement time = intercept + slope · difficulty, by least squares, or the mean of such lines.
 
     Attributes
     ----------
@@ -45,9 +46,9 @@ class Regression:
     intercept_ci, slope_ci
         95 % confidence intervals.
     r2
-        Share of variance explained.
+        Share of variance explained; NaN of a mean of lines.
     n
-        Number of points.
+        Number of points, or of lines.
     """
 
     intercept: float
@@ -79,16 +80,40 @@ def regress(difficulty_bit: FloatArray, movement_time: FloatArray) -> Regression
     )
 
 
+def mean_line(lines: Sequence[Regression]) -> Regression | None:
+    """Return the mean of participants' lines, with intervals over people; None of fewer than two.
+
+    People differ, and each has several points: points of all together are no independent ones.
+    """
+    from scipy.stats import t
+
+    if len(lines) < 2:  # noqa: PLR2004 - one line has no spread
+        return None
+    both = np.array([(line.intercept, line.slope) for line in lines])
+    means = both.mean(axis=0)
+    reach = float(t.ppf(0.975, len(lines) - 1)) * both.std(axis=0, ddof=1) / math.sqrt(len(lines))
+    return Regression(
+        intercept=float(means[0]),
+        slope=float(means[1]),
+        intercept_ci=_around(means[0], reach[0]),
+        slope_ci=_around(means[1], reach[1]),
+        r2=math.nan,
+        n=len(lines),
+    )
+
+
 def _around(value: float, reach: float) -> tuple[float, float]:
     return float(value - reach), float(value + reach)
 
 
 def throughput(movements: "pd.DataFrame") -> "pd.DataFrame":
-    """Return each participant's throughput: the mean over conditions of mean IDe / MT.
+    """Return each participant's throughput: the mean over conditions of IDe over mean MT.
 
-    A condition is a distance. Its effective width comes of the spread of its ends along the task
-    axis. With fewer than :data:`POOL_BELOW` ends in a condition, the participant's conditions share
-    one spread, each about its own mean; with fewer than that in all, all participants do.
+    Of means, as ISO 9241-411 has it: a mean of single movements' ratios is higher, the more so the
+    more their times vary. A condition is a distance. Its effective width comes of the spread of its
+    ends along the task axis. With fewer than :data:`POOL_BELOW` ends in a condition, the
+    participant's conditions share one spread, each about its own mean; with fewer than that in all,
+    all participants do.
     ``pooled`` says which. Where a task only ends inside the target, ends are cut off at its edge
     and throughput is flattered; ``bounded`` counts those ends.
 
@@ -111,7 +136,7 @@ def throughput(movements: "pd.DataFrame") -> "pd.DataFrame":
         for group in groups:
             spread = float(group["error_along"].std(ddof=1)) if pooled == "no" else shared
             effective = difficulty(float(group["amplitude"].mean()), effective_width(spread))
-            bits.append(float((effective / group["movement_time"]).mean()))
+            bits.append(effective / float(group["movement_time"].mean()))
         rows.append(
             {
                 "participant": participant,
