@@ -49,8 +49,8 @@ def known(curves: np.ndarray, phase: int) -> dict[str, np.ndarray]:
         return own
     return own | {
         "change": mine.mean(axis=1) - before.mean(axis=1),
-        "warm-up decrement": mine[:, 0] - before[:, -1],
-        "retention": mine[:, -1] - before[:, -1],
+        "difference score": mine[:, 0] - before[:, -1],
+        "net gain": mine[:, -1] - before[:, -1],
     }
 
 
@@ -199,13 +199,13 @@ def test_what_goes_by_a_position_or_phase_that_somebody_lacks_is_not_made_of_its
     }
     everything = own["P000"]
     assert len(everything) == 2 + 5 + 5
-    assert everything - own["P001"] == {("2", "gain"), ("2", "warm-up decrement")}
+    assert everything - own["P001"] == {("2", "gain"), ("2", "difference score")}
     assert everything - own["P002"] == {
         ("1", "gain"),
-        ("2", "warm-up decrement"),
-        ("2", "retention"),
+        ("2", "difference score"),
+        ("2", "net gain"),
     }
     # Neither is the third session compared with the first.
     away = {(at, name) for at, name in everything if at == "2"}
-    away |= {("3", name) for name in ("change", "warm-up decrement", "retention")}
+    away |= {("3", name) for name in ("change", "difference score", "net gain")}
     assert everything - own["P003"] == away

@@ -279,11 +279,11 @@ def test_learning_has_two_time_scales(report: Path, movements: pd.DataFrame) -> 
         "slope",
         "gain",
         "change",
-        "warm-up decrement",
-        "retention",
+        "difference score",
+        "net gain",
     }
-    decrement, gain = found[("2 retention", "warm-up decrement")], found[("2 retention", "gain")]
-    kept = found[("2 retention", "retention")]
+    decrement, gain = found[("2 retention", "difference score")], found[("2 retention", "gain")]
+    kept = found[("2 retention", "net gain")]
     if decrement.n == gain.n == kept.n:
         assert decrement.mean + gain.mean == pytest.approx(kept.mean, rel=1e-9)
 

@@ -182,6 +182,29 @@ def test_an_asymptote_that_data_do_not_show_is_not_identified() -> None:
     assert fit_curve("power", n[:3], n[:3]) is None
 
 
+@pytest.mark.parametrize("curve", ["exponential", "power"])
+def test_neither_flat_nor_linear_series_have_an_asymptote_and_no_time_is_negative(
+    curve: str,
+) -> None:
+    rng, n = np.random.default_rng(38), np.arange(1.0, 9.0)
+    flat = [fit_curve(curve, n, 5.0 + rng.normal(0.0, 0.5, 8)) for _ in range(100)]
+    linear = [fit_curve(curve, n, 9.0 - 0.6 * n + rng.normal(0.0, 0.3, 8)) for _ in range(100)]
+    fits = [fit for fit in [*flat, *linear] if fit is not None]
+    assert len(fits) == 200
+    assert sum(fit.identified for fit in fits[:100]) <= 5
+    assert sum(fit.identified for fit in fits[100:]) <= 5
+    assert min(fit.asymptote for fit in fits) >= 0.0
+
+
+def test_a_curve_that_levels_off_is_identified_though_there_is_noise() -> None:
+    rng, n = np.random.default_rng(39), np.arange(1.0, 9.0)
+    fits = [
+        fit_curve("exponential", n, 5.0 + 6.0 * np.exp(-0.8 * (n - 1)) + rng.normal(0.0, 0.2, 8))
+        for _ in range(50)
+    ]
+    assert sum(fit is not None and fit.identified for fit in fits) >= 48
+
+
 OPERATOR = (
     "operator: {use: simulated_operator, fitts_a_s: 3.0, fitts_b_s: 3.0, reaction_sd: 0, "
     "endpoint_noise: 0, motor_noise: 0, learning_gain: %s, learning_rate: 0.15}"

@@ -117,10 +117,10 @@ def test_learning_goes_from_the_last_block_of_a_session_to_the_first_of_the_next
     own = scales[scales["group"] == "all"]
     found = own.groupby("quantity")["phase"].agg(list)
     assert found["change"] == list(factors.phases[1:])
-    assert found["warm-up decrement"] == found["retention"] == ["3 retention, guided"]
+    assert found["difference score"] == found["net gain"] == ["3 retention, guided"]
     before = done.assign(pair="one")  # nothing is taken away
     scales, _ = outcomes.time_scale_tables(before, factors)
-    row = scales[(scales["quantity"] == "warm-up decrement") & (scales["group"] == "all")]
+    row = scales[(scales["quantity"] == "difference score") & (scales["group"] == "all")]
     cells = done.groupby(["participant", "phase", "place"])["movement_time"].mean().unstack([1, 2])
     last = cells["2 acquisition, free"][float(PLACES)]
     change = cells["3 retention, guided"][1.0] - last

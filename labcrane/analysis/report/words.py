@@ -261,8 +261,8 @@ def _scale(row: Mapping[str, Any], style: Style, people: int) -> str:
     spoken = {
         "slope": "Change with each position of",
         "change": "Mean change to",
-        "warm-up decrement": "Warm-up decrement at the start of",
-        "retention": "Difference of the last positions, to",
+        "difference score": "Difference score from the last position to the first of",
+        "net gain": "Net gain from last position to last position, to",
     }
     if row["group"] != "all" or row["quantity"] not in spoken:
         return ""

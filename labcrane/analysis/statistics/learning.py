@@ -44,6 +44,12 @@ RUNS: dict[str, Callable[[FloatArray], FloatArray]] = {
 }
 """What a curve's gain falls along: both are asymptote + gain · exp(-rate · run)."""
 
+CLEARLY = 2.0
+"""Difference of AICc from which on one model is held to be better than another."""
+
+EDGE = 1e-3
+"""Share of the values' spread within which an asymptote is at its bound."""
+
 RATES = np.geomspace(*RATE_BOUNDS, 60)
 """Rates at which a search looks first."""
 
@@ -66,8 +72,9 @@ class LearningCurve:
         Akaike's criterion corrected for few points; the lower one fits better. NaN with fewer
         than six points, for which the correction does not exist.
     identified
-        Whether the asymptote can be told from the data: its standard error is less than the
-        spread of the points, and the rate is not at its bounds.
+        Whether the data show an asymptote: the curve's AICc is lower by :data:`CLEARLY` than that
+        of their mean and of a straight line, the asymptote's standard error is less than the spread
+        of the points, and no parameter is at its bounds.
     n
         Number of points.
     """
@@ -91,7 +98,8 @@ class LearningCurve:
 def fit_curve(curve: str, n: FloatArray, values: FloatArray) -> LearningCurve | None:
     """Fit one curve by least squares with bounds; None with fewer points than parameters + 1.
 
-    Gains may be negative: who gets worse is fitted as well. The search starts at the best of many
+    Gains may be negative: who gets worse is fitted as well. Values that are all positive, as times
+    are, have an asymptote of 0 or more. The search starts at the best of many
     rates, as at each the other two follow from a straight line.
     """
     from scipy.optimize import least_squares
@@ -101,7 +109,8 @@ def fit_curve(curve: str, n: FloatArray, values: FloatArray) -> LearningCurve | 
     if len(x) <= PARAMETERS:
         return None
     run, spread = RUNS[curve](x), float(np.ptp(y)) or 1.0
-    lower = [float(y.min()) - 2 * spread, -4 * spread, RATE_BOUNDS[0]]
+    least = float(y.min()) - 2 * spread
+    lower = [max(least, 0.0) if y.min() > 0.0 else least, -4 * spread, RATE_BOUNDS[0]]
     upper = [float(y.max()) + 2 * spread, 4 * spread, RATE_BOUNDS[1]]
 
     def misses(p: FloatArray) -> FloatArray:
@@ -122,14 +131,17 @@ def fit_curve(curve: str, n: FloatArray, values: FloatArray) -> LearningCurve | 
     errors = _errors(best.jac, 2.0 * float(best.cost), len(x))
     asymptote, gain, rate = map(float, best.x)
     inside = RATE_BOUNDS[0] * 1.01 < rate < RATE_BOUNDS[1] * 0.99
+    inside = inside and asymptote - lower[0] > EDGE * spread
+    aicc = _aicc(2.0 * float(best.cost), len(x), PARAMETERS)
+    plain = min(_aicc(squares, len(x), k) for k, squares in enumerate(_plain(x, y), start=1))
     return LearningCurve(
         curve,
         asymptote,
         gain,
         rate,
         *errors,
-        aicc=_aicc(2.0 * float(best.cost), len(x)),
-        identified=inside and errors[0] < float(y.std(ddof=1)),
+        aicc=aicc,
+        identified=inside and errors[0] < float(y.std(ddof=1)) and aicc < plain - CLEARLY,
         n=len(x),
     )
 
@@ -156,8 +168,14 @@ def _errors(jacobian: FloatArray, squares: float, n: int) -> tuple[float, float,
     return float(asymptote), float(gain), float(rate)
 
 
-def _aicc(squares: float, n: int) -> float:
-    k = PARAMETERS + 1  # and the variance
+def _plain(x: FloatArray, y: FloatArray) -> tuple[float, float]:
+    """Return the sums of squares about the mean and about a straight line."""
+    line = np.polynomial.Polynomial.fit(x, y, 1)
+    return float(((y - y.mean()) ** 2).sum()), float(((y - line(x)) ** 2).sum())
+
+
+def _aicc(squares: float, n: int, parameters: int) -> float:
+    k = parameters + 1  # and the variance
     if n - k - 1 <= 0:
         return math.nan
     likelihood = n * math.log(max(squares, np.finfo(float).tiny) / n)

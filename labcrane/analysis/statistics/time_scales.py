@@ -1,4 +1,9 @@
-"""Two time scales of learning: within sessions or blocks, and from one to the next."""
+"""Change within sessions or blocks, and from one to the next.
+
+Named as motor learning names them: the difference score is what a retention interval costs, from
+the end of practice to the first position after it (Schmidt & Lee 2011). It is a warm-up decrement
+only as far as it is made good at once, which no single position can tell.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,8 +24,8 @@ QUANTITIES = {
     "slope": "change per position within it, least squares",
     "gain": "its last position minus its first",
     "change": "its mean minus that of the one before",
-    "warm-up decrement": "its first position minus the last of the session before",
-    "retention": "its last position minus the last of the session before",
+    "difference score": "its first position minus the last of the session before",
+    "net gain": "its last position minus the last of the session before",
 }
 """What is worked out of each participant's session or block."""
 
@@ -127,8 +132,8 @@ def quantities(movements: "pd.DataFrame", measure: str) -> "pd.DataFrame":
     ----------
     movements
         With the columns ``phase`` (a session or block, in order) and ``place`` (position in it),
-        and ``session`` where a session has several phases: only its first has a warm-up decrement
-        and retention, against the last phase of the session before. Without it each phase is one.
+        and ``session`` where a session has several phases: only its first has a difference score
+        and a net gain, against the last phase of the session before. Without it each phase is one.
     """
     import pandas as pd
 
@@ -161,8 +166,8 @@ def quantities(movements: "pd.DataFrame", measure: str) -> "pd.DataFrame":
             if before is not None:
                 found["change"] = mean - before
             if session_before not in {None, sessions[phase]}:
-                found["warm-up decrement"] = first - last_before
-                found["retention"] = last - last_before
+                found["difference score"] = first - last_before
+                found["net gain"] = last - last_before
             about = {"participant": participant, "group": of_group[participant], "phase": phase}
             for name, seen in found.items():
                 if np.isfinite(seen[0]):
