@@ -71,8 +71,8 @@ class Indicator:
 
     @property
     def raw(self) -> float:
-        """The indicator in points."""
-        return float(self.completed) * sum(self.points.values())
+        """The indicator in points: 0 for a test that was not completed, whatever is missing."""
+        return sum(self.points.values()) if self.completed else 0.0
 
     @property
     def percent(self) -> float:

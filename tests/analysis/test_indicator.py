@@ -86,6 +86,12 @@ def test_a_missing_rating_is_not_made_up() -> None:
     assert found.objective == 100.0
 
 
+def test_a_test_that_was_not_completed_has_no_points_though_a_rating_is_missing() -> None:
+    found = points(1.0, ratings=(math.nan, 1.0), k=False)
+    assert (found.raw, found.percent) == (0.0, 0.0)
+    assert math.isnan(found.subjective)
+
+
 @pytest.mark.parametrize(
     ("weights", "message"),
     [
