@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 KIND, CHANNEL = "Gaze", "aoi"
 AREAS = ".areas"
 SIDES = ("left", "top", "right", "bottom")
+ROUNDING_S = 1e-9
+"""Samples that hold for as long as a look lasts make one."""
+
 PIXELS = frozenset({"px", "pixel", "pixels"})
 
 
@@ -72,17 +75,30 @@ class Looks:
     def _held(self, start: float, stop: float) -> FloatArray:
         """Return for how long each sample holds between two times, in s, shape ``(n,)``."""
         steps = np.diff(self.time, append=np.nan)
-        usual = float(np.nanmedian(steps)) if len(steps) > 1 else 0.0
+        usual = self._usual
         until = self.time + np.where(np.isnan(steps), usual, np.minimum(steps, 2.0 * usual))
         held: FloatArray = np.minimum(until, stop) - np.maximum(self.time, start)
         return np.clip(held, 0.0, None)
 
-    def first(self, area: str, start: float, stop: float) -> float:
-        """Return when ``area`` was first looked at from ``start`` to ``stop``; NaN for never."""
-        during = (self.time >= start) & (self.time < stop)
-        on = np.array([name == area for name in self.area])
-        found = np.flatnonzero(during & on)
-        return float(self.time[found[0]]) if found.size else float("nan")
+    def first(self, area: str, start: float, stop: float, least_s: float = 0.0) -> float:
+        """Return when ``area`` was first looked at from ``start`` to ``stop``; NaN for never.
+
+        A look lasts for ``least_s`` without a sample elsewhere, lost or missing.
+        """
+        held = self._held(start, stop)
+        on = np.array([name == area for name in self.area], bool) & (held > 0.0)
+        going_on = np.concatenate([[False], on[:-1] & (np.diff(self.time) <= 2.0 * self._usual)])
+        begins = np.flatnonzero(on & ~going_on)
+        if not begins.size:
+            return math.nan
+        lasts = np.add.reduceat(np.where(on, held, 0.0), begins)
+        long = begins[lasts >= least_s - ROUNDING_S]
+        return max(float(self.time[long[0]]), start) if long.size else math.nan
+
+    @property
+    def _usual(self) -> float:
+        """The usual step from sample to sample, in s."""
+        return float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
 
 
 def looks(session: SessionRecord, delay_s: float = 0.0) -> Looks | None:
@@ -446,7 +462,9 @@ def _is_lost(value: object) -> bool:
     return not isinstance(value, str) and math.isnan(float(str(value)))
 
 
-def gaze_measures(seen: Looks, started: float, onset: float, offset: float) -> dict[str, float]:
+def gaze_measures(
+    seen: Looks, started: float, onset: float, offset: float, look_least_s: float = 0.066
+) -> dict[str, float]:
     """Return how much of gaze is known, and dwell and first look for each area.
 
     ``gaze_valid_before`` and ``gaze_valid_during`` are the shares of the time from the trial's
@@ -459,6 +477,8 @@ def gaze_measures(seen: Looks, started: float, onset: float, offset: float) -> d
     ----------
     started, onset, offset
         Of trial and movement, on our clock, in seconds.
+    look_least_s
+        How long a first look lasts at least, in seconds: less is no fixation.
     """
     found = {
         "gaze_valid_before": seen.valid(started, onset),
@@ -467,7 +487,7 @@ def gaze_measures(seen: Looks, started: float, onset: float, offset: float) -> d
     for area in seen.areas:
         found[f"dwell_before_{area}"] = seen.dwell(area, started, onset)
         found[f"dwell_during_{area}"] = seen.dwell(area, onset, offset)
-        found[f"look_lead_{area}"] = onset - seen.first(area, started, onset)
+        found[f"look_lead_{area}"] = onset - seen.first(area, started, onset, look_least_s)
     return found
 
 

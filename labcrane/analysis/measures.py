@@ -57,6 +57,10 @@ class MeasureSettings:
         Of :func:`~labcrane.analysis.kinematics.smoothness.sub_movements`.
     limit_tolerance_deg
         Distance in degrees at which a joint is at its limit.
+    lag_most_s
+        Largest lag of one hand behind the other, in seconds.
+    look_least_s
+        How long a first look lasts at least, in seconds.
     display_delay_s
         From handing a picture to the screen to its light, in seconds, as ``labcrane doctor
         --display`` measures it: which picture was looked at.
@@ -70,6 +74,8 @@ class MeasureSettings:
     low_pass_hz: float = 6.0
     prominence: float = 0.05
     limit_tolerance_deg: float = 0.1
+    lag_most_s: float = 0.5
+    look_least_s: float = 0.066
     display_delay_s: float = 0.0
 
     def as_dict(self) -> dict[str, object]:
@@ -160,7 +166,9 @@ def measure_session(
         span = movement.span
         if seen is not None and span is not None:
             due = movement.due
-            row |= gaze_measures(seen, due[0], due[span.start], due[span.stop - 1])
+            row |= gaze_measures(
+                seen, due[0], due[span.start], due[span.stop - 1], settings.look_least_s
+            )
         rows.append(row)
     measured = pd.DataFrame(rows, index=trials.index)
     if measured["measured_anew"].any():
@@ -280,7 +288,7 @@ def _sticks(movement: Movement, span: slice, settings: MeasureSettings) -> dict[
     }
     hands = [_deflection(axes, stick) for stick in sorted({n.rpartition(".")[0] for n in axes})]
     if len(hands) == 2:  # noqa: PLR2004 - a pair of hands
-        peak, lag = coordination(hands[0], hands[1], movement.rate_hz)
+        peak, lag = coordination(hands[0], hands[1], movement.rate_hz, settings.lag_most_s)
         found |= {"coordination": peak, "coordination_lag": lag}
     return found
 

@@ -89,8 +89,13 @@ def reversals(axis: FloatArray, hysteresis: float) -> int:
             return 0
 
 
-def coordination(left: FloatArray, right: FloatArray, rate_hz: float) -> tuple[float, float]:
+def coordination(
+    left: FloatArray, right: FloatArray, rate_hz: float, most_s: float = 0.5
+) -> tuple[float, float]:
     """Return the peak of the cross-correlation of two hands' deflections, and its lag in seconds.
+
+    Lags are searched to ``most_s`` either way: the best of all lags of a movement is high for hands
+    that have nothing to do with each other.
 
     Parameters
     ----------
@@ -109,9 +114,11 @@ def coordination(left: FloatArray, right: FloatArray, rate_hz: float) -> tuple[f
     power = float(np.sqrt((a @ a) * (b @ b)))
     if power == 0.0:
         return float("nan"), float("nan")
-    values = correlate(b, a) / power
+    lags = np.arange(1 - len(a), len(a))
+    near = np.abs(lags) <= most_s * rate_hz
+    values, lags = correlate(b, a)[near] / power, lags[near]
     peak = int(np.argmax(values))
-    return float(values[peak]), (peak - (len(a) - 1)) / rate_hz
+    return float(values[peak]), float(lags[peak]) / rate_hz
 
 
 def effort(command: FloatArray, speeds: FloatArray) -> float:

@@ -85,6 +85,25 @@ def test_looks_are_counted_to_the_sample() -> None:
     assert found["look_lead_b"] == pytest.approx(0.1)
 
 
+def test_a_sample_alone_is_no_first_look_and_neither_are_two_beside_a_gap() -> None:
+    time = np.arange(0.0, 1.0, 0.02)
+    areas = np.full(50, "", dtype=object)
+    areas[5] = "a"  # a sample alone, of 20 ms
+    areas[10:13] = "a"  # 60 ms
+    areas[20:24] = "a"  # 80 ms
+    seen = Looks(time, areas.tolist(), np.ones(50, bool), ["a"])
+    assert seen.first("a", 0.0, 1.0) == pytest.approx(0.1)
+    assert seen.first("a", 0.0, 1.0, 0.06) == pytest.approx(0.2)
+    assert seen.first("a", 0.0, 1.0, 0.066) == pytest.approx(0.4)
+    assert math.isnan(seen.first("a", 0.0, 1.0, 0.1))
+    assert seen.first("a", 0.41, 1.0, 0.05) == pytest.approx(0.41)
+    found = gaze_measures(seen, 0.0, 0.9, 0.98)
+    assert found["look_lead_a"] == pytest.approx(0.9 - 0.4)
+    late = np.where(np.arange(50) >= 22, time + 0.3, time)
+    torn = Looks(late, areas.tolist(), np.ones(50, bool), ["a"])
+    assert math.isnan(torn.first("a", 0.0, 1.3, 0.07))
+
+
 def test_a_gap_in_the_eyes_is_no_look() -> None:
     seen = Looks(np.array([0.0, 0.1, 0.2, 5.0, 5.1]), ["a"] * 5, np.ones(5, bool), ["a"])
     assert seen.dwell("a", 0.0, 10.0) == pytest.approx(0.1 + 0.1 + 0.2 + 0.1 + 0.1)

@@ -120,6 +120,22 @@ def test_the_lag_of_two_hands_is_found() -> None:
     assert all(map(math.isnan, coordination(left, np.ones(len(left)), RATE_HZ)))
 
 
+def test_a_lag_is_searched_only_as_far_as_one_hand_follows_the_other() -> None:
+    left, right = np.exp(-40.0 * (TIME + 0.4) ** 2), np.exp(-40.0 * (TIME - 0.4) ** 2)
+    assert coordination(left, right, RATE_HZ, 1.0)[1] == pytest.approx(0.8)
+    peak, lag = coordination(left, right, RATE_HZ)
+    assert abs(lag) <= 0.5
+    assert peak < 0.3
+    random = np.random.default_rng(5)
+    hands = low_pass(random.normal(size=(2, 40, 600)).reshape(80, 600).T, RATE_HZ, 1.0)
+    found = [
+        [coordination(hands[:, k], hands[:, k + 40], RATE_HZ, most)[0] for k in range(40)]
+        for most in (0.5, 6.0)
+    ]
+    near, anywhere = np.mean(found, axis=1)
+    assert near < 0.8 * anywhere
+
+
 def test_effort_is_the_share_of_full_speed() -> None:
     command = np.tile([0.5, -1.0], (7, 1))
     assert effort(command, np.array([1.0, 2.0])) == pytest.approx(0.5)

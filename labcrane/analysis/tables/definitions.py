@@ -41,7 +41,10 @@ MEASURES: Mapping[str, tuple[str, str]] = {
     "simultaneous": ("1", "fraction of the movement time with two or more axes in use"),
     "axes_used": ("1", "mean number of axes in use"),
     "bimanual": ("1", "of the time with a stick in use, the fraction with more than one"),
-    "coordination": ("1", "largest cross-correlation of both sticks' deflections"),
+    "coordination": (
+        "1",
+        "largest cross-correlation of both sticks' deflections, up to half a second apart",
+    ),
     "coordination_lag": ("s", "its lag, positive when the right stick follows"),
     "effort": ("1", "root mean square of the joint commands, as a fraction of full speed"),
     "limit_hits": ("1", "times a joint came to one of its limits"),
