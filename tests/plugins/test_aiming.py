@@ -446,3 +446,11 @@ def test_a_twitch_is_no_onset() -> None:
     last = Path(limit_s=2.0).play(twitch)[-1]
     assert math.isnan(last.results["movement_onset"])
     assert math.isnan(last.results["circle_to_circle"])
+
+
+def test_a_record_may_have_the_share_of_a_former_rule_and_a_new_protocol_may_not() -> None:
+    written = {"onset_share": 0.05, "onset_speed": 0.03}
+    recorded = AimingSettings.model_validate(written, context={"recorded": True})
+    assert recorded == AimingSettings(onset_speed=0.03)
+    with pytest.raises(ValueError, match="onset_share"):
+        AimingSettings.model_validate(written)
