@@ -184,4 +184,5 @@ def running(table: "pd.DataFrame", factors: Factors) -> "pd.DataFrame":
     for phase in factors.phases:
         before[phase] = so_far
         so_far += factors.places[phase]
-    return table.assign(sequence=table[PLACE] + table[PHASE].map(before))
+    # Without a movement, as of a test that nobody could be in, the map would be of words.
+    return table.assign(sequence=table[PLACE] + table[PHASE].map(before).astype(float))

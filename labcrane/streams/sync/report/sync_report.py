@@ -72,6 +72,8 @@ class SyncReport:
     def as_json(self) -> dict[str, Any]:
         """Return what JSON can hold; what is not known is null."""
         plain = {name: finite(each) for name, each in asdict(self).items()}
+        if not self.absent:  # as in recordings of before
+            del plain["absent"]
         return {"verdict": self.verdict.value, **plain}
 
     def table(self) -> list[tuple[str, ...]]:
