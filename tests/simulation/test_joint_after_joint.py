@@ -22,7 +22,7 @@ from labcrane.machines import reach
 
 labcrane_api = 1
 AXES = ("x", "y", "twist", "slider", "trigger", "connected")
-STICKS = ((0, 1.0), (7, -1.0), (1, 1.0), (6, 1.0))  # of slew, shoulder, elbow and wrist
+STICKS = ((0, -1.0), (7, -1.0), (1, 1.0), (6, -1.0))  # of slew, shoulder, elbow and wrist
 LOOK_S, HALT_S, PRESS_S = 0.35, 0.4, 0.1
 
 
