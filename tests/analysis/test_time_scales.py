@@ -149,7 +149,7 @@ def test_of_one_order_for_all_there_is_only_what_compares_a_pair_with_itself(see
     people = dict.fromkeys(sorted(same["participant"].unique()), "none")
     told = summary(found, "movement_time", people).set_index(["phase", "quantity"])
     first, second = (whole.dropna()[f"{phase} session"] for phase in (1, 2))
-    wanted = {"change": second.mean(axis=1) - first.mean(axis=1), "retention": second[8] - first[8]}
+    wanted = {"change": second.mean(axis=1) - first.mean(axis=1), "net gain": second[8] - first[8]}
     for quantity, values in wanted.items():
         row = told.loc[("2 session", quantity)]
         assert (row["adjustment"], row["why"], row["n"]) == ("", "", len(values))

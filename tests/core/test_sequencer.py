@@ -281,5 +281,5 @@ def test_an_axis_that_the_device_does_not_have_is_refused_before_the_first_tick(
 ) -> None:
     from labcrane import ProtocolError
 
-    with pytest.raises(ProtocolError, match=r"'left\.z'"):
+    with pytest.raises(ProtocolError, match=r"'-left\.z'"):
         a_study(tmp_path, SHORT.replace("left.x", "left.z"))
