@@ -120,7 +120,7 @@ def test_who_is_missing_is_named_with_why_and_in_every_table(
         said,
     )
     scales = "slope of 2 retention, gain of 2 retention, change of 2 retention, "
-    scales += "warm-up decrement of 2 retention, retention of 2 retention"
+    scales += "difference score of 2 retention, net gain of 2 retention"
     assert (
         f"Without {names}, tested over linear trend of sequence in 2 retention, {scales}: nothing "
         "recorded in 2 retention." in said
