@@ -19,6 +19,7 @@ from hypothesis import HealthCheck, settings
 from left_out import leave_out, look_again, nothing_to_find
 from needs import need, not_tried
 from parts import Parts, add_options, asked_for
+from port_block import claim
 from second_try import GATE, SecondTry
 
 from labcrane.streams.network import LOOPBACK
@@ -28,7 +29,8 @@ atexit.register(shutil.rmtree, _FOLDER, ignore_errors=True)
 _CONFIG = _FOLDER / "lsl_api.cfg"
 # Ports of their own, not only a session: when a source is gone, liblsl takes any stream that looks
 # like it, of whatever session (see labcrane.streams.recorder.recorder).
-_FIRST_PORT = 16_800 + 140 * (os.getpid() % 110)
+_FIRST_PORT, _HOLDER = claim()
+atexit.register(_HOLDER.close)
 _CONFIG.write_text(
     LOOPBACK.replace("[lab]", f"[lab]\nSessionID = labcrane-tests-{os.getpid()}").replace(
         "[ports]", f"[ports]\nMulticastPort = {_FIRST_PORT}\nBasePort = {_FIRST_PORT + 1}"
