@@ -41,8 +41,8 @@ from labcrane.testing import ch8, make_run
 ROUNDS = 7
 TICKS = 2400
 WARM_UP = 200
-RATES_HZ = tuple(round(240 * 1.2**step) for step in range(24))
-"""A session's rate, and on in steps of a fifth up to 16 kHz."""
+RATES_HZ = (*(round(240 * 1.2**step) for step in range(12)), 2000)
+"""A session's rate, and on in steps of a fifth up to the highest that a protocol may ask for."""
 
 PACED_S = 4.0
 FEW = 0.01
