@@ -39,9 +39,9 @@ sessions:
   - name: only
     steps:
       - block: {{task: aiming}}
-      - break: {{seconds: 4}}
+      - break: {{seconds: 900}}
       - block: {{task: aiming, feedback: none}}
-      - break: {{seconds: 8}}
+      - break: {{seconds: 900}}
       - block: {{task: aiming}}
 """
 )
@@ -145,6 +145,8 @@ def test_killed_hanging_and_raising_feedback_leave_the_session_as_it_is(
             first, second = hosts()[:2]
             first.send_signal(signal.SIGKILL)
             second.send_signal(signal.SIGSTOP)
+            wait_for(lambda: told.count("feedback.lost") >= 3, patience_s=240)
+            console.give(Command(Order.SKIP))
             wait_for(lambda: told.back() == {"killed", "hanging", "raising"}, patience_s=240)
             wait_for(lambda: told.count("break.start") == 2, patience_s=240)
             console.give(Command(Order.SKIP))

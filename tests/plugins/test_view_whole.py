@@ -1,5 +1,6 @@
 """What is on the screen while a crane moves: whole pictures only, in windows with names."""
 
+import itertools
 import json
 import os
 import subprocess
@@ -64,7 +65,10 @@ def windows(display: str) -> dict[str, tuple[int, int]]:
 
 
 def grabbed(renderer: str, grabs: int, *bare: str, every_s: float = 0.013) -> tuple[list[str], int]:
-    """Return what grabs of two windows with a moving crane lack, and how many pictures differ."""
+    """Return what grabs of two windows with a moving crane lack, and how many pictures differ.
+
+    Where the computer draws few pictures, there are more grabs, for up to five minutes.
+    """
     with an_x_server() as display, ExitStack() as both:
         least = {
             name: both.enter_context(moving(display, renderer, name, *bare))
@@ -76,7 +80,11 @@ def grabbed(renderer: str, grabs: int, *bare: str, every_s: float = 0.013) -> tu
         (left, top), (right, below) = halves.values()
         assert abs(right - left) >= SIZE[0] or abs(below - top) >= SIZE[1]
         broken, seen = [], set()
-        for number in range(grabs):
+        until = time.monotonic() + 300.0
+        for number in itertools.count():
+            enough = number >= grabs and len(seen) > grabs / 2
+            if enough or (number >= grabs and time.monotonic() > until):
+                break
             grab = np.asarray(ImageGrab.grab(xdisplay=display))
             for name, (x, y) in halves.items():
                 picture = grab[y : y + SIZE[1], x : x + SIZE[0]]
@@ -96,7 +104,7 @@ def test_every_grab_of_two_windows_shows_whole_pictures_while_the_crane_moves(
 ) -> None:
     broken, pictures = grabbed(renderer, GRABS)
     assert not broken, "\n".join(broken)
-    assert pictures > GRABS / 4, "the crane did not move"
+    assert pictures > GRABS / 2, "the crane did not move"
 
 
 @pytest.mark.soak

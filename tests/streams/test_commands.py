@@ -65,7 +65,10 @@ def test_streams_are_watched_until_it_is_known_how_they_come(source: str) -> Non
     assert max(map(len, done.stdout.splitlines())) <= 80
     about = " ".join(done.stdout.partition("Amplifier: ")[2].split("Amplifier: ")[0].split())
     assert about.startswith("EEG, 2 channels at 100 Hz, in 1, microvolts clock ")
-    assert re.search(r"clock [+-]0\.000\d{3} s, [+-]\d+\.\d ppm, round trip \d+\.\d\d ms", about)
+    told = re.search(r"clock ([+-]\d\.\d{6}) s, [+-]\d+\.\d ppm, round trip (\d+\.\d\d) ms", about)
+    assert told, about
+    offset, there_and_back = float(told[1]), 1e-3 * float(told[2])
+    assert abs(offset) < 0.0005 + there_and_back  # a busy computer answers its probes late
     assert "0 lost by its counter" in about
     assert "signal alive" in about
 
