@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
+from leavings import watch
 from left_out import leave_out, look_again, nothing_to_find
 from needs import need, not_tried
 from parts import Parts, add_options, asked_for
@@ -70,6 +71,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput"):
         os.environ[TURNS] = str(_FOLDER)
+        if sys.platform != "win32":
+            watch()
     if asked_for(config):
         config.pluginmanager.register(Parts(config))
     if GATE in os.environ and not hasattr(config, "workerinput"):
