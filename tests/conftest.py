@@ -19,6 +19,7 @@ from hypothesis import HealthCheck, settings
 from leavings import watch
 from left_out import leave_out, look_again, nothing_to_find
 from needs import need, not_tried
+from once import RUN_FOLDER
 from parts import Parts, add_options, asked_for
 from port_block import claim
 from second_try import GATE, SecondTry
@@ -58,10 +59,10 @@ settings.register_profile(
 settings.load_profile("tests")
 
 WAITING = 2
-"""Processes beyond one a core: many tests wait, for a session in real time or for a device."""
+"""Processes beyond one a core: many tests wait, for a session in real time or for a device.
 
-TURNS = "LABCRANE_TEST_TURNS"
-"""Names the folder that the processes of a run share, for their locks."""
+Of the quick tests fewer do, and each process imports and collects all of them: they have one less.
+"""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -70,7 +71,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput"):
-        os.environ[TURNS] = str(_FOLDER)
+        os.environ[RUN_FOLDER] = str(_FOLDER)
         if sys.platform != "win32":
             watch()
     if asked_for(config):
@@ -84,11 +85,12 @@ QUICK = "not slow and not long and not soak"
 
 
 @pytest.hookimpl(optionalhook=True)  # pytest -p no:xdist
-def pytest_xdist_auto_num_workers() -> int:
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     """Return how many processes ``-n auto`` starts."""
     if sys.platform == "win32":
         return os.cpu_count() or 1
-    return len(os.sched_getaffinity(0)) + WAITING
+    quick = config.getoption("markexpr") == QUICK
+    return len(os.sched_getaffinity(0)) + WAITING - quick
 
 
 def pytest_collection() -> None:
@@ -135,7 +137,7 @@ def _turn(*, alone: bool) -> Iterator[None]:
         return
     import fcntl
 
-    folder = Path(os.environ[TURNS])
+    folder = Path(os.environ[RUN_FOLDER])
     with (
         (folder / "queue").open("w", encoding="utf-8") as queue,
         (folder / "computer").open("w", encoding="utf-8") as computer,

@@ -47,6 +47,7 @@ def test_what_has_passed_is_noted_and_what_failed_is_run_again(
     assert "3 deselected" in said or processes != "0"
 
 
+@pytest.mark.slow
 def test_no_test_begins_when_the_time_is_up(tmp_path: Path) -> None:
     said = run_in(tmp_path, "-n", "0", "--for", "0", "--noted", "noted.txt")
     assert "0 passed, 0 failed, 4 left for another run; 0 had passed before" in said

@@ -74,6 +74,7 @@ def test_more_than_three_in_all_stages_of_a_gate_get_no_second_try(tmp_path: Pat
     assert "no second try: 4 tests failed in this gate, 3 may" in said
 
 
+@pytest.mark.slow
 def test_a_run_in_which_nothing_fails_needs_none(tmp_path: Path) -> None:
     status, said, noted = gate_in(tmp_path)
     assert (status, noted["passed"], noted["second_try"]) == (0, 6, [])

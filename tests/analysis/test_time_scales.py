@@ -126,6 +126,7 @@ def test_of_unbalanced_pairs_what_statsmodels_finds_that_they_add_is_taken_away(
     assert np.ptp(movements["movement_time"] - alone + alone.mean() - wanted) > 0.05
 
 
+@pytest.mark.slow
 def test_learning_is_found_whole_though_few_people_had_pairs_in_orders_that_favour_it() -> None:
     slopes = []
     for seed in range(30):

@@ -107,6 +107,7 @@ def test_a_session_that_ends_by_its_rule_owes_nothing(tmp_path: Path) -> None:
     assert not remaining(where.study, whole, so_far, "redo_trial").steps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [STAIRS, QUEST], ids=["stairs", "quest"])
 @pytest.mark.parametrize("dies_in", [1, 2, 5, 7, 9])
 def test_a_killed_session_goes_on_as_if_it_had_not_been(
@@ -169,6 +170,7 @@ def test_the_next_session_goes_on_from_the_last_and_both_replay_to_the_bit(
         assert replay_session(path, session).difference is None
 
 
+@pytest.mark.slow
 def test_a_killed_second_session_carries_what_it_began_with(tmp_path: Path) -> None:
     run(visit(tmp_path, STAIRS), ScriptedConsole())
     with pytest.raises(DiesError):
@@ -179,6 +181,7 @@ def test_a_killed_second_session_carries_what_it_began_with(tmp_path: Path) -> N
     assert [(each["level"], each["success"]) for each in context["carried"]] == told
 
 
+@pytest.mark.slow
 def test_without_carrying_each_session_begins_anew(tmp_path: Path) -> None:
     text = STAIRS.replace("rounds: 8", "rounds: 8\n      carry: false")
     run(visit(tmp_path, text), ScriptedConsole())
@@ -194,6 +197,7 @@ def test_a_level_that_is_gone_is_refused_before_the_next_session_begins(tmp_path
         run(visit(tmp_path, less, session=2), ScriptedConsole())
 
 
+@pytest.mark.slow
 def test_a_skipped_trial_tells_nothing_and_a_repeated_one_keeps_its_level(tmp_path: Path) -> None:
     class Orders(ScriptedConsole):
         def commands(self):

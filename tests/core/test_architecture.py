@@ -332,6 +332,7 @@ VERBS = re.compile(
 QUESTIONS = ("How", "What", "When", "Where", "Whether", "Which", "Who", "Why", "From", "In", "To")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", ["labcrane", "plugins", "benchmarks"])
 def test_every_module_says_first_what_thing_it_is(folder: str) -> None:
     first = {

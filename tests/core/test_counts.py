@@ -59,6 +59,7 @@ def shown(counts: TrialCounts, events: list[Event]) -> list[str]:
     return [line.strip() for line in printed.getvalue().splitlines()]
 
 
+@pytest.mark.slow
 def test_the_lines_the_bar_the_page_and_the_view_count_alike(visit: Visit) -> None:
     console = ScriptedConsole()
     run(visit, console)
@@ -133,6 +134,7 @@ def test_data_elsewhere_and_a_pilot_are_in_the_resume_command(visit: Visit, tmp_
     assert options.endswith(" --pilot")
 
 
+@pytest.mark.slow
 def test_the_next_session_is_named_where_there_is_one(tmp_path: Path) -> None:
     study = a_study(tmp_path, TWO)
     visit = Visit(study, "P001", 1, tmp_path / "data", simulated=True, fast=True)

@@ -174,6 +174,7 @@ def test_labcranes_language_server_marks_what_a_check_finds(
         assert editor.save(path) == []
 
 
+@pytest.mark.slow
 @needs("pybullet")
 def test_mistakes_in_another_file_are_marked_where_the_protocol_names_it(
     tmp_path: Path, own_server: Sequence[str], capsys: pytest.CaptureFixture[str]

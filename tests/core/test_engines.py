@@ -19,6 +19,7 @@ def protocol(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_an_engine_beside_itself_differs_by_nothing(protocol: Path) -> None:
     done = compare_engines(protocol, ["kinematic_crane", "kinematic_crane"])
     one, other = done.driven
@@ -26,6 +27,7 @@ def test_an_engine_beside_itself_differs_by_nothing(protocol: Path) -> None:
     assert all(gap.largest == 0.0 for gap in done.gaps(one, other))
 
 
+@pytest.mark.slow
 @needs("mujoco")
 def test_the_law_and_mujoco_get_the_same_input_and_end_their_trials_together(
     protocol: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -159,6 +159,7 @@ def test_a_setting_that_cannot_be_is_refused(text: str, why: str, tmp_path: Path
     assert not seen.events("feedback.setting")
 
 
+@pytest.mark.slow
 def test_a_failed_process_pauses_the_session_if_the_protocol_says_so(tmp_path: Path) -> None:
     orders = {
         50: [FeedbackLost("tone", "it hangs")],
@@ -175,6 +176,7 @@ def test_a_failed_process_pauses_the_session_if_the_protocol_says_so(tmp_path: P
     assert not any(frame.paused for frame in calm.frames)
 
 
+@pytest.mark.slow
 def test_feedback_that_cannot_start_refuses_the_session_or_is_left_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -131,6 +131,7 @@ def is_text(mode: object) -> bool:
     return isinstance(mode, str) and set(mode) <= set("rwxat+") and "b" not in mode
 
 
+@pytest.mark.slow
 def test_what_not_every_system_has_is_used_only_where_the_others_have_their_own_way() -> None:
     used = {
         str(path.relative_to(ROOT)): tuple(sorted(names))
@@ -140,6 +141,7 @@ def test_what_not_every_system_has_is_used_only_where_the_others_have_their_own_
     assert used == {path: tuple(sorted(names)) for path, names in TWINS.items()}
 
 
+@pytest.mark.slow
 def test_no_text_is_read_or_written_in_the_encoding_of_the_country() -> None:
     found = [
         f"{path.relative_to(ROOT)}:{line}"

@@ -193,6 +193,7 @@ REFERENCE = "      - reference: {task: retrieval}"
 ASK = ", ask: [subjective_accuracy, situational_awareness]"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "key", "said", "line"),
     [

@@ -92,6 +92,7 @@ def test_show_tells_settings_with_units_and_defaults_signals_and_an_example(
         assert word in said
 
 
+@pytest.mark.slow
 @needs("pybullet")
 def test_every_offer_can_be_shown_and_its_example_is_what_a_protocol_takes(
     schema: "Draft202012Validator", capsys: pytest.CaptureFixture[str]

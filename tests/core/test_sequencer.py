@@ -80,6 +80,7 @@ def names_of(frame: Frame) -> list[str]:
     return [event.name for event in frame.events]
 
 
+@pytest.mark.slow
 def test_a_pause_holds_the_machine_and_the_trials_clock(study: Study) -> None:
     plain = rehearse(study)
     seen = rehearse(study, {200: give(Order.PAUSE), 500: give(Order.START)})
@@ -144,6 +145,7 @@ def test_notes_and_the_completion_flag_are_in_the_record(study: Study) -> None:
     assert seen.events("trial.end")[0].data["completion"] == 0
 
 
+@pytest.mark.slow
 def test_a_test_that_has_ended_is_judged_until_the_next_begins(tmp_path: Path) -> None:
     text = SHORT.replace("task: aiming", "task: aiming, ask: [subjective_accuracy]")
     study = a_study(tmp_path, text)

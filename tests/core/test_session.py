@@ -90,6 +90,7 @@ def test_every_number_is_a_flat_float64_column_with_a_unit(visit: Visit) -> None
     assert "ses-01/trials/movement_time" in found
 
 
+@pytest.mark.slow
 def test_a_session_is_never_run_twice(visit: Visit) -> None:
     path = run(visit, ScriptedConsole())
     before = path.read_bytes()

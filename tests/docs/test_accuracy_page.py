@@ -28,6 +28,7 @@ def test_the_table_shows_no_promise_that_is_broken() -> None:
         assert float(stated) <= 1.0 or passed.startswith("0 of"), line
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", ["60 Hz, single samples lost", "steady, clean probes"])
 def test_the_table_is_what_the_command_gives(row: str) -> None:
     (line,) = (line for line in LINES if cells(line)[0] == row)

@@ -76,6 +76,7 @@ def with_code(content: dict[str, Any], code: str) -> None:
     content["context"]["own_plugins"] = {"plugins/evil.py": code}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [[], ["--show"], ["--speed", "50"]], ids=" ".join)
 def test_code_in_a_recording_is_not_run(
     told: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str]

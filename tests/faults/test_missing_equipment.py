@@ -69,6 +69,7 @@ def test_a_session_goes_on_without_what_is_missing_where_the_protocol_says_so(
     assert ready.facts.startswith("renderer p3tinydisplay (software: no graphics card")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "policy"),
     [("mirror", "restart"), ("second", "pause"), ("lettered", "restart"), ("tone", "pause")],

@@ -69,6 +69,7 @@ def launch(protocol: Path) -> tuple[Outcome, list[str]]:
     return Launcher(order, QueueConsole(), told.append).run(), told
 
 
+@pytest.mark.slow
 def test_the_launcher_says_in_which_component_a_session_died(spoil: Spoil) -> None:
     protocol = spoil("dynamics step 100 exiting")
     outcome, _ = launch(protocol)
@@ -80,6 +81,7 @@ def test_the_launcher_says_in_which_component_a_session_died(spoil: Spoil) -> No
     assert len(session.streams["loop"].data) == 99
 
 
+@pytest.mark.slow
 def test_the_launcher_passes_on_what_a_session_says_of_a_plugin(spoil: Spoil) -> None:
     protocol = spoil("scheme command 20 raising")
     with pytest.raises(

@@ -15,6 +15,7 @@ from labcrane.registry.registry import discover
 from labcrane.session.session import Visit, run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("role", "method", "at", "how"),
     [*((*case, "raising") for case in CASES), ("dynamics", "step", 50, "leaving")],
@@ -44,6 +45,7 @@ def test_a_method_that_raises_is_named_with_its_line_and_nothing_is_lost(
         assert session.events["name"].iloc[-1] == "session.end"
 
 
+@pytest.mark.slow
 def test_a_machine_that_cannot_be_reset_is_named_when_its_session_is_gone_on_with(
     spoil: Spoil,
 ) -> None:

@@ -4,15 +4,20 @@ import csv
 from pathlib import Path
 
 import pytest
-from governance.kept_people import copied
+from governance.kept_people import copied, lab_in
 from governance.written import record_export
 from governed import GROUPED, TODAY, Lab
+from once import made_once
 
 
 @pytest.fixture(scope="session")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Lab:
     """Return a study with the sessions of three participants, and an export of them."""
-    lab = Lab(tmp_path_factory.mktemp("lab"), GROUPED)
+    return lab_in(made_once("governance", _record, tmp_path_factory.mktemp("lab")))
+
+
+def _record(folder: Path) -> None:
+    lab = Lab(folder, GROUPED)
     lab.approve()
     for name in ("P001", "P002", "P007"):
         lab.run(name)
@@ -31,7 +36,6 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Lab:
         Path("P001.txt"): ["P001"],
     }
     record_export(lab.places, "tables", tables, files, TODAY)
-    return lab
 
 
 @pytest.fixture

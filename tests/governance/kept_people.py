@@ -22,9 +22,14 @@ REASON = "withdrew consent"
 def copied(recorded: Lab, folder: Path) -> Lab:
     shutil.copytree(recorded.folder, folder / "lab")
     (folder / "store").mkdir()
+    return lab_in(folder / "lab")
+
+
+def lab_in(folder: Path) -> Lab:
+    """Return the study that is in ``folder`` already."""
     lab = Lab.__new__(Lab)
-    lab.folder, lab.protocol = folder / "lab", folder / "lab" / "study.yaml"
-    lab.places = Places(folder / "lab" / "data")
+    lab.folder, lab.protocol = folder, folder / "study.yaml"
+    lab.places = Places(folder / "data")
     return lab
 
 

@@ -183,6 +183,7 @@ def test_what_is_not_balanced_is_told_with_what_would_be(tmp_path: Path) -> None
     assert len(list(csv.reader(io.StringIO(as_csv(allocate(study, names)))))) == 8
 
 
+@pytest.mark.slow
 def test_a_simulated_participants_slot_is_its_number(tmp_path: Path) -> None:
     study = a_study(tmp_path, ordered("latin_square"))
     visit = Visit(study, "P011", 1, tmp_path / "data", simulated=True, fast=True)

@@ -107,6 +107,7 @@ def test_the_same_version_with_other_files_is_refused(
         check_eligibility(lab.visit("P001"))
 
 
+@pytest.mark.slow
 def test_a_difference_is_in_the_record_where_the_protocol_does_not_refuse_it(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -118,6 +119,7 @@ def test_a_difference_is_in_the_record_where_the_protocol_does_not_refuse_it(
     assert admission.context["otherwise_installed"] == ["winch was 1.0, is 2.0"]
 
 
+@pytest.mark.slow
 def test_an_amendment_takes_what_is_installed_now(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:

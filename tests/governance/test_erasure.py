@@ -58,6 +58,7 @@ def test_what_people_wrote_themselves_is_named(lab: Lab) -> None:
     assert done.mentions == [str(lab.places.root / "todo.txt")]
 
 
+@pytest.mark.slow
 def test_pilots_and_simulations_under_the_pseudonym_go_too(lab: Lab) -> None:
     for name in ("P007-PILOT", "P007-SIMULATED"):
         (lab.places.root / name).mkdir()
@@ -77,6 +78,7 @@ def test_a_store_that_is_not_plugged_in_is_told_and_reached_later(lab: Lab) -> N
     check_erased(lab)
 
 
+@pytest.mark.slow
 def test_an_export_on_another_disk_is_reached_later(lab: Lab, tmp_path: Path) -> None:
     disk = tmp_path / "disk"
     disk.mkdir()

@@ -151,6 +151,7 @@ def third_party(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return package
 
 
+@pytest.mark.slow
 def test_one_byte_of_a_plugins_source_is_refused_and_its_caches_do_not_count(
     lab: Lab, third_party: Path
 ) -> None:
@@ -196,6 +197,7 @@ def test_labcranes_own_source_is_locked(lab: Lab) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_the_lock_holds_on_another_computer_under_another_path(lab: Lab, tmp_path: Path) -> None:
     """Another process, another folder, another installation of the very same source."""
     elsewhere = tmp_path / "another disk" / "Studien"

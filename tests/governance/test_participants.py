@@ -43,6 +43,7 @@ def test_a_participant_without_consent_is_refused(lab: Lab) -> None:
     assert check_eligibility(lab.visit("P001")).slot == 1
 
 
+@pytest.mark.slow
 def test_a_session_leaves_approval_consent_slot_and_group_in_the_file(tmp_path: Path) -> None:
     lab = Lab(tmp_path, GROUPED)
     lock = lab.approve()
@@ -61,6 +62,7 @@ def test_a_session_leaves_approval_consent_slot_and_group_in_the_file(tmp_path: 
     assert (sitting.session, sitting.lock, sitting.deviations) == (1, lock.seal, [])
 
 
+@pytest.mark.slow
 @needs("permissions")
 def test_everything_about_people_is_for_the_user_only(lab: Lab) -> None:
     lab.run("P001")
@@ -105,6 +107,7 @@ def test_the_deviations_of_a_session_that_was_killed_come_from_its_journal(lab: 
     assert [d.what for _, d in all_deviations(lab.places)] == ["skipped", "session cut off"]
 
 
+@pytest.mark.slow
 def test_a_session_that_never_was_recorded_was_none(lab: Lab) -> None:
     lab.consent("P001")
     check_eligibility(lab.visit("P001"))
@@ -194,6 +197,7 @@ def test_what_leads_to_a_person_is_found(text: str, found: str | None) -> None:
     assert personal(text) == found
 
 
+@pytest.mark.slow
 def test_a_note_that_leads_to_a_person_is_refused_everywhere(lab: Lab) -> None:
     lab.consent("P001")
     for refused in (

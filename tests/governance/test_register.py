@@ -61,6 +61,7 @@ def _enrol(folder: Path, names: list[str]) -> None:
         lab.consent(name)
 
 
+@pytest.mark.slow
 @needs("fork")
 def test_processes_that_write_at_once_lose_nothing_and_share_no_slot(tmp_path: Path) -> None:
     lab = Lab(tmp_path, GROUPED)
@@ -95,6 +96,7 @@ while True:
 """
 
 
+@pytest.mark.slow
 def test_a_kill_during_a_write_leaves_a_whole_register(tmp_path: Path) -> None:
     places, last = Places(tmp_path / "data"), 0
     for round_number in range(1, 6):

@@ -48,6 +48,7 @@ def test_a_relabelling_that_is_killed_anywhere_is_finished_by_the_next_call(
     assert at_every_write(recorded, tmp_path, relabel, check_relabelled, step) > 15
 
 
+@pytest.mark.slow
 def test_relabelling_changes_the_number_and_keeps_everything_else(lab: Lab) -> None:
     unfinished.move(lab.places, store_of(lab))
     before = labcrane.open_recording(lab.places.raw("P007") / "P007.h5").session(1)

@@ -72,6 +72,7 @@ def test_a_swapped_consent_text_is_noticed_wherever_somebody_is_to_take_part(
     assert "is not the lock under which people took part" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_amendments_are_followed_back_to_the_lock_under_which_people_took_part(lab: Lab) -> None:
     for number, text in enumerate((OTHER, f"{OTHER}Really.\n")):
         (lab.folder / "consent_v2.txt").write_text(text, encoding="utf-8")

@@ -166,6 +166,7 @@ def test_clients_that_reconnect_and_never_read_get_in_and_take_no_tick(visited) 
     np.testing.assert_array_equal(ticks, np.arange(len(ticks)))
 
 
+@pytest.mark.slow
 def test_a_port_that_is_taken_says_what_to_do(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]

@@ -171,6 +171,7 @@ def moments(length: float, count: int = 100) -> list[float]:
     return [draw.uniform(0.0, length) for _ in range(count)]
 
 
+@pytest.mark.slow
 def test_a_frame_of_a_film_is_the_newest_recorded_row_at_any_time(file: Path, film: Film) -> None:
     record = open_recording(file).session(1)
     time_s = record.streams["state"].time
@@ -315,6 +316,7 @@ def test_a_killed_session_is_shown_as_far_as_its_journal_goes_and_nothing_is_wri
     assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
 
 
+@pytest.mark.slow
 def test_a_damaged_participant_file_is_shown_from_its_journals(
     file: Path, film: Film, tmp_path: Path
 ) -> None:

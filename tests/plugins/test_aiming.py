@@ -193,6 +193,7 @@ def test_the_reaction_is_the_first_command_after_a_tick_without_one(held: int) -
     assert math.isnan(never["reaction_time"])
 
 
+@pytest.mark.slow
 def test_the_task_finds_onset_and_reaction_of_the_functions_of_whole_arrays() -> None:
     random = np.random.default_rng(38)
     found = 0

@@ -119,6 +119,7 @@ def test_no_joint_is_driven_through_its_limit(
         assert np.abs(states[-1, 4:8] / command).max() < 0.01, "and stay"
 
 
+@pytest.mark.slow
 @needs_mujoco
 @machines
 @rates

@@ -277,6 +277,7 @@ def test_torques_worked_out_before_the_step_change_its_time_only(
     np.testing.assert_allclose(paths[0][:, :8], paths[1][:, :8], rtol=0, atol=1e-6)
 
 
+@pytest.mark.slow
 @needs_bullet
 def test_a_simulated_operator_who_aims_asks_no_motor_for_too_much(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -152,6 +152,7 @@ def crossings(force: FloatArray) -> int:
     return int((above[1:] & ~above[:-1]).sum())
 
 
+@pytest.mark.slow
 def test_what_slides_is_pushed_with_its_friction(tmp_path: Path) -> None:
     seen = run_of(tmp_path, Pusher(1), BLOCK)
     force, support = (column(seen, f"scene.block.{what}") for what in ("force.block", "support"))
@@ -166,6 +167,7 @@ def test_what_slides_is_pushed_with_its_friction(tmp_path: Path) -> None:
     np.testing.assert_allclose(force[sliding] / support[sliding], FRICTION, rtol=0.02)
 
 
+@pytest.mark.slow
 def test_each_push_above_the_limit_is_one_mistake_however_it_trembles(tmp_path: Path) -> None:
     seen = run_of(tmp_path, Pusher(3), BLOCK)
     (row,) = seen.trials()
@@ -179,6 +181,7 @@ def test_each_push_above_the_limit_is_one_mistake_however_it_trembles(tmp_path: 
     assert (row["outcome"], row["k"]) == ("success", 1.0)
 
 
+@pytest.mark.slow
 def test_the_fifth_push_ends_the_run_with_k_0(tmp_path: Path) -> None:
     seen = run_of(tmp_path, Pusher(7), BLOCK)
     (row,) = seen.trials()
@@ -196,6 +199,7 @@ def test_an_override_lets_a_run_of_seven_pushes_reach_its_goal_with_k_1(tmp_path
     assert not seen.events("mistakes.too_many")
 
 
+@pytest.mark.slow
 def test_pressing_until_the_drive_stalls_is_an_overload_in_its_direction(tmp_path: Path) -> None:
     ways = (1, -1, 1, -1, 1)
     seen = run_of(tmp_path, Presser(ways), ABOVE_AND_BELOW)
@@ -207,6 +211,7 @@ def test_pressing_until_the_drive_stalls_is_an_overload_in_its_direction(tmp_pat
     assert (row["outcome"], row["k"]) == ("success", 1.0)
 
 
+@pytest.mark.slow
 def test_the_fifth_overload_of_one_direction_ends_the_run(tmp_path: Path) -> None:
     seen = run_of(tmp_path, Presser((1, -1) * 5), ABOVE_AND_BELOW)
     (row,) = seen.trials()

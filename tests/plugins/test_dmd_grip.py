@@ -94,6 +94,7 @@ def grasp(arm: Dynamics) -> None:
     step(arm, 9.0, jaws=-100)
 
 
+@pytest.mark.slow
 def test_a_grip_forms_carries_and_is_let_go(tmp_path: Path) -> None:
     with standing(GRASP.format(slip=300), tmp_path) as (arm, state):
         held, height = state.index("grip.thing"), state.index("scene.thing.position.z")
@@ -109,6 +110,7 @@ def test_a_grip_forms_carries_and_is_let_go(tmp_path: Path) -> None:
         assert let_go[-1][height] < 0.2
 
 
+@pytest.mark.slow
 def test_a_grip_breaks_above_the_slip_force_and_that_is_a_drop(tmp_path: Path) -> None:
     with standing(GRASP.format(slip=20), tmp_path) as (arm, state):
         grasp(arm)

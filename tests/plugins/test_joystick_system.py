@@ -119,6 +119,7 @@ def test_listing_the_plugin_imports_no_pygame():
     assert run_python(code).stdout == "False\n"
 
 
+@pytest.mark.slow
 def test_opening_is_silent_and_leaves_the_environment_as_it_was():
     code = (
         "import os; before = dict(os.environ)\n"

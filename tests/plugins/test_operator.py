@@ -63,6 +63,7 @@ KEYS = "{use: keyboard, view: front, axes: {a: [a, d], b: [s, w], c: [j, l], e: 
 VIEW = "views: {front: {use: view, keys: [a, d, s, w, j, l, k, i, g, f]}}\nsessions:"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("end", ["rest_inside", "trigger"])
 def test_hands_on_a_keyboard_move_as_those_on_two_joysticks(tmp_path: Path, end: str) -> None:
     sticks = SHORT.replace("movements: 2", f"movements: 2, end: {end}")
@@ -154,6 +155,7 @@ def test_a_whole_session_goes_on_from_where_the_machine_stands() -> None:
     assert np.mean(reached) >= 0.95
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("actuator", ACTUATOR_PRESETS)
 def test_a_machine_that_follows_late_is_brought_in(actuator: str) -> None:
     reached = []
@@ -170,6 +172,7 @@ def test_the_other_machine_is_operated_as_well() -> None:
         assert loop.trial(target, number, number).reached_s is not None
 
 
+@pytest.mark.slow
 def test_without_noise_movement_time_follows_fitts_law_exactly_as_set() -> None:
     a, b, reaction = 2.0, 4.0, 0.3
     steady = STEADY | {"fitts_a_s": a, "fitts_b_s": b, "reaction_s": reaction}

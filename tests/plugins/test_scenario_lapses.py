@@ -46,6 +46,7 @@ def test_a_grip_is_pressed_on_with_its_probability_and_once(random: np.random.Ge
     assert abs(often - 600 * share) < 4.0 * math.sqrt(600 * share * (1 - share))
 
 
+@pytest.mark.slow
 def test_with_time_it_gets_slower_and_errs_more_often() -> None:
     settings = ErrorSettings(bumps_per_min=2.0, bump_s=0.05, fatigue_per_min=0.1)
     lapses = Lapses(settings, RATE_HZ, (3, 4))

@@ -118,6 +118,7 @@ def test_the_target_is_red_and_the_other_one_is_not() -> None:
     assert np.ptp(colours["other"]) < 60
 
 
+@pytest.mark.slow
 def test_the_machine_throws_a_shadow_on_the_ground() -> None:
     frame = make_frame()
     lit, shaded = (shown(frame, shadow=pixels, camera="free") for pixels in (0, 1024))
@@ -132,6 +133,7 @@ def test_the_machine_throws_a_shadow_on_the_ground() -> None:
     np.testing.assert_allclose(*elsewhere, atol=6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("flip", "axis"), [("horizontal", 1), ("vertical", 0)])
 def test_a_mirrored_window_is_the_picture_turned_over(flip: str, axis: int) -> None:
     frame = make_frame()
@@ -143,6 +145,7 @@ def test_a_mirrored_window_is_the_picture_turned_over(flip: str, axis: int) -> N
     assert not np.array_equal(mirrored, plain)
 
 
+@pytest.mark.slow
 def test_the_areas_of_a_mirrored_window_are_turned_over_too() -> None:
     boxes = []
     for flip in ("none", "horizontal"):

@@ -142,6 +142,7 @@ def test_behind_a_mirror_a_tracker_finds_them_and_the_record_says_where_in_the_w
     assert_equal(seen(detector, np.ascontiguousarray(np.flip(picture, axis))), said)
 
 
+@pytest.mark.slow
 def test_the_text_begins_beside_the_first_marker() -> None:
     with a_view(hud=("distance",)) as view, a_view(hud=("distance",), gaze_markers={}) as marked:
         pictures = []

@@ -151,6 +151,7 @@ def test_everything_in_a_scene_is_drawn_where_it_stands(name: str, view: View, r
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["touch", "casualty"])
 def test_what_moves_is_drawn_where_the_state_says(name: str, view: View, run: Run) -> None:
     *_, thing = place_objects(load_scene(RETRIEVAL / "scenes" / f"{name}.yaml"), 3)

@@ -34,6 +34,7 @@ def test_a_picture_is_the_cameras_part_of_the_window(flip: str) -> None:
     assert len(np.unique(picture.pixels)) > 20
 
 
+@pytest.mark.slow
 def test_pictures_come_at_their_own_rate_and_say_how_old_they_are() -> None:
     slow = {**STILL, "name": "slow", "delay_s": 0.5}
     settings = {"camera": STILL, "beside": (slow,), "shadow": 0, "supervisor": {"rate_hz": 2.0}}

@@ -120,6 +120,7 @@ def test_the_state_says_why_nobody_is_to_move(
     assert standing(frame, situation) == word
 
 
+@pytest.mark.slow
 def test_every_state_covers_the_picture_in_every_language() -> None:
     seen = {}
     states = {

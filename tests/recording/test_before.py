@@ -264,6 +264,7 @@ def test_a_replay_of_before_gives_every_number(before: Path) -> None:
     assert [line for line in differences if not line.startswith("differs: ")] == []
 
 
+@pytest.mark.slow
 def test_the_journal_of_before_makes_the_participant_file_of_before(
     before: Path, tmp_path: Path
 ) -> None:

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
 from needs import UNSHARE, needs
 
 needs_mounts = needs("mounts")
@@ -114,6 +115,7 @@ print("went on")
 """
 
 
+@pytest.mark.slow
 @needs_mounts
 def test_a_full_disk_at_the_end_leaves_the_participant_file_as_it_was(tmp_path: Path) -> None:
     done = in_namespace("size=1500k", FULL_AT_THE_END, tmp_path)

@@ -71,6 +71,7 @@ def test_equal_samples_are_known_by_every_bit_of_stamp_and_values() -> None:
     assert keys[0] == keys[2] != keys[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dtype", ["float32", "float64", "int8", "int16", "int32", "int64"])
 def test_keys_of_a_million_different_samples_differ(dtype) -> None:
     random = np.random.default_rng(5)

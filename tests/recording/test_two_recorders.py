@@ -45,6 +45,7 @@ def record(path, header, whole, lives, random):
     return mine
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 2**32), st.sampled_from([EEG, KEYS]))
 def test_what_any_recorder_had_is_there_once_and_in_order(tmp_path_factory, seed, header) -> None:

@@ -169,6 +169,7 @@ def test_a_text_that_changes_while_a_journal_is_relabelled_is_noticed(
         relabel_journal(folder / f"ses-01_{kind}.xdf", tmp_path / "new.xdf", "P001", "P002")
 
 
+@pytest.mark.slow
 def test_what_is_as_it_was_is_accepted(folder: Path, tmp_path: Path) -> None:
     path = folder / "P001.h5"
     journals = [folder / "ses-02_run.xdf", folder / "ses-02_streams.xdf"]

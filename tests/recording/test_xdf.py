@@ -248,6 +248,7 @@ def test_a_file_is_read_while_it_is_written(tmp_path: Path) -> None:
             assert len(read_xdf(path).stream("n").stamps) == k + 1
 
 
+@pytest.mark.slow
 def test_long_runs_of_equal_frames_read_as_pyxdf_reads_them(tmp_path: Path) -> None:
     # They are viewed in one piece, not read sample by sample; what that saves is in
     # benchmarks/recording.py.

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from once import made_once
 
 from labcrane.analysis.cohort import Cohort, Status, find_cohort
 from labcrane.participants.folders import Places
@@ -14,7 +15,10 @@ from results.recorded import record, study
 @pytest.fixture(scope="session")
 def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three people, one of them without an end, a pilot, a simulation, an erased one, a wreck."""
-    root = tmp_path_factory.mktemp("results")
+    return made_once("results", _record, tmp_path_factory.mktemp("results")) / "data"
+
+
+def _record(root: Path) -> None:
     folder = root / "data"
     chosen = study(root)
     record(chosen, folder, "P001", gaze=True)
@@ -27,7 +31,6 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
         register.tombstones.append(stone)
     (folder / "P007").mkdir()
     (folder / "P007" / "ses-01_run.xdf").write_bytes(b"XDF:")
-    return folder
 
 
 @pytest.fixture(scope="session")
@@ -39,6 +42,9 @@ def cohort(data: Path) -> Cohort:
 @pytest.fixture(scope="session")
 def electrodes(tmp_path_factory: pytest.TempPathFactory) -> Cohort:
     """One person with EEG, eyes and a heart, each on a clock of its own."""
-    root = tmp_path_factory.mktemp("electrodes")
-    record(study(root), root / "data", "P001", gaze=True, eeg=True)
-    return find_cohort(root / "data")
+
+    def record_one(root: Path) -> None:
+        record(study(root), root / "data", "P001", gaze=True, eeg=True)
+
+    place = tmp_path_factory.mktemp("electrodes")
+    return find_cohort(made_once("electrodes", record_one, place) / "data")

@@ -194,6 +194,7 @@ def test_the_group_of_the_design_is_in_the_table_of_people(tmp_path: Path) -> No
     assert dict(zip(people["participant_id"], people["group"], strict=True)) == expected
 
 
+@pytest.mark.slow
 def test_missing_files_of_people_are_named(cohort: Cohort, tmp_path: Path) -> None:
     gone = BidsSettings(people=tmp_path / "gone.csv")
     with pytest.raises(ProtocolError, match=r"there is no file .*gone\.csv with age, sex"):

@@ -63,6 +63,7 @@ def test_an_excluded_participant_is_listed_with_the_reason_and_not_used(data: Pa
     assert (left_out.status, left_out.why) == excluded["P002"]
 
 
+@pytest.mark.slow
 def test_a_session_that_is_still_to_come_makes_a_participant_half_finished(tmp_path: Path) -> None:
     from results.recorded import STUDY, record, study
 

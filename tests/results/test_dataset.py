@@ -22,6 +22,7 @@ def dataset(cohort: Cohort) -> Dataset:
     return Dataset(cohort.included)
 
 
+@pytest.mark.slow
 def test_a_trial_is_cut_out_of_the_frames_that_say_they_are_of_it(
     dataset: Dataset, cohort: Cohort
 ) -> None:
@@ -86,6 +87,7 @@ def test_kept_measures_are_those_that_were_made(
     pd.testing.assert_frame_equal(measures_of(person), first)
 
 
+@pytest.mark.slow
 def test_measures_are_made_anew_of_another_file_program_or_setting(
     person: Participant, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -118,6 +118,7 @@ def errors(folder: Path) -> list[str]:
     return [f"{i['code']} {i.get('location')}" for i in issues if i["severity"] == "error"]
 
 
+@pytest.mark.slow
 @needs("bids-validator-deno")
 def test_the_validator_finds_no_error_in_eeg_motion_physio_and_phenotype(bids: Path) -> None:
     assert errors(bids) == []

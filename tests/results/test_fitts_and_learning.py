@@ -83,6 +83,7 @@ def test_throughput_is_of_mean_times_so_that_their_scatter_does_not_raise_it() -
     assert throughput(uneven)["throughput"].to_numpy() == pytest.approx(even, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_interval_of_the_mean_line_holds_peoples_true_mean_as_often_as_it_says() -> None:
     rng, held, runs = np.random.default_rng(4), 0, 200
     bits = np.repeat(np.log2(np.array([2.0, 3.0, 4.0, 6.0]) / 0.5 + 1.0), 8)

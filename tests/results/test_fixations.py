@@ -132,6 +132,7 @@ def test_without_the_operators_view_there_is_no_row(tmp_path: Path, facts: tuple
     assert fixations(open_recording(path).session(1)).empty
 
 
+@pytest.mark.slow
 def test_only_blinks_are_told_as_no_valid_sample(tmp_path: Path) -> None:
     path = record(
         study(tmp_path, WITH_CHECKS), tmp_path / "data", "P001", orders=ready(FACTS),

@@ -68,6 +68,7 @@ def test_eyes_that_look_into_the_window_are_measured_as_eyes_that_name_what_they
     assert (seen[others] == 0.0).all(axis=None), "areas that were there, and nobody looked at"
 
 
+@pytest.mark.slow
 def test_the_display_s_delay_is_a_setting_of_the_measures(tmp_path: Path) -> None:
     path = record(study(tmp_path), tmp_path / "data", "P001", gaze=["cab"])
     session = open_recording(path).session(1)

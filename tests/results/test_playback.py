@@ -90,6 +90,7 @@ def test_the_first_frame_brings_what_the_session_was_about_then(file: Path) -> N
     assert situation.trial == frame.trial == trials["trial"].iloc[1]
 
 
+@pytest.mark.slow
 def test_of_a_session_that_went_on_each_part_is_shown_with_its_own_events(tmp_path: Path) -> None:
     """Ticks are counted anew in each part."""
     visit = Visit(a_study(tmp_path), "P001", 1, tmp_path / "data", simulated=True, fast=True)

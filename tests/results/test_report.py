@@ -322,6 +322,7 @@ def test_a_rehearsal_fails_in_nothing_that_is_not_there(tmp_path: Path) -> None:
     assert (row["sync_verdict"], row["not_there"]) == ("PASS", "eeg, gaze")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", ["tables", "matlab", "bids", "psychds", "xdf"])
 def test_export_writes_what_is_asked_for_and_who_was_left_out(
     data: Path, tmp_path: Path, to: str, capsys: pytest.CaptureFixture[str]

@@ -193,6 +193,7 @@ def paper_of(movements: pd.DataFrame, measure: str) -> tuple[str, str]:
     return free, f"{row['F Value']:.2f}"
 
 
+@pytest.mark.slow
 def test_the_answer_gives_the_plain_test_of_the_primary_outcome_and_names_the_adjusted_one(
     movements: pd.DataFrame, data: Path
 ) -> None:

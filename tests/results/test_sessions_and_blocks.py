@@ -108,6 +108,7 @@ def test_sessions_with_the_same_blocks_are_two_factors_as_afex_has_them(
     assert set(tests.loc[["session", "block", "session:block"], "n"]) == {people - 1}
 
 
+@pytest.mark.slow
 def test_learning_goes_from_the_last_block_of_a_session_to_the_first_of_the_next() -> None:
     done, factors = told(7, BLOCKS)
     assert factors.phases == (

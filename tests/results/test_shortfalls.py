@@ -150,6 +150,7 @@ def test_a_test_of_the_whole_sample_says_nothing_of_n(found) -> None:
     assert "Every planned test was made, of everybody and every level." in page
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_a_group_that_lacks_a_session_is_named(found, seed: int) -> None:
     table = drawn(seed, (4, 5, 6))

@@ -425,6 +425,7 @@ for (stratum in summary(aov(model, d))) {
 """
 
 
+@pytest.mark.slow
 @needs_r
 @pytest.mark.parametrize("groups", [("none",), ("none", "slow", "fast")])
 def test_positions_beside_pairs_are_tested_in_the_strata_of_r(

@@ -20,6 +20,7 @@ def unprobed(data: Path, tmp_path: Path) -> Path:
     return copied
 
 
+@pytest.mark.slow
 def test_an_export_refuses_streams_never_probed_unless_told_and_says_so(
     unprobed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

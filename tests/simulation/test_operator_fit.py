@@ -112,6 +112,7 @@ def test_what_went_into_a_simulation_is_found_again(recording: Path) -> None:
     assert fitted["learning_rate"].value == pytest.approx(0.15, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_fitted_operator_is_a_part_that_a_protocol_takes(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -147,6 +148,7 @@ def test_the_duration_of_a_movement_of_least_jerk_is_found_from_a_part_of_it() -
     assert found == pytest.approx(3.0, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("distances", "movements", "what"),
     [

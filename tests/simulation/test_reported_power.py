@@ -225,6 +225,7 @@ def test_the_f_test_of_two_groups_finds_what_their_contrast_finds() -> None:
     assert found[0].type_m != found[0].type_m  # an F test has no sign
 
 
+@pytest.mark.slow
 def test_the_reports_trend_finds_what_a_t_test_of_slopes_finds_in_each_cohort() -> None:
     table = movements(groups=("",), slope=-0.08)
     planned = plan_test("trend", read_effect("movement_time~sequence"), table, NOTHING)

@@ -212,6 +212,7 @@ def test_two_simulations_do_not_share_a_folder(study: Path, tmp_path: Path) -> N
     os.close(fd)
 
 
+@pytest.mark.slow
 def test_a_participant_who_leaves_has_no_later_session(study: Path, tmp_path: Path) -> None:
     cohort = study.with_name("leaving.yaml")
     cohort.write_text("labcrane_cohort: 1\ndropout: 1.0\n")

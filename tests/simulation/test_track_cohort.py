@@ -123,6 +123,7 @@ sessions:
 """
 
 
+@pytest.mark.slow
 def test_the_command_tells_bias_and_spread_and_is_the_same_again(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -217,6 +217,7 @@ def test_samples_wait_for_no_monitor(tmp_path: Path) -> None:
     noted.feed.close()
 
 
+@pytest.mark.slow
 def test_monitors_that_die_again_and_again_are_left_out(tmp_path: Path) -> None:
     noted = Noted(tmp_path)
 

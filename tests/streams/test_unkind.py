@@ -139,6 +139,7 @@ def test_what_the_shortest_round_trip_hides_is_in_the_error(one_way: float) -> N
     assert (np.abs(offset) <= error).all()
 
 
+@pytest.mark.slow
 def test_markers_whose_program_goes_on_did_not_die() -> None:
     for seed in range(10):
         drawn = quiet_at_last(np.random.default_rng(seed))

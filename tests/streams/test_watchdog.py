@@ -47,6 +47,7 @@ def flow(until, chunk=10, every=0.02):
     return flow
 
 
+@pytest.mark.slow
 def test_the_rate_is_that_of_the_last_seconds():
     assert rate(flow(20.0), 20.0) == pytest.approx(500.0)
     assert rate(Flow(), 20.0) is None
