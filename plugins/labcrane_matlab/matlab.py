@@ -63,6 +63,7 @@ class Matlab(Exporter):
         trials = book[book["table"] == "trials"]
         return struct(
             {
+                "study": text(str(participant.context.get("study", ""))),
                 "participant": text(participant.name),
                 "status": text(str(participant.status)),
                 "why": text(participant.why),

@@ -5,10 +5,13 @@ function study = read_labcrane(folder)
 %   study.trials                  one row per movement, all participants: a table in MATLAB,
 %                                 a struct of columns in Octave
 %   study.units                   the unit of each of its columns
+%   study.questionnaires          one row per answer, all participants
+%   study.scores                  one row per score of a questionnaire
 %   study.participants(1).name
 %   study.participants(1).sessions{1}.streams.state.data.joint_angle_slew
 %
-% Times are seconds, angles rad, lengths m; units are beside every stream.
+% Times are seconds, angles rad, lengths m; units are beside every stream. Where a participant lacks
+% a column that others have, numbers are NaN and texts ''.
 
 if nargin < 1
   folder = fileparts(mfilename('fullpath'));
@@ -17,36 +20,89 @@ files = sort({dir(fullfile(folder, '*.mat')).name});
 if isempty(files)
   error('labcrane:empty', 'there is no .mat file in %s', folder);
 end
-columns = struct();
+tables = {'trials', 'questionnaires', 'scores'};
+study = struct('units', struct());
+for t = 1:numel(tables)
+  study.(tables{t}) = struct();
+end
 for k = 1:numel(files)
   one = load(fullfile(folder, files{k}));
   person = one.labcrane;
-  entry = struct('name', person.participant, 'status', person.status, 'why', person.why);
-  entry.sessions = person.sessions;
-  study.participants(k) = entry;
-  columns = append(columns, person.trials, k == 1);
   if k == 1
-    study.units = person.units;
+    first = person;
+  elseif ~strcmp(person.study, first.study)
+    error('labcrane:studies', ...
+      '%s is of the study ''%s'' and %s of ''%s''; read each study from a folder of its own', ...
+      first.participant, first.study, person.participant, person.study);
+  end
+  study.participants(k) = struct('name', person.participant, 'status', person.status, ...
+    'why', person.why, 'sessions', {person.sessions});
+  study.units = join_units(study.units, person.units, person.participant);
+  for t = 1:numel(tables)
+    study.(tables{t}) = append(study.(tables{t}), person.(tables{t}), person.participant);
   end
 end
-if exist('OCTAVE_VERSION', 'builtin')
-  study.trials = columns;
-else
-  study.trials = struct2table(columns);
+if ~exist('OCTAVE_VERSION', 'builtin')
+  for t = 1:numel(tables)
+    study.(tables{t}) = struct2table(study.(tables{t}));
+  end
 end
 end
 
-function all = append(all, more, first)
-% Add the rows of one participant; a column that one of them lacks is an error, not a gap.
-if first
-  all = more;
+function units = join_units(units, more, who)
+% Add the units of one participant's columns; numbers of different units are not one column.
+names = fieldnames(more);
+for n = 1:numel(names)
+  name = names{n};
+  if isfield(units, name) && ~strcmp(units.(name), more.(name))
+    error('labcrane:units', ['%s has the column %s in ''%s'' and others have it in ''%s''; ' ...
+      'read each study from a folder of its own'], who, name, more.(name), units.(name));
+  end
+  units.(name) = more.(name);
+end
+end
+
+function all = append(all, more, who)
+% Add the rows of one participant, with missing values where only one side has a column.
+above = rows(all);
+below = rows(more);
+names = [fieldnames(all); fieldnames(rmfield(more, intersect(fieldnames(all), fieldnames(more))))];
+for n = 1:numel(names)
+  name = names{n};
+  [upper, lower] = alike(column(all, name, above), column(more, name, below), name, who);
+  all.(name) = [upper; lower];
+end
+end
+
+function count = rows(table)
+names = fieldnames(table);
+count = 0;
+if ~isempty(names)
+  count = numel(table.(names{1}));
+end
+end
+
+function values = column(table, name, count)
+if isfield(table, name)
+  values = table.(name);
+else
+  values = NaN(count, 1);
+end
+end
+
+function [a, b] = alike(a, b, name, who)
+% Return two columns of one type: what is all missing takes the type of the other.
+if iscell(a) == iscell(b)
   return
 end
-names = fieldnames(all);
-if ~isequal(sort(names), sort(fieldnames(more)))
-  error('labcrane:columns', 'participants have different columns; they are different studies');
-end
-for n = 1:numel(names)
-  all.(names{n}) = [all.(names{n}); more.(names{n})];
+if iscell(a)
+  [b, a] = alike(b, a, name, who);
+elseif all(isnan(a))
+  a = repmat({''}, numel(a), 1);
+elseif all(cellfun(@isempty, b))
+  b = NaN(numel(b), 1);
+else
+  error('labcrane:types', ['the column %s is words of one participant and numbers of another; ' ...
+    'read %s from a folder of its own'], name, who);
 end
 end

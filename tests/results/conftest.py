@@ -9,6 +9,7 @@ from labcrane.analysis.cohort import Cohort, Status, find_cohort
 from labcrane.participants.folders import Places
 from labcrane.participants.register import Tombstone, changed
 from labcrane.session.commands import Command, Order
+from results.awkward import Awkward
 from results.recorded import record, study
 
 
@@ -48,3 +49,9 @@ def electrodes(tmp_path_factory: pytest.TempPathFactory) -> Cohort:
 
     place = tmp_path_factory.mktemp("electrodes")
     return find_cohort(made_once("electrodes", record_one, place) / "data")
+
+
+@pytest.fixture(scope="session")
+def awkward(tmp_path_factory: pytest.TempPathFactory) -> Awkward:
+    """Unlike people, recorded by the program itself."""
+    return Awkward(tmp_path_factory.mktemp("awkward"))

@@ -1,0 +1,56 @@
+"""Unlike people through every exporter, to the programs that read it."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.io import loadmat, savemat
+
+from labcrane.analysis.measures import measures_of
+from results.awkward import ANSWERS, FORMULA, HALF_FINISHED, NULL, Awkward
+from results.consumers import needs_octave, octave, table
+
+pytestmark = [pytest.mark.slow, pytest.mark.xdist_group("awkward")]
+
+OCTAVE = """
+addpath(argument); s = read_labcrane(argument);
+number = @(x) sprintf('%.17g', x);
+row = @(name, values) printf('%s|%s\\n', name, strjoin(cellfun(number, num2cell(values), ...
+    'UniformOutput', false)', '|'));
+row('time', s.trials.movement_time); row('rating', s.trials.accuracy_rating);
+row('load', s.questionnaires.value(strcmp(s.questionnaires.item, 'mental')));
+row('raw', s.scores.value(strcmp(s.scores.score, 'raw')));
+printf('who|%s\\n', strjoin(s.trials.participant', '|'));
+printf('group|%s\\n', strjoin(s.trials.group', '|'));
+printf('why|%s\\n', strjoin(s.questionnaires.text(strcmp(s.questionnaires.item, 'why'))', '|'));
+"""
+
+
+@needs_octave
+def test_octave_reads_unlike_people_in_one_call(awkward: Awkward) -> None:
+    said = table(octave(OCTAVE, awkward.export("matlab")))
+    measured = pd.concat(measures_of(person) for person in awkward.cohort.included)
+    np.testing.assert_array_equal(np.array(said["time"], float), measured["movement_time"])
+    assert said["who"] == measured["participant"].tolist()
+    assert set(said["group"]) == {"null", "loud"}
+    given = list(zip(said["who"], map(float, said["rating"]), strict=True))
+    rated = {name for name, rating in given if not np.isnan(rating)}
+    assert rated == set(ANSWERS) - {HALF_FINISHED}
+    assert all(rating == ANSWERS[name]["rating"] for name, rating in given if not np.isnan(rating))
+    assert np.array(said["load"], float).tolist() == [10, 20, 20, 40, 30, 40, 80]
+    assert said["raw"] == said["load"]
+    assert said["why"][:2] == [FORMULA, NULL]
+
+
+@needs_octave
+def test_octave_refuses_people_of_two_studies(awkward: Awkward, tmp_path: Path) -> None:
+    for name in ("P001.mat", "read_labcrane.m"):
+        shutil.copy(awkward.export("matlab") / name, tmp_path)
+    other = loadmat(tmp_path / "P001.mat")["labcrane"]
+    other["study"][0, 0] = np.array(["another"])
+    savemat(tmp_path / "Q001.mat", {"labcrane": other}, long_field_names=True)
+    caught = "try; read_labcrane(argument); catch e; disp(e.message); end"
+    said = octave(f"addpath(argument); {caught}", tmp_path)
+    assert "P001 is of the study 'rehearsal' and P001 of 'another'; read each study" in said
